@@ -1,0 +1,40 @@
+"""Meshes, curvature, devices and rays; no optimisation."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from ._siblings import check_siblings
+
+if TYPE_CHECKING:
+    from .curvature import CurvatureField as CurvatureField
+    from .curvature import principal_curvatures as principal_curvatures
+    from .mesh import TriangleMesh as TriangleMesh
+    from .rays import RayCaster as RayCaster
+    from .readers import load_mesh as load_mesh
+    from .regions import Region as Region
+    from .regions import dominant_regions as dominant_regions
+
+# Imported on first use (PEP 562), so that `plan --help` stays cheap.
+_EXPORTS = {
+    "CurvatureField": "curvature",
+    "RayCaster": "rays",
+    "Region": "regions",
+    "TriangleMesh": "mesh",
+    "dominant_regions": "regions",
+    "load_mesh": "readers",
+    "principal_curvatures": "curvature",
+}
+__all__ = sorted(_EXPORTS)
+
+
+def __getattr__(name: str) -> object:
+    if name not in _EXPORTS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_EXPORTS[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+check_siblings()

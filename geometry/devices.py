@@ -1,0 +1,149 @@
+"""Optical models of devices: a pinhole with lens distortion, and a parallel beam.
+
+Device frames follow OpenCV: +x right, +y down, +z along the optical axis; the centre of
+the top-left pixel is (u, v) = (0, 0), so an image w pixels wide spans -0.5 to w - 0.5.
+A projector is an inverse camera and uses the same pinhole.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_UNDISTORT_STEPS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class PinholeModel:
+    """A camera or diverging projector.
+
+    Attributes:
+        camera_matrix: K in [px], shape (3, 3); no skew.
+        resolution: Width and height in [px].
+        range_m: Nearest and farthest distance |P - O| that is sharp, in [m].
+        distortion: Brown-Conrady k1, k2, p1, p2, k3, as in OpenCV.
+    """
+
+    camera_matrix: NDArray[np.float64]
+    resolution: tuple[int, int]
+    range_m: tuple[float, float]
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def focal_px(self) -> float:
+        """Geometric mean of the two focal lengths in [px]."""
+        return float(np.sqrt(self.camera_matrix[0, 0] * self.camera_matrix[1, 1]))
+
+    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return pixels (u, v) of points in the device frame; (..., 3) to (..., 2).
+
+        Points at or behind the optical centre give NaN.
+        """
+        z = points[..., 2]
+        front = z > 0
+        scale = np.divide(1.0, z, out=np.full_like(z, np.nan), where=front)
+        normalised = self._distort(points[..., :2] * scale[..., None])
+        return normalised * self._focal + self._principal
+
+    def contains(self, pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether pixels (..., 2) lie inside the image; NaN doesn't."""
+        return np.all(
+            (pixels >= -0.5) & (pixels <= np.array(self.resolution) - 0.5), axis=-1
+        )
+
+    def rays(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return unit viewing directions in the device frame; (..., 2) to (..., 3)."""
+        target = (np.asarray(pixels, dtype=np.float64) - self._principal) / self._focal
+        normalised = target
+        if any(self.distortion):
+            for _ in range(_UNDISTORT_STEPS):
+                error = self._distort(normalised) - target
+                step = np.linalg.solve(self._distort_slope(normalised), error[..., None])
+                normalised = normalised - step[..., 0]
+        rays = np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
+        return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+    def ray_jacobian(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J_r = dr/d(u, v) in [1/px] at points of the device frame.
+
+        With p = (x/z, y/z), q(p) the distorted p and r = (p, 1)/|(p, 1)|::
+
+            J_r = dr/dp (dq/dp)^-1 diag(1/fx, 1/fy)
+
+        Args:
+            points: In front of the device, in [m], shape (n, 3).
+
+        Returns:
+            Shape (n, 3, 2).
+        """
+        p = points[:, :2] / points[:, 2:]
+        norm = np.sqrt(1.0 + np.sum(p * p, axis=1))
+        r = np.column_stack([p, np.ones(len(p))]) / norm[:, None]
+        dr_dp = (np.eye(3)[None, :, :2] - r[:, :, None] * r[:, None, :2]) / norm[
+            :, None, None
+        ]
+        if any(self.distortion):
+            dr_dp = dr_dp @ np.linalg.inv(self._distort_slope(p))
+        return dr_dp / self._focal
+
+    @property
+    def _focal(self) -> NDArray[np.float64]:
+        return np.array([self.camera_matrix[0, 0], self.camera_matrix[1, 1]])
+
+    @property
+    def _principal(self) -> NDArray[np.float64]:
+        return self.camera_matrix[:2, 2]
+
+    def _distort(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not any(self.distortion):
+            return p
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = p[..., 0], p[..., 1]
+        s = x * x + y * y
+        radial = 1.0 + s * (k1 + s * (k2 + s * k3))
+        return np.stack(
+            [
+                x * radial + 2.0 * p1 * x * y + p2 * (s + 2.0 * x * x),
+                y * radial + p1 * (s + 2.0 * y * y) + 2.0 * p2 * x * y,
+            ],
+            axis=-1,
+        )
+
+    def _distort_slope(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivative dq/dp of the distortion, shape (..., 2, 2)."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = p[..., 0], p[..., 1]
+        s = x * x + y * y
+        radial = 1.0 + s * (k1 + s * (k2 + s * k3))
+        slope = 2.0 * (k1 + s * (2.0 * k2 + 3.0 * s * k3))
+        cross = x * y * slope + 2.0 * (p1 * x + p2 * y)
+        rows = [
+            [radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, cross],
+            [cross, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x],
+        ]
+        return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+@dataclass(frozen=True, eq=False)
+class ParallelModel:
+    """A projector of parallel light, the paper's ideal beam.
+
+    Light leaves the panel in the device's plane z = 0 and runs along +z.
+
+    Attributes:
+        resolution: Width and height of the panel in [px].
+        pixel_pitch_m: Side of a panel pixel, which is also its side on the object [m].
+        range_m: Nearest and farthest z that is sharp, in [m].
+        beam_radius: Radius of the beam about the panel's centre in [m]; None: no limit
+            beside the panel's edges.
+    """
+
+    resolution: tuple[int, int]
+    pixel_pitch_m: float
+    range_m: tuple[float, float]
+    beam_radius: float | None = None
+
+    @property
+    def half_panel(self) -> NDArray[np.float64]:
+        """Half width and half height of the panel in [m], shape (2,)."""
+        return 0.5 * self.pixel_pitch_m * np.array(self.resolution, dtype=np.float64)

@@ -1,0 +1,140 @@
+"""A triangle mesh in metres, and where it came from."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class MeshError(ValueError):
+    """A mesh that can't be used: says what, the value, the rule and the remedy."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """One kind of change made to a mesh while it was read, and how often."""
+
+    kind: str
+    count: int
+
+
+@dataclass(frozen=True)
+class MeshSource:
+    """Provenance of a mesh.
+
+    Attributes:
+        path: File that was read, as it was given.
+        sha256: Digest of that file's bytes, hexadecimal.
+        unit: Length unit the file's numbers were taken in.
+        scale_to_m: Metres in one file unit.
+        n_vertices: Vertices in the file, before repairs.
+        n_faces: Faces in the file, before repairs.
+        repairs: What was changed, in the order it was done.
+    """
+
+    path: str
+    sha256: str
+    unit: str
+    scale_to_m: float
+    n_vertices: int
+    n_faces: int
+    repairs: tuple[Repair, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Oriented triangles in metres; faces are counter-clockwise seen from outside.
+
+    Attributes:
+        vertices: Positions in the world frame, in [m], shape (n_v, 3).
+        faces: Vertex indices, shape (n_f, 3).
+        source: Where it came from; None for meshes made in memory.
+
+    Raises:
+        MeshError: If an array has the wrong shape, a coordinate isn't finite, an index
+            is out of range or there is no face.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    source: MeshSource | None = None
+
+    def __post_init__(self) -> None:
+        vertices = np.array(self.vertices, dtype=np.float64, order="C")
+        faces = np.array(self.faces, dtype=np.int64, order="C")
+        if vertices.ndim != 2 or vertices.shape[1] != 3:
+            raise MeshError(f"vertices must be (n, 3), got {vertices.shape}")
+        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
+            raise MeshError(f"faces must be (n, 3) with n >= 1, got {faces.shape}")
+        if not np.all(np.isfinite(vertices)):
+            bad = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
+            raise MeshError(f"vertex {bad} is {vertices[bad]}: must be finite numbers")
+        if not (faces.min() >= 0 and faces.max() < len(vertices)):
+            raise MeshError(
+                f"face indices span {faces.min()}..{faces.max()}, "
+                f"must lie in 0..{len(vertices) - 1}"
+            )
+        for name, values in (("vertices", vertices), ("faces", faces)):
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """Corner positions of each face in [m], shape (n_f, 3, 3)."""
+        return _read_only(self.vertices[self.faces])
+
+    @cached_property
+    def _cross(self) -> NDArray[np.float64]:
+        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """Area of each face in [m²], shape (n_f,)."""
+        return _read_only(0.5 * np.linalg.norm(self._cross, axis=1))
+
+    @cached_property
+    def face_normals(self) -> NDArray[np.float64]:
+        """Outward unit normal of each face, shape (n_f, 3); zero where it has no area."""
+        length = 2.0 * self.face_areas[:, None]
+        return _read_only(
+            np.divide(self._cross, length, out=np.zeros_like(self._cross), where=length > 0)
+        )
+
+    @cached_property
+    def face_centroids(self) -> NDArray[np.float64]:
+        """Centroid of each face in [m], shape (n_f, 3)."""
+        return _read_only(self.corners.mean(axis=1))
+
+    @cached_property
+    def area(self) -> float:
+        """Total area in [m²]."""
+        return float(self.face_areas.sum())
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner of the bounding box of the faces in [m], (2, 3)."""
+        used = self.corners.reshape(-1, 3)
+        return _read_only(np.stack([used.min(axis=0), used.max(axis=0)]))
+
+    @cached_property
+    def centre(self) -> NDArray[np.float64]:
+        """Centre of the bounding box in [m], shape (3,)."""
+        return _read_only(self.bounds.mean(axis=0))
+
+    @cached_property
+    def radius(self) -> float:
+        """Radius in [m] of the smallest sphere about `centre` that holds every face."""
+        return float(np.linalg.norm(self.corners - self.centre, axis=2).max())
+
+    @cached_property
+    def mean_edge(self) -> float:
+        """Mean edge length over the faces in [m]."""
+        edges = self.corners - np.roll(self.corners, 1, axis=1)
+        return float(np.linalg.norm(edges, axis=2).mean())
+
+
+def _read_only(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    values.setflags(write=False)
+    return values

@@ -1,0 +1,105 @@
+"""Poses as 4 x 4 matrices named ``b_from_a``, so that products cancel.
+
+A matrix named ``b_from_a`` maps coordinates in frame ``a`` to frame ``b``::
+
+    c_from_a = c_from_b @ b_from_a
+
+Device frames are right-handed with +x right, +y down and +z along the optical axis
+(OpenCV, COLMAP; the ``_optical`` frames of ROS REP 103).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def look_at(
+    positions: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    up: NDArray[np.float64],
+    *,
+    roll: float = 0.0,
+) -> NDArray[np.float64]:
+    """Return ``world_from_device`` for devices that look at targets.
+
+    Where a device looks straight along ``up``, the world axis least along it takes
+    the place of ``up``.
+
+    Args:
+        positions: Optical centres in [m], shape (n, 3) or (3,).
+        targets: Points on the optical axes in [m], broadcast against positions.
+        up: World direction that appears upwards (-y) in the image, shape (3,).
+        roll: Turn of the device about its own axis, from +x towards +y, in [rad].
+
+    Returns:
+        Poses, shape (n, 4, 4) or (4, 4).
+
+    Raises:
+        ValueError: If a target is at its position.
+    """
+    positions, targets = np.broadcast_arrays(
+        np.asarray(positions, dtype=np.float64), np.asarray(targets, dtype=np.float64)
+    )
+    z = targets - positions
+    length = np.linalg.norm(z, axis=-1, keepdims=True)
+    if not np.all(length > 0):
+        raise ValueError("a target coincides with its position: no viewing direction")
+    z = z / length
+    up = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
+    spare = np.eye(3)[np.argmin(np.abs(up))]
+    along = np.abs(z @ up)[..., None] > 1.0 - 1e-9
+    x = np.cross(z, np.where(along, spare, up))
+    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    y = np.cross(z, x)
+    c, s = np.cos(roll), np.sin(roll)
+    poses = np.zeros((*z.shape[:-1], 4, 4))
+    poses[..., :3, 0] = c * x + s * y
+    poses[..., :3, 1] = c * y - s * x
+    poses[..., :3, 2] = z
+    poses[..., :3, 3] = positions
+    poses[..., 3, 3] = 1.0
+    return poses
+
+
+def inverse(b_from_a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ``a_from_b`` of rigid matrices, shape (..., 4, 4)."""
+    turned = np.swapaxes(b_from_a[..., :3, :3], -1, -2)
+    result = np.zeros_like(b_from_a)
+    result[..., :3, :3] = turned
+    result[..., :3, 3] = -(turned @ b_from_a[..., :3, 3:])[..., 0]
+    result[..., 3, 3] = 1.0
+    return result
+
+
+def transform(
+    b_from_a: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return points (n, 3) of frame a in frame b."""
+    return points @ b_from_a[:3, :3].T + b_from_a[:3, 3]
+
+
+def fibonacci_cap(
+    n: int, axis: NDArray[np.float64], half_angle: float
+) -> NDArray[np.float64]:
+    """Return n unit vectors spread evenly over a spherical cap.
+
+    Args:
+        n: Number of directions, at least 1.
+        axis: Centre of the cap, shape (3,).
+        half_angle: Opening of the cap in [rad]; pi is the whole sphere.
+
+    Returns:
+        Shape (n, 3), from the axis outwards.
+    """
+    axis = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    e1 = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    e1 /= np.linalg.norm(e1)
+    e2 = np.cross(axis, e1)
+    i = np.arange(n)
+    height = 1.0 - (1.0 - np.cos(half_angle)) * (i + 0.5) / n
+    around = i * (np.pi * (3.0 - np.sqrt(5.0)))
+    radius = np.sqrt(np.clip(1.0 - height * height, 0.0, None))[:, None]
+    return (
+        height[:, None] * axis
+        + radius * np.cos(around)[:, None] * e1
+        + radius * np.sin(around)[:, None] * e2
+    )

@@ -1,0 +1,1 @@
+"""The check from pixels: it shares no code with the planner but data types."""

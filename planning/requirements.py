@@ -1,0 +1,193 @@
+"""What a rig must do: every limit that binds, in metres and radians.
+
+These values are written into the plan file, so that each claim can be recomputed from
+the plan and the surface alone. A limit that is None doesn't bind.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, Self, TypeVar
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class ProjectorLimits:
+    """When a surface point counts as lit: the margins of eq. (2).
+
+    Attributes:
+        max_incidence: theta_max; -N.L >= cos(max_incidence) [rad].
+        min_tangent_angle: tau_min; angle between L and the line of T1 [rad].
+    """
+
+    max_incidence: float
+    min_tangent_angle: float
+
+
+@dataclass(frozen=True)
+class CameraLimits:
+    """When a surface point counts as seen.
+
+    Attributes:
+        max_incidence: Largest angle between N and the direction of the camera [rad].
+        max_sample_distance_m: Largest z / (f cos(incidence)) in [m].
+    """
+
+    max_incidence: float
+    max_sample_distance_m: float | None = None
+
+
+@dataclass(frozen=True)
+class TriangulationLimits:
+    """When a pair of projector and camera measures a point well enough.
+
+    Attributes:
+        min_conditioning: Least |r.m|, rings only.
+        noise_px: s_0, edge noise at frontal light [px].
+        max_sigma_m: Largest s_N [m].
+        min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
+        ring_sigma_m: s_R, error of ring placement [m].
+        min_angle: Least triangulation angle, `dense` and `none` only [rad].
+        max_angle: Largest triangulation angle, `dense` and `none` only [rad].
+    """
+
+    min_conditioning: float
+    noise_px: float
+    max_sigma_m: float | None = None
+    min_ring_pitch_px: float | None = None
+    ring_sigma_m: float | None = None
+    min_angle: float | None = None
+    max_angle: float | None = None
+
+
+@dataclass(frozen=True)
+class CheckLimits:
+    """What the reconstruction from pixels must reach.
+
+    Attributes:
+        max_rms_m: Root mean square distance of points from the surface [m].
+        max_p95_m: 95th percentile of the absolute distance [m].
+        max_bias_m: Absolute mean of the signed distance, outside positive [m].
+        tau_m: Distance within which a sample must have a measured point [m].
+        min_completeness: Least share of the target predicted measured with a point
+            within tau.
+        max_predicted_missing: Largest share of the samples predicted measured that
+            have no point within tau.
+    """
+
+    max_rms_m: float
+    max_p95_m: float
+    max_bias_m: float
+    tau_m: float
+    min_completeness: float
+    max_predicted_missing: float
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Where devices may stand: a shell about the object, or a cone cut from it.
+
+    A position Q is admissible iff |Q - centre| lies in the device's radius range, the
+    angle between Q - centre and `axis` is at most `half_angle`, and
+    (Q - centre) . up >= floor_m where a floor is given.
+
+    Attributes:
+        centre: Centre of the object's bounding box in the world [m].
+        object_radius_m: Radius of the sphere about `centre` that holds the object [m].
+        up: Unit vector that points up.
+        axis: Unit vector, axis of the cone.
+        half_angle: Half opening of the cone [rad]; pi is the whole shell.
+        projector_radius_m: Least and largest distance of projectors from `centre` [m].
+        camera_radius_m: Least and largest distance of cameras from `centre` [m].
+        floor_m: Least height above `centre` along `up` [m]; None: no floor.
+        n_reference_projectors: Poses in the projectors' reference set.
+        n_reference_cameras: Poses in the cameras' reference set.
+        reference_ring_radius: Outermost ring of the reference projectors: its tangent
+            R (diverging) or its radius in [m] (parallel).
+    """
+
+    centre: tuple[float, float, float]
+    object_radius_m: float
+    up: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    half_angle: float
+    projector_radius_m: tuple[float, float]
+    camera_radius_m: tuple[float, float]
+    floor_m: float | None
+    n_reference_projectors: int
+    n_reference_cameras: int
+    reference_ring_radius: float
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """All that is asked of a plan.
+
+    Attributes:
+        max_projectors: Projectors at most.
+        max_cameras: Cameras at most; None: as many as the coverage needs.
+        coverage: Measured area / area reachable by cameras, on the target.
+        dominant_coverage: Lit area / area reachable by projectors, on the target.
+        min_reachable: Area reachable by projectors / target area.
+        target: `dominant` regions, or the whole `surface`.
+        pattern: `rings`; `dense` and `none` come later.
+    """
+
+    max_projectors: int
+    max_cameras: int | None
+    coverage: float
+    dominant_coverage: float
+    min_reachable: float
+    target: Literal["dominant", "surface"]
+    pattern: Literal["rings", "dense", "none"]
+    projector: ProjectorLimits
+    camera: CameraLimits
+    triangulation: TriangulationLimits
+    check: CheckLimits
+    workspace: Workspace
+
+    def to_document(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        document = asdict(self)
+        document["workspace"] = {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in document["workspace"].items()
+        }
+        return document
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> Self:
+        """Read what `to_document` wrote; unknown keys are left aside.
+
+        Raises:
+            KeyError: If a required key is missing.
+            TypeError: If a section isn't a table.
+        """
+        workspace = {
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in document["workspace"].items()
+        }
+        plain = {
+            key: document[key]
+            for key in (
+                "max_projectors",
+                "max_cameras",
+                "coverage",
+                "dominant_coverage",
+                "min_reachable",
+                "target",
+                "pattern",
+            )
+        }
+        return cls(
+            **plain,
+            projector=_read(ProjectorLimits, document["projector"]),
+            camera=_read(CameraLimits, document["camera"]),
+            triangulation=_read(TriangulationLimits, document["triangulation"]),
+            check=_read(CheckLimits, document["check"]),
+            workspace=_read(Workspace, workspace),
+        )
+
+
+def _read(kind: type[_T], table: dict[str, Any]) -> _T:
+    known = kind.__dataclass_fields__  # type: ignore[attr-defined]
+    return kind(**{key: value for key, value in table.items() if key in known})
