@@ -296,7 +296,8 @@ def sphere_band_limit(
         raise InfeasibleLimitsError(
             f"a camera in the equator's plane covers a cap of {np.degrees(cap):.1f} "
             f"deg, the band reaches {np.degrees(latitude):.1f} deg: no number of "
-            f"cameras on this ring covers it; stand farther off or accept more incidence"
+            f"cameras on this ring covers it; stand farther off or accept more "
+            f"incidence"
         )
     return _ring(float(np.arccos(cosine)), ring_radius)
 

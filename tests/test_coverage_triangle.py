@@ -128,9 +128,7 @@ def test_a_rigid_motion_changes_no_angle():
         return seam_angles(
             lift(point) @ rotation.T + move,
             lift(onward) @ rotation.T,
-            centres=tuple(
-                lift(c) @ rotation.T + move for c in (ups.centre1, ups.centre2)
-            ),
+            centres=tuple(lift(c) @ rotation.T + move for c in centres),
             axes=tuple(lift(a) @ rotation.T for a in (ups.axis1, ups.axis2)),
             normals=tuple(lift(n) @ rotation.T for n in (here, beyond)),
         )
