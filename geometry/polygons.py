@@ -1,0 +1,99 @@
+"""Cut polygons into triangles: fans where convex, ear clipping where not."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def triangulate(
+    points: NDArray[np.float64], polygons: Sequence[Sequence[int]]
+) -> NDArray[np.int64]:
+    """Return the triangles of polygons, in their order and with their winding.
+
+    A fan about the first corner of a concave polygon would leave its outline, so
+    concave ones are cut ear by ear in the plane of their vector area. Polygons of one
+    or two corners (points and lines in some formats) give none.
+
+    Args:
+        points: Positions, shape (n, 3).
+        polygons: Vertex indices of each polygon, all in range.
+
+    Returns:
+        Shape (m, 3).
+    """
+    sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    cut: list[NDArray[np.int64]] = []
+    owner: list[NDArray[np.int64]] = []
+    for size in np.unique(sizes[sizes >= 3]).tolist():
+        which = np.flatnonzero(sizes == size)
+        corners = np.array([polygons[i] for i in which], dtype=np.int64)
+        fans = np.stack(
+            [
+                np.stack([corners[:, 0], corners[:, k], corners[:, k + 1]], axis=1)
+                for k in range(1, size - 1)
+            ],
+            axis=1,
+        )
+        if size > 3:
+            for i in np.flatnonzero(_concave(points, fans)):
+                fans[i] = _ears(points, corners[i])
+        cut.append(fans.reshape(-1, 3))
+        owner.append(np.repeat(which, size - 2))
+    if not cut:
+        return np.empty((0, 3), dtype=np.int64)
+    order = np.argsort(np.concatenate(owner), kind="stable")
+    return np.concatenate(cut)[order]
+
+
+def _concave(points: NDArray[np.float64], fans: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether some triangle of each fan (n, k, 3) is turned against the whole."""
+    a, b, c = (points[fans[..., k]] for k in range(3))
+    areas = np.cross(b - a, c - a)
+    total = areas.sum(axis=1, keepdims=True)
+    along = np.einsum("ijk,ijk->ij", areas, np.broadcast_to(total, areas.shape))
+    return np.any(along < 0, axis=1)
+
+
+def _ears(points: NDArray[np.float64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    flat = _in_plane(points[corners])
+    left = list(range(len(corners)))
+    triangles: list[tuple[int, int, int]] = []
+    while len(left) > 3:
+        at = next((i for i in range(len(left)) if _is_ear(flat, left, i)), None)
+        if at is None:
+            # Self-crossing outline: no cut is right; keep every corner in use.
+            at = 0
+        n = len(left)
+        triangles.append((left[at - 1], left[at], left[(at + 1) % n]))
+        del left[at]
+    triangles.append((left[0], left[1], left[2]))
+    return corners[np.array(triangles)]
+
+
+def _in_plane(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coordinates (n, 2), counter-clockwise, in the plane of the vector area."""
+    local = polygon - polygon.mean(axis=0)
+    normal = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    frame = np.stack([first, np.cross(normal, first)], axis=1)
+    return local @ (frame / np.maximum(np.linalg.norm(frame, axis=0), 1e-300))
+
+
+def _is_ear(flat: NDArray[np.float64], left: list[int], at: int) -> bool:
+    n = len(left)
+    a, b, c = left[at - 1], left[at], left[(at + 1) % n]
+    if not _turn(flat[a], flat[b], flat[c]) > 0:
+        return False
+    others = flat[[i for i in left if i not in (a, b, c)]]
+    inside = np.ones(len(others), dtype=bool)
+    for p, q in ((a, b), (b, c), (c, a)):
+        inside &= _turn(flat[p], flat[q], others) >= 0
+    return not inside.any()
+
+
+def _turn(
+    p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    along, to = q - p, r - p
+    return along[0] * to[..., 1] - along[1] * to[..., 0]

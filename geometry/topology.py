@@ -1,0 +1,72 @@
+"""Edges, borders and components of triangles; indices only, no positions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The undirected edges of a mesh and the three that each face has.
+
+    Attributes:
+        ends: Vertices of each edge, lower index first, shape (n_e, 2).
+        of_face: Edges of each face, from corner 0 to 1, 1 to 2 and 2 to 0, (n_f, 3).
+        n_faces: Faces at each edge, shape (n_e,).
+    """
+
+    ends: NDArray[np.int64]
+    of_face: NDArray[np.int64]
+    n_faces: NDArray[np.int64]
+
+    @property
+    def border(self) -> NDArray[np.bool_]:
+        """Edges with one face, shape (n_e,)."""
+        return self.n_faces == 1
+
+
+def mesh_edges(faces: NDArray[np.int64]) -> Edges:
+    """Return the edges of triangles (n_f, 3)."""
+    ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    span = int(faces.max()) + 1
+    key, of_face, counts = np.unique(
+        low * span + high, return_inverse=True, return_counts=True
+    )
+    return Edges(
+        np.stack([key // span, key % span], axis=1),
+        of_face.reshape(-1, 3),
+        counts.astype(np.int64),
+    )
+
+
+def adjacent_faces(edges: Edges, *, manifold_only: bool = True) -> NDArray[np.int64]:
+    """Return pairs of faces that share an edge, shape (m, 2).
+
+    Around an edge of more than two faces, consecutive faces are paired, unless
+    ``manifold_only`` leaves such edges out.
+    """
+    flat = edges.of_face.ravel()
+    order = np.argsort(flat, kind="stable")
+    same = flat[order][1:] == flat[order][:-1]
+    if manifold_only:
+        same &= edges.n_faces[flat[order][1:]] == 2
+    return np.stack([order[:-1][same] // 3, order[1:][same] // 3], axis=1)
+
+
+def components(pairs: NDArray[np.int64], n: int) -> tuple[int, NDArray[np.int64]]:
+    """Return the number of connected components of n nodes, and each node's, (n,).
+
+    Components are numbered by their lowest node.
+    """
+    links = coo_array(
+        (np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), (n, n)
+    )
+    count, label = connected_components(links, directed=False)
+    _, first = np.unique(label, return_index=True)
+    rank = np.empty(count, dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(count)
+    return int(count), rank[label]
