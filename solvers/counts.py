@@ -1,0 +1,265 @@
+"""Fewest sets, and most weight of K sets: the order in which the methods are tried.
+
+From above: greedy, swaps, large-neighbourhood search. From below: Lagrangian bound,
+then exact search over K-tuples. Each spends a share of one counted budget.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .exact_cover import TupleSearch, best_tuple
+from .mixed_integer import fits, linear_multipliers, solve_integer
+from .neighbourhood import cheapest, greedy, most_coverage, prune
+from .reductions import ReducedCover
+from .relaxation import cost_bound, count_bound, coverage_bounds, tighten
+from .status import SolveStatus, WorkBudget
+
+_EMPTY = np.empty(0, dtype=np.int64)
+_INTEGER_PROOF = "branch and bound (HiGHS)"
+
+
+@dataclass(frozen=True, eq=False)
+class CountAnswer:
+    """Fewest or cheapest sets that reach the weight; indices of the reduced cover.
+
+    The bound counts sets or sums costs, as was asked.
+    """
+
+    status: SolveStatus
+    selected: NDArray[np.int64]
+    lower_bound: float
+    proof: str
+
+
+@dataclass(frozen=True, eq=False)
+class WeightAnswer:
+    """Most weight of K sets; indices and weight of the reduced cover."""
+
+    status: SolveStatus
+    selected: NDArray[np.int64]
+    upper_bound: float
+    proof: str
+
+
+def fewest_sets(
+    cover: ReducedCover, budget: WorkBudget, *, seed: int, max_sets: int | None = None
+) -> CountAnswer:
+    """Find the fewest sets that reach the required weight, with a lower bound.
+
+    Args:
+        cover: A cover whose sets together reach the required weight.
+        budget: Counted work.
+        seed: Seed of the neighbourhood search.
+        max_sets: Sets allowed.
+    """
+    selected = prune(cover, greedy(cover, _EMPTY, budget))
+    cap = cover.n_sets if max_sets is None else max_sets
+    lower, proof = 1, "a positive weight needs a set"
+    multipliers = cover.weights
+    sized = count_bound(cover, multipliers)
+    if sized > lower:
+        lower, proof = sized, "sum of the largest sets"
+    selected = _improve(cover, selected, lower, budget.part(0.02 * budget.units), seed)
+
+    lagrangian = budget.part(0.25 * budget.units)
+    while lower < min(selected.size, cap + 1):
+        step = tighten(cover, lower, cover.required, multipliers, lagrangian)
+        multipliers = step.multipliers
+        proved = count_bound(cover, multipliers)
+        if proved <= lower:
+            break
+        lower, proof = proved, "Lagrangian bound"
+    selected = _improve(cover, selected, lower, budget.part(0.15 * budget.units), seed)
+
+    while lower < min(selected.size, cap + 1):
+        search = best_tuple(
+            cover,
+            lower,
+            target=cover.required,
+            multipliers=multipliers,
+            budget=budget.part(0.9 * budget.remaining),
+            first=True,
+        )
+        if search.selected is not None:
+            selected = search.selected
+        elif search.complete:
+            lower, proof = lower + 1, _tuple_proof(lower, search)
+        else:
+            break
+    if lower < min(selected.size, cap + 1) and fits(cover):
+        answer = solve_integer(cover, selected, budget)
+        selected = _better(cover, selected, answer.selected)
+        proved = math.ceil(answer.lower_bound / float(cover.costs[0]) - 1e-5)
+        if proved > lower:
+            lower, proof = proved, _INTEGER_PROOF
+    return _count_answer(cover, selected, lower, proof, cap, budget, seed)
+
+
+def cheapest_sets(
+    cover: ReducedCover, budget: WorkBudget, *, seed: int, max_sets: int | None = None
+) -> CountAnswer:
+    """Find the cheapest sets that reach the required weight, with a lower bound.
+
+    Args:
+        cover: A cover whose sets together reach the required weight.
+        budget: Counted work.
+        seed: Seed of the neighbourhood search.
+        max_sets: Sets allowed; more of them leave the status ``UNKNOWN``.
+    """
+    selected = cheapest(
+        cover,
+        greedy(cover, _EMPTY, budget),
+        budget.part(0.2 * budget.units),
+        seed=seed,
+        max_kicks=300,
+    )
+    lower, proof = float(cover.costs.min()), "a positive weight needs a set"
+    multipliers = linear_multipliers(cover, budget.part(0.5 * budget.units))
+    if multipliers is not None:
+        bound = cost_bound(cover, multipliers)
+        if bound > lower:
+            lower, proof = bound, "linear relaxation"
+    cost = float(cover.costs[selected].sum())
+    if lower < cost * (1.0 - 1e-9) and fits(cover):
+        answer = solve_integer(cover, selected, budget)
+        selected = _better(cover, selected, answer.selected)
+        cost = float(cover.costs[selected].sum())
+        if answer.lower_bound > lower:
+            lower, proof = answer.lower_bound, _INTEGER_PROOF
+    settled = lower >= cost * (1.0 - 1e-5)
+    lower = cost if settled else lower
+    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
+    if max_sets is not None and selected.size > max_sets:
+        status = SolveStatus.UNKNOWN
+    if not settled:
+        proof = f"{proof}; search cut by the {budget.reason}"
+    return CountAnswer(status, selected, lower, proof)
+
+
+def most_weight(
+    cover: ReducedCover,
+    n_sets: int,
+    budget: WorkBudget,
+    *,
+    seed: int,
+    start: NDArray[np.int64] = _EMPTY,
+) -> WeightAnswer:
+    """Find the most weight that K sets cover, with an upper bound."""
+    n_sets = min(n_sets, cover.n_sets)
+    if n_sets == 0:
+        return WeightAnswer(SolveStatus.OPTIMAL, _EMPTY, 0.0, "no set is allowed")
+    best = _EMPTY
+    for first in (start, _EMPTY) if start.size else (_EMPTY,):
+        filled = greedy(cover, first, budget, n_sets=n_sets)
+        best = max(best, filled, key=cover.weight_of)
+    best = most_coverage(
+        cover,
+        best,
+        budget.part(0.2 * budget.units),
+        target=cover.total,
+        seed=seed,
+        max_kicks=20 + 10 * n_sets,
+    )
+    weight = cover.weight_of(best)
+    if weight >= cover.total:
+        proof = "all that any set covers is covered"
+        return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
+    least = max(1.0, np.floor(cover.total * 1e-11))
+    part = budget.part(0.2 * budget.units)
+    step = tighten(cover, n_sets, weight + least, cover.weights, part)
+    upper = float(coverage_bounds(cover, step.multipliers)[n_sets])
+    if upper < weight + least:
+        return WeightAnswer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
+    search = best_tuple(
+        cover,
+        n_sets,
+        target=weight + least,
+        multipliers=step.multipliers,
+        budget=budget.part(budget.remaining),
+    )
+    if search.selected is not None:
+        best, weight = search.selected, search.weight
+    if search.complete:
+        return WeightAnswer(
+            SolveStatus.OPTIMAL, best, weight, _tuple_proof(n_sets, search)
+        )
+    upper = max(weight, min(upper, search.upper_bound))
+    proof = f"Lagrangian bound; search cut by the {budget.reason}"
+    return WeightAnswer(SolveStatus.FEASIBLE, best, upper, proof)
+
+
+def _better(
+    cover: ReducedCover, selected: NDArray[np.int64], other: NDArray[np.int64] | None
+) -> NDArray[np.int64]:
+    """Return the cheaper of a cover and a proposal that may not be one."""
+    if other is None or cover.weight_of(other) < cover.required:
+        return selected
+    other = prune(cover, other)
+    cheaper = cover.costs[other].sum() < cover.costs[selected].sum() * (1.0 - 1e-12)
+    return other if cheaper else selected
+
+
+def _improve(
+    cover: ReducedCover,
+    selected: NDArray[np.int64],
+    lower: int,
+    budget: WorkBudget,
+    seed: int,
+) -> NDArray[np.int64]:
+    """Return a cover of fewer sets while the neighbourhood search finds one."""
+    while selected.size > lower:
+        size = selected.size - 1
+        without = [np.delete(selected, i) for i in range(selected.size)]
+        start = max(without, key=cover.weight_of)
+        fewer = most_coverage(
+            cover,
+            start,
+            budget,
+            target=cover.required,
+            seed=seed,
+            max_kicks=20 + 10 * size,
+        )
+        if cover.weight_of(fewer) < cover.required:
+            break
+        selected = prune(cover, fewer)
+    return selected
+
+
+def _count_answer(
+    cover: ReducedCover,
+    selected: NDArray[np.int64],
+    lower: int,
+    proof: str,
+    cap: int,
+    budget: WorkBudget,
+    seed: int,
+) -> CountAnswer:
+    """Close the solve: use what work is left for more weight at the same count."""
+    size = min(selected.size, cap)
+    start = selected if selected.size <= cap else _EMPTY
+    # Its own allowance, so that a hard proof doesn't cost the larger area.
+    spare = budget.part(max(budget.remaining, 0.0))
+    spare.units = max(spare.units, 0.1 * budget.units)
+    best = most_weight(cover, size, spare, seed=seed, start=start)
+    if selected.size <= cap:
+        settled = lower >= selected.size
+        status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
+        selected = best.selected
+    else:
+        settled = lower > cap
+        status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
+        selected = best.selected
+    if not settled:
+        proof = f"{proof}; search cut by the {budget.reason}"
+    return CountAnswer(status, selected, float(lower), proof)
+
+
+def _tuple_proof(n_sets: int, search: TupleSearch) -> str:
+    if n_sets == 1:
+        return "single sets by exhaustion"
+    if search.pairs_only and n_sets == 2:
+        return "pairs by exhaustion"
+    return f"sets of {n_sets} by branch and bound"

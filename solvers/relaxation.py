@@ -1,0 +1,171 @@
+"""Bounds on covers from multipliers, safe whatever made the multipliers.
+
+Most weight of K sets: for any 0 <= lambda <= w::
+
+    w(union S) <= sum_i (w_i - lambda_i) + sum_{j in S} lambda(a_j)
+
+since a covered row pays lambda_i at least once. The least of the right side over
+lambda is the bound of the linear program (Lagrangian duality). Fewest sets: the first K
+whose bound reaches W.
+
+Cheapest sets: for any lambda >= 0, with reduced costs d_j = c_j - lambda(a_j)::
+
+    cost >= min {lambda y : w y >= W, 0 <= y <= 1} + sum_j min(0, d_j)
+
+The printed bound is evaluated here in numpy; the linear program only proposes lambda.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .reductions import ReducedCover
+from .status import WorkBudget
+
+# Rounding of sums of real multipliers, relative to the total weight.
+ROUNDING = 1e-11
+
+
+def coverage_bounds(
+    cover: ReducedCover, multipliers: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return an upper bound on the weight of any K sets, for K = 0, ..., n_s.
+
+    Args:
+        cover: The cover.
+        multipliers: Any numbers, shape (n_e,); clipped into [0, w].
+    """
+    clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
+    prices = np.sort(cover.by_set @ clipped)[::-1]
+    rest = float(np.sum(cover.weights - clipped))
+    bounds = rest + np.concatenate([[0.0], np.cumsum(prices)])
+    return np.minimum(bounds * (1.0 + ROUNDING), cover.total)
+
+
+def count_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> int:
+    """Return a lower bound on the number of sets that reach the required weight.
+
+    It is n_s + 1 where no number of sets reaches it.
+    """
+    reaches = coverage_bounds(cover, multipliers) >= cover.required
+    return int(np.argmax(reaches)) if np.any(reaches) else cover.n_sets + 1
+
+
+def cost_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
+    """Return a lower bound on the cost of any selection that reaches the weight.
+
+    Args:
+        cover: The cover.
+        multipliers: Any numbers, shape (n_e,), in cost; negative ones count as 0.
+    """
+    given = np.clip(np.nan_to_num(multipliers), 0.0, None)
+    prices = cover.by_set @ given
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fit = float(np.min(np.where(prices > 0, cover.costs / prices, np.inf)))
+    best = 0.0
+    for scale in (1.0, fit if np.isfinite(fit) else 0.0):
+        reduced = cover.costs - scale * prices
+        bound = scale * _cheapest_rows(cover, given) + np.minimum(reduced, 0.0).sum()
+        best = max(best, float(bound))
+    return best * (1.0 - 1e-9)
+
+
+def _cheapest_rows(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
+    """min lambda y over 0 <= y <= 1 with w y >= W: a fractional knapsack."""
+    order = np.argsort(multipliers / cover.weights, kind="stable")
+    reached = np.cumsum(cover.weights[order])
+    last = int(np.searchsorted(reached, cover.required))
+    if last >= order.size:
+        return float(multipliers.sum())
+    before = reached[last - 1] if last else 0.0
+    share = (cover.required - before) / cover.weights[order[last]]
+    return float(multipliers[order[:last]].sum() + share * multipliers[order[last]])
+
+
+@dataclass(frozen=True, eq=False)
+class Tightening:
+    """Multipliers after a descent.
+
+    Attributes:
+        multipliers: The best found, in [0, w], shape (n_e,).
+        bound: Weight that no K sets exceed, by these multipliers.
+        primal: Fractional selection that the steps averaged to, shape (n_s,).
+    """
+
+    multipliers: NDArray[np.float64]
+    bound: float
+    primal: NDArray[np.float64]
+
+
+def tighten(
+    cover: ReducedCover,
+    n_sets: int,
+    target: float,
+    start: NDArray[np.float64],
+    budget: WorkBudget,
+    *,
+    max_steps: int = 200,
+) -> Tightening:
+    """Lower the coverage bound for K sets until it is below a target or stalls.
+
+    Volume algorithm: subgradient steps towards a running mean of the K dearest sets.
+
+    Args:
+        cover: The cover.
+        n_sets: K.
+        target: Weight below which the bound need not go.
+        start: Multipliers to start from, shape (n_e,).
+        budget: Work; two matrix products a step.
+        max_steps: Steps at most.
+
+    References:
+        Barahona and Anbil, "The volume algorithm: producing primal solutions with a
+        subgradient method", Mathematical Programming 87, 2000.
+    """
+    w = cover.weights
+    total = cover.total
+    share = np.clip(start / w, 0.0, 1.0)
+    best_share = share
+    bound, chosen = _dearest(cover, share, n_sets)
+    primal = chosen.copy()
+    aim = min(target, total) * 0.998
+    step, stale, mark, marked = 1.0, 0, bound, 0
+    for i in range(max_steps):
+        if bound < target or budget.exhausted:
+            break
+        excess = 1.0 - cover.by_row @ primal
+        moving = np.where(excess > 0, best_share < 1.0, best_share > 0.0)
+        length = float(np.sum(w * excess * excess * moving))
+        if not length > 0:
+            break
+        share = np.clip(
+            best_share + step * max(bound - aim, 1e-4 * total) / length * excess, 0, 1
+        )
+        value, chosen = _dearest(cover, share, n_sets)
+        budget.spend(2 * cover.entries)
+        primal = 0.9 * primal + 0.1 * chosen
+        if value < bound:
+            bound, best_share, stale, step = value, share, 0, min(step * 1.1, 4.0)
+        else:
+            stale += 1
+            if stale % 5 == 0:
+                step *= 0.6
+        if i - marked >= 30:
+            if mark - bound < 2e-4 * total and bound - target > 20 * (mark - bound):
+                break
+            mark, marked = bound, i
+    return Tightening(best_share * w, bound, primal)
+
+
+def _dearest(
+    cover: ReducedCover, share: NDArray[np.float64], n_sets: int
+) -> tuple[float, NDArray[np.float64]]:
+    """Return the coverage bound for K sets and the indicator of the K dearest."""
+    multipliers = share * cover.weights
+    prices = cover.by_set @ multipliers
+    top = np.argsort(-prices, kind="stable")[:n_sets]
+    chosen = np.zeros(prices.size)
+    chosen[top] = 1.0
+    rest = float(np.sum(cover.weights - multipliers))
+    return (rest + float(prices[top].sum())) * (1.0 + ROUNDING), chosen

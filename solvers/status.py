@@ -1,0 +1,83 @@
+"""How a solve ended, and the work that it may spend."""
+
+import enum
+import time
+
+
+class SolveStatus(enum.Enum):
+    """Why a solver stopped, and hence what its answer proves."""
+
+    OPTIMAL = "proven optimal"
+    LOCALLY_OPTIMAL = "locally optimal; no global claim"
+    FEASIBLE = "feasible; stopped at a limit before a proof"
+    INFEASIBLE = "proven infeasible"
+    UNKNOWN = "stopped at a limit or failed without a usable point"
+
+    @property
+    def has_point(self) -> bool:
+        """Whether a feasible point came back."""
+        return self in (
+            SolveStatus.OPTIMAL,
+            SolveStatus.LOCALLY_OPTIMAL,
+            SolveStatus.FEASIBLE,
+        )
+
+
+class WorkBudget:
+    """Counted work, so that a slower machine gives the same answer.
+
+    One unit is one matrix entry touched (about 1 ns). The clock only cuts: an answer
+    that it cut says so and is exempt from being reproducible.
+
+    Attributes:
+        units: Work allowed.
+        spent: Work done so far.
+    """
+
+    def __init__(self, units: float, *, time_limit: float = float("inf")) -> None:
+        if not units >= 0:
+            raise ValueError(f"work budget is {units}, must be at least 0")
+        if not time_limit >= 0:
+            raise ValueError(f"time limit is {time_limit} s, must be at least 0")
+        self.units = float(units)
+        self.spent = 0.0
+        self._deadline = time.monotonic() + time_limit
+        self._parent: WorkBudget | None = None
+
+    def part(self, units: float) -> "WorkBudget":
+        """Return a smaller budget whose work counts here too."""
+        child = WorkBudget(max(0.0, min(units, self.remaining)))
+        child._deadline = self._deadline
+        child._parent = self
+        return child
+
+    def spend(self, units: float) -> None:
+        """Count work that was done."""
+        self.spent += units
+        if self._parent is not None:
+            self._parent.spend(units)
+
+    @property
+    def remaining(self) -> float:
+        """Work left, at least 0."""
+        return max(0.0, self.units - self.spent)
+
+    @property
+    def time_left(self) -> float:
+        """Wall time until the clock cuts, in [s]."""
+        return self._deadline - time.monotonic()
+
+    @property
+    def out_of_time(self) -> bool:
+        """Whether the clock cut the solve."""
+        return time.monotonic() > self._deadline
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether to stop, because of work or of the clock."""
+        return self.spent >= self.units or self.out_of_time
+
+    @property
+    def reason(self) -> str:
+        """What ended the work, for people."""
+        return "time limit" if self.out_of_time else "work budget"
