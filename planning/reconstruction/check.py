@@ -1,0 +1,307 @@
+"""The check of a plan from pixels: render, decode, triangulate, merge, compare."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.rays import RayCaster
+from geometry.sampling import SurfaceSamples, sample_surface
+
+from ..plan import RigPlan
+from .calibration import (
+    PairCalibration,
+    ProjectorCalibration,
+    calibrate_camera,
+    calibrate_projector,
+)
+from .cloud import Cloud
+from .decode import Decoded, decode
+from .merge import Merged, merge
+from .patterns import ring_patterns
+from .photometry import Photometry
+from .render import View, render_pair, view
+from .verdict import (
+    Accuracy,
+    Completeness,
+    judge,
+    likely_cause,
+    measure_accuracy,
+    measure_completeness,
+)
+
+_DEFAULT_SAMPLES = 20_000
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class PairCount:
+    """What one pair of devices gave.
+
+    Attributes:
+        projector: Id of the projector.
+        camera: Id of the camera.
+        lit_pixels: Pixels with enough contrast.
+        n_edges: Ring edges found.
+        n_points: Points triangulated.
+        rejected: Edges without a point, by cause.
+    """
+
+    projector: str
+    camera: str
+    lit_pixels: int
+    n_edges: int
+    n_points: int
+    rejected: dict[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What the rig measured of the object, judged against the plan's limits.
+
+    Attributes:
+        everything: All points, before redundancy was removed.
+        merged: The cloud that stays, with normals and standard deviations.
+        accuracy: Of the merged cloud; None if it is empty.
+        completeness: Of the target.
+        pairs: What each pair gave.
+        photometry: The simulated light and sensor.
+        failures: One sentence for each limit that isn't kept.
+    """
+
+    everything: Cloud
+    merged: Merged
+    accuracy: Accuracy | None
+    completeness: Completeness
+    pairs: tuple[PairCount, ...]
+    photometry: Photometry
+    failures: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.failures
+
+    @property
+    def n_points(self) -> int:
+        """Points before redundancy was removed."""
+        return len(self.everything)
+
+    @property
+    def n_merged(self) -> int:
+        """Points that stay."""
+        return len(self.merged.cloud)
+
+    @property
+    def redundant_fraction(self) -> float:
+        """Share of the points that was removed as redundant."""
+        return 1.0 - self.n_merged / self.n_points if self.n_points else 0.0
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the `reconstruction` object of `plan.json`."""
+        accuracy, complete = self.accuracy, self.completeness
+        return {
+            "n_points": self.n_points,
+            "n_merged": self.n_merged,
+            "redundant_fraction": self.redundant_fraction,
+            "accuracy_rms_m": accuracy and accuracy.rms_m,
+            "accuracy_p95_m": accuracy and accuracy.p95_m,
+            "accuracy_bias_m": accuracy and accuracy.bias_m,
+            "accuracy_max_m": accuracy and accuracy.max_m,
+            "completeness": [
+                {"threshold_m": threshold, "fraction": fraction}
+                for threshold, fraction in zip(
+                    complete.thresholds_m, complete.fractions, strict=True
+                )
+            ],
+            "predicted_missing": complete.predicted_missing,
+            "pixel_noise": self.photometry.pixel_noise,
+            "ambient": self.photometry.ambient,
+            "passed": self.passed,
+            "failures": list(self.failures),
+        }
+
+
+def reconstruct_plan(
+    plan: RigPlan,
+    *,
+    seed: int,
+    threads: int = 2,
+    truth: RigPlan | None = None,
+    samples: SurfaceSamples | None = None,
+    predicted: NDArray[np.bool_] | None = None,
+    photometry: Photometry | None = None,
+    progress: Progress | None = None,
+) -> Reconstruction:
+    """Measure the object of a plan through rendered images, and judge the result.
+
+    Args:
+        plan: What the decoder believes: poses, optics, patterns; its mesh is compared.
+        seed: Of the pixel noise; every frame draws from a stream of its own.
+        threads: Worker threads; the result doesn't depend on them.
+        truth: What really stands there, devices matched by id; the plan by default. A
+            device that it lacks is off.
+        samples: Points of the surface to judge completeness on; those outside the
+            target are left aside. Fresh ones of the target by default.
+        predicted: Which of the samples the plan claims measured, shape (n,). Without it
+            completeness is reported but not judged.
+        photometry: Simulated light and sensor.
+        progress: Called with the pairs done and their total.
+
+    Raises:
+        ValueError: If `predicted` comes without samples, or in another number.
+    """
+    light = photometry or Photometry()
+    samples, predicted = _target_samples(plan, samples, predicted, seed)
+    decoded = _decode_pairs(plan, truth or plan, light, seed, threads, progress)
+    parts = [
+        replace(
+            pair.cloud,
+            projector=np.full(len(pair.cloud), p, dtype=np.int16),
+            camera=np.full(len(pair.cloud), c, dtype=np.int16),
+        )
+        for (p, c), pair in decoded
+    ]
+    everything = Cloud.join(parts)
+    gap_m, pitch_px = _ring_gap(plan, everything)
+    merged = merge(everything, gap_m=gap_m, pitch_px=pitch_px)
+    limits = plan.requirements.check
+    mesh = plan.surface.mesh
+    completeness = measure_completeness(
+        everything, merged.cloud, samples, predicted, limits.tau_m
+    )
+    accuracy = None
+    failures: tuple[str, ...] = ("no point was measured: no ring edge was decoded",)
+    if len(merged.cloud):
+        accuracy = measure_accuracy(merged.cloud, mesh, threads=threads)
+        cause = likely_cause(
+            merged.cloud,
+            accuracy,
+            mesh,
+            limits,
+            projectors=tuple(projector.id for projector in plan.projectors),
+            cameras=tuple(camera.id for camera in plan.cameras),
+        )
+        failures = judge(accuracy, completeness, limits, cause)
+    return Reconstruction(
+        everything,
+        merged,
+        accuracy,
+        completeness,
+        tuple(_count(plan, p, c, pair) for (p, c), pair in decoded),
+        light,
+        failures,
+    )
+
+
+def _target_samples(
+    plan: RigPlan,
+    samples: SurfaceSamples | None,
+    predicted: NDArray[np.bool_] | None,
+    seed: int,
+) -> tuple[SurfaceSamples, NDArray[np.bool_] | None]:
+    target = plan.surface.target_faces(plan.requirements.target)
+    if samples is None:
+        if predicted is not None:
+            raise ValueError("predicted needs the samples that it speaks of")
+        mesh = plan.surface.mesh
+        return sample_surface(mesh, _DEFAULT_SAMPLES, seed=seed, within=target), None
+    inside = target[samples.faces]
+    if predicted is None:
+        return samples.take(inside), None
+    if predicted.shape != (len(samples),):
+        raise ValueError(
+            f"predicted has shape {predicted.shape} for {len(samples)} samples"
+        )
+    return samples.take(inside), predicted[inside]
+
+
+def _decode_pairs(
+    plan: RigPlan,
+    truth: RigPlan,
+    photometry: Photometry,
+    seed: int,
+    threads: int,
+    progress: Progress | None,
+) -> list[tuple[tuple[int, int], Decoded]]:
+    """Render and decode every pair; the order, and every number, is always the same."""
+    mesh = truth.surface.mesh
+    caster = RayCaster(mesh, threads=1)
+    standing = {camera.id: calibrate_camera(camera) for camera in truth.cameras}
+    shining = {
+        projector.id: calibrate_projector(projector) for projector in truth.projectors
+    }
+    believed = [calibrate_camera(camera) for camera in plan.cameras]
+    designed = [calibrate_projector(projector) for projector in plan.projectors]
+    radii = [projector.ring_radii for projector in plan.projectors]
+    min_conditioning = plan.requirements.triangulation.min_conditioning
+
+    def look(c: int) -> View | None:
+        camera = standing.get(believed[c].id)
+        return camera and view(camera, mesh, caster, photometry)
+
+    def measure(pair: tuple[int, int]) -> Decoded:
+        p, c = pair
+        design, seen = designed[p], views[c]
+        projector: ProjectorCalibration | None = shining.get(design.id)
+        if seen is None or projector is None:
+            return Decoded.nothing()
+        patterns = ring_patterns(design, radii[p], believed[c])
+        frames = render_pair(
+            seen, projector, design, patterns, caster, photometry, (seed, p, c)
+        )
+        return decode(
+            frames,
+            patterns,
+            PairCalibration(design, believed[c]),
+            min_conditioning=min_conditioning,
+        )
+
+    pairs = [(p, c) for c in range(len(believed)) for p in range(len(designed))]
+    with ThreadPoolExecutor(threads) as pool:
+        views = list(pool.map(look, range(len(believed))))
+        done = list(_reported(pool.map(measure, pairs), len(pairs), progress))
+    return list(zip(pairs, done, strict=True))
+
+
+def _reported(
+    results: Iterator[Decoded], total: int, progress: Progress | None
+) -> Iterator[Decoded]:
+    for n, result in enumerate(results, start=1):
+        if progress is not None:
+            progress(n, total)
+        yield result
+
+
+def _ring_gap(plan: RigPlan, cloud: Cloud) -> tuple[float, float]:
+    """Median distance of neighbouring rings, across the beam [m] and in images [px]."""
+    if len(cloud) == 0:
+        return plan.requirements.check.tau_m, 1.0
+    gaps = np.empty(len(cloud))
+    for p, projector in enumerate(plan.projectors):
+        own = cloud.projector == p
+        radii = projector.ring_radii
+        step = np.diff(radii, prepend=radii[0] - (radii[1] - radii[0]))[cloud.ring[own]]
+        if projector.light == "diverging":
+            ring = calibrate_projector(projector).to_ring(cloud.points[own])
+            step = step * ring[:, 2] / np.sqrt(1.0 + radii[cloud.ring[own]] ** 2)
+        gaps[own] = step
+    centres = np.array([camera.world_from_device[:3, 3] for camera in plan.cameras])
+    focal = np.array([calibrate_camera(camera).focal_px for camera in plan.cameras])
+    reach = np.linalg.norm(cloud.points - centres[cloud.camera], axis=1)
+    pitch = gaps * focal[cloud.camera] / reach
+    return float(np.median(gaps)), float(np.median(pitch))
+
+
+def _count(plan: RigPlan, p: int, c: int, pair: Decoded) -> PairCount:
+    return PairCount(
+        plan.projectors[p].id,
+        plan.cameras[c].id,
+        pair.lit_pixels,
+        pair.n_edges,
+        len(pair.cloud),
+        pair.rejected,
+    )

@@ -1,0 +1,76 @@
+"""Measured points and what the scanner knows of each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Points triangulated from ring edges.
+
+    Attributes:
+        points: In the world [m], shape (n, 3).
+        rays: Unit viewing directions that measured them, shape (n, 3).
+        beams: Unit directions of the light there, shape (n, 3).
+        pixels: Sub-pixel positions (u, v) in the camera's image, shape (n, 2).
+        camera: Index of the camera, shape (n,).
+        projector: Index of the projector, shape (n,).
+        ring: Index of the ring edge, shape (n,).
+        conditioning: r.m, shape (n,).
+        shift: Displacement of the point when its edge moves by one pixel across itself,
+            in [m/px], shape (n, 3).
+        noise_px: Standard deviation of the edge's position across itself [px], (n,).
+    """
+
+    points: NDArray[np.float64]
+    rays: NDArray[np.float64]
+    beams: NDArray[np.float64]
+    pixels: NDArray[np.float64]
+    camera: NDArray[np.int16]
+    projector: NDArray[np.int16]
+    ring: NDArray[np.int16]
+    conditioning: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    noise_px: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def take(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> "Cloud":
+        """Return some of the points."""
+        return Cloud(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def sigma(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the standard deviation [m] of each point along a normal, (n,)."""
+        return np.abs(np.einsum("ij,ij->i", self.shift, normals)) * self.noise_px
+
+    @staticmethod
+    def empty() -> "Cloud":
+        """Return a cloud of no points."""
+        vectors, numbers = np.zeros((0, 3)), np.zeros(0)
+        index = np.zeros(0, dtype=np.int16)
+        return Cloud(
+            points=vectors,
+            rays=vectors,
+            beams=vectors,
+            pixels=np.zeros((0, 2)),
+            camera=index,
+            projector=index,
+            ring=index,
+            conditioning=numbers,
+            shift=vectors,
+            noise_px=numbers,
+        )
+
+    @staticmethod
+    def join(clouds: Sequence["Cloud"]) -> "Cloud":
+        """Return all points of several clouds, in their order."""
+        return Cloud(
+            *(
+                np.concatenate([getattr(cloud, field.name) for cloud in clouds])
+                for field in fields(Cloud)
+            )
+        )

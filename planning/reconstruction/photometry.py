@@ -1,0 +1,96 @@
+"""How bright a pixel comes out: albedo, lens blur, exposure, noise, quantisation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_WAVELENGTHS_M = (0.009, 0.017, 0.031)
+
+
+@dataclass(frozen=True)
+class Photometry:
+    """The simulated light and sensor.
+
+    Attributes:
+        projector_blur_m: Standard deviation of the blur of a drawn edge, across the
+            beam at the object [m].
+        camera_blur_px: Standard deviation of the lens's blur [px].
+        ambient: Ambient light as a share of the projector's at normal incidence.
+        albedo_variation: Amplitude of the texture, as a share of the mean albedo.
+        full_well: Electrons at full scale.
+        read_noise: Standard deviation of the read noise, in grey levels of 255.
+        exposure: Share of full scale that the brightest pixels reach.
+        noisy: Whether noise is added; frames are quantised to 8 bits if so.
+    """
+
+    projector_blur_m: float = 0.25e-3
+    camera_blur_px: float = 0.6
+    ambient: float = 0.05
+    albedo_variation: float = 0.2
+    full_well: float = 10_000.0
+    read_noise: float = 1.0
+    exposure: float = 0.85
+    noisy: bool = True
+
+    @property
+    def pixel_noise(self) -> float:
+        """Standard deviation of a half-bright pixel in grey levels of 255."""
+        shot = 127.5 * 255.0 / self.full_well
+        return float(np.sqrt(shot + self.read_noise**2)) if self.noisy else 0.0
+
+    def albedo(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return the albedo of world points (n, 3): a solid texture about 1."""
+        if self.albedo_variation == 0.0:
+            return np.ones(len(points), dtype=np.float32)
+        waves = np.zeros(len(points), dtype=np.float32)
+        for axis, length in enumerate(_WAVELENGTHS_M):
+            along = points[:, axis] + 0.5 * points[:, (axis + 1) % 3]
+            waves += np.sin((along * (2.0 * np.pi / length)).astype(np.float32))
+        return 1.0 + np.float32(self.albedo_variation / 3.0) * waves
+
+    def blur(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return an image under the lens's point spread, a separable Gaussian."""
+        if self.camera_blur_px == 0.0:
+            return image
+        reach = max(1, int(np.ceil(3.5 * self.camera_blur_px)))
+        taps = np.exp(-0.5 * (np.arange(reach + 1) / self.camera_blur_px) ** 2)
+        taps = (taps / (2.0 * taps.sum() - taps[0])).astype(np.float32)
+        return _smooth_rows(_smooth_rows(image, taps).T, taps).T
+
+    def capture(
+        self, grey: NDArray[np.float32], key: tuple[int, ...], gain: float
+    ) -> NDArray[np.float32] | NDArray[np.uint8]:
+        """Return what the sensor reports of an image.
+
+        Shot noise and read noise, ``var = 255 grey / full_well + read_noise^2`` in grey
+        levels; clipped and rounded to 8 bits. Noise-free frames are not quantised.
+
+        Args:
+            grey: Irradiance, shape (h, w).
+            key: Seeds the noise: one key, one noise, whatever the number of threads.
+            gain: Grey levels in a unit of irradiance.
+        """
+        level = grey * np.float32(gain)
+        if not self.noisy:
+            return level
+        rng = np.random.Generator(np.random.SFC64(np.random.SeedSequence(key)))
+        noise = rng.standard_normal(level.shape, dtype=np.float32)
+        spread = level * np.float32(255.0 / self.full_well)
+        spread += np.float32(self.read_noise**2)
+        np.sqrt(spread, out=spread)
+        noise *= spread
+        level += noise
+        np.rint(level, out=level)
+        return np.clip(level, 0.0, 255.0, out=level).astype(np.uint8)
+
+
+def _smooth_rows(
+    image: NDArray[np.float32], taps: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Convolve along axis 0 with symmetric taps; beyond the border it is dark."""
+    result = image * taps[0]
+    for k in range(1, min(len(taps), len(image))):
+        result[k:] += taps[k] * image[:-k]
+        result[:-k] += taps[k] * image[k:]
+    return result

@@ -1,0 +1,230 @@
+"""Measured points against the mesh, and both against the limits that the plan states."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from geometry.mesh import TriangleMesh
+from geometry.proximity import closest_points
+from geometry.sampling import SurfaceSamples
+
+from ..requirements import CheckLimits
+from .cloud import Cloud
+
+_MM = 1e3
+# Incidence of light beyond which edges smear, in formulation.md section 2 [rad].
+_GRAZING = np.deg2rad(70.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """Signed distances of points from the mesh along its normals, outside positive.
+
+    Attributes:
+        distances: In [m], shape (n,).
+        faces: Nearest face of each point, shape (n,).
+    """
+
+    distances: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square in [m]."""
+        return float(np.sqrt(np.mean(self.distances**2)))
+
+    @property
+    def p95_m(self) -> float:
+        """95th percentile of the absolute distance in [m]."""
+        return float(np.percentile(np.abs(self.distances), 95.0))
+
+    @property
+    def bias_m(self) -> float:
+        """Mean in [m]."""
+        return float(np.mean(self.distances))
+
+    @property
+    def max_m(self) -> float:
+        """Largest absolute distance in [m]."""
+        return float(np.abs(self.distances).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Completeness:
+    """Shares of surface samples with a measured point nearby.
+
+    Attributes:
+        thresholds_m: Half, one and two tau [m].
+        fractions: Of the target predicted measured, after redundancy was removed.
+        predicted_missing: Share of it with no point within tau in the whole cloud;
+            None without a prediction.
+        missing: Samples predicted measured that have no such point, shape (n,).
+    """
+
+    thresholds_m: tuple[float, float, float]
+    fractions: tuple[float, float, float]
+    predicted_missing: float | None
+    missing: NDArray[np.bool_]
+
+
+def measure_accuracy(cloud: Cloud, mesh: TriangleMesh, *, threads: int) -> Accuracy:
+    """Return the distances of a cloud from the full mesh."""
+    nearest = closest_points(mesh, cloud.points, threads=threads)
+    return Accuracy(nearest.distances, nearest.faces)
+
+
+def nearest_distance(cloud: Cloud, samples: SurfaceSamples) -> NDArray[np.float64]:
+    """Return the distance from each sample to a point measured from its own side.
+
+    A point counts if its viewing ray r meets the sample's normal with r.N < 0: on a
+    thin shell points of the other side are near, too. Each camera's nearest point is
+    tried.
+
+    Returns:
+        In [m], inf where there is no such point, shape (n_samples,).
+    """
+    best = np.full(len(samples), np.inf)
+    for camera in np.unique(cloud.camera):
+        own = cloud.camera == camera
+        distance, nearest = KDTree(cloud.points[own]).query(samples.points)
+        facing = np.einsum("ij,ij->i", cloud.rays[own][nearest], samples.normals) < 0.0
+        best = np.where(facing, np.minimum(best, distance), best)
+    return best
+
+
+def measure_completeness(
+    everything: Cloud,
+    merged: Cloud,
+    samples: SurfaceSamples,
+    predicted: NDArray[np.bool_] | None,
+    tau_m: float,
+) -> Completeness:
+    """Return how much of the samples was measured, and what should have been.
+
+    Args:
+        everything: All points.
+        merged: Those that stay after redundancy is removed.
+        samples: Of the target.
+        predicted: Samples that the plan claims measured; None: all, without a claim.
+        tau_m: One ring gap [m].
+    """
+    claimed = np.ones(len(samples), dtype=bool) if predicted is None else predicted
+    thresholds = (0.5 * tau_m, tau_m, 2.0 * tau_m)
+    kept = nearest_distance(merged, samples.take(claimed))
+    fractions = [_share(kept <= threshold) for threshold in thresholds]
+    missing = claimed & ~(nearest_distance(everything, samples) <= tau_m)
+    return Completeness(
+        thresholds,
+        (fractions[0], fractions[1], fractions[2]),
+        None if predicted is None else _share(missing[claimed]),
+        missing,
+    )
+
+
+def judge(
+    accuracy: Accuracy,
+    completeness: Completeness,
+    limits: CheckLimits,
+    cause: str,
+) -> tuple[str, ...]:
+    """Return a sentence for each limit that isn't kept: what, value, limit, cause."""
+    lengths = (
+        ("rms distance of the points from the mesh", accuracy.rms_m, limits.max_rms_m),
+        ("95th percentile of the distance", accuracy.p95_m, limits.max_p95_m),
+        ("mean signed distance", abs(accuracy.bias_m), limits.max_bias_m),
+    )
+    failures = [
+        f"{name} is {_MM * value:.3f} mm, limit {_MM * limit:.3f} mm; {cause}"
+        for name, value, limit in lengths
+        if not value <= limit
+    ]
+    missing = completeness.predicted_missing
+    if missing is None:
+        return tuple(failures)
+    share, tau = completeness.fractions[1], _MM * completeness.thresholds_m[1]
+    if not share >= limits.min_completeness:
+        failures.append(
+            f"completeness is {share:.3f} of the target predicted measured at "
+            f"{tau:.2f} mm, limit {limits.min_completeness:.3f}; {cause}"
+        )
+    if not missing <= limits.max_predicted_missing:
+        failures.append(
+            f"{100 * missing:.2f} % of the samples predicted measured have no point "
+            f"within {tau:.2f} mm, limit {100 * limits.max_predicted_missing:.2f} %; "
+            f"{cause}"
+        )
+    return tuple(failures)
+
+
+def likely_cause(
+    cloud: Cloud,
+    accuracy: Accuracy,
+    mesh: TriangleMesh,
+    limits: CheckLimits,
+    *,
+    projectors: tuple[str, ...],
+    cameras: tuple[str, ...],
+) -> str:
+    """Return what the errors point at, in words.
+
+    In this order: devices that gave no point; one device that carries the errors;
+    grazing light; the object itself.
+    """
+    silent = [
+        name
+        for names, index in ((projectors, cloud.projector), (cameras, cloud.camera))
+        for i, name in enumerate(names)
+        if not np.any(index == i)
+    ]
+    if silent:
+        return (
+            f"{' and '.join(silent)} gave no point: dark, covered, blocked or aimed "
+            f"elsewhere"
+        )
+    if accuracy.rms_m <= limits.max_rms_m and accuracy.p95_m <= limits.max_p95_m:
+        return "the measured points are accurate: surface that the plan counts on is missed"
+    guilty = _guilty_device(cloud, accuracy, projectors, cameras)
+    if guilty is not None:
+        return guilty
+    off = np.abs(accuracy.distances) > limits.max_rms_m
+    cosine = -np.einsum(
+        "ij,ij->i", cloud.beams[off], mesh.face_normals[accuracy.faces[off]]
+    )
+    if float(np.median(cosine)) < np.cos(_GRAZING):
+        return "most of the points that are off were lit at grazing incidence"
+    return (
+        "every pair of devices is off alike: the object isn't the mesh of the plan, or "
+        "several devices differ from it"
+    )
+
+
+def _guilty_device(
+    cloud: Cloud,
+    accuracy: Accuracy,
+    projectors: tuple[str, ...],
+    cameras: tuple[str, ...],
+) -> str | None:
+    """Name the device without which the rest is at least three times as accurate."""
+    error = np.abs(accuracy.distances)
+    best: tuple[float, str] | None = None
+    for names, index in ((projectors, cloud.projector), (cameras, cloud.camera)):
+        for i, name in enumerate(names):
+            own = index == i
+            if len(names) < 2 or not np.any(~own):
+                continue
+            with_it = float(np.median(error[own]))
+            without = float(np.median(error[~own]))
+            text = (
+                f"{name} differs from the plan in pose or optics: median error of its "
+                f"points {_MM * with_it:.3f} mm, of the others {_MM * without:.3f} mm"
+            )
+            ratio = with_it / max(without, 1e-9)
+            if ratio > 3.0 and (best is None or ratio > best[0]):
+                best = ratio, text
+    return None if best is None else best[1]
+
+
+def _share(values: NDArray[np.bool_]) -> float:
+    return float(np.mean(values)) if len(values) else 0.0
