@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from .errors import RigError
 from .rig_models import RigTable
@@ -95,7 +96,7 @@ def read_rig(name_or_path: str | Path) -> RigTable:
     try:
         return RigTable.model_validate(tables)
     except ValidationError as error:
-        raise RigError("\n".join(_faults(where, tables, error))) from None
+        raise RigError("\n".join(_faults(where, error))) from None
 
 
 def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
@@ -184,15 +185,15 @@ def _preset(name: str) -> Preset:
     return Preset(name, table.description, devices, tuple(figures))
 
 
-def _faults(where: str, tables: dict[str, Any], error: ValidationError) -> list[str]:
+def _faults(where: str, error: ValidationError) -> list[str]:
     return [
-        f"{where}: {_fault(tuple(entry['loc']), entry['type'], entry['msg'], entry)}"
+        f"{where}: {_fault(tuple(entry['loc']), entry)}"
         for entry in error.errors(include_url=False)
     ]
 
 
-def _fault(loc: tuple[int | str, ...], kind: str, message: str, entry: Any) -> str:
-    path = _dotted(loc)
+def _fault(loc: tuple[int | str, ...], entry: ErrorDetails) -> str:
+    kind, message, path = entry["type"], entry["msg"], _dotted(loc)
     if kind == "missing":
         return f"`{path}` is missing; write it"
     if kind == "extra_forbidden":

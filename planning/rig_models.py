@@ -4,7 +4,7 @@ Unknown keys, numbers out of range, text for numbers and NaN are refused. The ta
 say what was written; `planning.rig` turns them into devices and requirements.
 """
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
@@ -26,7 +26,7 @@ def _off_is_none(value: object) -> object:
 
 
 # TOML has no null: a limit that isn't to bind is written "off".
-Optional = Annotated[Positive | None, BeforeValidator(_off_is_none)]
+Limit = Annotated[Positive | None, BeforeValidator(_off_is_none)]
 
 
 class Table(BaseModel):
@@ -220,12 +220,12 @@ class LimitsTable(Table):
     projector_max_incidence_deg: Acute = 60.0
     min_tangent_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 40.0
     camera_max_incidence_deg: Acute = 70.0
-    max_sample_distance_mm: Optional = None
+    max_sample_distance_mm: Limit = None
     min_conditioning: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
     noise_px: Positive = 0.1
-    min_ring_pitch_px: Optional = 6.0
-    max_sigma_mm: Optional = 0.3
-    ring_sigma_mm: Optional = None
+    min_ring_pitch_px: Limit = 6.0
+    max_sigma_mm: Limit = 0.3
+    ring_sigma_mm: Limit = None
     min_angle_deg: Annotated[float, Field(ge=0.0, lt=180.0)] | None = None
     max_angle_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = None
 
@@ -286,7 +286,3 @@ class RigTable(Table):
     limits: LimitsTable = LimitsTable()
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
-
-    def plain(self) -> dict[str, Any]:
-        """Return the tables as plain values."""
-        return self.model_dump(mode="json")
