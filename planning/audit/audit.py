@@ -1,0 +1,168 @@
+"""The audit of a whole plan: every claim against a recomputation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.errors import PlanFileError
+from planning.plan import RigPlan
+from planning.surface import Surface
+
+from .areas import audit_areas, audit_causes, audit_contributions, recomputed_areas
+from .baselines import audit_baselines
+from .devices import audit_devices, audit_workspace
+from .estimates import Estimator
+from .ledger import Ledger, as_number
+from .occlusion import Shadow
+from .recompute import Reach, Recomputed, reach_of, recompute
+from .samples import AuditSamples, draw_samples
+from .serving import audit_serving
+from .tables import audit_certificates, audit_marginal, audit_rest
+from .verdict import unmet_requirements
+
+DEFAULT_SEED = 20_141_203
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """What the audit found.
+
+    Attributes:
+        failures: A sentence for each false claim: key, claimed, recomputed, tolerance.
+        unmet: One sentence for each requirement that the plan, by its own claims,
+            misses. That is no false claim.
+        areas: Recomputed AREAS of `surface` and `target`, keys as in `coverage` [m²].
+        samples: The audit's samples.
+        lit: Whether any projector lights each sample, shape (n,).
+        predicted: Whether any pair measures each sample, shape (n,).
+        reachable_by_projectors: Shape (n,).
+        reachable_by_cameras: Shape (n,).
+    """
+
+    failures: tuple[str, ...]
+    unmet: tuple[str, ...]
+    areas: dict[str, dict[str, float]]
+    samples: AuditSamples
+    lit: NDArray[np.bool_]
+    predicted: NDArray[np.bool_]
+    reachable_by_projectors: NDArray[np.bool_]
+    reachable_by_cameras: NDArray[np.bool_]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every claim held."""
+        return not self.failures
+
+    def in_target(self) -> tuple[AuditSamples, NDArray[np.bool_]]:
+        """Return the samples of the target, all of one weight, and their prediction."""
+        inside = self.samples.in_target
+        return self.samples.take(inside), self.predicted[inside]
+
+
+def audit_plan(
+    plan: RigPlan,
+    *,
+    seed: int = DEFAULT_SEED,
+    n_samples: int = 20_000,
+    threads: int = 2,
+) -> Audit:
+    """Recompute every claim of a plan from its document and its surface alone.
+
+    Nothing of the planner, its visibility or its measurability is used: samples,
+    projection, ring normal, ray derivative and occlusion are the audit's own.
+
+    Args:
+        plan: The plan, as written.
+        seed: Of the audit's samples; not the planner's.
+        n_samples: Number of samples.
+        threads: Worker threads of the ray caster; the result doesn't depend on them.
+
+    Raises:
+        PlanFileError: If the plan is broken, so that its claims have no meaning.
+    """
+    _require_whole(plan)
+    ledger = Ledger(plan.document)
+    target = plan.requirements.target
+    samples = draw_samples(plan.surface, target, n_samples, seed)
+    shadow = Shadow(plan.surface.mesh, threads=threads)
+    own = recompute(plan, samples, shadow)
+    reach = reach_of(plan, own, shadow, seed)
+    estimator = _estimator(plan, samples, ledger)
+    audit_devices(plan, ledger)
+    audit_workspace(plan, ledger)
+    audit_areas(own, reach, estimator, ledger)
+    audit_causes(own, reach, estimator, ledger)
+    audit_contributions(plan, own, estimator, ledger)
+    audit_serving(plan, own, estimator, shadow, ledger)
+    audit_marginal(own, estimator, ledger)
+    audit_certificates(plan, own, estimator, ledger)
+    audit_baselines(plan, ledger)
+    audit_rest(plan, ledger)
+    return _result(plan, own, reach, estimator, ledger)
+
+
+def _result(
+    plan: RigPlan, own: Recomputed, reach: Reach, estimator: Estimator, ledger: Ledger
+) -> Audit:
+    return Audit(
+        failures=ledger.failures,
+        unmet=unmet_requirements(plan),
+        areas=recomputed_areas(own, reach, estimator),
+        samples=own.samples,
+        lit=own.lit,
+        predicted=own.measured,
+        reachable_by_projectors=reach.projectors,
+        reachable_by_cameras=reach.cameras,
+    )
+
+
+def _estimator(plan: RigPlan, samples: AuditSamples, ledger: Ledger) -> Estimator:
+    claimed = as_number(ledger.read("coverage", "samples"))
+    ledger.holds(
+        claimed is not None and claimed >= 1,
+        "coverage.samples",
+        f"{ledger.read('coverage', 'samples')!r} must be the number of samples",
+    )
+    areas = plan.surface.mesh.face_areas
+    inside = plan.surface.target_faces(plan.requirements.target)
+    return Estimator(
+        samples, int(claimed or 0), float(areas.sum()), float(areas[inside].sum())
+    )
+
+
+def _require_whole(plan: RigPlan) -> None:
+    """Refuse a plan whose parts can't be read, so that no claim of it has a meaning."""
+    try:
+        pattern = plan.requirements.pattern
+        _ = plan.projectors, plan.cameras
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise PlanFileError(
+            f"broken plan ({type(error).__name__}: {error}); plan again"
+        ) from None
+    if pattern != "rings":
+        raise PlanFileError(
+            f"requirements.pattern is {pattern!r}; only 'rings' can be audited"
+        )
+    _require_shapes(plan.surface)
+
+
+def _require_shapes(surface: Surface) -> None:
+    for name in ("reference_projectors", "reference_rings", "reference_cameras"):
+        poses = getattr(surface, name)
+        whole = poses.ndim == 3 and poses.shape[1:] == (4, 4)
+        if not (whole and np.all(np.isfinite(poses))):
+            raise PlanFileError(
+                f"surface.npz: {name} must be (n, 4, 4) finite numbers, "
+                f"got {poses.shape}; plan again"
+            )
+    if surface.reference_rings.shape != surface.reference_projectors.shape:
+        raise PlanFileError(
+            f"surface.npz: {len(surface.reference_rings)} reference_rings for "
+            f"{len(surface.reference_projectors)} reference_projectors; plan again"
+        )
+    n = len(surface.mesh.faces)
+    if surface.steep.shape != (n, 3) or not np.all(np.isfinite(surface.steep)):
+        raise PlanFileError(
+            f"surface.npz: steep must be ({n}, 3) finite numbers, plan again"
+        )

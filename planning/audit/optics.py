@@ -1,0 +1,110 @@
+"""Projection, lens distortion and ring coordinate, written anew for the audit.
+
+Where the maker of a plan differentiates by hand, this module differentiates its own
+projection numerically: an error of sign or of order shows as a difference of areas.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
+
+_STEP = 1e-5
+
+
+def in_frame(
+    world_from_frame: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return world points (n, 3) in a frame: R^T (P - t)."""
+    return (points - world_from_frame[:3, 3]) @ world_from_frame[:3, :3]
+
+
+def in_world(
+    world_from_frame: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return directions (n, 3) of a frame in the world: R d."""
+    return directions @ world_from_frame[:3, :3].T
+
+
+def pixels_of(device: PinholeModel, local: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where points in front of a device appear, (n, 3) to (n, 2) [px].
+
+    OpenCV's model: x' = x/z, s = x'^2 + y'^2, radial factor 1 + k1 s + k2 s^2 + k3 s^3,
+    tangential p1, p2, then K.
+    """
+    k1, k2, p1, p2, k3 = device.distortion
+    x = local[:, 0] / local[:, 2]
+    y = local[:, 1] / local[:, 2]
+    s = x**2 + y**2
+    radial = 1 + k1 * s + k2 * s**2 + k3 * s**3
+    bent_x = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x**2)
+    bent_y = y * radial + p1 * (s + 2 * y**2) + 2 * p2 * x * y
+    (fx, skew, cx), (_, fy, cy) = device.camera_matrix[:2]
+    return np.column_stack([fx * bent_x + skew * bent_y + cx, fy * bent_y + cy])
+
+
+def in_image(
+    resolution: tuple[int, int], pixels: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return whether pixels (n, 2) lie inside the image; pixel centres are integers."""
+    width, height = resolution
+    u, v = pixels[:, 0], pixels[:, 1]
+    return (u >= -0.5) & (u <= width - 0.5) & (v >= -0.5) & (v <= height - 0.5)
+
+
+def pixel_gradient(
+    device: PinholeModel, local: NDArray[np.float64], across: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return g = J_r^T v for vectors v across the viewing rays.
+
+    The image shifts by A = d pixel / d(turn of the ray about the optical centre) along
+    two directions e1, e2 perpendicular to the ray r, taken by central differences; then
+    J_r = E A^-1 with E = [e1 e2], and g = A^-T E^T v.
+
+    Args:
+        device: The camera.
+        local: Points in its frame in [m], shape (n, 3).
+        across: Vectors v in its frame, perpendicular to the rays, shape (n, 3).
+
+    Returns:
+        g in [1/px], shape (n, 2).
+    """
+    r = local / np.linalg.norm(local, axis=1, keepdims=True)
+    spare = np.where(np.abs(r[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    e1 = np.cross(r, spare)
+    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    e2 = np.cross(r, e1)
+    a, b = (
+        (pixels_of(device, r + _STEP * e) - pixels_of(device, r - _STEP * e))
+        / (2 * _STEP)
+        for e in (e1, e2)
+    )
+    determinant = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    p = np.einsum("ij,ij->i", e1, across)
+    q = np.einsum("ij,ij->i", e2, across)
+    g_u = (p * b[:, 1] - q * a[:, 1]) / determinant
+    g_v = (q * a[:, 0] - p * b[:, 0]) / determinant
+    return np.column_stack([g_u, g_v])
+
+
+def ring_coordinate(ring: NDArray[np.float64], diverging: bool) -> NDArray[np.float64]:
+    """Return the coordinate c that is constant on each ring surface, (n, 3) to (n,).
+
+    c = sqrt(x^2 + y^2) for cylinders (parallel light), divided by z for cones.
+    """
+    radius = np.hypot(ring[:, 0], ring[:, 1])
+    return radius / ring[:, 2] if diverging else radius
+
+
+def ring_gradient(ring: NDArray[np.float64], diverging: bool) -> NDArray[np.float64]:
+    """Return the gradient of the ring coordinate in the ring frame, (n, 3) [1/m or 1].
+
+    The normal of the ring surface is m = grad c / |grad c|, and rings whose coordinates
+    differ by `gap` stand gap / |grad c| apart: both kinds of light in one rule.
+    """
+    radius = np.hypot(ring[:, 0], ring[:, 1])
+    outward = ring[:, :2] / radius[:, None]
+    if not diverging:
+        return np.column_stack([outward, np.zeros(len(ring))])
+    z = ring[:, 2]
+    return np.column_stack([outward / z[:, None], -radius / z**2])
