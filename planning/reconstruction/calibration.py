@@ -61,7 +61,7 @@ class CameraCalibration:
     def rays(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return unit viewing directions (n, 3) in the world of pixels (n, 2).
 
-        The lens is inverted by the fixed point of ``p = (q - tangential(p)) / radial(p)``.
+        The lens is inverted by the fixed point ``p = (q - tangential(p)) / radial(p)``;
         NaN where that doesn't settle: no point of the scene is imaged there.
         """
         matrix = self.matrix
@@ -123,7 +123,7 @@ class ProjectorCalibration:
             where panel coordinates are (x/z, y/z); for parallel light, where they are
             (x, y) in [m], 1 / pixel pitch on the diagonal.
         resolution: Width and height in [px].
-        beam_radius: Radius of a parallel beam about the device's axis in [m]; None: none.
+        beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
     """
 
     id: str

@@ -13,7 +13,7 @@ from scipy.special import erfinv
 
 from .calibration import PairCalibration
 from .cloud import Cloud
-from .patterns import Frames, RingPatterns
+from .patterns import Frames, Images, RingPatterns
 from .triangulate import intersect_rings
 
 _MIN_CONTRAST = 10.0
@@ -151,9 +151,7 @@ class _Reader:
         sure: Pixels whose every bit stands out.
     """
 
-    def __init__(
-        self, stack: NDArray[np.uint8] | NDArray[np.float32], patterns: RingPatterns
-    ) -> None:
+    def __init__(self, stack: Images, patterns: RingPatterns) -> None:
         self._stack = stack
         self.patterns = patterns
         white, black = stack[0].astype(np.float32), stack[1].astype(np.float32)

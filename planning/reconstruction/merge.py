@@ -15,7 +15,7 @@ from .cloud import Cloud
 # Edges are compared within tiles of the image about one ring pitch wide.
 _MIN_TILE_PX, _MAX_TILE_PX = 6, 64
 _MIN_POINTS = 12
-# A plane fit counts as one if the points spread in two directions, this unevenly at most.
+# A plane is one if the points spread in two directions, at most this unevenly.
 _MIN_SPREAD = 0.02
 # A projector may stand for another in a tile if it measured this share as many points.
 _MIN_SUPPORT = 0.4
@@ -69,7 +69,7 @@ class _Tiles:
 
     @classmethod
     def of(cls, pixels: NDArray[np.float64], side: int) -> "_Tiles":
-        """Lay tiles over the points; one row and column of empty ones surrounds them."""
+        """Lay tiles over the points, with one row and column of empty ones around."""
         place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
         columns, rows = (place.max(axis=0) + 2).tolist()
         return cls(place[:, 1] * columns + place[:, 0], (rows, columns))

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from .calibration import CameraCalibration, ProjectorCalibration
 
+Images = NDArray[np.uint8 | np.float32]
+
 
 @dataclass(frozen=True, eq=False)
 class RingPatterns:
@@ -104,7 +106,7 @@ class Frames:
         corner: Pixel (u, v) of the stack's top-left pixel in the camera's image.
     """
 
-    stack: NDArray[np.uint8] | NDArray[np.float32]
+    stack: Images
     corner: tuple[int, int]
 
 

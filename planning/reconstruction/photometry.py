@@ -60,7 +60,7 @@ class Photometry:
 
     def capture(
         self, grey: NDArray[np.float32], key: tuple[int, ...], gain: float
-    ) -> NDArray[np.float32] | NDArray[np.uint8]:
+    ) -> NDArray[np.uint8 | np.float32]:
         """Return what the sensor reports of an image.
 
         Shot noise and read noise, ``var = 255 grey / full_well + read_noise^2`` in grey

@@ -10,7 +10,7 @@ from geometry.mesh import TriangleMesh
 from geometry.rays import RayCaster
 
 from .calibration import CameraCalibration, ProjectorCalibration
-from .patterns import Frames, RingPatterns, ring_plane
+from .patterns import Frames, Images, RingPatterns, ring_plane
 from .photometry import Photometry
 
 _MARGIN_PX = 6
@@ -201,7 +201,7 @@ def render_pair(
     ]
     parts.append(seen.image(light.white * light.root, light.samples))
     kind = np.uint8 if photometry.noisy else np.float32
-    stack = np.empty((patterns.n_frames, *seen.shape), dtype=kind)
+    stack: Images = np.empty((patterns.n_frames, *seen.shape), dtype=kind)
     stack[0] = photometry.capture(white + ambient, (*seed, 0), gain)
     stack[1] = photometry.capture(ambient, (*seed, 1), gain)
     for index, part in enumerate(parts):
@@ -218,7 +218,8 @@ def _level(bright: NDArray[np.float32], light: _Light) -> NDArray[np.float32]:
     inwards = np.concatenate([bright[:1], bright[:-1]]) - bright
     outwards = np.concatenate([bright[1:], bright[-1:]]) - bright
     k = light.annulus
-    return bright[k] + inwards[k] * light.inner + outwards[k] * light.outer
+    level = bright[k] + inwards[k] * light.inner + outwards[k] * light.outer
+    return level.astype(np.float32, copy=False)
 
 
 def _shine(

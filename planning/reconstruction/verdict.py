@@ -1,4 +1,4 @@
-"""Measured points against the mesh, and both against the limits that the plan states."""
+"""Measured points against the mesh, judged by the limits that the plan states."""
 
 from dataclasses import dataclass
 
@@ -75,21 +75,32 @@ def measure_accuracy(cloud: Cloud, mesh: TriangleMesh, *, threads: int) -> Accur
     return Accuracy(nearest.distances, nearest.faces)
 
 
-def nearest_distance(cloud: Cloud, samples: SurfaceSamples) -> NDArray[np.float64]:
+def nearest_distance(
+    cloud: Cloud, samples: SurfaceSamples, reach_m: float
+) -> NDArray[np.float64]:
     """Return the distance from each sample to a point measured from its own side.
 
     A point counts if its viewing ray r meets the sample's normal with r.N < 0: on a
     thin shell points of the other side are near, too. Each camera's nearest point is
     tried.
 
+    Args:
+        cloud: Measured points.
+        samples: Of the surface.
+        reach_m: Points farther away aren't looked for [m].
+
     Returns:
-        In [m], inf where there is no such point, shape (n_samples,).
+        In [m], inf where there is no such point within reach, shape (n_samples,).
     """
     best = np.full(len(samples), np.inf)
     for camera in np.unique(cloud.camera):
         own = cloud.camera == camera
-        distance, nearest = KDTree(cloud.points[own]).query(samples.points)
-        facing = np.einsum("ij,ij->i", cloud.rays[own][nearest], samples.normals) < 0.0
+        distance, nearest = KDTree(cloud.points[own]).query(
+            samples.points, distance_upper_bound=reach_m
+        )
+        # Where nothing is in reach the index is one past the last point.
+        rays = np.concatenate([cloud.rays[own], np.zeros((1, 3))])[nearest]
+        facing = np.einsum("ij,ij->i", rays, samples.normals) < 0.0
         best = np.where(facing, np.minimum(best, distance), best)
     return best
 
@@ -112,9 +123,10 @@ def measure_completeness(
     """
     claimed = np.ones(len(samples), dtype=bool) if predicted is None else predicted
     thresholds = (0.5 * tau_m, tau_m, 2.0 * tau_m)
-    kept = nearest_distance(merged, samples.take(claimed))
+    reach = 2.01 * tau_m
+    kept = nearest_distance(merged, samples.take(claimed), reach)
     fractions = [_share(kept <= threshold) for threshold in thresholds]
-    missing = claimed & ~(nearest_distance(everything, samples) <= tau_m)
+    missing = claimed & ~(nearest_distance(everything, samples, reach) <= tau_m)
     return Completeness(
         thresholds,
         (fractions[0], fractions[1], fractions[2]),
@@ -184,7 +196,9 @@ def likely_cause(
             f"elsewhere"
         )
     if accuracy.rms_m <= limits.max_rms_m and accuracy.p95_m <= limits.max_p95_m:
-        return "the measured points are accurate: surface that the plan counts on is missed"
+        return (
+            "what was measured is accurate, but surface that the plan counts on is not"
+        )
     guilty = _guilty_device(cloud, accuracy, projectors, cameras)
     if guilty is not None:
         return guilty
