@@ -12,7 +12,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from planning.errors import InfeasibleLimitsError, InputError, RigError
 from planning.requirements import Requirements
 from planning.rig import list_presets, load_rig
-from planning.rig_files import preset_names, read_rig
+from planning.rig_files import lay_over, preset_names, read_rig
 from planning.rig_models import RigTable
 
 MINIMAL = """
@@ -611,3 +611,33 @@ def test_documentation_names_every_key():
             ]
             tables += inner
             assert inner or f"`{name}`" in page or name == "sources", name
+
+
+def test_tables_are_laid_over_key_by_key():
+    base = {
+        "rings": {"tilt_deg": 8.0, "gap_mm": 3.0},
+        "camera": {
+            "name": "a",
+            "throw_ratio": 1.5,
+            "focus": {"f_number": 2.0, "blur_px": 1.0},
+            "sources": {"throw_ratio": "read", "focus.f_number": "read", "focus": "x"},
+        },
+    }
+    before = json.dumps(base)
+    merged = lay_over(
+        base,
+        {
+            "rings": {"gap_mm": 4.0},
+            "camera": {"focal_mm": 9.0, "focus": {"f_number": 4.0}},
+        },
+    )
+    assert merged == {
+        "rings": {"tilt_deg": 8.0, "gap_mm": 4.0},
+        "camera": {
+            "name": "a",
+            "focal_mm": 9.0,
+            "focus": {"f_number": 4.0, "blur_px": 1.0},
+            "sources": {"focus": "x"},
+        },
+    }
+    assert json.dumps(base) == before
