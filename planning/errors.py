@@ -56,3 +56,17 @@ class TimeLimitError(PlanningError):
     """The time limit came before any plan."""
 
     exit_code = 5
+
+
+class InterruptedPlanError(PlanningError):
+    """The run was interrupted after a first plan stood.
+
+    Attributes:
+        plan: The best plan so far, marked `truncated`.
+    """
+
+    exit_code = 130
+
+    def __init__(self, plan: RigPlan) -> None:
+        super().__init__("interrupted; the best plan so far is kept")
+        self.plan = plan

@@ -1,9 +1,10 @@
 """The surface as planned: what every claim in a plan speaks about."""
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
 from zipfile import BadZipFile
 
 import numpy as np
@@ -58,19 +59,24 @@ class Surface:
         """Return whether each face is in the target, `dominant` or `surface`."""
         return self.in_dominant if target == "dominant" else np.ones_like(self.in_dominant)
 
-    def save(self, path: Path) -> str:
-        """Write `surface.npz`, byte for byte the same for equal values; its SHA-256."""
-        arrays = {
-            "vertices": self.mesh.vertices,
-            "faces": self.mesh.faces,
+    def save(self, path: Path) -> None:
+        """Write `surface.npz`, byte for byte the same for equal values."""
+        write_atomically(path, lambda file: file.write(self._bytes))
+
+    def sha256(self) -> str:
+        """Return the digest of the file that `save` writes."""
+        return hashlib.sha256(self._bytes).hexdigest()
+
+    @cached_property
+    def _bytes(self) -> bytes:
+        buffer = BytesIO()
+        np.savez_compressed(
+            buffer,
+            vertices=self.mesh.vertices,
+            faces=self.mesh.faces,
             **{name: getattr(self, name) for name in _ARRAYS[2:]},
-        }
-
-        def write(file: BinaryIO) -> None:
-            np.savez_compressed(file, **arrays)
-
-        write_atomically(path, write)
-        return sha256_of(path)
+        )
+        return buffer.getvalue()
 
     @classmethod
     def load(cls, path: Path) -> "Surface":

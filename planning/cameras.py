@@ -1,0 +1,190 @@
+"""Section VI of the paper: the fewest cameras that measure what the projectors light."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import lighting, measurability
+from .candidates import camera_candidates
+from .errors import InfeasibleLimitsError
+from .lighting import Light, Target
+from .measurability import Rings
+from .plan import PlannedCamera, PlannedProjector
+from .projectors import merged
+from .scene import Scene
+from .selection import certificate, select_fewest
+
+_ROWS = 2000
+_CHECK_ROWS = 4000
+_ROUNDS = 3
+_STREAM = 200
+
+
+@dataclass(frozen=True, eq=False)
+class LitSamples:
+    """Samples with the light of every projector of the plan on them.
+
+    Attributes:
+        target: The samples that at least one projector lights.
+        lit: Which projector lights which, shape (n, n_projectors).
+        lights: Light of each projector.
+        rings: Ring surfaces of each projector.
+    """
+
+    target: Target
+    lit: NDArray[np.bool_]
+    lights: tuple[Light, ...]
+    rings: tuple[Rings, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CameraStage:
+    """What the camera stage found; the attributes are those of `ProjectorStage`."""
+
+    cameras: tuple[PlannedCamera, ...]
+    reference: tuple[PlannedCamera, ...]
+    rows: LitSamples
+    by_count: dict[int, tuple[PlannedCamera, ...]]
+    certificate: dict[str, Any]
+
+
+def lit_samples(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> LitSamples:
+    """Return the samples that the projectors light, with their light and rings."""
+    lit = np.stack(
+        [
+            lighting.first_failure(
+                projector, target, scene.requirements.projector, scene.visibility
+            )
+            == lighting.LIT
+            for projector in projectors
+        ],
+        axis=1,
+    )
+    kept = target.take(lit.any(axis=1))
+    return LitSamples(
+        kept,
+        lit[lit.any(axis=1)],
+        tuple(lighting.light_on(projector, kept) for projector in projectors),
+        rings_of(projectors, kept),
+    )
+
+
+def rings_of(
+    projectors: Sequence[PlannedProjector], target: Target
+) -> tuple[Rings, ...]:
+    """Return the ring surfaces of every projector at samples."""
+    points = target.samples.points
+    return tuple(measurability.rings_at(projector, points) for projector in projectors)
+
+
+def measured_by(
+    scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
+) -> NDArray[np.bool_]:
+    """Return which camera measures which sample with any projector, (n, n_cameras)."""
+    return np.stack([_measured(scene, camera, rows) for camera in cameras], axis=1)
+
+
+def plan_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    template: PlannedCamera,
+    n_candidates: int,
+) -> CameraStage:
+    """Choose the fewest cameras that measure the required share of what is lit.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with their rings.
+        template: Optics of the camera.
+        n_candidates: Poses offered.
+
+    Raises:
+        InfeasibleLimitsError: If no candidate measures any lit sample.
+    """
+    required = scene.requirements
+    candidates = camera_candidates(template, required.workspace, n_candidates)
+    target = scene.target_samples(_ROWS, _STREAM)
+    rows = lit_samples(scene, projectors, target)
+    measured = measured_by(scene, candidates, rows)
+    if not measured.any():
+        raise InfeasibleLimitsError(
+            f"no camera of {len(candidates)} poses measures any lit sample: range, "
+            f"field, incidence, conditioning, sigma and pitch exclude each other; "
+            f"relax the first of {_failing(scene, candidates, rows)}"
+        )
+    for attempt in range(1, _ROUNDS + 1):
+        selection = select_fewest(
+            measured, required.coverage, max_count=required.max_cameras, seed=scene.seed
+        )
+        fresh_target = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
+        fresh = lit_samples(scene, projectors, fresh_target)
+        seen = measured_by(scene, candidates, fresh)
+        covered = seen[:, selection.chosen].any(axis=1).sum()
+        if (
+            selection.status == "infeasible"
+            or covered >= required.coverage * seen.any(axis=1).sum()
+        ):
+            break
+        target = merged(target, fresh_target)
+        rows = lit_samples(scene, projectors, target)
+        measured = np.concatenate([measured, seen])
+    return CameraStage(
+        tuple(candidates[i] for i in selection.chosen),
+        candidates,
+        rows,
+        {
+            count: tuple(candidates[i] for i in chosen)
+            for count, chosen in selection.by_count.items()
+        },
+        certificate(
+            selection, len(rows.target), target.samples.weight, len(candidates)
+        ),
+    )
+
+
+def _measured(
+    scene: Scene, camera: PlannedCamera, rows: LitSamples
+) -> NDArray[np.bool_]:
+    """Whether a camera measures each sample; rays come last, as they cost most."""
+    required = scene.requirements
+    seen = measurability.view(camera, rows.target, required.camera, None)
+    wanted = np.zeros(len(rows.target), dtype=bool)
+    normals = rows.target.samples.normals
+    for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
+        open_pairs = np.flatnonzero(
+            (seen.stage == measurability.SEEN) & rows.lit[:, p] & ~wanted
+        )
+        quality = measurability.pair_quality(
+            normals[open_pairs],
+            light.take(open_pairs),
+            rings.take(open_pairs),
+            seen.take(open_pairs),
+            required.triangulation,
+        )
+        stage = measurability.first_pair_failure(quality, required.triangulation)
+        wanted[open_pairs[stage == measurability.MEASURED]] = True
+    tested = np.flatnonzero(wanted)
+    points = rows.target.samples.points[tested]
+    blocked = scene.visibility.blocked(camera.world_from_device[:3, 3], points)
+    wanted[tested[blocked]] = False
+    return wanted
+
+
+def _failing(
+    scene: Scene, candidates: Sequence[PlannedCamera], rows: LitSamples
+) -> str:
+    counts = np.zeros(measurability.SEEN, dtype=np.int64)
+    for camera in candidates:
+        stage = measurability.view(
+            camera, rows.target, scene.requirements.camera, scene.visibility
+        ).stage
+        counts += np.bincount(stage, minlength=measurability.SEEN + 1)[:-1]
+    if not counts.any():
+        return ", ".join(measurability.PAIR_CAUSES)
+    order = np.argsort(-counts, kind="stable")
+    return ", ".join(measurability.SEEN_CAUSES[i] for i in order if counts[i])

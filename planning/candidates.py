@@ -1,0 +1,151 @@
+"""Poses offered to the cover programs: spread evenly over the workspace, aimed at it."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import ParallelModel, PinholeModel
+from geometry.poses import fibonacci_cap, look_at
+
+from .plan import PlannedCamera, PlannedProjector
+from .requirements import Workspace
+from .rings import ring_frame
+
+_QUARTER = float(np.pi / 2)
+
+
+def shell_positions(
+    workspace: Workspace, radius_m: tuple[float, float], n: int
+) -> NDArray[np.float64]:
+    """Return at least n admissible positions in the middle of the shell, (m, 3).
+
+    Where a floor cuts the cone, the lattice is refined until n positions are left, so
+    that a small workspace is searched as densely as a large one is.
+
+    Args:
+        workspace: The shell or cone.
+        radius_m: Least and largest distance of this kind of device.
+        n: Positions wanted.
+    """
+    radius = 0.5 * (radius_m[0] + radius_m[1])
+    centre = np.array(workspace.centre)
+    offered = n
+    for _ in range(8):
+        directions = fibonacci_cap(
+            offered, np.array(workspace.axis), workspace.half_angle
+        )
+        height = radius * (directions @ np.array(workspace.up))
+        keep = (
+            np.ones(offered, dtype=bool)
+            if workspace.floor_m is None
+            else height >= workspace.floor_m
+        )
+        if keep.sum() >= n or not keep.any():
+            break
+        offered = int(np.ceil(1.1 * offered * n / keep.sum()))
+    return centre + radius * directions[keep]
+
+
+def aimed_poses(
+    positions: NDArray[np.float64],
+    aim: NDArray[np.float64],
+    up: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    *,
+    roll: float = 0.0,
+) -> NDArray[np.float64]:
+    """Return ``world_from_device`` with the middle of the image on the aim, (n, 4, 4).
+
+    With lens shift the middle of the image is off the optical axis, so the device is
+    turned against its line of sight by that angle.
+    """
+    world_from_aim = look_at(positions, aim, up, roll=roll)
+    return world_from_aim @ _aim_from_device(device)
+
+
+def rolls_for(
+    device: PinholeModel | ParallelModel, object_radius: float, distance: float
+) -> tuple[float, ...]:
+    """Return the rolls worth offering: upright; on its side too if the object overflows.
+
+    Args:
+        device: Optics.
+        object_radius: Radius of the sphere that holds the object [m].
+        distance: From the device to the centre of that sphere [m].
+    """
+    if isinstance(device, ParallelModel):
+        half = float(device.half_panel.min())
+        return (0.0,) if object_radius <= half else (0.0, _QUARTER)
+    width, height = device.resolution
+    edges = np.array([[-0.5, (height - 1) / 2], [(width - 1) / 2, -0.5]])
+    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
+    half_angle = np.arccos(np.clip(device.rays(edges) @ middle, -1.0, 1.0)).min()
+    fits = object_radius < distance and np.arcsin(object_radius / distance) <= half_angle
+    return (0.0,) if fits else (0.0, _QUARTER)
+
+
+def projector_candidates(
+    template: PlannedProjector,
+    workspace: Workspace,
+    n: int,
+    *,
+    ring_offset: tuple[float, float],
+) -> tuple[PlannedProjector, ...]:
+    """Return projector candidates over the whole workspace.
+
+    Args:
+        template: Optics, light and rings; its poses are replaced.
+        workspace: Where devices may stand.
+        n: Candidates wanted, at least.
+        ring_offset: Tilt and azimuth of the ring axis, as `ring_frame` takes them.
+    """
+    poses = _poses(
+        template.device, workspace, workspace.projector_radius_m, n
+    )
+    return tuple(
+        replace(
+            template,
+            world_from_device=pose,
+            world_from_ring=ring_frame(pose, template.device, *ring_offset),
+        )
+        for pose in poses
+    )
+
+
+def camera_candidates(
+    template: PlannedCamera, workspace: Workspace, n: int
+) -> tuple[PlannedCamera, ...]:
+    """Return camera candidates over the whole workspace, at least n."""
+    poses = _poses(template.device, workspace, workspace.camera_radius_m, n)
+    return tuple(replace(template, world_from_device=pose) for pose in poses)
+
+
+def _poses(
+    device: PinholeModel | ParallelModel,
+    workspace: Workspace,
+    radius_m: tuple[float, float],
+    n: int,
+) -> NDArray[np.float64]:
+    distance = 0.5 * (radius_m[0] + radius_m[1])
+    rolls = rolls_for(device, workspace.object_radius_m, distance)
+    positions = shell_positions(workspace, radius_m, -(-n // len(rolls)))
+    centre, up = np.array(workspace.centre), np.array(workspace.up)
+    return np.concatenate(
+        [aimed_poses(positions, centre, up, device, roll=roll) for roll in rolls]
+    )
+
+
+def _aim_from_device(device: PinholeModel | ParallelModel) -> NDArray[np.float64]:
+    pose = np.eye(4)
+    if isinstance(device, ParallelModel):
+        return pose
+    width, height = device.resolution
+    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
+    # Smallest rotation that takes the middle ray onto +z (Rodrigues).
+    axis = np.cross(middle, [0.0, 0.0, 1.0])
+    skew = np.array(
+        [[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]]
+    )
+    pose[:3, :3] += skew + skew @ skew / (1.0 + middle[2])
+    return pose

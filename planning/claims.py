@@ -1,0 +1,297 @@
+"""What a plan may claim: areas recomputed from its poses on samples never used before."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import lighting, measurability
+from .cameras import LitSamples, lit_samples, measured_by
+from .lighting import Target
+from .plan import PlannedCamera, PlannedProjector
+from .scene import Scene
+
+N_SAMPLES = 12_000
+_TARGET_STREAM = 900
+_SURFACE_STREAM = 901
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """The devices of a plan and the reference sets that reachability refers to."""
+
+    projectors: tuple[PlannedProjector, ...]
+    cameras: tuple[PlannedCamera, ...]
+    reference_projectors: tuple[PlannedProjector, ...]
+    reference_cameras: tuple[PlannedCamera, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Areas:
+    """The five areas that belong together, in [m²]."""
+
+    area_m2: float
+    reachable_by_projectors_m2: float
+    lit_m2: float
+    reachable_by_cameras_m2: float
+    measured_m2: float
+
+    def to_document(self) -> dict[str, float]:
+        """Return plain JSON values."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True, eq=False)
+class Claims:
+    """All that a plan claims about areas.
+
+    Attributes:
+        surface: Areas of the whole surface.
+        target: Areas of the target.
+        uncovered_by_cause: Target area that isn't measured, by cause [m²].
+        unreachable_by_cause: Target area that no reference projector lights [m²].
+        lit_area_m2: Target area that each projector lights.
+        min_margin_rad: Least margin over what each projector serves.
+        seen_area_m2: Target area that each camera measures.
+        sole_area_m2: Target area that only this camera measures.
+        regions: `lit_by` and `lit_fraction` of each region.
+        target_samples: The samples behind the target's figures.
+        measured_by: Which camera measures which of those, (n, n_cameras).
+    """
+
+    surface: Areas
+    target: Areas
+    uncovered_by_cause: dict[str, float]
+    unreachable_by_cause: dict[str, float]
+    lit_area_m2: tuple[float, ...]
+    min_margin_rad: tuple[float, ...]
+    seen_area_m2: tuple[float, ...]
+    sole_area_m2: tuple[float, ...]
+    regions: tuple[dict[str, Any], ...]
+    target_samples: Target
+    measured_by: NDArray[np.bool_]
+
+
+def make_claims(scene: Scene, rig: Rig) -> Claims:
+    """Recompute every area from poses as they will be written."""
+    target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
+    weight = target.samples.weight
+    stages = _light_stages(scene, rig.projectors, target)
+    lit = stages == lighting.LIT
+    seen = _measured_by(scene, rig, target, lit)
+    measured = seen.any(axis=1)
+    reachable, furthest = _reachable_by_projectors(scene, rig, target, lit.any(axis=1))
+    areas = _areas(scene, rig, target, reachable, lit, measured)
+    served = lighting.served_by(lit, _margins(scene, rig.projectors, target))
+    return Claims(
+        _surface_areas(scene, rig),
+        areas,
+        _by_cause(_uncovered(scene, rig, target, stages, measured), weight),
+        _by_cause(
+            [lighting.CAUSES[stage] for stage in furthest[~reachable]], weight
+        ),
+        tuple(weight * lit.sum(axis=0)),
+        _least_margins(scene, rig, target, served),
+        tuple(weight * seen.sum(axis=0)),
+        tuple(weight * (seen & (seen.sum(axis=1) == 1)[:, None]).sum(axis=0)),
+        _regions(scene, rig, target, lit, served),
+        target,
+        seen,
+    )
+
+
+def lit_area(
+    scene: Scene, projectors: Sequence[PlannedProjector]
+) -> tuple[float, float]:
+    """Return the area of target and surface that projectors light, in [m²]."""
+    return _union(scene, lambda target: _lit(scene, projectors, target))
+
+
+def measured_area(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+) -> tuple[float, float]:
+    """Return the area of target and surface that a rig measures, in [m²]."""
+
+    def measured(target: Target) -> NDArray[np.bool_]:
+        rows = lit_samples(scene, projectors, target)
+        return measured_by(scene, cameras, rows).any(axis=1)
+
+    return _union(scene, measured)
+
+
+def _union(scene: Scene, covered: Any) -> tuple[float, float]:  # noqa: ANN401
+    sets = (
+        scene.target_samples(N_SAMPLES, _TARGET_STREAM),
+        scene.surface_samples(N_SAMPLES, _SURFACE_STREAM),
+    )
+    a, b = (float(s.samples.weight * covered(s).sum()) for s in sets)
+    return a, b
+
+
+def _surface_areas(scene: Scene, rig: Rig) -> Areas:
+    surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
+    lit = _light_stages(scene, rig.projectors, surface) == lighting.LIT
+    measured = _measured_by(scene, rig, surface, lit).any(axis=1)
+    reachable, _ = _reachable_by_projectors(scene, rig, surface, lit.any(axis=1))
+    return _areas(scene, rig, surface, reachable, lit, measured)
+
+
+def _areas(
+    scene: Scene,
+    rig: Rig,
+    target: Target,
+    reachable: NDArray[np.bool_],
+    lit: NDArray[np.bool_],
+    measured: NDArray[np.bool_],
+) -> Areas:
+    weight = target.samples.weight
+    by_cameras = measured.copy()
+    for camera in rig.reference_cameras:
+        left = np.flatnonzero(lit.any(axis=1) & ~by_cameras)
+        if not len(left):
+            break
+        rows = _lit_rows(rig.projectors, target.take(left), lit[left])
+        by_cameras[left] = measured_by(scene, [camera], rows)[:, 0]
+    counts = (
+        len(target),
+        reachable.sum(),
+        lit.any(axis=1).sum(),
+        by_cameras.sum(),
+        measured.sum(),
+    )
+    return Areas(*(float(weight * count) for count in counts))
+
+
+def _light_stages(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.int8]:
+    limits, visibility = scene.requirements.projector, scene.visibility
+    return np.stack(
+        [lighting.first_failure(p, target, limits, visibility) for p in projectors],
+        axis=1,
+    )
+
+
+def _lit(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.bool_]:
+    return (_light_stages(scene, projectors, target) == lighting.LIT).any(axis=1)
+
+
+def _lit_rows(
+    projectors: Sequence[PlannedProjector], target: Target, lit: NDArray[np.bool_]
+) -> LitSamples:
+    points = target.samples.points
+    return LitSamples(
+        target,
+        lit,
+        tuple(lighting.light_on(p, target) for p in projectors),
+        tuple(measurability.rings_at(p, points) for p in projectors),
+    )
+
+
+def _measured_by(
+    scene: Scene, rig: Rig, target: Target, lit: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    return measured_by(scene, rig.cameras, _lit_rows(rig.projectors, target, lit))
+
+
+def _reachable_by_projectors(
+    scene: Scene, rig: Rig, target: Target, lit: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
+    """Which samples some pose lights, and how far the others came over all poses."""
+    reachable = lit.copy()
+    furthest = np.zeros(len(target), dtype=np.int8)
+    for projector in rig.reference_projectors:
+        left = np.flatnonzero(~reachable)
+        if not len(left):
+            break
+        stage = lighting.first_failure(
+            projector, target.take(left), scene.requirements.projector, scene.visibility
+        )
+        reachable[left] = stage == lighting.LIT
+        furthest[left] = np.maximum(furthest[left], stage)
+    return reachable, furthest
+
+
+def _margins(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.float64]:
+    limits = scene.requirements.projector
+    return np.stack(
+        [lighting.margins(lighting.light_on(p, target), limits) for p in projectors],
+        axis=1,
+    )
+
+
+def _least_margins(
+    scene: Scene, rig: Rig, target: Target, served: NDArray[np.int64]
+) -> tuple[float, ...]:
+    margin = _margins(scene, rig.projectors, target)
+    return tuple(
+        float(margin[served == p, p].min()) if np.any(served == p) else 0.0
+        for p in range(len(rig.projectors))
+    )
+
+
+def _uncovered(
+    scene: Scene,
+    rig: Rig,
+    target: Target,
+    stages: NDArray[np.int8],
+    measured: NDArray[np.bool_],
+) -> list[str]:
+    """The cause of each sample that isn't measured."""
+    lit = stages == lighting.LIT
+    dark = ~lit.any(axis=1)
+    causes = [lighting.CAUSES[stage] for stage in stages[dark].max(axis=1)]
+    left = np.flatnonzero(lit.any(axis=1) & ~measured)
+    rows = _lit_rows(rig.projectors, target.take(left), lit[left])
+    furthest = np.zeros(len(left), dtype=np.int8)
+    required = scene.requirements
+    for camera in rig.cameras:
+        seen = measurability.view(
+            camera, rows.target, required.camera, scene.visibility
+        )
+        furthest = np.maximum(furthest, np.minimum(seen.stage, measurability.SEEN))
+        clear = np.flatnonzero(seen.stage == measurability.SEEN)
+        for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
+            pairs = clear[rows.lit[clear, p]]
+            quality = measurability.pair_quality(
+                rows.target.samples.normals[pairs],
+                light.take(pairs),
+                rings.take(pairs),
+                seen.take(pairs),
+                required.triangulation,
+            )
+            stage = measurability.first_pair_failure(quality, required.triangulation)
+            furthest[pairs] = np.maximum(furthest[pairs], stage)
+    return causes + [measurability.CAUSES[stage] for stage in furthest]
+
+
+def _by_cause(causes: list[str], weight: float) -> dict[str, float]:
+    order = lighting.CAUSES + measurability.CAUSES
+    return {c: weight * causes.count(c) for c in order if c in causes}
+
+
+def _regions(
+    scene: Scene,
+    rig: Rig,
+    target: Target,
+    lit: NDArray[np.bool_],
+    served: NDArray[np.int64],
+) -> tuple[dict[str, Any], ...]:
+    region = scene.region[target.samples.faces]
+    entries: list[dict[str, Any]] = []
+    for index in range(int(scene.region.max()) + 1):
+        inside = region == index
+        by = np.unique(served[inside & (served >= 0)])
+        share = float(lit[inside].any(axis=1).mean()) if inside.any() else 0.0
+        entries.append(
+            {"lit_by": [rig.projectors[p].id for p in by], "lit_fraction": share}
+        )
+    return tuple(entries)

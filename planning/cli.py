@@ -1,0 +1,209 @@
+"""The command line: `plan --mesh face.obj --max-projectors 3`, and its subcommands.
+
+Heavy packages are imported inside the commands, so that `plan --help` stays quick.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+_NOT_BUILT = {
+    "reconstruct": "simulates or reads captures, decodes, triangulates, merges",
+    "report": "writes one self-contained HTML file",
+    "export": "writes poses for OpenCV, COLMAP, glTF, Blender, ROS, USD, CSV",
+}
+
+
+class _DefaultGroup(click.Group):
+    """A group whose `rig` command runs when no subcommand is named."""
+
+    default = "rig"
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0].startswith("-") and args[0] not in ("--help", "--version"):
+            args = [self.default, *args]
+        return super().parse_args(ctx, args)
+
+    def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_help(ctx, formatter)
+        command = self.commands[self.default]
+        formatter.write_paragraph()
+        formatter.write_text("Options of `plan --mesh ...`:")
+        command.format_options(ctx, formatter)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [name for name in self.commands if name != self.default]
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            from difflib import get_close_matches
+
+            close = get_close_matches(args[0], self.list_commands(ctx), n=1)
+            if close:
+                error.message += f" Did you mean '{close[0]}'?"
+            raise
+
+
+@click.group(
+    cls=_DefaultGroup,
+    invoke_without_command=False,
+    context_settings={"help_option_names": ["--help", "-h"], "max_content_width": 100},
+)
+@click.version_option(package_name="ringrig", prog_name="plan")
+def main() -> None:
+    """Plan a structured-light scanner: how many projectors and cameras, and where.
+
+    \b
+    plan --mesh face.obj --max-projectors 3     plans, checks from pixels, writes ./face-plan/
+    plan verify face-plan/plan.json             recomputes every claim, then checks again
+
+    Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
+    4 nothing can be served, 5 time limit, 130 interrupted.
+    """
+
+
+@main.command("rig")
+@click.option("--mesh", "meshes", multiple=True, required=True, metavar="FILE",
+              help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.")
+@click.option("--max-projectors", type=click.IntRange(1), required=True, metavar="N",
+              help="Projectors at most.")
+@click.option("--max-cameras", type=click.IntRange(1), metavar="N",
+              help="Cameras at most [default: as many as needed].")
+@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in", "um"]),
+              help="Unit of a file that states none [default: mm].")
+@click.option("--size-mm", type=float, metavar="S",
+              help="Instead of --unit: longest side of the bounding box.")
+@click.option("--up", type=click.Choice(["x", "y", "z", "-x", "-y", "-z"]),
+              help="Axis that points up [default: z].")
+@click.option("--rig", "rig_name", default="default", show_default=True,
+              metavar="NAME|rig.toml", help="Devices and limits.")
+@click.option("--light", type=click.Choice(["diverging", "parallel"]),
+              help="A real projector, or the paper's collimated light [default: the rig's].")
+@click.option("--pattern", type=click.Choice(["rings", "dense", "none"]),
+              default="rings", show_default=True, help="What is projected.")
+@click.option("--target", type=click.Choice(["dominant", "surface"]),
+              default="dominant", show_default=True, help="What must be covered.")
+@click.option("--dominant-coverage", type=click.FloatRange(0, 1, min_open=True),
+              metavar="F", help="Lit share of the reachable target [default: 0.90].")
+@click.option("--coverage", type=click.FloatRange(0, 1, min_open=True), metavar="F",
+              help="Measured share of the reachable target [default: 0.95].")
+@click.option("--min-reachable", type=click.FloatRange(0, 1, min_open=True),
+              metavar="F", help="Share of the target that must be reachable [default: 0.90].")
+@click.option("--accuracy", "accuracy_mm", type=click.FloatRange(0, min_open=True),
+              metavar="MM", help="Largest standard deviation along the normal [default: 0.3].")
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="DIR",
+              help="Output folder [default: ./NAME-plan].")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
+              help="Of every random draw.")
+@click.option("--time-limit", type=click.FloatRange(0, min_open=True), metavar="S",
+              help="Cut the run after S seconds; the plan is marked truncated.")
+@click.option("--threads", type=click.IntRange(1), metavar="N",
+              help="Worker threads; no result depends on it [default: all cores].")
+@click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
+@click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option("--quiet", is_flag=True, help="No progress on stderr.")
+@click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
+def rig_command(**options: Any) -> None:  # noqa: ANN401
+    """Plan a rig for a mesh (the default command)."""
+    from .commands import plan_command
+
+    if options["unit"] and options["size_mm"] is not None:
+        raise click.UsageError("give --unit or --size-mm, not both")
+    if options["prove"]:
+        raise click.UsageError("--prove isn't built yet: bounds over all poses come later")
+    if options["pattern"] != "rings":
+        raise click.UsageError(f"--pattern {options['pattern']} isn't built yet: use rings")
+    if len(options["meshes"]) > 1 or Path(options["meshes"][0]).is_dir():
+        raise click.UsageError("several meshes on one rig aren't built yet: give one file")
+    _run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
+
+
+@main.command()
+@click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
+@click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE",
+              help="Also hold the plan's surface against this mesh, read anew.")
+@click.option("--truth", type=click.Path(path_type=Path), metavar="other-plan.json",
+              help="Render with the devices of another plan: what really stands there.")
+@click.option("--seed", type=click.IntRange(0), help="Of the audit [default: the plan's].")
+@click.option("--threads", type=click.IntRange(1), metavar="N", help="Worker threads.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option("--quiet", is_flag=True, help="No progress on stderr.")
+@click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
+def verify(**options: Any) -> None:  # noqa: ANN401
+    """Recompute every claim from the files alone, then check from pixels."""
+    from .commands import verify_command
+
+    _run(lambda: verify_command(options), debug=options["debug"])
+
+
+@main.command()
+@click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
+def rigs(debug: bool) -> None:
+    """List the rigs that need no file, with the source of every number."""
+    from .commands import rigs_command
+
+    _run(rigs_command, debug=debug)
+
+
+@main.command()
+@click.option("-o", "--output", type=click.Path(path_type=Path), default="face.obj",
+              show_default=True, metavar="FILE", help="Where it goes.")
+@click.option("--faces", type=click.IntRange(500, 2_000_000), default=24_000,
+              show_default=True, metavar="N", help="Triangles, about.")
+@click.option("--variant", type=click.IntRange(0), metavar="SEED",
+              help="Another head of the population [default: the mean head].")
+@click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
+def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
+    """Write the sample head, an OBJ file in millimetres."""
+    from .commands import sample_command
+
+    _run(lambda: sample_command(output, faces, variant), debug=debug)
+
+
+def _not_built(name: str, purpose: str) -> None:
+    @main.command(
+        name,
+        short_help=f"(not built yet) {purpose}",
+        context_settings={"ignore_unknown_options": True, "help_option_names": ["--help"]},
+    )
+    @click.argument("anything", nargs=-1, type=click.UNPROCESSED)
+    def command(anything: tuple[str, ...]) -> None:
+        raise click.UsageError(f"`plan {name}` isn't built yet; it {purpose}")
+
+    command.__doc__ = f"Not built yet: {purpose}."
+
+
+for _name, _purpose in _NOT_BUILT.items():
+    _not_built(_name, _purpose)
+
+
+def _run(command: Any, *, debug: bool) -> None:  # noqa: ANN401
+    """Run a command; turn our own errors into one line and the documented exit code."""
+    from geometry.mesh import MeshError
+
+    from .errors import PlanningError
+
+    try:
+        code = command()
+    except KeyboardInterrupt:
+        click.echo("plan: interrupted; nothing was lost, nothing new was written", err=True)
+        sys.exit(130)
+    except (PlanningError, MeshError, OSError) as error:
+        if debug:
+            raise
+        click.echo(f"plan: {' '.join(str(error).split())}", err=True)
+        sys.exit(_exit_code(error))
+    sys.exit(code)
+
+
+def _exit_code(error: Exception) -> int:
+    if isinstance(error, OSError):
+        return 2
+    return int(getattr(error, "exit_code", 3))

@@ -1,0 +1,155 @@
+"""What each subcommand does; everything heavy is imported from here on."""
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from geometry.readers import load_mesh
+
+from .draw import save_rig_picture
+from .errors import (
+    InterruptedPlanError,
+    RequirementError,
+)
+from .pipeline import plan_rig
+from .plan import RigPlan
+from .progress import Report
+from .rig import list_presets, load_rig
+from .sample_head import HeadShape, write_sample
+from .summary import summary
+from .verification import verify_plan
+
+
+def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
+    """Plan, write the output folder, print the result; return the exit code."""
+    report = _report(quiet=options["quiet"])
+    path = Path(options["meshes"][0])
+    rig = load_rig(options["rig_name"], light=options["light"])
+    mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
+    folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
+    _check_writable(folder)
+    _say_size(report, mesh)
+    missed: tuple[str, ...] = ()
+    code = 0
+    try:
+        plan = plan_rig(
+            mesh,
+            rig,
+            max_projectors=options["max_projectors"],
+            max_cameras=options["max_cameras"],
+            target=options["target"],
+            dominant_coverage=options["dominant_coverage"],
+            coverage=options["coverage"],
+            min_reachable=options["min_reachable"],
+            accuracy_mm=options["accuracy_mm"],
+            up=options["up"],
+            seed=options["seed"],
+            threads=options["threads"] or _cores(),
+            check=not options["no_check"],
+            time_limit=options["time_limit"],
+            progress=report,
+            command=("plan", *command),
+        )
+    except RequirementError as error:
+        plan, missed, code = error.plan, error.shortfalls, error.exit_code
+    except InterruptedPlanError as error:
+        plan, code = error.plan, error.exit_code
+    files = _save(plan, folder, report)
+    if options["as_json"]:
+        _print_json(plan.document | {"files": files, "missed": list(missed)})
+    else:
+        click.echo(summary(plan, files, missed))
+    return code
+
+
+def verify_command(options: Mapping[str, Any]) -> int:
+    """Audit and check a plan; return 0 if every claim holds, 1 if not."""
+    report = _report(quiet=options["quiet"])
+    plan = RigPlan.load(options["plan_file"])
+    mesh = None
+    if options["mesh"] is not None:
+        source = plan.document["meshes"][0]
+        mesh = load_mesh(options["mesh"], unit=source["unit"])
+    truth = None if options["truth"] is None else RigPlan.load(options["truth"])
+    seed = {} if options["seed"] is None else {"seed": options["seed"]}
+    found = verify_plan(
+        plan,
+        mesh,
+        truth=truth,
+        threads=options["threads"] or _cores(),
+        progress=report,
+        **seed,
+    )
+    if options["as_json"]:
+        _print_json(found.to_document())
+    else:
+        click.echo(found.summary())
+    return 0 if found.passed else 1
+
+
+def rigs_command() -> int:
+    """Print the presets with the source of every number."""
+    for preset in list_presets():
+        click.echo(preset)
+    return 0
+
+
+def sample_command(output: Path, faces: int, variant: int | None) -> int:
+    """Write the sample head."""
+    shape = HeadShape() if variant is None else HeadShape.random(variant)
+    write_sample(output, shape=shape, n_faces=faces)
+    click.echo(f"wrote {output}: a head in millimetres, face along -y, up z")
+    return 0
+
+
+def _report(*, quiet: bool) -> Report | None:
+    return None if quiet else lambda line: click.echo(f"plan: {line}", err=True)
+
+
+def _say_size(report: Report | None, mesh: Any) -> None:  # noqa: ANN401
+    if report is None:
+        return
+    size = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
+    source = mesh.source
+    report(
+        f"{source.path}: {size[0]:.1f} x {size[1]:.1f} x {size[2]:.1f} mm "
+        f"(unit {source.unit}), {len(mesh.faces)} faces"
+    )
+    for repair in source.repairs:
+        report(f"  repaired: {repair.kind}, {repair.count}")
+
+
+def _check_writable(folder: Path) -> None:
+    """Fail before the work, not after it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise click.UsageError(
+            f"can't write to {folder}: {error.strerror}; choose another folder with -o"
+        ) from None
+
+
+def _save(plan: RigPlan, folder: Path, report: Report | None) -> list[str]:
+    names = [folder / name for name in ("plan.json", "surface.npz", "rig.png")]
+    plan.save(names[0])
+    if report is not None:
+        report("drawing")
+    save_rig_picture(plan, names[2])
+    return [str(name) for name in names]
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
+
+
+def _print_json(document: Mapping[str, Any]) -> None:
+    click.echo(json.dumps(document, indent=1, allow_nan=False))
+
+

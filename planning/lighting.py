@@ -1,0 +1,200 @@
+"""Eq. (2) with margins: what a projector lights, and the first limit that forbids it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
+from geometry.poses import inverse, transform
+from geometry.sampling import SurfaceSamples
+from geometry.visibility import Visibility
+
+from .plan import PlannedProjector
+from .requirements import ProjectorLimits
+
+CAUSES = (
+    "projector_beam",
+    "projector_range",
+    "projector_incidence",
+    "tangent_angle",
+    "projector_occlusion",
+)
+LIT = len(CAUSES)
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Samples with the steep direction of the face that each lies on.
+
+    Attributes:
+        samples: Where, with normals.
+        steep: Unit T1, zero where arbitrary, shape (n, 3).
+    """
+
+    samples: SurfaceSamples
+    steep: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "Target":
+        """Return some of the samples."""
+        return Target(self.samples.take(chosen), self.steep[chosen])
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """One projector's light on n samples, before occlusion.
+
+    Attributes:
+        directions: Unit L(P), shape (n, 3).
+        distances: |P - Q| (diverging) or z (parallel) in [m], shape (n,).
+        incidence_cos: -N.L, shape (n,).
+        tangent_cos: |T1.L|, 0 where T1 is arbitrary, shape (n,).
+        ring_coordinate: R = tangent (diverging) or radius in [m] (parallel), (n,).
+    """
+
+    directions: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    incidence_cos: NDArray[np.float64]
+    tangent_cos: NDArray[np.float64]
+    ring_coordinate: NDArray[np.float64]
+
+    def take(self, chosen: NDArray[np.int64]) -> "Light":
+        """Return the light on some of the samples."""
+        return Light(
+            self.directions[chosen],
+            self.distances[chosen],
+            self.incidence_cos[chosen],
+            self.tangent_cos[chosen],
+            self.ring_coordinate[chosen],
+        )
+
+
+def light_on(projector: PlannedProjector, target: Target) -> Light:
+    """Return the light of a projector at samples, wherever they are."""
+    points, normals = target.samples.points, target.samples.normals
+    pose = projector.world_from_device
+    offsets = points - pose[:3, 3]
+    if projector.light == "parallel":
+        directions = np.broadcast_to(pose[:3, 2], points.shape)
+        distances = offsets @ pose[:3, 2]
+    else:
+        distances = np.linalg.norm(offsets, axis=1)
+        directions = offsets / np.where(distances > 0, distances, 1.0)[:, None]
+    return Light(
+        directions,
+        distances,
+        -np.einsum("ij,ij->i", normals, directions),
+        np.abs(np.einsum("ij,ij->i", target.steep, directions)),
+        ring_coordinate(projector, points),
+    )
+
+
+def ring_coordinate(
+    projector: PlannedProjector, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return each point's ring radius (parallel, [m]) or tangent (diverging).
+
+    Points behind a diverging projector get inf.
+    """
+    ring = transform(inverse(projector.world_from_ring), points)
+    rho = np.hypot(ring[:, 0], ring[:, 1])
+    if projector.light == "parallel":
+        return rho
+    front = ring[:, 2] > 0
+    return np.divide(rho, ring[:, 2], out=np.full_like(rho, np.inf), where=front)
+
+
+def first_failure(
+    projector: PlannedProjector,
+    target: Target,
+    limits: ProjectorLimits,
+    visibility: Visibility,
+    *,
+    light: Light | None = None,
+) -> NDArray[np.int8]:
+    """Return the index in `CAUSES` of the first limit that fails; `LIT` if none does.
+
+    Args:
+        projector: Pose, optics and rings.
+        target: Samples.
+        limits: Margins of eq. (2).
+        visibility: Occlusion.
+        light: What `light_on` returned, to save computing it again.
+
+    Returns:
+        Shape (n,).
+    """
+    light = light_on(projector, target) if light is None else light
+    low, high = projector.device.range_m
+    tests = (
+        _in_beam(projector, target.samples.points, light),
+        (light.distances >= low) & (light.distances <= high),
+        light.incidence_cos >= np.cos(limits.max_incidence),
+        light.tangent_cos <= np.cos(limits.min_tangent_angle),
+    )
+    stage = np.full(len(target), LIT, dtype=np.int8)
+    for index in range(len(tests) - 1, -1, -1):
+        stage[~tests[index]] = index
+    clear = np.flatnonzero(stage == LIT)
+    points = target.samples.points[clear]
+    blocked = visibility.blocked(light_sources(projector, points), points)
+    stage[clear[blocked]] = LIT - 1
+    return stage
+
+
+def light_sources(
+    projector: PlannedProjector, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return where the light of each point leaves the device: its plane or its centre."""
+    pose = projector.world_from_device
+    if projector.light == "diverging":
+        return pose[:3, 3]
+    depth = (points - pose[:3, 3]) @ pose[:3, 2]
+    return points - depth[:, None] * pose[:3, 2]
+
+
+def margins(light: Light, limits: ProjectorLimits) -> NDArray[np.float64]:
+    """Return min(theta_max - incidence, tangent angle - tau_min) in [rad], shape (n,).
+
+    Where T1 is arbitrary, only the first term counts.
+    """
+    incidence = np.arccos(np.clip(light.incidence_cos, -1.0, 1.0))
+    margin = limits.max_incidence - incidence
+    tangent = np.arccos(np.clip(light.tangent_cos, 0.0, 1.0)) - limits.min_tangent_angle
+    # An arbitrary T1 is stored as zero, so its cosine is exactly 0.
+    return np.where(light.tangent_cos > 0, np.minimum(margin, tangent), margin)
+
+
+def served_by(
+    lit: NDArray[np.bool_], margin: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return the projector that serves each sample, -1 where none lights it.
+
+    Args:
+        lit: Shape (n, n_projectors).
+        margin: Smaller margin of each pair in [rad], same shape.
+
+    Returns:
+        Shape (n,); the lower index on ties.
+    """
+    ranked = np.where(lit, margin, -np.inf)
+    return np.where(lit.any(axis=1), np.argmax(ranked, axis=1), -1)
+
+
+def _in_beam(
+    projector: PlannedProjector, points: NDArray[np.float64], light: Light
+) -> NDArray[np.bool_]:
+    local = transform(inverse(projector.world_from_device), points)
+    inside = light.ring_coordinate <= projector.ring_radii[-1]
+    device = projector.device
+    if isinstance(device, PinholeModel):
+        return inside & device.contains(device.project(local))
+    inside &= np.all(np.abs(local[:, :2]) <= device.half_panel, axis=1)
+    if device.beam_radius is not None:
+        inside &= np.hypot(local[:, 0], local[:, 1]) <= device.beam_radius
+    return inside
+
+

@@ -1,0 +1,59 @@
+"""Progress, stage times, and the limits that end a run early."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from .errors import TimeLimitError
+
+Report = Callable[[str], None]
+
+
+class Stopwatch:
+    """Times stages and tells whoever listens which one runs.
+
+    Args:
+        report: Receives one line when a stage begins; None for silence.
+        time_limit: Wall time in [s] after which `check` raises; None for no limit.
+    """
+
+    def __init__(
+        self, report: Report | None = None, *, time_limit: float | None = None
+    ) -> None:
+        self._report = report
+        self._begin = time.monotonic()
+        self._limit = time_limit
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str, line: str) -> Iterator[None]:
+        """Time a stage; it starts only while there is time left.
+
+        Raises:
+            TimeLimitError: If the time limit has passed.
+        """
+        self.check()
+        self.say(line)
+        begin = time.monotonic()
+        try:
+            yield
+        finally:
+            spent = time.monotonic() - begin
+            self.seconds[name] = round(self.seconds.get(name, 0.0) + spent, 3)
+
+    def say(self, line: str) -> None:
+        """Report one line of progress."""
+        if self._report is not None:
+            self._report(line)
+
+    def check(self) -> None:
+        """Raise TimeLimitError once the time limit has passed."""
+        spent = time.monotonic() - self._begin
+        if self._limit is not None and spent > self._limit:
+            raise TimeLimitError(
+                f"the time limit of {self._limit:g} s passed after {spent:.1f} s"
+            )
+
+    def lift(self) -> None:
+        """Let the rest run whatever the time: a plan is being saved."""
+        self._limit = None

@@ -1,0 +1,162 @@
+"""Section III of the paper: the fewest projectors that light the dominant regions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import lighting
+from .candidates import projector_candidates
+from .errors import InfeasibleLimitsError
+from .lighting import Target
+from .plan import PlannedProjector
+from .scene import Scene
+from .selection import Selection, certificate, select_fewest
+
+_ROWS = 2000
+_CHECK_ROWS = 4000
+_ROUNDS = 3
+# Streams of random samples: rows of the cover, then a fresh check set for each round.
+_STREAM = 100
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectorStage:
+    """What the projector stage found.
+
+    Attributes:
+        projectors: The fewest, or the best that are allowed.
+        reference: The reference set, which is the candidate set.
+        rows: Samples that the cover was solved on.
+        by_count: Best candidates for each number of devices, for the marginal table.
+        certificate: As in the plan file.
+    """
+
+    projectors: tuple[PlannedProjector, ...]
+    reference: tuple[PlannedProjector, ...]
+    rows: Target
+    by_count: dict[int, tuple[PlannedProjector, ...]]
+    certificate: dict[str, Any]
+
+
+def plan_projectors(
+    scene: Scene,
+    template: PlannedProjector,
+    n_candidates: int,
+    *,
+    ring_offset: tuple[float, float],
+) -> ProjectorStage:
+    """Choose the fewest projectors that light the required share of the target.
+
+    A minimal cover overfits its samples; so it is tested on fresh ones, and where it
+    falls short there, they join the rows and the cover is solved again.
+
+    Args:
+        scene: Surface and requirements.
+        template: Optics and rings of the projector.
+        n_candidates: Poses offered.
+        ring_offset: Tilt and azimuth of the ring axis until the cameras are known.
+
+    Raises:
+        InfeasibleLimitsError: If no candidate lights any sample.
+    """
+    required = scene.requirements
+    candidates = projector_candidates(
+        template, required.workspace, n_candidates, ring_offset=ring_offset
+    )
+    if not candidates:
+        raise InfeasibleLimitsError(
+            "the workspace holds no position: its floor, cone and shell exclude each "
+            "other; lower the floor or widen the cone"
+        )
+    rows = scene.target_samples(_ROWS, _STREAM)
+    stages = lit_stages(scene, candidates, rows)
+    if not np.any(stages == lighting.LIT):
+        raise InfeasibleLimitsError(_nothing_lit(stages, len(candidates)))
+    for attempt in range(1, _ROUNDS + 1):
+        selection = select_fewest(
+            stages == lighting.LIT,
+            required.dominant_coverage,
+            max_count=required.max_projectors,
+            seed=scene.seed,
+        )
+        fresh = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
+        fresh_stages = lit_stages(scene, candidates, fresh)
+        lit = fresh_stages == lighting.LIT
+        covered = lit[:, selection.chosen].any(axis=1).sum()
+        if (
+            selection.status == "infeasible"
+            or covered >= required.dominant_coverage * lit.any(axis=1).sum()
+        ):
+            break
+        rows = merged(rows, fresh)
+        stages = np.concatenate([stages, fresh_stages])
+    return _stage(scene, candidates, rows, stages, selection)
+
+
+def lit_stages(
+    scene: Scene, candidates: Sequence[PlannedProjector], rows: Target
+) -> NDArray[np.int8]:
+    """Return the first failing limit of every sample (row) and candidate (column)."""
+    stages = np.empty((len(rows), len(candidates)), dtype=np.int8)
+    for column, candidate in enumerate(candidates):
+        stages[:, column] = lighting.first_failure(
+            candidate, rows, scene.requirements.projector, scene.visibility
+        )
+    return stages
+
+
+def merged(first: Target, second: Target) -> Target:
+    """Return both sets of samples as one; every sample stands for the same area."""
+    a, b = first.samples, second.samples
+    total = len(a) * a.weight
+    samples = type(a)(
+        np.concatenate([a.points, b.points]),
+        np.concatenate([a.normals, b.normals]),
+        np.concatenate([a.faces, b.faces]),
+        total / (len(a) + len(b)),
+    )
+    return Target(samples, np.concatenate([first.steep, second.steep]))
+
+
+def _stage(
+    scene: Scene,
+    candidates: tuple[PlannedProjector, ...],
+    rows: Target,
+    stages: NDArray[np.int8],
+    selection: Selection,
+) -> ProjectorStage:
+    proof = certificate(selection, len(rows), rows.samples.weight, len(candidates))
+    proof["excluded_pairs"] = {
+        cause: int((stages == index).sum())
+        for index, cause in enumerate(lighting.CAUSES)
+    }
+    proof["n_regions"] = int(scene.region.max()) + 1
+    return ProjectorStage(
+        tuple(candidates[i] for i in selection.chosen),
+        candidates,
+        rows,
+        {
+            count: tuple(candidates[i] for i in chosen)
+            for count, chosen in selection.by_count.items()
+        },
+        proof,
+    )
+
+
+def _nothing_lit(stages: NDArray[np.int8], n_candidates: int) -> str:
+    counts = np.bincount(stages.ravel(), minlength=lighting.LIT)[: lighting.LIT]
+    share = 100.0 * counts / counts.sum()
+    named = ", ".join(
+        f"{cause} {part:.0f} %"
+        for cause, part in sorted(
+            zip(lighting.CAUSES, share, strict=True), key=lambda pair: -pair[1]
+        )
+        if part >= 1.0
+    )
+    return (
+        f"no projector of {n_candidates} poses lights any part of the target; of all "
+        f"pairs of pose and sample, the first limit that fails is {named}; relax it"
+    )

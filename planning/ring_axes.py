@@ -1,0 +1,118 @@
+"""Turn the ring axes so that no blind curve (|r.m| = 0) crosses what must be measured."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import measurability
+from .cameras import LitSamples, lit_samples, rings_of
+from .lighting import Target
+from .measurability import Rings, View
+from .plan import PlannedCamera, PlannedProjector
+from .rings import ring_frame
+from .scene import Scene
+
+_AZIMUTHS = 16
+_SWEEPS = 2
+
+
+def turn_ring_axes(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    tilt: float,
+) -> tuple[PlannedProjector, ...]:
+    """Return the projectors with the ring axes under which the cameras measure most.
+
+    Each projector in turn tries a number of azimuths of its tilted (or shifted) axis;
+    among equals the one with the largest mean |r.m| of each sample's best pair wins.
+    The ring surfaces move, the light doesn't: what is lit stays lit.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned.
+        cameras: As planned.
+        rows: Lit samples.
+        tilt: Tilt of the axes, or their shift, as `ring_frame` takes it.
+    """
+    views = [
+        measurability.view(c, rows.target, scene.requirements.camera, scene.visibility)
+        for c in cameras
+    ]
+    turned = list(projectors)
+    scores = np.stack(
+        [_scores(scene, rows, p, views, rings) for p, rings in enumerate(rows.rings)]
+    )
+    points = rows.target.samples.points
+    for _ in range(_SWEEPS):
+        before = list(turned)
+        for p in range(len(turned)):
+            best = _value(scores)
+            for azimuth in np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS):
+                offered = _with_axis(turned[p], tilt, float(azimuth))
+                trial = scores.copy()
+                rings = measurability.rings_at(offered, points)
+                trial[p] = _scores(scene, rows, p, views, rings)
+                value = _value(trial)
+                if value > best:
+                    best, scores, turned[p] = value, trial, offered
+        if all(a is b for a, b in zip(before, turned, strict=True)):
+            break
+    return tuple(turned)
+
+
+def widest_gap(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> float:
+    """Return the largest ring spacing h on samples that are lit, in [m].
+
+    It is the distance tau within which a check must find a point. Where nothing is
+    lit, the spacing over all samples stands in.
+    """
+    rows = lit_samples(scene, projectors, target)
+    if not len(rows.target):
+        rings = rings_of(projectors, target)
+        return float(max(ring.spacing.max() for ring in rings))
+    return float(
+        max(
+            ring.spacing[rows.lit[:, p]].max(initial=0.0)
+            for p, ring in enumerate(rows.rings)
+        )
+    )
+
+
+def _with_axis(
+    projector: PlannedProjector, tilt: float, azimuth: float
+) -> PlannedProjector:
+    frame = ring_frame(projector.world_from_device, projector.device, tilt, azimuth)
+    return replace(projector, world_from_ring=frame)
+
+
+def _scores(
+    scene: Scene, rows: LitSamples, p: int, views: Sequence[View], rings: Rings
+) -> NDArray[np.float64]:
+    """Best |r.m| of projector p at each sample over the cameras; 0 if not measured."""
+    limits = scene.requirements.triangulation
+    score = np.zeros(len(rows.target))
+    for seen in views:
+        pairs = np.flatnonzero((seen.stage == measurability.SEEN) & rows.lit[:, p])
+        quality = measurability.pair_quality(
+            rows.target.samples.normals[pairs],
+            rows.lights[p].take(pairs),
+            rings.take(pairs),
+            seen.take(pairs),
+            limits,
+        )
+        stage = measurability.first_pair_failure(quality, limits)
+        good = stage == measurability.MEASURED
+        kept = pairs[good]
+        score[kept] = np.maximum(score[kept], quality.conditioning[good])
+    return score
+
+
+def _value(scores: NDArray[np.float64]) -> tuple[int, float]:
+    best = scores.max(axis=0)
+    return int(np.count_nonzero(best)), round(float(best.mean()), 9)

@@ -1,0 +1,63 @@
+"""What both planning stages look at: the surface, its target, and how rays see it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import TriangleMesh
+from geometry.sampling import sample_surface
+from geometry.visibility import Visibility
+
+from .lighting import Target
+from .requirements import Requirements
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that doesn't depend on where devices stand.
+
+    Attributes:
+        mesh: The surface.
+        region: Dominant region of each face, -1 for none, shape (n_f,).
+        steep: Unit T1 of each face, zero where arbitrary or outside the target.
+        requirements: What is asked.
+        seed: Of every random draw.
+        threads: Worker threads; no result depends on it.
+    """
+
+    mesh: TriangleMesh
+    region: NDArray[np.int64]
+    steep: NDArray[np.float64]
+    requirements: Requirements
+    seed: int
+    threads: int
+
+    @cached_property
+    def visibility(self) -> Visibility:
+        """Occlusion by the mesh."""
+        return Visibility(self.mesh, threads=self.threads)
+
+    @cached_property
+    def target_faces(self) -> NDArray[np.bool_]:
+        """Whether each face is in the target."""
+        if self.requirements.target == "surface":
+            return np.ones(len(self.mesh.faces), dtype=bool)
+        return self.region >= 0
+
+    def target_samples(self, n: int, stream: int) -> Target:
+        """Return n area-true samples of the target; each stream is a fresh draw."""
+        return self._samples(n, stream, self.target_faces)
+
+    def surface_samples(self, n: int, stream: int) -> Target:
+        """Return n area-true samples of the whole surface."""
+        return self._samples(n, stream, None)
+
+    def _samples(
+        self, n: int, stream: int, within: NDArray[np.bool_] | None
+    ) -> Target:
+        # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.
+        seed = int(np.random.SeedSequence([self.seed, stream]).generate_state(1)[0])
+        samples = sample_surface(self.mesh, n, seed=seed, within=within)
+        return Target(samples, self.steep[samples.faces])

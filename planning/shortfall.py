@@ -1,0 +1,135 @@
+"""Which requirements a plan misses, why, and the smallest relaxation that would help."""
+
+import math
+from typing import Any
+
+from .requirements import Requirements
+
+_CAUSE_WORDS = {
+    "projector_beam": "outside the beam or the image of every projector",
+    "projector_range": "out of the projectors' range",
+    "projector_incidence": "met by the light at too large an angle",
+    "tangent_angle": "lit along the steep direction (tangent angle too small)",
+    "projector_occlusion": "shadowed from every projector that faces it",
+    "camera_field": "outside the image of every camera",
+    "camera_range": "out of the cameras' depth of field",
+    "camera_incidence": "seen at too large an angle",
+    "camera_occlusion": "hidden from every camera that faces it",
+    "sample_distance": "sampled too coarsely",
+    "conditioning": "on a blind curve (|r.m| too small)",
+    "sigma": "measured with too large a deviation",
+    "pitch": "with rings too close in the image",
+}
+
+
+def cause_words(cause: str) -> str:
+    """Return a cause of the plan file as a phrase."""
+    return _CAUSE_WORDS.get(cause, cause)
+
+
+def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
+    """Return the largest causes with their share of an area, as one line."""
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])[:most]
+    return "; ".join(
+        f"{_percent(area / whole)} {cause_words(cause)}" for cause, area in ranked
+    )
+
+
+def shortfalls(
+    document: dict[str, Any], requirements: Requirements
+) -> tuple[str, ...]:
+    """Return one sentence for each requirement that a plan misses.
+
+    Args:
+        document: The plan, with its claims and, where it was made, its check.
+        requirements: What was asked.
+    """
+    return (
+        *_reachable(document, requirements),
+        *_lit(document, requirements),
+        *_measured(document, requirements),
+        *_check(document),
+    )
+
+
+def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+    areas = document["coverage"]["target"]
+    share = areas["reachable_by_projectors_m2"] / areas["area_m2"]
+    if share >= asked.min_reachable:
+        return ()
+    causes = document["coverage"]["unreachable_by_cause"]
+    helps = document["coverage"].get("relaxations", [])
+    line = (
+        f"only {_percent(share)} of the target can be lit from anywhere in the "
+        f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
+        f"{_cm2(areas['area_m2'] - areas['reachable_by_projectors_m2'])} of "
+        f"{_cm2(areas['area_m2'])} can't be reached: "
+        f"{causes_line(causes, areas['area_m2'])}"
+    )
+    steps = [
+        f"{step['change']} would reach {_percent(step['reachable_share'])}"
+        for step in helps
+    ]
+    steps.append(f"--min-reachable {_down(share)} accepts what there is")
+    return (f"{line}. What would help: {'; '.join(steps)}",)
+
+
+def _lit(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+    areas = document["coverage"]["target"]
+    reachable = areas["reachable_by_projectors_m2"]
+    share = areas["lit_m2"] / reachable if reachable > 0 else 0.0
+    if share >= asked.dominant_coverage:
+        return ()
+    needed = document["certificates"]["projectors"]["needed"]
+    count = len(document["projectors"])
+    line = (
+        f"{count} projector{'s' * (count > 1)} light {_percent(share)} of the reachable "
+        f"target, {_percent(asked.dominant_coverage)} is required"
+    )
+    return (f"{line}. What would help: {_more('projectors', needed, asked, share)}",)
+
+
+def _measured(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+    areas = document["coverage"]["target"]
+    reachable = areas["reachable_by_cameras_m2"]
+    share = areas["measured_m2"] / reachable if reachable > 0 else 0.0
+    if share >= asked.coverage:
+        return ()
+    needed = document["certificates"]["cameras"]["needed"]
+    count = len(document["cameras"])
+    line = (
+        f"{count} camera{'s' * (count > 1)} measure {_percent(share)} of what is lit "
+        f"and measurable, {_percent(asked.coverage)} is required"
+    )
+    return (f"{line}. What would help: {_more('cameras', needed, asked, share)}",)
+
+
+def _more(kind: str, needed: dict[str, Any], asked: Requirements, share: float) -> str:
+    allowed = getattr(asked, f"max_{kind}")
+    option = "dominant-coverage" if kind == "projectors" else "coverage"
+    accept = f"--{option} {_down(share)} accepts this plan"
+    if allowed is None or needed["count"] <= allowed:
+        return accept
+    bound = (
+        "proved over the candidates"
+        if needed["lower_bound"] == needed["count"]
+        else f"at least {needed['lower_bound']} proved over the candidates"
+    )
+    return f"--max-{kind} {needed['count']} ({bound}), or {accept}"
+
+
+def _check(document: dict[str, Any]) -> tuple[str, ...]:
+    check = document["reconstruction"]
+    return () if check is None or check["passed"] else tuple(check["failures"])
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _down(share: float) -> str:
+    return f"{math.floor(100.0 * share) / 100.0:.2f}"
+
+
+def _cm2(area_m2: float) -> str:
+    return f"{1e4 * area_m2:.1f} cm²"

@@ -1,0 +1,238 @@
+"""The result that a person reads in ten seconds."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .plan import PlannedCamera, PlannedProjector, RigPlan
+from .shortfall import causes_line
+
+_AXES = "xyz"
+
+
+def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
+    """Return the plan as text, in millimetres, degrees and square centimetres.
+
+    Args:
+        plan: The plan.
+        files: Where it was written.
+        missed: What `shortfalls` returned.
+    """
+    parts = [
+        _head(plan),
+        _devices(plan),
+        _proofs(plan),
+        _coverage(plan),
+        _marginal(plan),
+        _check(plan),
+        *(f"MISSED   {line}" for line in missed),
+        *(f"files    {name}" for name in files[:1]),
+        *(f"         {name}" for name in files[1:]),
+    ]
+    return "\n".join(parts)
+
+
+def _head(plan: RigPlan) -> str:
+    document, workspace = plan.document, plan.requirements.workspace
+    mesh = document["meshes"][0]
+    size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
+    cut = "; TRUNCATED, not the best that could be found" if document["truncated"] else ""
+    where = (
+        "the whole shell about it (no floor)"
+        if workspace.half_angle >= np.pi and workspace.floor_m is None
+        else f"a cone of {np.degrees(workspace.half_angle):.0f} degrees"
+        if workspace.floor_m is None
+        else f"the shell above {1e3 * workspace.floor_m:.0f} mm from its centre"
+    )
+    return (
+        f"PLAN     {len(plan.projectors)} projectors, {len(plan.cameras)} cameras for "
+        f"{mesh['path']}{cut}\n"
+        f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, unit "
+        f"{mesh['unit']}, up {_axis(workspace.up)}; rig {document['rig']['name']}, "
+        f"{document['rig']['light']} light\n"
+        f"         devices may stand in {where}"
+    )
+
+
+def _axis(up: Sequence[float]) -> str:
+    index = int(np.argmax(np.abs(up)))
+    return f"{'-' if up[index] < 0 else '+'}{_AXES[index]}"
+
+
+def _devices(plan: RigPlan) -> str:
+    lines = [
+        "\n     position x, y, z [mm]            image centre aims along         roll   "
+        "standoff",
+        "                                      azimuth   elevation [deg]     [deg]   "
+        "to centre [mm]",
+    ]
+    centre = np.array(plan.requirements.workspace.centre)
+    up = np.array(plan.requirements.workspace.up)
+    for device in (*plan.projectors, *plan.cameras):
+        position = device.world_from_device[:3, 3]
+        azimuth, elevation, roll = aim_angles(device, up)
+        x, y, z = 1e3 * position
+        distance = 1e3 * np.linalg.norm(position - centre)
+        lines.append(
+            f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {azimuth:12.1f} "
+            f"{elevation:10.1f}   {roll:12.1f}   {distance:10.1f}"
+        )
+    return "\n".join(lines)
+
+
+def aim_angles(
+    device: PlannedProjector | PlannedCamera, up: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return azimuth, elevation and roll of a device in degrees.
+
+    Azimuth counts about `up` from the first world axis that isn't along it towards
+    the next (x towards y for up z); elevation is the angle above the horizontal; roll
+    turns the image clockwise as the device sees it, 0 with the image upright.
+    """
+    pose = device.world_from_device
+    axis = _middle(device)
+    k = int(np.argmax(np.abs(up)))
+    e1 = np.eye(3)[(k + 1) % 3]
+    e2 = np.cross(up, e1)
+    azimuth = np.degrees(np.arctan2(axis @ e2, axis @ e1))
+    elevation = np.degrees(np.arcsin(np.clip(axis @ up, -1.0, 1.0)))
+    level = np.cross(axis, up)
+    if np.linalg.norm(level) < 1e-6:
+        return float(azimuth), float(elevation), 0.0
+    level /= np.linalg.norm(level)
+    roll = np.arctan2(pose[:3, 0] @ np.cross(axis, level), pose[:3, 0] @ level)
+    return float(azimuth), float(elevation), float(np.degrees(roll)) + 0.0
+
+
+def _middle(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
+    pose = device.world_from_device
+    if isinstance(device, PlannedProjector) and device.light == "parallel":
+        return pose[:3, 2]
+    width, height = device.device.resolution
+    k = device.device.camera_matrix  # type: ignore[union-attr]
+    ray = np.array(
+        [
+            ((width - 1) / 2 - k[0, 2]) / k[0, 0],
+            ((height - 1) / 2 - k[1, 2]) / k[1, 1],
+            1.0,
+        ]
+    )
+    return pose[:3, :3] @ (ray / np.linalg.norm(ray))
+
+
+def _proofs(plan: RigPlan) -> str:
+    asked = plan.requirements
+    proofs = plan.document["certificates"]
+    lines = [
+        _proof("projector", proofs["projectors"], asked.dominant_coverage, "light"),
+        _proof("camera", proofs["cameras"], asked.coverage, "measure")
+        + " (given these projectors)",
+        f"         {len(plan.document['regions'])} dominant regions; nothing is proved "
+        f"over poses beside the candidates",
+    ]
+    return "\n" + "\n".join(lines)
+
+
+def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
+    candidates, needed = proof["candidates"], proof["needed"]
+    count = proof["count"]
+    scope = (
+        f"to {verb} {100 * share:g} % of what the {candidates['n_candidates']} candidate "
+        f"poses reach of {proof['n_samples']} samples"
+    )
+    name = f"{kind}s"
+    if needed["count"] > count:
+        have = f"at least {needed['lower_bound']} {name} are needed"
+        return f"PROVED   {have}, {needed['count']} suffice, {scope}"
+    if proof["status"] == "optimal":
+        one = count == 1
+        return (
+            f"PROVED   {count} {kind if one else name} {'is' if one else 'are'} the "
+            f"fewest {scope}"
+        )
+    return (
+        f"BOUND    {count} {name}; at least {candidates['lower_bound']} are needed {scope}"
+    )
+
+
+def _coverage(plan: RigPlan) -> str:
+    coverage = plan.coverage
+    target, surface = coverage["target"], coverage["surface"]
+    rows = [
+        ("area", "area_m2"),
+        ("reachable by projectors", "reachable_by_projectors_m2"),
+        ("lit", "lit_m2"),
+        ("reachable by cameras", "reachable_by_cameras_m2"),
+        ("measured", "measured_m2"),
+    ]
+    name = plan.requirements.target
+    lines = [
+        f"\n{'':<9}{'':<25}{'target (' + name + ')':>24}{'whole surface':>24}",
+        *(
+            f"{'':<9}{label:<25}{_cell(target, key):>24}{_cell(surface, key):>24}"
+            for label, key in rows
+        ),
+    ]
+    lit = _ratio(target["lit_m2"], target["reachable_by_projectors_m2"])
+    measured = _ratio(target["measured_m2"], target["reachable_by_cameras_m2"])
+    lines.append(
+        f"COVERAGE lit / reachable by projectors {lit}, measured / reachable by cameras "
+        f"{measured}, on the target, {coverage['samples']} fresh samples"
+    )
+    left = coverage["uncovered_by_cause"]
+    if left:
+        lines.append(f"         not measured: {causes_line(left, target['area_m2'])}")
+    return "\n".join(lines)
+
+
+def _cell(areas: dict[str, float], key: str) -> str:
+    share = 100.0 * areas[key] / areas["area_m2"]
+    return f"{1e4 * areas[key]:9.1f} cm² {share:6.1f} %"
+
+
+def _ratio(part: float, whole: float) -> str:
+    return f"{100.0 * part / whole:.1f} %" if whole > 0 else "undefined"
+
+
+def _marginal(plan: RigPlan) -> str:
+    area = plan.coverage["target"]["area_m2"]
+    rows = plan.document["marginal"]
+    lines: list[str] = []
+    for kind, key, verb, planned in (
+        ("n_projectors", "lit_target_m2", "lit", len(plan.projectors)),
+        ("n_cameras", "measured_target_m2", "measured", len(plan.cameras)),
+    ):
+        cells = [
+            f"{row[kind]}{'*' if row[kind] == planned else ''}: "
+            f"{100.0 * row[key] / area:.1f} %"
+            for row in rows
+            if kind in row
+        ]
+        label = kind.removeprefix("n_")
+        lines.append(f"         {label:<10} {verb} of the target   {'   '.join(cells)}")
+    return "\nMARGINAL what one more or fewer would change (* as planned)\n" + "\n".join(
+        lines
+    )
+
+
+def _check(plan: RigPlan) -> str:
+    check = plan.document["reconstruction"]
+    if check is None:
+        return "\nNOT CHECKED (--no-check): no reconstruction from pixels was made"
+    limits = plan.requirements.check
+    whole = [f"{100 * c['fraction']:.1f} % within {1e3 * c['threshold_m']:.1f} mm"
+             for c in check["completeness"]]
+    verdict = "passed" if check["passed"] else "FAILED"
+    return (
+        f"\nCHECK    {verdict}: reconstructed from rendered pixels, "
+        f"{check['n_merged']} points of {check['n_points']}\n"
+        f"         rms {1e3 * check['accuracy_rms_m']:.3f} mm (limit "
+        f"{1e3 * limits.max_rms_m:g}), p95 {1e3 * check['accuracy_p95_m']:.3f} "
+        f"({1e3 * limits.max_p95_m:g}), bias {1e3 * check['accuracy_bias_m']:+.3f} "
+        f"({1e3 * limits.max_bias_m:g})\n"
+        f"         of the target predicted measured: {', '.join(whole)}; "
+        f"{100 * check['predicted_missing']:.2f} % missing "
+        f"({100 * limits.max_predicted_missing:g} %)"
+    )
