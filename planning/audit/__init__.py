@@ -4,7 +4,7 @@ Of the toolkit it imports data types (plan, requirements, surface, device models
 mesh and the bare ray caster, nothing that plans, samples, projects or sees.
 """
 
-from .audit import DEFAULT_SEED, Audit, audit_plan
+from .audit import Audit, audit_plan
 from .samples import AuditSamples
 
-__all__ = ["DEFAULT_SEED", "Audit", "AuditSamples", "audit_plan"]
+__all__ = ["Audit", "AuditSamples", "audit_plan"]

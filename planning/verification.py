@@ -1,0 +1,280 @@
+"""`plan verify`: the audit of every claim, then the check from pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geometry.mesh import TriangleMesh
+
+from .audit import Audit, audit_plan
+from .plan import RigPlan
+
+if TYPE_CHECKING:
+    from .reconstruction.check import Reconstruction
+
+_MM = 1e3
+# Room between two runs with different pixel noise: a share of the figure, and a floor.
+_REPEATABLE = {
+    "n_points": (0.05, 100.0),
+    "n_merged": (0.05, 100.0),
+    "redundant_fraction": (0.0, 0.03),
+    "accuracy_rms_m": (0.15, 3e-6),
+    "accuracy_p95_m": (0.15, 6e-6),
+    "accuracy_bias_m": (0.15, 3e-6),
+    "predicted_missing": (0.0, 0.01),
+}
+_FRACTION_SLACK = 0.02
+_MESH_SAMPLES = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """Whether a plan's claims hold.
+
+    Attributes:
+        failures: One sentence for each false claim and each limit of the check that
+            isn't kept.
+        audit: The geometric audit.
+        reconstruction: The check from pixels; None if it wasn't asked for.
+    """
+
+    failures: tuple[str, ...]
+    audit: Audit
+    reconstruction: Reconstruction | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether every claim holds and the check kept its limits."""
+        return not self.failures
+
+    @property
+    def unmet(self) -> tuple[str, ...]:
+        """Requirements that the plan misses and says so: no false claims."""
+        return self.audit.unmet
+
+    @property
+    def coverage(self) -> dict[str, dict[str, float]]:
+        """Recomputed areas of `surface` and `target`, keys as in the plan [m²]."""
+        return self.audit.areas
+
+    def to_document(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        found = self.reconstruction
+        return {
+            "passed": self.passed,
+            "failures": list(self.failures),
+            "unmet": list(self.unmet),
+            "coverage": self.coverage,
+            "samples": len(self.audit.samples),
+            "reconstruction": None if found is None else found.to_document(),
+        }
+
+    def summary(self) -> str:
+        """Return the verdict for a person, in a few lines."""
+        lines = [
+            _areas_line(name, self.coverage[name]) for name in ("target", "surface")
+        ]
+        lines.append(_pixels_line(self.reconstruction))
+        lines += [f"not met: {sentence}" for sentence in self.unmet]
+        lines += [f"FALSE: {sentence}" for sentence in self.failures]
+        count = len(self.failures)
+        found = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
+        lines.append(
+            f"verified: every claim holds ({found})"
+            if self.passed
+            else f"NOT verified: {count} failure{'s' * (count > 1)}"
+        )
+        return "\n".join(lines)
+
+
+def verify_plan(
+    plan: RigPlan,
+    mesh: TriangleMesh | None = None,
+    *,
+    check_pixels: bool = True,
+    truth: RigPlan | None = None,
+    seed: int | None = None,
+    threads: int = 2,
+    progress: Callable[[str], None] | None = None,
+) -> Verification:
+    """Recompute every claim of a plan, then measure its object through pixels.
+
+    Args:
+        plan: The plan, as written.
+        mesh: If given, it must be the surface that the plan speaks of.
+        check_pixels: Whether the reconstruction is run.
+        truth: What really stands there; the plan by default.
+        seed: Of the audit's samples and the pixel noise; the plan's own by default.
+        threads: Worker threads; the result doesn't depend on them.
+        progress: Receives a line when a stage begins.
+
+    Raises:
+        PlanFileError: If the plan is broken, so that its claims have no meaning.
+    """
+    say = progress or (lambda _: None)
+    seed = int(plan.document["seed"]) if seed is None else seed
+    say("audit: recomputing every claim on fresh samples")
+    audit = audit_plan(plan, seed=seed, threads=threads)
+    failures = list(audit.failures)
+    if mesh is not None:
+        failures += compare_meshes(mesh, plan.surface.mesh, threads=threads)
+    found = None
+    if check_pixels:
+        found = _reconstruct(plan, audit, truth, seed, threads, say)
+        failures += found.failures
+        failures += compare_figures(
+            plan.document["reconstruction"], found.to_document()
+        )
+    return Verification(tuple(failures), audit, found)
+
+
+def compare_meshes(
+    mesh: TriangleMesh, surface: TriangleMesh, *, threads: int = 2
+) -> list[str]:
+    """Return why a mesh isn't the surface of a plan; nothing if it is.
+
+    Equal vertices and faces settle it. Otherwise random points of either must lie on
+    the other within 1e-4 of its radius, and the areas agree to 1e-3: the same shape,
+    differently repaired or triangulated.
+    """
+    slack = 1e-4 * surface.radius
+    if mesh.faces.shape == surface.faces.shape and np.array_equal(
+        mesh.faces, surface.faces
+    ):
+        same = mesh.vertices.shape == surface.vertices.shape
+        if same and np.abs(mesh.vertices - surface.vertices).max() <= 1e-9:
+            return []
+    if not np.allclose(mesh.bounds, surface.bounds, rtol=0.0, atol=slack):
+        sizes = [np.round(_MM * np.ptp(m.bounds, axis=0), 2) for m in (mesh, surface)]
+        return [
+            f"mesh: its bounding box ({sizes[0].tolist()} mm) isn't that of surface.npz "
+            f"({sizes[1].tolist()} mm); check the file, the unit and the axes"
+        ]
+    apart = max(_apart(mesh, surface, threads), _apart(surface, mesh, threads))
+    if not apart <= slack:
+        return [
+            f"mesh: lies up to {_MM * apart:.3g} mm off surface.npz "
+            f"(tolerance {_MM * slack:.2g} mm): another shape"
+        ]
+    if not abs(mesh.area - surface.area) <= 1e-3 * surface.area:
+        return [
+            f"mesh: area {mesh.area:.6g} m², of surface.npz {surface.area:.6g} m², "
+            f"tolerance 0.1 %"
+        ]
+    return []
+
+
+def compare_figures(
+    recorded: Mapping[str, Any] | None, found: Mapping[str, Any]
+) -> list[str]:
+    """Return where a plan's recorded reconstruction differs from one run again.
+
+    Pixel noise may differ between the runs, so figures may by 5 % (counts), 15 %
+    (distances) or 1 to 3 points (shares), with a floor for figures near 0.
+    """
+    if recorded is None:
+        return []
+    failures: list[str] = []
+    for name, (share, floor) in _REPEATABLE.items():
+        claimed, value = recorded.get(name), found.get(name)
+        if value is None:
+            continue
+        slack = max(share * abs(value), floor)
+        if not _near(claimed, value, slack):
+            failures.append(
+                f"reconstruction.{name}: claimed {claimed}, run again {value:.6g}, "
+                f"tolerance {slack:.2g}"
+            )
+    rows = recorded.get("completeness") or []
+    if len(rows) != len(found["completeness"]):
+        failures.append(f"reconstruction.completeness: {len(rows)} rows are claimed")
+        return failures
+    for claimed, row in zip(rows, found["completeness"], strict=True):
+        at = row["threshold_m"]
+        if not _near(claimed.get("threshold_m"), at, 1e-9) or not _near(
+            claimed.get("fraction"), row["fraction"], _FRACTION_SLACK
+        ):
+            failures.append(
+                f"reconstruction.completeness: claimed {claimed}, run again "
+                f"{row['fraction']:.4f} at {_MM * at:.3g} mm, tolerance {_FRACTION_SLACK}"
+            )
+    if recorded.get("passed") is True and not found["passed"]:
+        failures.append(
+            "reconstruction.passed: claimed true, the check run again fails"
+        )
+    return failures
+
+
+def _near(claimed: object, value: float, slack: float) -> bool:
+    if isinstance(claimed, bool) or not isinstance(claimed, (int, float)):
+        return False
+    return abs(claimed - value) <= slack
+
+
+def _reconstruct(
+    plan: RigPlan,
+    audit: Audit,
+    truth: RigPlan | None,
+    seed: int,
+    threads: int,
+    say: Callable[[str], None],
+) -> Reconstruction:
+    """Run the check from pixels on the audit's own samples of the target."""
+    from geometry.sampling import SurfaceSamples
+
+    from .reconstruction.check import reconstruct_plan
+
+    inside, predicted = audit.in_target()
+    samples = SurfaceSamples(
+        inside.points, inside.normals, inside.faces, float(inside.weights[0])
+    )
+    return reconstruct_plan(
+        plan,
+        seed=seed,
+        threads=threads,
+        truth=truth,
+        samples=samples,
+        predicted=predicted,
+        progress=lambda done, total: say(f"pixels: pair {done} of {total}"),
+    )
+
+
+def _apart(mesh: TriangleMesh, other: TriangleMesh, threads: int) -> float:
+    """Largest distance of random points of one mesh from the other in [m]."""
+    from geometry.proximity import closest_points
+
+    rng = np.random.default_rng(0)
+    areas = mesh.face_areas
+    faces = rng.choice(len(areas), size=_MESH_SAMPLES, p=areas / areas.sum())
+    shares = rng.dirichlet((1.0, 1.0, 1.0), size=_MESH_SAMPLES)
+    points = np.einsum("nk,nkd->nd", shares, mesh.corners[faces])
+    return float(np.abs(closest_points(other, points, threads=threads).distances).max())
+
+
+def _areas_line(name: str, areas: Mapping[str, float]) -> str:
+    return (
+        f"{name} {1e4 * areas['area_m2']:.2f} cm², recomputed: "
+        f"{1e4 * areas['reachable_by_projectors_m2']:.2f} reachable by projectors, "
+        f"{1e4 * areas['lit_m2']:.2f} lit, "
+        f"{1e4 * areas['reachable_by_cameras_m2']:.2f} of it reachable by cameras, "
+        f"{1e4 * areas['measured_m2']:.2f} measured"
+    )
+
+
+def _pixels_line(found: Reconstruction | None) -> str:
+    if found is None:
+        return "pixels: NOT CHECKED"
+    figures = found.to_document()
+    if figures["accuracy_rms_m"] is None:
+        return "pixels: no point was measured"
+    return (
+        f"pixels: {figures['n_merged']} points, rms "
+        f"{_MM * figures['accuracy_rms_m']:.3f} mm, p95 "
+        f"{_MM * figures['accuracy_p95_m']:.3f} mm, bias "
+        f"{_MM * figures['accuracy_bias_m']:.3f} mm, predicted but missing "
+        f"{100 * figures['predicted_missing']:.2f} %"
+    )
