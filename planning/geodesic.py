@@ -1,0 +1,136 @@
+"""A geodesic grid: the faces of an icosahedron, each divided into n² triangles."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class GeodesicGrid:
+    """Directions spread over the sphere, and the triangles between them.
+
+    Attributes:
+        frequency: Parts that each edge of the icosahedron is divided into, n.
+        directions: Unit vectors, shape (10 n² + 2, 3); mirror images in all three
+            coordinate planes.
+        faces: Counter-clockwise seen from outside, shape (20 n², 3).
+        home: Icosahedron face that each direction was made from, (10 n² + 2,).
+        steps: Its integer barycentric coordinates there, sum n, (10 n² + 2, 3).
+        lattice: Direction at each lattice point of each icosahedron face, by its last
+            two barycentric coordinates, -1 outside, shape (20, n + 1, n + 1).
+    """
+
+    frequency: int
+    directions: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    home: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    lattice: NDArray[np.int64]
+
+    def interpolate(
+        self, values: NDArray[np.float64], onto: "GeodesicGrid"
+    ) -> NDArray[np.float64]:
+        """Return values of this grid's directions at those of a finer one, linearly.
+
+        Args:
+            values: One row for each direction of this grid, shape (n, k).
+            onto: The grid to interpolate to.
+
+        Returns:
+            Shape (len(onto.directions), k).
+        """
+        n = self.frequency
+        place = onto.steps[:, 1:] * (n / onto.frequency)
+        cell = np.minimum(place.astype(np.int64), n - 1)
+        # A point on the third edge of its icosahedron face belongs to the cell before.
+        beyond = cell.sum(axis=1) >= n
+        cell[beyond, np.argmax(cell[beyond], axis=1)] -= 1
+        (a, b), (i, j) = (place - cell).T, cell.T
+        lower = (a + b <= 1.0) | (i + j == n - 1)
+        step = np.where(lower, 0, 1)
+        weights = np.where(lower, [1.0 - a - b, a, b], [a + b - 1.0, 1.0 - b, 1.0 - a])
+        corners = (
+            self.lattice[onto.home, i + step, j + step],
+            self.lattice[onto.home, i + 1, j],
+            self.lattice[onto.home, i, j + 1],
+        )
+        return np.sum(
+            [w[:, None] * values[c] for w, c in zip(weights, corners, strict=True)],
+            axis=0,
+        )
+
+
+def geodesic_grid(frequency: int) -> GeodesicGrid:
+    """Return the geodesic grid of a frequency.
+
+    Raises:
+        ValueError: If the frequency is below 1.
+    """
+    n = frequency
+    if not n >= 1:
+        raise ValueError(f"frequency must be at least 1, got {n}")
+    corners, triangles = _icosahedron()
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+    inside = i + j <= n
+    steps = np.stack([n - i - j, i, j], axis=-1)[inside]
+    point, first = _shared_points(triangles, steps, n)
+    home, row = np.divmod(first, len(steps))
+    lattice = np.full((20, n + 1, n + 1), -1)
+    lattice[:, inside] = point
+    weights = steps[row] / n
+    directions = sum(
+        weights[:, k, None] * corners[triangles[home, k]] for k in range(3)
+    )
+    length = np.sqrt(np.sum(directions**2, axis=1, keepdims=True))
+    return GeodesicGrid(
+        n, directions / length, _cells(lattice, i + j), home, steps[row], lattice
+    )
+
+
+def _shared_points(
+    triangles: NDArray[np.int64], steps: NDArray[np.int64], n: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Number of each face's points with shared ones merged, and where each is first.
+
+    Points are told apart by whole numbers, never by nearness: the sorted corners that
+    a point lies between, with their integer weights.
+    """
+    weights = np.broadcast_to(steps, (20, *steps.shape))
+    names = np.broadcast_to(triangles[:, None, :], weights.shape)
+    base = 13 * (n + 1)
+    codes = np.sort(np.where(weights > 0, names * (n + 1) + weights, base - 1), axis=-1)
+    keys = (codes[..., 0] * base + codes[..., 1]) * base + codes[..., 2]
+    _, first, number = np.unique(keys.ravel(), return_index=True, return_inverse=True)
+    return number.reshape(20, -1), first
+
+
+def _cells(lattice: NDArray[np.int64], total: NDArray[np.int64]) -> NDArray[np.int64]:
+    n = lattice.shape[1] - 1
+    here, right, up, across = (
+        lattice[:, :-1, :-1],
+        lattice[:, 1:, :-1],
+        lattice[:, :-1, 1:],
+        lattice[:, 1:, 1:],
+    )
+    lower = np.stack([here, right, up], axis=-1)[:, total[:-1, :-1] < n]
+    upper = np.stack([right, across, up], axis=-1)[:, total[:-1, :-1] < n - 1]
+    return np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
+
+
+def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    golden = 0.5 * (1.0 + 5.0**0.5)
+    signs = [(a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    corners = np.array(
+        [(0.0, a, b * golden) for a, b in signs]
+        + [(a, b * golden, 0.0) for a, b in signs]
+        + [(b * golden, 0.0, a) for a, b in signs]
+    )
+    triangles: list[tuple[int, int, int]] = []
+    for a, b, c in combinations(range(12), 3):
+        sides = corners[[a, b, c]] - corners[[b, c, a]]
+        if np.all(np.sum(sides**2, axis=1) < 4.5):
+            outward = np.linalg.det(corners[[a, b, c]]) > 0.0
+            triangles.append((a, b, c) if outward else (a, c, b))
+    return corners, np.array(triangles)
