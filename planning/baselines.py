@@ -222,7 +222,7 @@ def _field_beyond(
     beta: _Array,
     sense: float,
 ) -> _Array:
-    """b of a camera seen from E at a bearing; its axis lies beta back from there."""
+    """Half field of a camera seen from E at a bearing; its axis is beta from there."""
     axis = bearing - sense * beta
     cosine, sine = np.cos(axis)[:, None], np.sin(axis)[:, None]
     along = -(cosine * angles.outward + sine * angles.onward)
@@ -239,12 +239,13 @@ def _row(
     angles = test.angles
     centre1, centre2 = one.world_from_device[:3, 3], two.world_from_device[:3, 3]
     axis1, axis2 = one.world_from_device[:3, 2], two.world_from_device[:3, 2]
-    d1, d2 = np.linalg.norm(point - centre1), np.linalg.norm(point - centre2)
+    d1 = float(np.linalg.norm(point - centre1))
+    d2 = float(np.linalg.norm(point - centre2))
     standoff1, standoff2 = (point - centre1) @ axis1, (point - centre2) @ axis2
     lateral, axial = baseline_parts(centre1, axis1, centre2)
     half1, half2 = test.half_field1[i], test.half_field2[i]
     phi, phi_max = float(angles.phi[i]), float(test.phi_max[i])
-    d_max = float(largest_baseline(d1, d2, np.asarray(phi_max)))
+    d_max = float(largest_baseline(d1, d2, phi_max))
     by_field = half2 - angles.beta2[i] < max_incidence - angles.iota2[i]
     return {
         "cameras": [one.id, two.id],
@@ -253,8 +254,8 @@ def _row(
         "standoff2": float(standoff2),
         "C1": float(standoff1 * np.tan(half1)),
         "C2": float(standoff2 * np.tan(half2)),
-        "D1": float(d1),
-        "D2": float(d2),
+        "D1": d1,
+        "D2": d2,
         "phi": phi,
         "phi_max": phi_max,
         "d": float(np.linalg.norm(centre2 - centre1)),

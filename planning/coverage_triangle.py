@@ -24,7 +24,9 @@ _TINY = 1e-9
 _UNDECIDED = 0.1
 
 
-def largest_baseline(d1: _Array, d2: _Array, phi_max: _Array) -> _Array:
+def largest_baseline(
+    d1: _Array | float, d2: _Array | float, phi_max: _Array | float
+) -> _Array:
     """Return d_max of eq. (9).
 
     Args:

@@ -50,8 +50,9 @@ def adjacency(points: _Array, normals: _Array) -> Adjacency:
     if k < 1:
         empty = np.zeros((n, 0), dtype=np.int64)
         return Adjacency(empty, empty.astype(bool))
-    distance, near = KDTree(points).query(points, k=k + 1)
-    distance, near = distance[:, 1:], near[:, 1:].astype(np.int64)
+    found = KDTree(points).query(points, k=k + 1)
+    distance = np.asarray(found[0], dtype=np.float64)[:, 1:]
+    near = np.asarray(found[1], dtype=np.int64)[:, 1:]
     valid = distance <= _REACH * np.median(distance[:, -1])
     turn = np.einsum("ij,ikj->ik", normals, normals[near])
     return Adjacency(near, valid & (turn > _SAME_SHEET))

@@ -1,0 +1,248 @@
+"""States the baseline program of `solvers` for cameras as they stand.
+
+Seams and kept samples are drawn from what is measured now; samples that a trial move
+lost come back as kept ones, so that the next proposal knows of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.baseline_program import (
+    BaselineProblem,
+    KeptPoints,
+    SeamPoints,
+    Shell,
+)
+
+from .baselines import check_seam, half_field
+from .plan import PlannedCamera
+from .requirements import Workspace
+from .seams import Adjacency, find_seam
+
+_Array = NDArray[np.float64]
+
+_SEAM_POINTS = 16
+_KEPT_POINTS = 24
+# Proposals stay this far inside the limits, since the samples between the kept ones
+# are held only by them.
+_SPARE_INCIDENCE = np.radians(0.3)
+_SPARE_FIELD = np.radians(0.1)
+_SPARE_CONDITIONING = 0.002
+
+
+@dataclass(frozen=True, eq=False)
+class SampledTarget:
+    """Samples that cameras measure, and the rings on them.
+
+    Attributes:
+        points: In [m], shape (n, 3).
+        normals: Unit face normals, shape (n, 3).
+        weights: Area behind each sample in [m^2], shape (n,).
+        adjacent: Near samples of each.
+        ring_normals: Unit ring normals m of each projector, shape (n_p, n, 3).
+        lit: Whether a projector lights a sample, shape (n, n_p).
+    """
+
+    points: _Array
+    normals: _Array
+    weights: _Array
+    adjacent: Adjacency
+    ring_normals: _Array
+    lit: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class SpreadLimits:
+    """What binds a camera that slides.
+
+    Attributes:
+        max_incidence: theta in [rad].
+        min_conditioning: Least |r.m|.
+        workspace: Where cameras may stand.
+    """
+
+    max_incidence: float
+    min_conditioning: float
+    workspace: Workspace
+
+
+def camera_shell(workspace: Workspace) -> Shell:
+    """Return where camera centres may stand."""
+    return Shell(
+        np.array(workspace.centre),
+        workspace.camera_radius_m,
+        np.array(workspace.axis),
+        workspace.half_angle,
+        np.array(workspace.up),
+        workspace.floor_m,
+    )
+
+
+def spread_problem(
+    cameras: Sequence[PlannedCamera],
+    aims: _Array,
+    measured_by: NDArray[np.bool_],
+    pairs: Sequence[tuple[int, int]],
+    target: SampledTarget,
+    limits: SpreadLimits,
+    *,
+    demanded: NDArray[np.int64],
+    max_step: float,
+) -> BaselineProblem:
+    """Return the program for cameras as they stand.
+
+    Args:
+        cameras: As they stand.
+        aims: Points that they look at in [m], shape (k, 3).
+        measured_by: Which camera measures which sample now, shape (n, k).
+        pairs: Neighbours.
+        target: The samples.
+        limits: What binds.
+        demanded: (camera, sample) pairs that must be kept besides the drawn ones,
+            shape (q, 2).
+        max_step: Farthest that a centre may move in [m].
+    """
+    centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras])
+    kept = [
+        np.column_stack([np.full(len(rows), c), rows])
+        for c, rows in enumerate(_sole_samples(cameras, measured_by, target))
+    ]
+    return BaselineProblem(
+        centres=centres,
+        aims=aims,
+        pairs=np.array(pairs, dtype=np.int64),
+        shell=camera_shell(limits.workspace),
+        seams=_seam_points(cameras, measured_by, pairs, target, limits),
+        kept=_kept_points(cameras, np.concatenate([*kept, demanded]), target),
+        max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
+        range_m=cameras[0].device.range_m,
+        min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
+        max_step=max_step,
+    )
+
+
+def _seam_points(
+    cameras: Sequence[PlannedCamera],
+    measured_by: NDArray[np.bool_],
+    pairs: Sequence[tuple[int, int]],
+    target: SampledTarget,
+    limits: SpreadLimits,
+) -> SeamPoints:
+    parts: list[SeamPoints] = []
+    for pair in pairs:
+        for first, second in (pair, pair[::-1]):
+            seam = find_seam(first, second, target.points, measured_by, target.adjacent)
+            if not (len(seam.points) and seam.shares_border):
+                continue
+            test = check_seam(
+                cameras, target.points, target.normals, seam, limits.max_incidence
+            )
+            rows = _tight_and_spread(test.slack, test.points, _SEAM_POINTS)
+            fields = np.column_stack([test.half_field1, test.half_field2])
+            parts.append(
+                SeamPoints(
+                    np.tile(np.array([first, second]), (len(rows), 1)),
+                    test.points[rows],
+                    test.angles.outward[rows],
+                    test.angles.onward[rows],
+                    test.angles.delta_surface[rows],
+                    fields[rows] - _SPARE_FIELD,
+                )
+            )
+    if not parts:
+        none = np.zeros((0, 3))
+        pair = np.zeros((0, 2))
+        return SeamPoints(pair.astype(np.int64), none, none, none, np.zeros(0), pair)
+    names = ("cameras", "points", "outward", "onward", "turn", "half_fields")
+    return SeamPoints(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+
+
+def _sole_samples(
+    cameras: Sequence[PlannedCamera],
+    measured_by: NDArray[np.bool_],
+    target: SampledTarget,
+) -> list[NDArray[np.int64]]:
+    """Some of what each camera alone measures: the most oblique and well apart."""
+    sole = measured_by.sum(axis=1) == 1
+    chosen: list[NDArray[np.int64]] = []
+    for c, camera in enumerate(cameras):
+        rows = np.flatnonzero(sole & measured_by[:, c])
+        ray = target.points[rows] - camera.world_from_device[:3, 3]
+        facing = -np.einsum("ij,ij->i", ray, target.normals[rows])
+        facing /= np.linalg.norm(ray, axis=1)
+        chosen.append(
+            rows[_tight_and_spread(facing, target.points[rows], _KEPT_POINTS)]
+        )
+    return chosen
+
+
+def _kept_points(
+    cameras: Sequence[PlannedCamera],
+    kept: NDArray[np.int64],
+    target: SampledTarget,
+) -> KeptPoints:
+    kept = np.unique(kept.astype(np.int64).reshape(-1, 2), axis=0)
+    index, rows = kept[:, 0], kept[:, 1]
+    points = target.points[rows]
+    cosine = np.zeros(len(kept))
+    rings = np.zeros((len(kept), 3))
+    for c, camera in enumerate(cameras):
+        mine = np.flatnonzero(index == c)
+        if len(mine):
+            cosine[mine] = _field_cosines(camera, points[mine])
+            rings[mine] = _best_rings(camera, rows[mine], target)
+    return KeptPoints(index, points, target.normals[rows], cosine, rings)
+
+
+def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
+    """Cosine of the half field in the plane of the axis and each point."""
+    axis = camera.world_from_device[:3, 2]
+    ray = points - camera.world_from_device[:3, 3]
+    depth = ray @ axis
+    aside = ray - depth[:, None] * axis
+    distance = np.linalg.norm(aside, axis=1)
+    centred = distance <= 1e-12
+    aside = np.where(centred[:, None], camera.world_from_device[:3, 0], aside)
+    towards = aside / np.linalg.norm(aside, axis=1, keepdims=True)
+    along = np.broadcast_to(axis, towards.shape)
+    half = half_field(camera, along, towards, np.arctan2(distance, depth))
+    return np.cos(half - _SPARE_FIELD)
+
+
+def _best_rings(
+    camera: PlannedCamera, rows: NDArray[np.int64], target: SampledTarget
+) -> _Array:
+    """Ring normal of the projector that conditions each sample best, m.r > 0."""
+    if not len(target.ring_normals):
+        return np.zeros((len(rows), 3))
+    ray = target.points[rows] - camera.world_from_device[:3, 3]
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    along = np.einsum("ij,pij->ip", ray, target.ring_normals[:, rows])
+    best = np.argmax(np.where(target.lit[rows], np.abs(along), -1.0), axis=1)
+    each = np.arange(len(rows))
+    sign = np.where(along[each, best] < 0.0, -1.0, 1.0)
+    return sign[:, None] * target.ring_normals[best, rows]
+
+
+def _tight_and_spread(tightness: _Array, points: _Array, n: int) -> NDArray[np.int64]:
+    """Half of n the tightest (least), half farthest from each other; all if fewer."""
+    if len(points) <= n:
+        return np.arange(len(points))
+    chosen = list(np.argsort(tightness, kind="stable")[: n // 2])
+    gap = np.min(np.linalg.norm(points[:, None] - points[chosen][None], axis=2), axis=1)
+    while len(chosen) < n:
+        farthest = int(np.argmax(gap))
+        chosen.append(farthest)
+        gap = np.minimum(gap, np.linalg.norm(points - points[farthest], axis=1))
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def at_poses(cameras: Sequence[PlannedCamera], poses: _Array) -> list[PlannedCamera]:
+    """Return the cameras at other poses, shape (k, 4, 4)."""
+    return [
+        replace(camera, world_from_device=pose)
+        for camera, pose in zip(cameras, poses, strict=True)
+    ]
