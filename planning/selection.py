@@ -83,7 +83,7 @@ def select_fewest(
             count,
             warm_start=start,
             seed=seed,
-            budget=DEFAULT_BUDGET if count <= allowed else _MARGINAL_BUDGET,
+            budget=DEFAULT_BUDGET if allowed - 1 <= count <= allowed else _MARGINAL_BUDGET,
         )
         by_count[count] = warm = best.selected
         bounds[count] = best.upper_bound

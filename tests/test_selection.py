@@ -1,0 +1,71 @@
+"""Fewest candidates: against brute force, with every figure of the certificate."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from planning.selection import certificate, select_fewest
+
+
+def brute(covers, required, count):
+    """Most rows that `count` columns cover."""
+    return max(
+        covers[:, list(c)].any(axis=1).sum()
+        for c in itertools.combinations(range(covers.shape[1]), count)
+    )
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("share", [0.7, 0.9, 1.0])
+def test_count_bound_and_areas_against_brute_force(seed, share):
+    rng = np.random.default_rng(seed)
+    covers = rng.random((60, 9)) < 0.35
+    reachable = int(covers.any(axis=1).sum())
+    required = int(np.ceil(share * reachable - 1e-9))
+    best = {k: brute(covers, required, k) for k in range(1, 10)}
+    fewest = min(k for k in best if best[k] >= required)
+    found = select_fewest(covers, share, max_count=None, seed=0)
+    assert found.required == required
+    assert found.needed == len(found.chosen) == fewest
+    assert found.lower_bound <= fewest
+    assert found.status == ("optimal" if found.lower_bound == fewest else "feasible")
+    assert found.status == "optimal"
+    assert found.best_rows == best[fewest] <= found.best_rows_bound
+    if fewest > 1:
+        assert best[fewest - 1] <= found.one_fewer_bound < required
+    for count, chosen in found.by_count.items():
+        assert len(chosen) <= count
+        assert covers[:, chosen].any(axis=1).sum() == best[count]
+    assert found.greedy >= fewest
+
+
+def test_too_few_allowed_gives_the_best_of_them_and_what_would_be_needed():
+    covers = np.kron(np.eye(4, dtype=bool), np.ones((5, 1), dtype=bool))
+    found = select_fewest(covers, 1.0, max_count=2, seed=0)
+    assert found.status == "infeasible"
+    assert len(found.chosen) == 2
+    assert found.best_rows == found.best_rows_bound == 10
+    assert (found.needed, found.lower_bound) == (4, 4)
+    proof = certificate(found, 20, 0.5, 4)
+    assert proof["count"] == 2
+    assert proof["needed"] == {"count": 4, "lower_bound": 4}
+    assert proof["best_area"] == {"value_m2": 5.0, "upper_bound_m2": 5.0}
+    assert proof["required_m2"] == 10.0
+    assert proof["candidates"]["lower_bound"] <= proof["count"]
+
+
+def test_rows_out_of_reach_are_left_out_of_the_requirement():
+    covers = np.zeros((10, 2), dtype=bool)
+    covers[:4, 0] = covers[4:6, 1] = True
+    found = select_fewest(covers, 0.6, max_count=None, seed=0)
+    assert found.required == 4
+    assert found.chosen.tolist() == [0]
+
+
+def test_the_same_question_gets_the_same_answer():
+    covers = np.random.default_rng(5).random((120, 30)) < 0.3
+    first = select_fewest(covers, 0.95, max_count=None, seed=3)
+    again = select_fewest(covers, 0.95, max_count=None, seed=3)
+    assert first.chosen.tolist() == again.chosen.tolist()
+    assert first.lower_bound == again.lower_bound
