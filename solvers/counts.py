@@ -19,6 +19,7 @@ from .status import SolveStatus, WorkBudget
 
 _EMPTY = np.empty(0, dtype=np.int64)
 _INTEGER_PROOF = "branch and bound (HiGHS)"
+_LARGE_COUNT = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,9 @@ def fewest_sets(
 
     lagrangian = budget.part(0.25 * budget.units)
     while lower < min(selected.size, cap + 1):
-        step = tighten(cover, lower, cover.required, multipliers, lagrangian)
+        step = tighten(
+            cover.by_set, cover.weights, lower, cover.required, multipliers, lagrangian
+        )
         multipliers = step.multipliers
         proved = count_bound(cover, multipliers)
         if proved <= lower:
@@ -74,27 +77,14 @@ def fewest_sets(
         lower, proof = proved, "Lagrangian bound"
     selected = _improve(cover, selected, lower, budget.part(0.15 * budget.units), seed)
 
-    while lower < min(selected.size, cap + 1):
-        search = best_tuple(
-            cover,
-            lower,
-            target=cover.required,
-            multipliers=multipliers,
-            budget=budget.part(0.9 * budget.remaining),
-            first=True,
-        )
-        if search.selected is not None:
-            selected = search.selected
-        elif search.complete:
-            lower, proof = lower + 1, _tuple_proof(lower, search)
-        else:
-            break
-    if lower < min(selected.size, cap + 1) and fits(cover):
-        answer = solve_integer(cover, selected, budget)
-        selected = _better(cover, selected, answer.selected)
-        proved = math.ceil(answer.lower_bound / float(cover.costs[0]) - 1e-5)
-        if proved > lower:
-            lower, proof = proved, _INTEGER_PROOF
+    # Tuples are for small counts, branch and bound on rows and cuts for large ones.
+    methods = [_by_tuples, _by_integers]
+    for method in methods if lower < _LARGE_COUNT else methods[::-1]:
+        if lower < min(selected.size, cap + 1):
+            selected, proved, how = method(
+                cover, selected, lower, cap, multipliers, budget
+            )
+            lower, proof = (proved, how) if proved > lower else (lower, proof)
     return _count_answer(cover, selected, lower, proof, cap, budget, seed)
 
 
@@ -158,7 +148,7 @@ def most_weight(
     best = most_coverage(
         cover,
         best,
-        budget.part(0.2 * budget.units),
+        budget.part(0.4 * budget.units),
         target=cover.total,
         seed=seed,
         max_kicks=20 + 10 * n_sets,
@@ -169,7 +159,9 @@ def most_weight(
         return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
     least = max(1.0, np.floor(cover.total * 1e-11))
     part = budget.part(0.2 * budget.units)
-    step = tighten(cover, n_sets, weight + least, cover.weights, part)
+    step = tighten(
+        cover.by_set, cover.weights, n_sets, weight + least, cover.weights, part
+    )
     upper = float(coverage_bounds(cover, step.multipliers)[n_sets])
     if upper < weight + least:
         return WeightAnswer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
@@ -189,6 +181,51 @@ def most_weight(
     upper = max(weight, min(upper, search.upper_bound))
     proof = f"Lagrangian bound; search cut by the {budget.reason}"
     return WeightAnswer(SolveStatus.FEASIBLE, best, upper, proof)
+
+
+def _by_tuples(
+    cover: ReducedCover,
+    selected: NDArray[np.int64],
+    lower: int,
+    cap: int,
+    multipliers: NDArray[np.float64],
+    budget: WorkBudget,
+) -> tuple[NDArray[np.int64], int, str]:
+    """Exhaust the tuples of as many sets as the bound, then of one more."""
+    proof = ""
+    while lower < min(selected.size, cap + 1):
+        search = best_tuple(
+            cover,
+            lower,
+            target=cover.required,
+            multipliers=multipliers,
+            budget=budget.part(0.7 * budget.remaining),
+            first=True,
+        )
+        if search.selected is not None:
+            selected = search.selected
+        elif search.complete:
+            lower, proof = lower + 1, _tuple_proof(lower, search)
+        else:
+            break
+    return selected, lower, proof
+
+
+def _by_integers(
+    cover: ReducedCover,
+    selected: NDArray[np.int64],
+    lower: int,
+    cap: int,
+    multipliers: NDArray[np.float64],
+    budget: WorkBudget,
+) -> tuple[NDArray[np.int64], int, str]:
+    """Leave a small program to HiGHS."""
+    if not fits(cover):
+        return selected, lower, ""
+    answer = solve_integer(cover, selected, budget)
+    selected = _better(cover, selected, answer.selected)
+    proved = math.ceil(answer.lower_bound / float(cover.costs[0]) - 1e-5)
+    return selected, max(lower, proved), _INTEGER_PROOF
 
 
 def _better(
@@ -241,8 +278,8 @@ def _count_answer(
     size = min(selected.size, cap)
     start = selected if selected.size <= cap else _EMPTY
     # Its own allowance, so that a hard proof doesn't cost the larger area.
-    spare = budget.part(max(budget.remaining, 0.0))
-    spare.units = max(spare.units, 0.1 * budget.units)
+    spare = budget.part(np.inf)
+    spare.units = 0.3 * budget.units
     best = most_weight(cover, size, spare, seed=seed, start=start)
     if selected.size <= cap:
         settled = lower >= selected.size

@@ -28,7 +28,7 @@ from .reductions import WEIGHT_SLACK, ReducedCover, reduce_cover
 from .status import SolveStatus, WorkBudget
 
 MAX_ENTRIES = 500_000_000
-DEFAULT_BUDGET = 1.5e9
+DEFAULT_BUDGET = 2e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +68,14 @@ class CoverProblem:
             raise ValueError("costs must be finite and positive")
         if not 0.0 < self.min_coverage <= 1.0:
             raise ValueError(f"min_coverage must be in (0, 1], got {self.min_coverage}")
-        total = float(weights.sum())
+        with np.errstate(over="ignore"):
+            total = float(weights.sum())
+        if not np.isfinite(total):
+            raise ValueError("weights must have a finite sum")
         given = self.required_weight
         required = self.min_coverage * total if given is None else float(given)
         if not (required >= 0.0 and np.isfinite(required)):
             raise ValueError(f"required_weight must be at least 0, got {required}")
-        if not np.isfinite(total):
-            raise ValueError("weights must have a finite sum")
         for name, value in (("weights", weights), ("costs", costs)):
             value.flags.writeable = False
             object.__setattr__(self, name, value)

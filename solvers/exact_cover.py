@@ -2,26 +2,35 @@
 
 Branch and bound over columns. A node has chosen some sets, may still take r of its
 candidates, and is bounded by multipliers on the rows still open (``relaxation``) and by
-the r largest gains. With two sets left, all pairs are settled by one matrix product::
+the r largest gains. With two sets left, what all pairs leave open is a matrix product
+over the open rows::
 
-    w(i or j) = g_i + g_j - sum_e u_e a_ei a_ej
+    left(i, j) = sum_e u_e (1 - a_ei) (1 - a_ej)
 
-Integer-valued weights make that product exact, whatever the BLAS and its threads.
+Integer-valued weights make it exact, whatever the BLAS and its threads.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .reductions import ReducedCover
 from .relaxation import ROUNDING, tighten
 from .status import WorkBudget
 
-_ROW_BLOCK = 4096
+# Larger covers aren't searched: the dense copy would exceed 400 MB.
+_MAX_DENSE = 400_000_000
 _PAIR_BLOCK = 256
+_FIRST_ROWS = 64
+# Pairs are looked at one by one once fewer than this fraction is left.
+_FEW_PAIRS = 64
 # A dense multiply-add costs this share of a unit.
-_DENSE_UNIT = 1.0 / 12.0
+_DENSE_UNIT = 1.0 / 8.0
+# What a node costs however small it is.
+_CALL_UNITS = 1e5
+_NODE_STEPS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +71,8 @@ def best_tuple(
         budget: Work; when it ends, the bound of what is left open is returned.
         first: Whether any selection that reaches the target will do.
     """
+    if cover.n_sets * cover.weights.size > _MAX_DENSE:
+        return TupleSearch(None, 0.0, cover.total, complete=False, pairs_only=False)
     search = _Search(cover, target, budget, first)
     every = np.arange(cover.n_sets)
     upper = search.branch(every, cover.weights, multipliers, n_sets, [])
@@ -90,6 +101,10 @@ class _Search:
         self.weight = 0.0
         self.cut = False
         self.nodes = 0
+        self.dense = cover.by_set.astype(bool).toarray()
+        # Rows that few columns cover refute most.
+        servers = np.diff(cover.by_row.indptr)
+        self.row_order = np.argsort(servers, kind="stable")
         self._total = cover.total
         # Improvements below this share of the total are rounding, not weight.
         self._least = max(1.0, np.floor(self._total * ROUNDING))
@@ -121,7 +136,7 @@ class _Search:
             return covered
         rows = self.cover.by_set[candidates]
         gains = np.asarray(rows @ open_weights)
-        self.budget.spend(2.0 * rows.nnz + 8.0 * open_weights.size)
+        self.budget.spend(3.0 * rows.nnz + 8.0 * open_weights.size + _CALL_UNITS)
         r = min(r, candidates.size)
         if r == 1:
             best = int(np.argmax(gains))
@@ -136,16 +151,50 @@ class _Search:
         if self.budget.exhausted:
             self.cut = True
             return bound
-        # One of the sets is at least the mean, so every other bound is a floor.
         keep = self._may_help(gains, covered, 0.0, r) & self._may_help(
             prices, covered, float(np.sum(open_weights - multipliers)), r
         )
-        candidates, gains, prices = candidates[keep], gains[keep], prices[keep]
+        candidates, gains, rows = candidates[keep], gains[keep], rows[keep]
         if candidates.size == 0:
             return 0.0
+        firsts = self._must_take(rows, open_weights)
+        if not np.any(firsts):
+            return 0.0
         if r == 2:
-            return self._pairs(candidates, open_weights, gains, covered, chosen, bound)
-        return self._children(candidates, open_weights, multipliers, prices, r, chosen)
+            return self._pairs(
+                candidates, open_weights, gains, firsts, covered, chosen, bound
+            )
+        step = tighten(
+            rows,
+            open_weights,
+            r,
+            self.target - covered,
+            multipliers,
+            self.budget,
+            max_steps=_NODE_STEPS,
+        )
+        if covered + step.bound < self.target:
+            return 0.0
+        prices = np.asarray(rows @ step.multipliers)
+        return self._children(
+            candidates, open_weights, step.multipliers, prices, firsts, r, chosen
+        )
+
+    def _must_take(
+        self, rows: sparse.csr_array, open_weights: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Return which columns one must be taken from: those of the scarcest row.
+
+        A row is indispensable if it outweighs all that may stay uncovered; where none
+        is, any column may come first.
+        """
+        indispensable = np.flatnonzero(open_weights > self._total - self.target)
+        if indispensable.size == 0:
+            return np.ones(rows.shape[0], dtype=bool)
+        servers = np.asarray(rows.sum(axis=0)).ravel()[indispensable]
+        self.budget.spend(float(rows.nnz))
+        row = int(indispensable[int(np.argmin(servers))])
+        return np.asarray(rows @ _unit(open_weights.size, row)) > 0
 
     def _may_help(
         self, values: NDArray[np.float64], covered: float, rest: float, r: int
@@ -156,7 +205,7 @@ class _Search:
 
     def _bound(
         self,
-        rows: "object",
+        rows: sparse.csr_array,
         open_weights: NDArray[np.float64],
         multipliers: NDArray[np.float64],
         gains: NDArray[np.float64],
@@ -165,7 +214,7 @@ class _Search:
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
         """Return the better of the gain and the multiplier bound, and its prices."""
         multipliers = np.minimum(multipliers, open_weights)
-        prices = np.asarray(rows @ multipliers)  # type: ignore[operator]
+        prices = np.asarray(rows @ multipliers)
         rest = float(np.sum(open_weights - multipliers))
         by_gain = covered + float(np.sort(gains)[::-1][:r].sum())
         by_price = covered + rest + float(np.sort(prices)[::-1][:r].sum())
@@ -178,23 +227,25 @@ class _Search:
         open_weights: NDArray[np.float64],
         multipliers: NDArray[np.float64],
         prices: NDArray[np.float64],
+        firsts: NDArray[np.bool_],
         r: int,
         chosen: list[int],
     ) -> float:
+        """Take each possible first column in turn, then never again."""
         self.nodes += 1
-        covered = self._total - float(open_weights.sum())
-        rest = float(np.sum(open_weights - multipliers))
+        floor = self._total - float(np.sum(multipliers))
         order = np.argsort(-prices, kind="stable")
-        candidates, prices = candidates[order], prices[order]
-        dearest = np.concatenate([[0.0], np.cumsum(prices)])
+        candidates, prices, firsts = candidates[order], prices[order], firsts[order]
+        alive = np.ones(candidates.size, dtype=bool)
         upper = 0.0
-        for i in range(candidates.size):
-            last = min(i + r, candidates.size)
-            bound = (covered + rest + float(dearest[last] - dearest[i])) * (
-                1.0 + ROUNDING
-            )
-            if bound < self.target or self.done:
+        for i in np.flatnonzero(firsts):
+            alive[i] = False
+            others = prices[np.flatnonzero(alive)[: r - 1]]
+            bound = (floor + float(prices[i] + others.sum())) * (1.0 + ROUNDING)
+            if self.done:
                 break
+            if bound < self.target:
+                continue
             if self.budget.exhausted:
                 self.cut = True
                 return max(upper, bound)
@@ -203,51 +254,97 @@ class _Search:
             start, stop = self.cover.by_set.indptr[s : s + 2]
             left[self.cover.by_set.indices[start:stop]] = 0.0
             below = self.branch(
-                candidates[i + 1 :], left, multipliers, r - 1, [*chosen, s]
+                candidates[alive], left, multipliers, r - 1, [*chosen, s]
             )
             upper = max(upper, below)
         return upper
+
+    def _partners(self, gains: NDArray[np.float64], i: int, covered: float) -> int:
+        """Number of leading columns, sorted by gain, that may reach the target with i."""
+        need = self.target - covered - gains[i]
+        return int(np.searchsorted(-gains, -need, side="right"))
 
     def _pairs(
         self,
         candidates: NDArray[np.int64],
         open_weights: NDArray[np.float64],
         gains: NDArray[np.float64],
+        firsts: NDArray[np.bool_],
         covered: float,
         chosen: list[int],
         bound: float,
     ) -> float:
-        """Settle all pairs of candidates by matrix products."""
+        """Settle all pairs of a first column and any other."""
         order = np.argsort(-gains, kind="stable")
+        # The better of a pair meets the need with every partner that can.
+        order = order[: self._partners(gains[order], 0, covered)]
         candidates, gains = candidates[order], gains[order]
-        n = candidates.size
-        rows = np.flatnonzero(open_weights > 0)
-        weights = open_weights[rows]
-        work = _DENSE_UNIT * 0.5 * n * n * rows.size + 4.0 * n * rows.size
-        if work > self.budget.remaining:
-            self.cut = True
-            self.budget.spend(self.budget.remaining)
-            return bound
-        self.budget.spend(work)
-        dense = self.cover.by_set[candidates][:, rows].astype(np.float32).toarray()
+        every = bool(np.all(firsts))
+        leads = np.flatnonzero(firsts[order])
+        rows = self.row_order[open_weights[self.row_order] > 0]
+        self.budget.spend(2.0 * candidates.size * rows.size + _CALL_UNITS)
+        missed = ~self.dense[np.ix_(candidates, rows)]
         upper = 0.0
-        for top in range(0, n, _PAIR_BLOCK):
-            need = self.target - covered
-            stop = int(np.searchsorted(-gains, -(need - gains[top]), side="right"))
-            if stop <= top:
+        for block in np.split(leads, np.arange(_PAIR_BLOCK, leads.size, _PAIR_BLOCK)):
+            # Where any column may lead, partners before the leader were leaders.
+            head = int(block[0]) if every and block.size else 0
+            stop = self._partners(gains, int(block[0]), covered) if block.size else 0
+            if stop <= head:
                 break
-            block = dense[top : min(top + _PAIR_BLOCK, stop)]
-            pair = gains[top : top + len(block), None] + gains[None, top:stop]
-            for e in range(0, rows.size, _ROW_BLOCK):
-                part = slice(e, e + _ROW_BLOCK)
-                weighted = block[:, part] * weights[part]
-                pair -= weighted @ dense[top:stop, part].astype(np.float64).T
-            i, j = np.unravel_index(int(np.argmax(pair)), pair.shape)
-            weight = covered + float(pair[i, j])
-            if i == j:
-                self.offer([*chosen, int(candidates[top + i])], weight)
-            else:
-                pairing = [int(candidates[top + i]), int(candidates[top + j])]
-                self.offer([*chosen, *pairing], weight)
+            if self.budget.exhausted:
+                self.cut = True
+                return bound
+            i, j, left = self._best_pair(
+                missed[block], missed[head:stop], open_weights[rows]
+            )
+            if left is None:
+                continue
+            weight = self._total - left
+            ends = sorted({int(block[i]), head + j})
+            self.offer([*chosen, *(int(candidates[s]) for s in ends)], weight)
             upper = max(upper, weight)
         return upper
+
+    def _best_pair(
+        self,
+        ones: NDArray[np.bool_],
+        others: NDArray[np.bool_],
+        weights: NDArray[np.float64],
+    ) -> tuple[int, int, float | None]:
+        """Return the pair that leaves the least weight, if that is little enough.
+
+        What a pair leaves open only grows with the rows looked at, so most pairs are
+        refuted by the rows that fewest columns cover, which come first.
+        """
+        allowed = self._total - self.target
+        left = np.zeros((len(ones), len(others)))
+        start, length = 0, _FIRST_ROWS
+        while start < weights.size:
+            part = slice(start, start + length)
+            left += (ones[:, part] * weights[part]) @ others[:, part].T.astype(float)
+            width = min(length, weights.size - start)
+            self.budget.spend(left.size * (4.0 + width * _DENSE_UNIT))
+            start, length = start + length, 4 * length
+            alive = left <= allowed
+            n_alive = int(np.count_nonzero(alive))
+            if n_alive == 0:
+                return 0, 0, None
+            if n_alive * _FEW_PAIRS < left.size and start < weights.size:
+                i, j = np.nonzero(alive)
+                rest = slice(start, None)
+                for k in range(0, i.size, _PAIR_BLOCK):
+                    few = slice(k, k + _PAIR_BLOCK)
+                    both = ones[i[few], rest] & others[j[few], rest]
+                    left[i[few], j[few]] += both @ weights[rest]
+                    self.budget.spend(2.0 * both.size)
+                left[~alive] = np.inf
+                break
+        i, j = np.unravel_index(int(np.argmin(left)), left.shape)
+        value = float(left[i, j])
+        return int(i), int(j), value if value <= allowed else None
+
+
+def _unit(n: int, i: int) -> NDArray[np.float64]:
+    vector = np.zeros(n)
+    vector[i] = 1.0
+    return vector

@@ -17,9 +17,12 @@ from scipy import sparse
 from .reductions import ReducedCover
 from .status import WorkBudget
 
-# Units of work that one simplex iteration or one node costs, per nonzero.
+# Units of work per nonzero that a simplex iteration, the root with its cuts (of a
+# partial and of a full cover) and any other node cost.
 _UNITS_PER_ITERATION = 2.0
-_UNITS_PER_NODE = 300.0
+_UNITS_PER_ROOT = 100_000.0
+_UNITS_PER_FULL_ROOT = 20_000.0
+_UNITS_PER_NODE = 3_000.0
 _MAX_ENTRIES = 60_000
 
 
@@ -61,7 +64,7 @@ def linear_multipliers(
 
 
 def fits(cover: ReducedCover) -> bool:
-    """Whether the program is small enough for branch and bound in seconds."""
+    """Whether the program is small enough for branch and bound to be of use."""
     return cover.entries <= _MAX_ENTRIES
 
 
@@ -69,21 +72,22 @@ def solve_integer(
     cover: ReducedCover, start: NDArray[np.int64], budget: WorkBudget
 ) -> IntegerAnswer:
     """Run branch and bound from a known cover, up to a number of nodes."""
-    nodes = int(budget.remaining / (_UNITS_PER_NODE * cover.entries))
-    if nodes < 1 or budget.exhausted:
+    root = _UNITS_PER_FULL_ROOT if _is_full(cover) else _UNITS_PER_ROOT
+    spare = budget.remaining / cover.entries - root
+    if not spare > 0 or budget.exhausted:
         return IntegerAnswer(None, 0.0)
     solver = _model(cover, integer=True, budget=budget)
-    solver.setOptionValue("mip_max_nodes", min(nodes, 10_000_000))
+    solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
     _warm_start(solver, cover, start)
     solver.run()
     info = solver.getInfo()
-    budget.spend(_UNITS_PER_NODE * cover.entries * max(1, int(info.mip_node_count)))
+    nodes = _UNITS_PER_NODE * max(0, int(info.mip_node_count))
+    budget.spend((root + nodes) * cover.entries)
     values = np.asarray(solver.getSolution().col_value, dtype=np.float64)
     n = cover.n_sets
     selected = np.flatnonzero(values[:n] > 0.5) if values.size >= n else None
     bound = float(info.mip_dual_bound)
-    if not np.isfinite(bound):
-        bound = 0.0
+    bound = bound if np.isfinite(bound) else 0.0
     return IntegerAnswer(selected, max(0.0, bound - 1e-6 * max(1.0, abs(bound))))
 
 
@@ -92,7 +96,7 @@ def _model(cover: ReducedCover, *, integer: bool, budget: WorkBudget) -> Any:  #
     import highspy
 
     n_e, n_s = cover.weights.size, cover.n_sets
-    full = cover.required >= cover.total * (1.0 - 1e-12)
+    full = _is_full(cover)
     link: sparse.csr_array = cover.by_row
     quota = np.empty(0)
     if not full:
@@ -135,6 +139,11 @@ def _model(cover: ReducedCover, *, integer: bool, budget: WorkBudget) -> Any:  #
         solver.setOptionValue(name, value)
     solver.passModel(lp)
     return solver
+
+
+def _is_full(cover: ReducedCover) -> bool:
+    """Whether no row may be lost, so that the rows' own variables fall away."""
+    return cover.total - cover.required < float(cover.weights.min(initial=np.inf))
 
 
 def _warm_start(

@@ -19,12 +19,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .reductions import ReducedCover
 from .status import WorkBudget
 
 # Rounding of sums of real multipliers, relative to the total weight.
 ROUNDING = 1e-11
+# Steps after which a descent that hardly moves is given up.
+_LOOK_BACK = 30
 
 
 def coverage_bounds(
@@ -99,7 +102,8 @@ class Tightening:
 
 
 def tighten(
-    cover: ReducedCover,
+    by_set: sparse.csr_array,
+    weights: NDArray[np.float64],
     n_sets: int,
     target: float,
     start: NDArray[np.float64],
@@ -112,7 +116,8 @@ def tighten(
     Volume algorithm: subgradient steps towards a running mean of the K dearest sets.
 
     Args:
-        cover: The cover.
+        by_set: Ones where set s covers row e, shape (n_s, n_e).
+        weights: Weight of each row, at least 0, shape (n_e,).
         n_sets: K.
         target: Weight below which the bound need not go.
         start: Multipliers to start from, shape (n_e,).
@@ -123,49 +128,51 @@ def tighten(
         Barahona and Anbil, "The volume algorithm: producing primal solutions with a
         subgradient method", Mathematical Programming 87, 2000.
     """
-    w = cover.weights
-    total = cover.total
-    share = np.clip(start / w, 0.0, 1.0)
-    best_share = share
-    bound, chosen = _dearest(cover, share, n_sets)
+    by_row = by_set.T
+    total = float(weights.sum())
+    heavy = np.where(weights > 0, weights, 1.0)
+    best = np.clip(start / heavy, 0.0, 1.0)
+    bound, chosen = _dearest(by_set, weights, best, n_sets)
     primal = chosen.copy()
     aim = min(target, total) * 0.998
-    step, stale, mark, marked = 1.0, 0, bound, 0
+    step, stale, mark = 1.0, 0, bound
     for i in range(max_steps):
         if bound < target or budget.exhausted:
             break
-        excess = 1.0 - cover.by_row @ primal
-        moving = np.where(excess > 0, best_share < 1.0, best_share > 0.0)
-        length = float(np.sum(w * excess * excess * moving))
+        excess = 1.0 - by_row @ primal
+        moving = np.where(excess > 0, best < 1.0, best > 0.0)
+        length = float(np.sum(weights * excess * excess * moving))
         if not length > 0:
             break
-        share = np.clip(
-            best_share + step * max(bound - aim, 1e-4 * total) / length * excess, 0, 1
-        )
-        value, chosen = _dearest(cover, share, n_sets)
-        budget.spend(2 * cover.entries)
+        stride = step * max(bound - aim, 1e-4 * total) / length
+        share = np.clip(best + stride * excess, 0.0, 1.0)
+        value, chosen = _dearest(by_set, weights, share, n_sets)
+        budget.spend(3.0 * by_set.nnz + 20.0 * weights.size + 3e4)
         primal = 0.9 * primal + 0.1 * chosen
         if value < bound:
-            bound, best_share, stale, step = value, share, 0, min(step * 1.1, 4.0)
+            bound, best, stale, step = value, share, 0, min(step * 1.1, 4.0)
         else:
             stale += 1
             if stale % 5 == 0:
                 step *= 0.6
-        if i - marked >= 30:
-            if mark - bound < 2e-4 * total and bound - target > 20 * (mark - bound):
+        if i % _LOOK_BACK == _LOOK_BACK - 1:
+            gain, mark = mark - bound, bound
+            if bound - target > 20.0 * gain:
                 break
-            mark, marked = bound, i
-    return Tightening(best_share * w, bound, primal)
+    return Tightening(best * weights, bound, primal)
 
 
 def _dearest(
-    cover: ReducedCover, share: NDArray[np.float64], n_sets: int
+    by_set: sparse.csr_array,
+    weights: NDArray[np.float64],
+    share: NDArray[np.float64],
+    n_sets: int,
 ) -> tuple[float, NDArray[np.float64]]:
     """Return the coverage bound for K sets and the indicator of the K dearest."""
-    multipliers = share * cover.weights
-    prices = cover.by_set @ multipliers
+    multipliers = share * weights
+    prices = by_set @ multipliers
     top = np.argsort(-prices, kind="stable")[:n_sets]
     chosen = np.zeros(prices.size)
     chosen[top] = 1.0
-    rest = float(np.sum(cover.weights - multipliers))
+    rest = float(np.sum(weights - multipliers))
     return (rest + float(prices[top].sum())) * (1.0 + ROUNDING), chosen
