@@ -34,6 +34,9 @@ from .verdict import (
 )
 
 _DEFAULT_SAMPLES = 20_000
+# Edges that run more steeply along the viewing ray are steps between surfaces, unless
+# the plan counts on surface seen at such incidence [rad].
+_SLANTED = np.deg2rad(70.0)
 Progress = Callable[[int, int], None]
 
 
@@ -237,7 +240,8 @@ def _decode_pairs(
     believed = [calibrate_camera(camera) for camera in plan.cameras]
     designed = [calibrate_projector(projector) for projector in plan.projectors]
     radii = [projector.ring_radii for projector in plan.projectors]
-    min_conditioning = plan.requirements.triangulation.min_conditioning
+    requirements = plan.requirements
+    max_slant = float(np.tan(max(requirements.camera.max_incidence, _SLANTED)))
 
     def look(c: int) -> View | None:
         camera = standing.get(believed[c].id)
@@ -257,7 +261,8 @@ def _decode_pairs(
             frames,
             patterns,
             PairCalibration(design, believed[c]),
-            min_conditioning=min_conditioning,
+            min_conditioning=requirements.triangulation.min_conditioning,
+            max_slant=max_slant,
         )
 
     pairs = [(p, c) for c in range(len(believed)) for p in range(len(designed))]

@@ -1,49 +1,24 @@
-"""Images to measured points, with no knowledge of the object.
-
-An edge is where the decoded annulus index changes by exactly one between neighbouring
-pixels; which bit flipped says which frame holds the edge, and the zero level of that
-frame's normalised difference between the two pixels is the sub-pixel position.
-"""
+"""Images to measured points, with no knowledge of the object."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erfinv
+from scipy.spatial import KDTree
 
 from .calibration import PairCalibration
 from .cloud import Cloud
-from .patterns import Frames, Images, RingPatterns
-from .triangulate import intersect_rings
+from .edges import Edges, find_edges
+from .patterns import Frames, RingPatterns
+from .triangulate import RingHits, intersect_rings
 
-_MIN_CONTRAST = 10.0
-_SATURATED = 254.5
-# Least |I - I_inv| / (W - K) of every bit beside an edge, and of the root bit on it.
-_MIN_CERTAINTY = 0.25
-# Beyond this an edge is saturated, and its probit says nothing.
-_MAX_LEVEL = 0.98
-
-
-@dataclass(frozen=True, eq=False)
-class Edges:
-    """Ring edges in one camera's image.
-
-    Attributes:
-        pixels: Sub-pixel positions (u, v) in the camera's image, shape (n, 2).
-        rings: Ring edge of each, shape (n,).
-        roots: Sign of r.m, from the root disc, shape (n,).
-        across: Unit direction in the image across the edge, shape (n, 2).
-        noise_px: Standard deviation of the position along `across` [px], shape (n,).
-    """
-
-    pixels: NDArray[np.float64]
-    rings: NDArray[np.int64]
-    roots: NDArray[np.int8]
-    across: NDArray[np.float64]
-    noise_px: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.pixels)
+# Neighbours along a ring edge are looked for this far away in the image [px].
+_NEAR_PX = 2.6
+_MIN_NEIGHBOURS = 2
+# Keeps rings apart when neighbours are looked for.
+_RING_APART_PX = 100.0
+# tan(70 degrees).
+_MAX_SLANT = 2.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +49,7 @@ def decode(
     calibration: PairCalibration,
     *,
     min_conditioning: float = 0.1,
+    max_slant: float = _MAX_SLANT,
 ) -> Decoded:
     """Measure points from images, pattern definitions and calibration alone.
 
@@ -82,6 +58,9 @@ def decode(
         patterns: What the projector drew.
         calibration: Of both devices.
         min_conditioning: Least |r.m|; below it a point is left out.
+        max_slant: Most that a ring edge may run along the viewing ray, as the tangent
+            of the incidence at the camera. Where a surface hides another, false edges
+            run down the step between them; this finds them.
 
     Raises:
         ValueError: If the frames aren't as many as the patterns ask for.
@@ -97,11 +76,54 @@ def decode(
     rays = camera.rays(edges.pixels)
     radii = patterns.radii[edges.rings]
     hits = intersect_rings(camera.centre, rays, radii, edges.roots, projector)
-    drawn = projector.in_panel(projector.panel(hits.points)[0], margin_px=1.0)
-    missed = ~np.isfinite(hits.distances)
-    weak = ~missed & ~(np.abs(hits.conditioning) >= min_conditioning)
-    outside = ~missed & ~weak & ~drawn
-    cloud = Cloud(
+    slant = _slant(edges, hits, camera.focal_px)
+    causes = {
+        "no_intersection": ~np.isfinite(hits.distances),
+        "conditioning": ~(np.abs(hits.conditioning) >= min_conditioning),
+        "outside_panel": ~projector.in_panel(projector.panel(hits.points)[0], 1.0),
+        "isolated": np.isnan(slant),
+        "depth_step": ~(slant <= max_slant),
+    }
+    kept = np.ones(len(edges), dtype=bool)
+    rejected: dict[str, int] = {}
+    for cause, fails in causes.items():
+        rejected[cause] = int(np.count_nonzero(kept & fails))
+        kept &= ~fails
+    return Decoded(
+        _cloud(edges, rays, hits, calibration).take(kept),
+        lit_pixels,
+        len(edges),
+        rejected,
+    )
+
+
+def _slant(edges: Edges, hits: RingHits, focal_px: float) -> NDArray[np.float64]:
+    """Steepest change of distance along each edge, in units of a pixel's width there.
+
+    NaN where an edge has too few neighbours of its own ring.
+    """
+    slant = np.full(len(edges), np.nan)
+    rows = np.flatnonzero(np.isfinite(hits.distances))
+    if len(rows) == 0:
+        return slant
+    t = hits.distances[rows]
+    place = np.column_stack([edges.pixels[rows], _RING_APART_PX * edges.rings[rows]])
+    apart, other = KDTree(place).query(place, k=7, distance_upper_bound=_NEAR_PX)
+    found = (other < len(rows)) & (apart > 0.5)
+    steps = np.abs(t[np.where(found, other, 0)] - t[:, None])
+    run = np.where(found, apart, np.inf) * (t / focal_px)[:, None]
+    enough = np.count_nonzero(found, axis=1) >= _MIN_NEIGHBOURS
+    slant[rows] = np.where(enough, (steps / run).max(axis=1), np.nan)
+    return slant
+
+
+def _cloud(
+    edges: Edges,
+    rays: NDArray[np.float64],
+    hits: RingHits,
+    calibration: PairCalibration,
+) -> Cloud:
+    return Cloud(
         points=hits.points,
         rays=rays,
         beams=_beams(hits.points, calibration),
@@ -110,144 +132,9 @@ def decode(
         projector=np.zeros(len(edges), dtype=np.int16),
         ring=edges.rings.astype(np.int16),
         conditioning=hits.conditioning,
-        shift=_shift(edges, rays, hits.normals, hits.distances, calibration),
+        shift=_shift(edges, rays, hits, calibration),
         noise_px=edges.noise_px,
-    ).take(~(missed | weak | outside))
-    rejected = {
-        "no_intersection": int(missed.sum()),
-        "conditioning": int(weak.sum()),
-        "outside_panel": int(outside.sum()),
-    }
-    return Decoded(cloud, lit_pixels, len(edges), rejected)
-
-
-def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[Edges, int]:
-    """Return the labelled ring edges of a stack of images, and its lit pixels."""
-    reader = _Reader(frames.stack, patterns)
-    noise = reader.grey_noise()
-    along_rows = _crossings(reader, noise)
-    along_columns = _crossings(reader.transposed(), noise)
-    swapped = along_columns.pixels[:, ::-1], along_columns.across[:, ::-1]
-    # A crossing is kept in the one direction that runs more squarely into the edge.
-    a = np.abs(along_rows.across[:, 0]) >= np.abs(along_rows.across[:, 1])
-    b = np.abs(swapped[1][:, 1]) > np.abs(swapped[1][:, 0])
-    edges = Edges(
-        np.concatenate([along_rows.pixels[a], swapped[0][b]]) + np.array(frames.corner),
-        np.concatenate([along_rows.rings[a], along_columns.rings[b]]),
-        np.concatenate([along_rows.roots[a], along_columns.roots[b]]),
-        np.concatenate([along_rows.across[a], swapped[1][b]]),
-        np.concatenate([along_rows.noise_px[a], along_columns.noise_px[b]]),
     )
-    return edges, int(np.count_nonzero(reader.valid))
-
-
-class _Reader:
-    """Bits, annulus indices and normalised differences of a stack of images.
-
-    Attributes:
-        contrast: White - black, at least 1, shape (h, w).
-        valid: Pixels bright enough under the white frame and not saturated.
-        index: Annulus of each pixel, -1 where there is none.
-        sure: Pixels whose every bit stands out.
-    """
-
-    def __init__(self, stack: Images, patterns: RingPatterns) -> None:
-        self._stack = stack
-        self.patterns = patterns
-        white, black = stack[0].astype(np.float32), stack[1].astype(np.float32)
-        contrast = white - black
-        self.valid = (contrast >= _MIN_CONTRAST) & (white < _SATURATED)
-        self.contrast = np.maximum(contrast, np.float32(1.0))
-        code = np.zeros(contrast.shape, dtype=np.int16)
-        least = np.full(contrast.shape, np.inf, dtype=np.float32)
-        for bit in range(patterns.n_bits):
-            difference = self._difference(2 + 2 * bit)
-            code |= (difference > 0.0).astype(np.int16) << bit
-            np.minimum(least, np.abs(difference), out=least)
-        self.index = np.where(self.valid, patterns.index_of_code[code], np.int16(-1))
-        self.sure = self.valid & (least >= _MIN_CERTAINTY * self.contrast)
-
-    def transposed(self) -> "_Reader":
-        """Return the same reader with rows and columns exchanged."""
-        other = object.__new__(_Reader)
-        other._stack = self._stack.transpose(0, 2, 1)
-        other.patterns = self.patterns
-        for name in ("contrast", "valid", "index", "sure"):
-            setattr(other, name, getattr(self, name).T)
-        return other
-
-    def level(
-        self, frame: NDArray[np.int64] | int, i: NDArray[np.int64], j: NDArray[np.int64]
-    ) -> NDArray[np.float32]:
-        """Return (I - I_inv) / (W - K) of a frame at pixels: -1 dark to 1 bright."""
-        stack = self._stack
-        bright = stack[frame, i, j].astype(np.float32)
-        return (bright - stack[frame + 1, i, j]) / self.contrast[i, j]
-
-    def grey_noise(self) -> float:
-        """Return the standard deviation of one frame, from I + I_inv = W + K."""
-        i, j = np.nonzero(self.sure)
-        if len(i) < 100:
-            return 1.0
-        i, j = i[:: max(1, len(i) // 20_000)], j[:: max(1, len(j) // 20_000)]
-        frames = self._stack[:4, i, j].astype(np.float32)
-        rest = frames[2] + frames[3] - frames[0] - frames[1]
-        return max(0.5 * 1.4826 * float(np.median(np.abs(rest))), 1e-3)
-
-    def _difference(self, frame: int) -> NDArray[np.float32]:
-        return np.subtract(self._stack[frame], self._stack[frame + 1], dtype=np.float32)
-
-
-def _crossings(reader: _Reader, noise: float) -> Edges:
-    """Edges between pixels of one row, in pixels (column, row) of the reader."""
-    index, sure = reader.index, reader.sure
-    before, after = index[:, 1:-2], index[:, 2:-1]
-    found = (np.abs(after - before) == 1) & (before >= 0) & (after >= 0)
-    found &= (index[:, :-3] == before) & (index[:, 3:] == after)
-    found &= sure[:, :-3] & sure[:, 3:]
-    found[:1] = found[-1:] = False
-    i, j = np.nonzero(found)
-    j = j + 1
-    rings = np.minimum(index[i, j], index[i, j + 1]).astype(np.int64)
-    frame = 2 + 2 * reader.patterns.flipping_bit[rings]
-    left, right = reader.level(frame, i, j), reader.level(frame, i, j + 1)
-    along = right - left
-    cross = _row_slope(reader, frame, i, j)
-    root_frame = 2 + 2 * reader.patterns.n_bits
-    root = 0.5 * (reader.level(root_frame, i, j) + reader.level(root_frame, i, j + 1))
-    # A blurred step is an error function: its probit is a straight line.
-    a, b = (
-        erfinv(np.clip(level, -_MAX_LEVEL, _MAX_LEVEL).astype(np.float64))
-        for level in (left, right)
-    )
-    good = ((left > 0.0) != (right > 0.0)) & (np.abs(root) >= _MIN_CERTAINTY)
-    i, j, a, b = i[good], j[good], a[good], b[good]
-    along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
-    slope = np.hypot(along, cross)
-    contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
-    return Edges(
-        np.column_stack([j + a / (a - b), i.astype(np.float64)]),
-        rings[good],
-        np.where(root[good] > 0.0, 1, -1).astype(np.int8),
-        np.column_stack([along, cross]) / slope[:, None],
-        np.sqrt(2.0) * noise / (contrast * slope),
-    )
-
-
-def _row_slope(
-    reader: _Reader,
-    frame: NDArray[np.int64],
-    i: NDArray[np.int64],
-    j: NDArray[np.int64],
-) -> NDArray[np.float32]:
-    """Change of the level from row to row at an edge; 0 beside unlit pixels."""
-    below, above = (
-        reader.level(frame, i + side, j) + reader.level(frame, i + side, j + 1)
-        for side in (1, -1)
-    )
-    valid = reader.valid
-    lit = valid[i + 1, j] & valid[i + 1, j + 1] & valid[i - 1, j] & valid[i - 1, j + 1]
-    return np.where(lit, np.float32(0.25) * (below - above), np.float32(0.0))
 
 
 def _beams(
@@ -263,12 +150,11 @@ def _beams(
 def _shift(
     edges: Edges,
     rays: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    distances: NDArray[np.float64],
+    hits: RingHits,
     calibration: PairCalibration,
 ) -> NDArray[np.float64]:
     """Move of a point on its ring surface with its edge: t dr - r (m.t dr)/(r.m)."""
     beside = calibration.camera.rays(edges.pixels + 0.5 * edges.across)
-    moved = 2.0 * distances[:, None] * (beside - rays)
-    slide = np.einsum("ij,ij->i", moved, normals)
-    return moved - (slide / np.einsum("ij,ij->i", rays, normals))[:, None] * rays
+    moved = 2.0 * hits.distances[:, None] * (beside - rays)
+    slide = np.einsum("ij,ij->i", moved, hits.normals)
+    return moved - (slide / hits.conditioning)[:, None] * rays
