@@ -27,15 +27,17 @@ _FIRM = 2
 
 @dataclass(frozen=True, eq=False)
 class Adjacency:
-    """Near samples of each sample on the same sheet of the surface.
+    """Which samples lie near each other on the same sheet of the surface.
+
+    Each pair stands in both orders, sorted by the first and then by distance.
 
     Attributes:
-        near: Indices, shape (n, k).
-        valid: Whether each of them counts, shape (n, k).
+        first: Sample, shape (e,).
+        second: A near one, shape (e,).
     """
 
-    near: NDArray[np.int64]
-    valid: NDArray[np.bool_]
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
 
 
 def adjacency(points: _Array, normals: _Array) -> Adjacency:
@@ -48,14 +50,21 @@ def adjacency(points: _Array, normals: _Array) -> Adjacency:
     n = len(points)
     k = min(_NEAREST, n - 1)
     if k < 1:
-        empty = np.zeros((n, 0), dtype=np.int64)
-        return Adjacency(empty, empty.astype(bool))
+        return Adjacency(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     found = KDTree(points).query(points, k=k + 1)
-    distance = np.asarray(found[0], dtype=np.float64)[:, 1:]
-    near = np.asarray(found[1], dtype=np.int64)[:, 1:]
-    valid = distance <= _REACH * np.median(distance[:, -1])
-    turn = np.einsum("ij,ikj->ik", normals, normals[near])
-    return Adjacency(near, valid & (turn > _SAME_SHEET))
+    distance = np.asarray(found[0], dtype=np.float64)
+    near = np.asarray(found[1], dtype=np.int64)
+    first, second = np.repeat(np.arange(n), k + 1), near.ravel()
+    valid = distance.ravel() <= _REACH * np.median(distance[:, -1])
+    valid &= first != second
+    valid &= np.einsum("ij,ij->i", normals[first], normals[second]) > _SAME_SHEET
+    pairs = np.column_stack([first, second])[valid]
+    # The nearest of one needn't have it among its own nearest.
+    pairs = np.unique(np.concatenate([pairs, pairs[:, ::-1]]), axis=0)
+    first, second = pairs[:, 0], pairs[:, 1]
+    apart = np.linalg.norm(points[first] - points[second], axis=1)
+    order = np.lexsort((second, apart, first))
+    return Adjacency(first[order], second[order])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,21 +107,25 @@ def find_seam(
         adjacent: Of the same samples.
     """
     part1, part2 = measured_by[:, first], measured_by[:, second]
-    outside = (part2 & ~part1)[adjacent.near] & adjacent.valid
-    count = np.where(part1, outside.sum(axis=1), 0)
+    here, there = adjacent.first, adjacent.second
+    out = part1[here] & (part2 & ~part1)[there]
+    inside = part1[here] & part1[there]
+    count = np.bincount(here[out], minlength=len(points))
     border = np.flatnonzero(count >= _FIRM)
     if not len(border):
         border = np.flatnonzero(count > 0)
     if not len(border):
         shared = np.flatnonzero(part1 & part2)
         return Seam((first, second), shared, shared, np.zeros((len(shared), 3)), False)
-    near, out = adjacent.near[border], outside[border]
-    inside = part1[near] & adjacent.valid[border]
-    offsets = points[near] - points[border][:, None]
     # E itself belongs to camera 1's stretch, hence one more in the second mean.
-    onward = _mean(offsets, out, 0) - _mean(offsets, inside, 1)
-    nearest = near[np.arange(len(border)), np.argmax(out, axis=1)]
-    return Seam((first, second), border, nearest, onward, True)
+    onward = _mean(points, here[out], there[out], 0) - _mean(
+        points, here[inside], there[inside], 1
+    )
+    # Edges are sorted by distance, so the first one of a sample leads to the nearest.
+    _, nearest = np.unique(here[out], return_index=True)
+    beyond = np.zeros(len(points), dtype=np.int64)
+    beyond[here[out][nearest]] = there[out][nearest]
+    return Seam((first, second), border, beyond[border], onward[border], True)
 
 
 def neighbouring_pairs(
@@ -128,7 +141,7 @@ def neighbouring_pairs(
     Parts overlap by enough if the samples that both measure weigh at least
     `min_overlap_share` of the target. They touch by enough if the line along which
     they meet is at least as long as the side of a square of that area: on samples, at
-    least sqrt(min_overlap_share n) of one part have a near one in the other part only.
+    least sqrt(min_overlap_share n) of either part have a near one in the other only.
 
     Args:
         measured_by: Which camera measures which sample, shape (n, n_cameras).
@@ -150,7 +163,6 @@ def neighbouring_pairs(
         if (
             overlap >= min_overlap_share * total > 0.0
             or _contact(part1, part2, adjacent) >= least
-            or _contact(part2, part1, adjacent) >= least
         ):
             pairs.append((a, b))
     return pairs
@@ -159,8 +171,11 @@ def neighbouring_pairs(
 def _contact(
     part1: NDArray[np.bool_], part2: NDArray[np.bool_], adjacent: Adjacency
 ) -> int:
-    beside = (part2 & ~part1)[adjacent.near] & adjacent.valid
-    return int(np.count_nonzero(part1 & beside.any(axis=1)))
+    """How many samples lie along the line where two parts meet."""
+    here, there = adjacent.first, adjacent.second
+    into2 = part1[here] & (part2 & ~part1)[there]
+    into1 = part2[here] & (part1 & ~part2)[there]
+    return min(len(np.unique(here[into2])), len(np.unique(here[into1])))
 
 
 def overlap_components(
@@ -208,6 +223,11 @@ def overlap_graph_connected(
     return len(components) <= 1
 
 
-def _mean(offsets: _Array, chosen: NDArray[np.bool_], extra: int) -> _Array:
-    total = np.einsum("ikj,ik->ij", offsets, chosen.astype(np.float64))
-    return total / np.maximum(chosen.sum(axis=1) + extra, 1)[:, None]
+def _mean(
+    points: _Array, here: NDArray[np.int64], there: NDArray[np.int64], extra: int
+) -> _Array:
+    """Mean offset of the near samples of each sample, `extra` null ones included."""
+    offset = points[there] - points[here]
+    total = [np.bincount(here, offset[:, axis], len(points)) for axis in range(3)]
+    count = np.bincount(here, minlength=len(points)) + extra
+    return np.column_stack(total) / np.maximum(count, 1)[:, None]

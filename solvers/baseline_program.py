@@ -298,7 +298,9 @@ class _Stated:
             self.high = [np.maximum(np.concatenate(self.high), now)]
 
 
-def _state_workspace(stated: _Stated, problem: BaselineProblem, centres: ca.SX) -> None:
+def _state_workspace(
+    stated: _Stated, problem: BaselineProblem, centres: _Matrix
+) -> None:
     shell = problem.shell
     k = len(problem.centres)
     offset = centres - _repeated(shell.centre, k)
@@ -318,7 +320,7 @@ def _state_workspace(stated: _Stated, problem: BaselineProblem, centres: ca.SX) 
 
 
 def _state_seams(
-    stated: _Stated, problem: BaselineProblem, centres: ca.SX, axes: ca.SX
+    stated: _Stated, problem: BaselineProblem, centres: _Matrix, axes: _Matrix
 ) -> None:
     """Camera 2 has left at E what camera 1 gives up there, and vice versa."""
     left1, left2 = _seam_margins(problem, centres, axes)
@@ -353,7 +355,7 @@ def _seam_margins(
 
 
 def _state_kept(
-    stated: _Stated, problem: BaselineProblem, centres: ca.SX, axes: ca.SX
+    stated: _Stated, problem: BaselineProblem, centres: _Matrix, axes: _Matrix
 ) -> None:
     kept = problem.kept
     ray = ca.DM(kept.points) - _rows(centres, kept.camera)
