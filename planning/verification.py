@@ -115,7 +115,7 @@ def verify_plan(
     Raises:
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
-    say = progress or (lambda _: None)
+    say = progress or _silent
     seed = int(plan.document["seed"]) if seed is None else seed
     say("audit: recomputing every claim on fresh samples")
     audit = audit_plan(plan, seed=seed, threads=threads)
@@ -151,8 +151,8 @@ def compare_meshes(
     if not np.allclose(mesh.bounds, surface.bounds, rtol=0.0, atol=slack):
         sizes = [np.round(_MM * np.ptp(m.bounds, axis=0), 2) for m in (mesh, surface)]
         return [
-            f"mesh: its bounding box ({sizes[0].tolist()} mm) isn't that of surface.npz "
-            f"({sizes[1].tolist()} mm); check the file, the unit and the axes"
+            f"mesh: its bounding box ({sizes[0].tolist()} mm) isn't that of "
+            f"surface.npz ({sizes[1].tolist()} mm); check file, unit and axes"
         ]
     apart = max(_apart(mesh, surface, threads), _apart(surface, mesh, threads))
     if not apart <= slack:
@@ -200,13 +200,18 @@ def compare_figures(
         ):
             failures.append(
                 f"reconstruction.completeness: claimed {claimed}, run again "
-                f"{row['fraction']:.4f} at {_MM * at:.3g} mm, tolerance {_FRACTION_SLACK}"
+                f"{row['fraction']:.4f} at {_MM * at:.3g} mm, tolerance "
+                f"{_FRACTION_SLACK}"
             )
     if recorded.get("passed") is True and not found["passed"]:
         failures.append(
             "reconstruction.passed: claimed true, the check run again fails"
         )
     return failures
+
+
+def _silent(line: str) -> None:
+    """Report to nobody."""
 
 
 def _near(claimed: object, value: float, slack: float) -> bool:

@@ -39,6 +39,8 @@ SIGHT = (
 PAIR = ("conditioning", "sigma", "pitch")
 RADIUS_M = 0.05
 UP = np.array([0.0, 1.0, 0.0])
+# Sign of a cone's normal along the axis of the rings; +1 is the error to be found.
+RING_SIGN = -1.0
 
 
 @cache
@@ -95,14 +97,21 @@ def _reference(n: int, half_angle: float, distance: float) -> np.ndarray:
 
 
 def _ring(light: str, pose: np.ndarray) -> np.ndarray:
-    """Ring frame: turned by 1.5 degrees about the device's x, or shifted in y."""
+    """Ring frame: turned by 6 degrees about the device's x, or shifted in y."""
     ring = pose.copy()
     if light == "parallel":
         ring[:3, 3] += 0.02 * pose[:3, 1]
         return ring
-    c, s = math.cos(math.radians(1.5)), math.sin(math.radians(1.5))
+    c, s = math.cos(math.radians(6)), math.sin(math.radians(6))
     ring[:3, :3] = pose[:3, :3] @ np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
     return ring
+
+
+def _radii(light: str) -> list[float]:
+    """Rings whose gaps grow outwards, the first of them out on the object."""
+    if light == "parallel":
+        return np.geomspace(0.012, 0.062, 31).tolist()
+    return np.geomspace(0.075, 0.142, 37).tolist()
 
 
 def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
@@ -111,7 +120,6 @@ def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
     for name, direction in (("P1", (0.42, 0.0, 0.9)), ("P2", (-0.3, -0.2, 0.9))):
         at = np.array(direction) / np.linalg.norm(direction)
         pose = look_at(at, np.zeros(3), up=UP)
-        radii = np.linspace(0.002, 0.062, 31)
         projectors.append(
             {
                 "id": name,
@@ -119,7 +127,7 @@ def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
                 "world_from_device": pose.tolist(),
                 "world_from_ring": _ring(light, pose).tolist(),
                 **projector,
-                "ring_radii": radii.tolist(),
+                "ring_radii": _radii(light),
             }
         )
     for name, direction, aim in (
@@ -140,7 +148,7 @@ def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
         "meshes": [_mesh_entry(surface.mesh)],
         "surface": {"path": "surface.npz", "sha256": "", "curvature_radius_m": 0.01},
         "rig": {"light": light, "projector": dict(projector), "camera": dict(camera)},
-        "requirements": _requirements(target, surface),
+        "requirements": _requirements(light, target, surface),
         "projectors": projectors,
         "cameras": cameras,
         "cost": {"pixels": 2 * 2048 * 1536},
@@ -173,7 +181,7 @@ def _models(light: str) -> tuple[dict[str, Any], dict[str, Any]]:
         "beam_radius": None if diverging else 0.048,
     }
     camera = {
-        "K": [[16000.0, 0, 1023.5], [0, 15900.0, 760.0], [0, 0, 1]],
+        "K": [[16000.0, 0, 500.0], [0, 15900.0, 760.0], [0, 0, 1]],
         "distortion": [-0.5, 2.0, 0.01, -0.008, 0.0],
         "resolution": [2048, 1536],
         "range_m": [0.93, 0.972],
@@ -181,7 +189,7 @@ def _models(light: str) -> tuple[dict[str, Any], dict[str, Any]]:
     return projector, camera
 
 
-def _requirements(target: str, surface: Surface) -> dict[str, Any]:
+def _requirements(light: str, target: str, surface: Surface) -> dict[str, Any]:
     return {
         "max_projectors": 3,
         "max_cameras": None,
@@ -221,7 +229,7 @@ def _requirements(target: str, surface: Surface) -> dict[str, Any]:
             "floor_m": -1.0,
             "n_reference_projectors": 10,
             "n_reference_cameras": 4,
-            "reference_ring_radius": 0.062,
+            "reference_ring_radius": _radii(light)[-1],
         },
     }
 
@@ -456,7 +464,7 @@ def _triangulation_steps(
     else:
         coordinate = rho / y[2]
         slope = math.sqrt(1 + coordinate**2)
-        m = [y[0] / rho / slope, y[1] / rho / slope, -coordinate / slope]
+        m = [y[0] / rho / slope, y[1] / rho / slope, RING_SIGN * coordinate / slope]
         per_gap = y[2] / slope
     frame = projector["world_from_ring"]
     m = [sum(frame[i][j] * m[j] for j in range(3)) for i in range(3)]
@@ -519,7 +527,7 @@ def _claim_devices(document: Any, rows: Any, area: Any, inside: np.ndarray) -> N
     for i, entry in enumerate(document["projectors"]):
         entry["lit_area_m2"] = area(lambda row, i=i: row["lit_by"][i], inside)
         served = [r["margins"][i] for r in rows if r["inside"] and r["server"] == i]
-        entry["min_margin_rad"] = min(served)
+        entry["min_margin_rad"] = min(served, default=None)
     for j, entry in enumerate(document["cameras"]):
         entry["seen_area_m2"] = area(lambda row, j=j: row["seen"][j], inside)
         entry["sole_area_m2"] = area(
