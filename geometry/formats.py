@@ -96,10 +96,10 @@ class _Fetch(Resolver):
     def __init__(self, fetch: Callable[[str], bytes] | None) -> None:
         self._fetch = fetch
 
-    def get(self, name: str) -> bytes:
-        if self._fetch is None or PurePath(name).is_absolute() or ".." in name:
-            raise FormatError(f"it needs the file '{name}', which isn't beside it")
-        return self._fetch(name)
+    def get(self, key: str) -> bytes:
+        if self._fetch is None or PurePath(key).is_absolute() or ".." in key:
+            raise FormatError(f"it needs the file '{key}', which isn't beside it")
+        return self._fetch(key)
 
     def write(self, name: str, data: bytes) -> None:
         raise NotImplementedError

@@ -1,8 +1,8 @@
 """Turn faces so that they are counter-clockwise seen from outside.
 
-A *patch* is connected across edges of exactly two faces, the largest piece whose winding
-can be made consistent without a choice. Each patch is then decided on its own, so that a
-floating fragment never decides for the rest.
+A *patch* is connected across edges of exactly two faces: the largest piece whose
+winding can be made consistent without a choice. Each patch is then decided on its own,
+so that a floating fragment never decides for the rest.
 """
 
 import igl
@@ -29,10 +29,10 @@ def orient(mesh: TriangleMesh) -> tuple[NDArray[np.int64], tuple[Repair, ...]]:
 
     Winding is made consistent inside each patch, after its majority. A closed patch is
     turned if its signed volume is negative, unless it lies inside another closed one:
-    then it may be the inner wall of a hollow shell, and is turned only together with the
-    one that holds it. An open patch is turned if rays from all around hit more of its
-    back than of its front. Patches that neither decides (flat, or never seen) are turned
-    if most of the decided area was.
+    then it may be the inner wall of a hollow shell, and is turned only together with
+    the one that holds it. An open patch is turned if rays from all around hit more of
+    its back than of its front. Patches that neither decides (flat, or never seen) are
+    turned if most of the decided area was.
 
     Args:
         mesh: Welded, without duplicate or zero-area faces.

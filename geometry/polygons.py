@@ -27,7 +27,7 @@ def triangulate(
     owner: list[NDArray[np.int64]] = []
     for size in np.unique(sizes[sizes >= 3]).tolist():
         which = np.flatnonzero(sizes == size)
-        corners = np.array([polygons[i] for i in which], dtype=np.int64)
+        corners = np.array([polygons[i] for i in which.tolist()], dtype=np.int64)
         fans = np.stack(
             [
                 np.stack([corners[:, 0], corners[:, k], corners[:, k + 1]], axis=1)

@@ -16,10 +16,10 @@ _Arrays = tuple[NDArray[np.float64], NDArray[np.int64], tuple[Repair, ...]]
 def clean(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
     """Return a mesh that every later stage can take, and what was changed.
 
-    In this order: faces with a corner that isn't finite, and such vertices, are removed;
-    vertices at identical positions are welded (texture seams, triangle soups); faces
-    without area and faces with the corners of an earlier one are removed; vertices that
-    no face uses are removed. Winding and the order of what stays are kept.
+    In this order: faces with a corner that isn't finite, and such vertices, are
+    removed; vertices at identical positions are welded (texture seams, triangle soups);
+    faces without area and faces with the corners of an earlier one are removed;
+    vertices that no face uses are removed. Winding and the order of what stays are kept.
 
     Args:
         vertices: In any unit, shape (n_v, 3).

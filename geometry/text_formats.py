@@ -23,7 +23,7 @@ class FormatError(Exception):
 
 
 def decode(data: bytes) -> str:
-    """Return text of a UTF-8, UTF-16 or Latin-1 file; numbers are ASCII in all three."""
+    """Return the text of a UTF-8, UTF-16 or Latin-1 file; its numbers are ASCII."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace")
     return data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
