@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera_spread import spread_cameras
-from .cameras import CameraStage, lit_samples, measured_by, plan_cameras
+from .camera_spread import CameraSpread, spread_cameras
+from .cameras import CameraStage, measured_by, plan_cameras
 from .plan import PlannedCamera, PlannedProjector
 from .ring_axes import turn_ring_axes
 from .scene import Scene
+from .spread_problem import SpreadLimits
 
 _ROUNDS = 3
 
@@ -26,21 +27,6 @@ class CameraSolution:
 
     projectors: tuple[PlannedProjector, ...]
     stage: CameraStage
-
-
-@dataclass(frozen=True, eq=False)
-class Spread:
-    """Cameras slid apart to the largest baselines that the coverage allows.
-
-    Attributes:
-        cameras: As moved.
-        smallest_before_m: Smallest baseline of neighbours before, None for one camera.
-        smallest_after_m: The same after.
-    """
-
-    cameras: tuple[PlannedCamera, ...]
-    smallest_before_m: float | None
-    smallest_after_m: float | None
 
 
 def place_cameras(
@@ -79,27 +65,41 @@ def place_cameras(
     return best
 
 
-def spread(scene: Scene, solution: CameraSolution) -> Spread:
-    """Slide the cameras of a solution apart; no move that loses coverage is taken."""
-    cameras = solution.stage.cameras
-    rows = solution.stage.rows
-    required = int(round(_required_rows(solution.stage)))
+def spread(
+    scene: Scene, projectors: Sequence[PlannedProjector], stage: CameraStage
+) -> CameraSpread:
+    """Slide the cameras apart; no move that loses coverage is taken.
 
-    def moved(poses: NDArray[np.float64]) -> tuple[PlannedCamera, ...]:
-        return tuple(
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with their rings.
+        stage: Cameras from the cover, and its rows.
+    """
+    rows, required = stage.rows, scene.requirements
+    samples = rows.target.samples
+
+    def measure(poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        moved = [
             replace(camera, world_from_device=pose)
-            for camera, pose in zip(cameras, poses, strict=True)
-        )
+            for camera, pose in zip(stage.cameras, poses, strict=True)
+        ]
+        return measured_by(scene, moved, rows)
 
-    def evaluate(poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-        return measured_by(scene, moved(poses), rows)
-
-    raise NotImplementedError((required, evaluate, lit_samples, spread_cameras))
-
-
-def _required_rows(stage: CameraStage) -> float:
-    certificate = stage.certificate
-    return certificate["required_m2"] / stage.rows.target.samples.weight
+    return spread_cameras(
+        stage.cameras,
+        measure,
+        points=samples.points,
+        normals=samples.normals,
+        weights=samples.weight,
+        limits=SpreadLimits(
+            required.camera.max_incidence,
+            required.triangulation.min_conditioning,
+            required.workspace,
+        ),
+        required=stage.certificate["required_m2"],
+        ring_normals=np.stack([rings.normals for rings in rows.rings]),
+        lit=rows.lit,
+    )
 
 
 def _better(new: CameraStage, old: CameraStage) -> bool:

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from geometry.curvature import principal_curvatures
@@ -176,12 +177,12 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
         field = principal_curvatures(mesh)
         regions = dominant_regions(mesh, field)
         target = order.asked["target"]
-        clock.say(f"  {len(regions)} regions, {_share(regions, mesh):.1%} of the area")
+        clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
     requirements, radii, tilt = _resolve(order)
     scene = Scene(
         mesh,
         regions.face_region,
-        regions.steep if target == "dominant" else regions.steep_everywhere,
+        _steep(regions, target),
         requirements,
         order.seed,
         order.threads,
@@ -367,7 +368,7 @@ def _document(
             "path": "surface.npz",
             "sha256": surface.sha256(),
             "curvature_radius_m": draft.curvature_radius_m,
-            "dominant_share": _share(draft.regions, draft.scene.mesh),
+            "dominant_share": draft.regions.dominant_share,
         },
         "rig": draft.order.rig.to_document(),
         "requirements": requirements.to_document(),
@@ -415,7 +416,7 @@ def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:
         entry["failures"] = [*false, *entry["failures"]]
         entry["passed"] = entry["passed"] and not false
     greedy = draft.camera_stage.certificate["greedy_count"]
-    seconds = clock.seconds | ({} if found is None else found.seconds)
+    seconds = clock.seconds | getattr(found, "seconds", {})
     document = plan.document | {
         "reconstruction": entry,
         "members": [plan.document["members"][0] | {"reconstruction": entry}],
@@ -435,5 +436,8 @@ def _single(mesh: TriangleMesh | Sequence[TriangleMesh]) -> TriangleMesh:
     return mesh[0]
 
 
-def _share(regions: DominantRegions, mesh: TriangleMesh) -> float:
-    return float(mesh.face_areas[regions.face_region >= 0].sum()) / mesh.area
+def _steep(regions: DominantRegions, target: str) -> NDArray[np.float64]:
+    """T1 of each face of the target; zero elsewhere, where it binds nothing."""
+    if target == "surface":
+        return regions.steep
+    return np.where((regions.face_region >= 0)[:, None], regions.steep, 0.0)
