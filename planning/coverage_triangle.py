@@ -125,13 +125,14 @@ def seam_angles(
     Args:
         points: E in [m], shape (n, 3).
         onward: Direction along the surface from camera 1's stretch into camera 2's,
-            any length, shape (n, 3); where it is square to the plane's trace on the
-            surface (within 6 degrees), the side of O2 takes its place.
+            any length, shape (3,) or (n, 3); where it is square to the plane's trace
+            on the surface (within 6 degrees), the side of O2 takes its place.
         centres: O1 and O2 in [m], shape (3,) or (n, 3).
         axes: Unit optical axes of both, shape (3,) or (n, 3).
         normals: Unit normals at E on camera 1's and camera 2's side, (n, 3).
     """
     points = np.asarray(points, dtype=np.float64)
+    onward = np.broadcast_to(onward, points.shape)
     to1, to2 = centres[0] - points, centres[1] - points
     plane = _plane(to1, to2, onward, normals[0])
     out, on = _plane_axes(plane, to1, to2, onward, normals[0])

@@ -73,11 +73,12 @@ class Seam:
 
     Attributes:
         cameras: Indices of cameras 1 and 2, in this order.
-        points: Samples E of camera 1's part with samples of camera 2's own stretch
-            beside them, shape (m,).
+        points: Samples E that both measure, with samples of camera 2's own stretch
+            beside them; where the parts only touch, such samples of camera 1's part
+            alone, shape (m,).
         beyond: The nearest of those for each E, shape (m,).
-        onward: Direction from camera 1's stretch into camera 2's in [m], shape (m, 3);
-            zero where the parts share no border.
+        onward: From the middle of what camera 1 alone measures to the middle of what
+            camera 2 alone measures in [m], shape (3,).
         shares_border: False where camera 2's own stretch doesn't adjoin camera 1's
             part on the target (regions lie apart, or it has none); then `points` are
             all the samples that both measure.
@@ -109,23 +110,25 @@ def find_seam(
     part1, part2 = measured_by[:, first], measured_by[:, second]
     here, there = adjacent.first, adjacent.second
     out = part1[here] & (part2 & ~part1)[there]
-    inside = part1[here] & part1[there]
     count = np.bincount(here[out], minlength=len(points))
-    border = np.flatnonzero(count >= _FIRM)
+    onward = _mean(points, part2 & ~part1) - _mean(points, part1 & ~part2)
+    shared = np.flatnonzero(part1 & part2)
+    border = _border(count, part2)
     if not len(border):
-        border = np.flatnonzero(count > 0)
-    if not len(border):
-        shared = np.flatnonzero(part1 & part2)
-        return Seam((first, second), shared, shared, np.zeros((len(shared), 3)), False)
-    # E itself belongs to camera 1's stretch, hence one more in the second mean.
-    onward = _mean(points, here[out], there[out], 0) - _mean(
-        points, here[inside], there[inside], 1
-    )
+        return Seam((first, second), shared, shared, onward, False)
     # Edges are sorted by distance, so the first one of a sample leads to the nearest.
     _, nearest = np.unique(here[out], return_index=True)
     beyond = np.zeros(len(points), dtype=np.int64)
     beyond[here[out][nearest]] = there[out][nearest]
-    return Seam((first, second), border, beyond[border], onward[border], True)
+    return Seam((first, second), border, beyond[border], onward, True)
+
+
+def _border(count: NDArray[np.int64], reach: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Border samples inside camera 2's reach, or all where the parts only touch."""
+    for mask in ((count >= _FIRM) & reach, (count > 0) & reach, count >= _FIRM):
+        if mask.any():
+            return np.flatnonzero(mask)
+    return np.flatnonzero(count > 0)
 
 
 def neighbouring_pairs(
@@ -223,11 +226,6 @@ def overlap_graph_connected(
     return len(components) <= 1
 
 
-def _mean(
-    points: _Array, here: NDArray[np.int64], there: NDArray[np.int64], extra: int
-) -> _Array:
-    """Mean offset of the near samples of each sample, `extra` null ones included."""
-    offset = points[there] - points[here]
-    total = [np.bincount(here, offset[:, axis], len(points)) for axis in range(3)]
-    count = np.bincount(here, minlength=len(points)) + extra
-    return np.column_stack(total) / np.maximum(count, 1)[:, None]
+def _mean(points: _Array, chosen: NDArray[np.bool_]) -> _Array:
+    """Mean of the chosen points; of all where none is."""
+    return points[chosen if chosen.any() else slice(None)].mean(axis=0)

@@ -31,6 +31,7 @@ _KEPT_POINTS = 24
 _SPARE_INCIDENCE = np.radians(0.3)
 _SPARE_FIELD = np.radians(0.1)
 _SPARE_CONDITIONING = 0.002
+_COMFORT = np.radians(5.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ def spread_problem(
     centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras])
     kept = [
         np.column_stack([np.full(len(rows), c), rows])
-        for c, rows in enumerate(_sole_samples(cameras, measured_by, target))
+        for c, rows in enumerate(_sole_samples(cameras, measured_by, target, limits))
     ]
     return BaselineProblem(
         centres=centres,
@@ -164,15 +165,22 @@ def _sole_samples(
     cameras: Sequence[PlannedCamera],
     measured_by: NDArray[np.bool_],
     target: SampledTarget,
+    limits: SpreadLimits,
 ) -> list[NDArray[np.int64]]:
-    """Some of what each camera alone measures: the most oblique and well apart."""
+    """Some of what each camera alone measures, the most oblique and well apart.
+
+    Samples right at the limit are left out: on a noisy surface they lie everywhere and
+    would hold the cameras where they are. What a move really loses is demanded later.
+    """
     sole = measured_by.sum(axis=1) == 1
+    least = np.cos(limits.max_incidence - _COMFORT)
     chosen: list[NDArray[np.int64]] = []
     for c, camera in enumerate(cameras):
         rows = np.flatnonzero(sole & measured_by[:, c])
         ray = target.points[rows] - camera.world_from_device[:3, 3]
         facing = -np.einsum("ij,ij->i", ray, target.normals[rows])
         facing /= np.linalg.norm(ray, axis=1)
+        rows, facing = rows[facing >= least], facing[facing >= least]
         chosen.append(
             rows[_tight_and_spread(facing, target.points[rows], _KEPT_POINTS)]
         )
