@@ -3,9 +3,11 @@
 Heavy packages are imported inside the commands, so that `plan --help` stays quick.
 """
 
+import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -16,47 +18,51 @@ _NOT_BUILT = {
 }
 
 
+class _DefaultCommand(click.Command):
+    """The command that runs when no subcommand is named; it shows as plain `plan`."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,  # noqa: ANN401
+    ) -> click.Context:
+        """Return a context whose usage line says `plan`, not `plan rig`."""
+        return super().make_context("", args, parent, **extra)
+
+
 class _DefaultGroup(click.Group):
     """A group whose `rig` command runs when no subcommand is named."""
 
     default = "rig"
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        if args and args[0].startswith("-") and args[0] not in ("--help", "--version"):
+        """Put the default command in front of options that belong to it."""
+        own = ("--help", "-h", "--version")
+        if args and args[0].startswith("-") and args[0] not in own:
             args = [self.default, *args]
         return super().parse_args(ctx, args)
 
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Show the default command's options below the group's own page."""
         super().format_help(ctx, formatter)
-        command = self.commands[self.default]
         formatter.write_paragraph()
-        formatter.write_text("Options of `plan --mesh ...`:")
-        command.format_options(ctx, formatter)
+        formatter.write_text("plan --mesh FILE --max-projectors N")
+        self.commands[self.default].format_options(ctx, formatter)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """Leave the default command out of the list."""
         return [name for name in self.commands if name != self.default]
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        try:
-            return super().resolve_command(ctx, args)
-        except click.UsageError as error:
-            from difflib import get_close_matches
-
-            close = get_close_matches(args[0], self.list_commands(ctx), n=1)
-            if close:
-                error.message += f" Did you mean '{close[0]}'?"
-            raise
 
 
 @click.group(
+    "plan",
     cls=_DefaultGroup,
-    invoke_without_command=False,
     context_settings={"help_option_names": ["--help", "-h"], "max_content_width": 100},
 )
 @click.version_option(package_name="ringrig", prog_name="plan")
-def main() -> None:
+def commands() -> None:
     """Plan a structured-light scanner: how many projectors and cameras, and where.
 
     \b
@@ -68,7 +74,7 @@ def main() -> None:
     """
 
 
-@main.command("rig")
+@commands.command("rig", cls=_DefaultCommand)
 @click.option("--mesh", "meshes", multiple=True, required=True, metavar="FILE",
               help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.")
 @click.option("--max-projectors", type=click.IntRange(1), required=True, metavar="N",
@@ -125,7 +131,7 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
     _run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
 
 
-@main.command()
+@commands.command()
 @click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
 @click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE",
               help="Also hold the plan's surface against this mesh, read anew.")
@@ -143,7 +149,7 @@ def verify(**options: Any) -> None:  # noqa: ANN401
     _run(lambda: verify_command(options), debug=options["debug"])
 
 
-@main.command()
+@commands.command()
 @click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
 def rigs(debug: bool) -> None:
     """List the rigs that need no file, with the source of every number."""
@@ -152,7 +158,7 @@ def rigs(debug: bool) -> None:
     _run(rigs_command, debug=debug)
 
 
-@main.command()
+@commands.command()
 @click.option("-o", "--output", type=click.Path(path_type=Path), default="face.obj",
               show_default=True, metavar="FILE", help="Where it goes.")
 @click.option("--faces", type=click.IntRange(500, 2_000_000), default=24_000,
@@ -168,7 +174,7 @@ def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
 
 
 def _not_built(name: str, purpose: str) -> None:
-    @main.command(
+    @commands.command(
         name,
         short_help=f"(not built yet) {purpose}",
         context_settings={"ignore_unknown_options": True, "help_option_names": ["--help"]},
@@ -177,33 +183,50 @@ def _not_built(name: str, purpose: str) -> None:
     def command(anything: tuple[str, ...]) -> None:
         raise click.UsageError(f"`plan {name}` isn't built yet; it {purpose}")
 
-    command.__doc__ = f"Not built yet: {purpose}."
+    command.help = f"Not built yet: {purpose}."
 
 
 for _name, _purpose in _NOT_BUILT.items():
     _not_built(_name, _purpose)
 
 
-def _run(command: Any, *, debug: bool) -> None:  # noqa: ANN401
+def _run(command: Callable[[], int], *, debug: bool) -> None:
     """Run a command; turn our own errors into one line and the documented exit code."""
     from geometry.mesh import MeshError
 
     from .errors import PlanningError
 
     try:
-        code = command()
+        sys.exit(command())
     except KeyboardInterrupt:
-        click.echo("plan: interrupted; nothing was lost, nothing new was written", err=True)
-        sys.exit(130)
+        _stop("interrupted before a first plan stood; nothing was written", 130)
     except (PlanningError, MeshError, OSError) as error:
         if debug:
             raise
-        click.echo(f"plan: {' '.join(str(error).split())}", err=True)
-        sys.exit(_exit_code(error))
-    sys.exit(code)
+        _stop(str(error), 2 if isinstance(error, OSError) else _exit_code(error))
 
 
 def _exit_code(error: Exception) -> int:
-    if isinstance(error, OSError):
-        return 2
     return int(getattr(error, "exit_code", 3))
+
+
+def _stop(message: str, code: int) -> NoReturn:
+    click.echo(f"plan: {' '.join(message.split())}", err=True)
+    sys.exit(code)
+
+
+def main() -> None:
+    """Run the command line; the entry point of `plan`."""
+    # Sums must not be split differently on another number of cores; set before numpy
+    # and IPOPT are loaded. Rays have threads of their own.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+    try:
+        sys.exit(commands.main(prog_name="plan", standalone_mode=False))
+    except click.exceptions.NoArgsIsHelpError as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except click.ClickException as error:
+        _stop(f"{error.format_message()} (see `plan --help`)", error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        _stop("interrupted", 130)

@@ -95,7 +95,13 @@ def verify_command(options: Mapping[str, Any]) -> int:
 def rigs_command() -> int:
     """Print the presets with the source of every number."""
     for preset in list_presets():
-        click.echo(preset)
+        click.echo(f"{preset.name}: {preset.description}")
+        for role, device in preset.devices.items():
+            click.echo(f"  {role}: {device}")
+            for figure in preset.figures:
+                if figure.device == role:
+                    click.echo(f"    {figure.key} = {figure.value}")
+                    click.echo(f"        {figure.source}")
     return 0
 
 
