@@ -63,7 +63,7 @@ def tampered(plan: RigPlan, change: Callable[[dict[str, Any]], object]) -> RigPl
 def save(plan: RigPlan, folder: Any) -> Any:
     """Write a plan into a folder with a true digest; return the path of plan.json."""
     document = copy.deepcopy(plan.document)
-    document["surface"]["sha256"] = plan.surface.save(folder / "surface.npz")
+    document["surface"]["sha256"] = plan.surface.sha256()
     RigPlan(document, plan.surface).save(folder / "plan.json")
     return folder / "plan.json"
 
@@ -110,8 +110,8 @@ def _ring(light: str, pose: np.ndarray) -> np.ndarray:
 def _radii(light: str) -> list[float]:
     """Rings whose gaps grow outwards, the first of them out on the object."""
     if light == "parallel":
-        return np.geomspace(0.012, 0.062, 31).tolist()
-    return np.geomspace(0.075, 0.142, 37).tolist()
+        return np.geomspace(0.007, 0.062, 30).tolist()
+    return np.geomspace(0.062, 0.142, 38).tolist()
 
 
 def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
@@ -151,7 +151,7 @@ def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
         "requirements": _requirements(light, target, surface),
         "projectors": projectors,
         "cameras": cameras,
-        "cost": {"pixels": 2 * 2048 * 1536},
+        "cost": {"pixels": 2 * 640 * 480},
         "members": [],
         "reconstruction": None,
         "timings_s": {},
@@ -181,9 +181,9 @@ def _models(light: str) -> tuple[dict[str, Any], dict[str, Any]]:
         "beam_radius": None if diverging else 0.048,
     }
     camera = {
-        "K": [[16000.0, 0, 500.0], [0, 15900.0, 760.0], [0, 0, 1]],
+        "K": [[5000.0, 0, 156.0], [0, 4970.0, 237.0], [0, 0, 1]],
         "distortion": [-0.5, 2.0, 0.01, -0.008, 0.0],
-        "resolution": [2048, 1536],
+        "resolution": [640, 480],
         "range_m": [0.93, 0.972],
     }
     return projector, camera
@@ -202,21 +202,21 @@ def _requirements(light: str, target: str, surface: Surface) -> dict[str, Any]:
             "max_incidence": math.radians(60),
             "min_tangent_angle": math.radians(40),
         },
-        "camera": {"max_incidence": math.radians(70), "max_sample_distance_m": 1.4e-4},
+        "camera": {"max_incidence": math.radians(70), "max_sample_distance_m": 4.5e-4},
         "triangulation": {
             "min_conditioning": 0.1,
             "noise_px": 0.1,
-            "max_sigma_m": 2.6e-5,
-            "min_ring_pitch_px": 22.0,
-            "ring_sigma_m": 4e-6,
+            "max_sigma_m": 8.3e-5,
+            "min_ring_pitch_px": 7.0,
+            "ring_sigma_m": 1.3e-5,
         },
         "check": {
             "max_rms_m": 1e-4,
             "max_p95_m": 3e-4,
             "max_bias_m": 3e-5,
-            "tau_m": 2e-3,
+            "tau_m": 3e-3,
             "min_completeness": 0.9,
-            "max_predicted_missing": 0.01,
+            "max_predicted_missing": 0.03,
         },
         "workspace": {
             "centre": surface.mesh.centre.tolist(),

@@ -1,0 +1,153 @@
+"""`verify_plan`: audit, mesh and pixels together, from memory and from files."""
+
+import json
+
+import numpy as np
+import pytest
+
+from geometry.mesh import TriangleMesh
+from geometry.primitives import sphere
+from planning.errors import PlanFileError
+from planning.plan import RigPlan
+from planning.verification import compare_figures, compare_meshes, verify_plan
+
+
+@pytest.fixture(scope="module")
+def verified(handmade):
+    lines: list[str] = []
+    found = verify_plan(handmade.build_plan("diverging"), progress=lines.append)
+    return found, lines
+
+
+def test_a_true_plan_is_verified_down_to_the_pixels(verified):
+    found, lines = verified
+    assert found.failures == ()
+    assert found.passed
+    assert found.reconstruction.passed
+    assert found.reconstruction.n_merged > 10_000
+    assert lines[0].startswith("audit: ")
+    assert lines[-1] == "pixels: pair 4 of 4"
+    document = json.loads(json.dumps(found.to_document(), allow_nan=False))
+    assert document["passed"] is True
+    assert document["coverage"]["target"]["measured_m2"] > 0.004
+    assert document["reconstruction"]["passed"] is True
+    assert "verified: every claim holds (pixels checked)" in found.summary()
+
+
+def test_pixels_judge_the_audits_own_samples(verified):
+    found, _ = verified
+    inside, predicted = found.audit.in_target()
+    missing = found.reconstruction.completeness.missing
+    assert missing.shape == predicted.shape == (len(inside),)
+    assert not np.any(missing & ~predicted)
+
+
+def test_recorded_figures_are_held_against_a_run_with_other_noise(handmade, verified):
+    figures = verified[0].reconstruction.to_document()
+    plan = handmade.tampered(
+        handmade.build_plan(), lambda document: document.update(reconstruction=figures)
+    )
+    assert verify_plan(plan, seed=7).failures == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("n_points", 60_000),
+        ("accuracy_rms_m", 5e-6),
+        ("accuracy_p95_m", None),
+        ("accuracy_bias_m", 2e-5),
+        ("predicted_missing", 0.05),
+        ("redundant_fraction", 0.1),
+    ],
+)
+def test_a_false_figure_is_named(verified, name, value):
+    figures = verified[0].reconstruction.to_document()
+    failures = compare_figures(figures | {name: value}, figures)
+    assert len(failures) == 1
+    assert failures[0].startswith(f"reconstruction.{name}: claimed {value}, run again")
+
+
+def test_false_completeness_and_a_false_pass_are_named(verified):
+    figures = verified[0].reconstruction.to_document()
+    assert compare_figures(figures, figures) == []
+    assert compare_figures(None, figures) == []
+    rows = [
+        row | {"fraction": row["fraction"] - 0.1} for row in figures["completeness"]
+    ]
+    assert len(compare_figures(figures | {"completeness": rows}, figures)) == 3
+    assert "0 rows" in compare_figures(figures | {"completeness": []}, figures)[0]
+    failures = compare_figures(figures, figures | {"passed": False})
+    assert failures == [
+        "reconstruction.passed: claimed true, the check run again fails"
+    ]
+
+
+def test_a_false_claim_fails_without_the_pixels(handmade):
+    plan = handmade.tampered(
+        handmade.build_plan(),
+        lambda document: document["cameras"][0].update(seen_area_m2=0.1),
+    )
+    found = verify_plan(plan, check_pixels=False)
+    assert not found.passed
+    assert found.reconstruction is None
+    assert "NOT CHECKED" in found.summary()
+    assert "FALSE: C1.seen_area_m2: claimed 0.1 m²" in found.summary()
+
+
+def test_a_mounted_rig_that_differs_from_the_plan_fails(handmade):
+    plan = handmade.build_plan()
+
+    def turn(document):
+        pose = np.array(document["cameras"][1]["world_from_device"])
+        c, s = np.cos(0.002), np.sin(0.002)
+        pose[:3, :3] = pose[:3, :3] @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        document["cameras"][1]["world_from_device"] = pose.tolist()
+
+    found = verify_plan(plan, truth=handmade.tampered(plan, turn))
+    assert found.audit.passed
+    assert not found.passed
+    assert any("C2" in failure for failure in found.failures)
+
+
+def test_the_files_alone_are_enough_and_the_mesh_may_be_given(handmade, tmp_path):
+    path = handmade.save(handmade.build_plan("parallel"), tmp_path)
+    plan = RigPlan.load(path)
+    assert verify_plan(plan, sphere(0.05, subdivisions=3), check_pixels=False).passed
+    found = verify_plan(plan, sphere(0.051, subdivisions=3), check_pixels=False)
+    assert [f for f in found.failures if "isn't that of surface.npz" in f]
+
+
+def test_a_changed_surface_is_refused(handmade, tmp_path):
+    path = handmade.save(handmade.build_plan(), tmp_path)
+    handmade.build_plan("parallel").surface.save(tmp_path / "surface.npz")
+    with pytest.raises(PlanFileError, match="SHA-256"):
+        RigPlan.load(path)
+
+
+def test_one_shape_in_other_triangles_is_the_same_mesh():
+    mesh = sphere(0.05, subdivisions=3)
+    quarters = mesh.corners
+    middle = (quarters + np.roll(quarters, -1, axis=1)) / 2
+    a, b, c = (quarters[:, i] for i in range(3))
+    ab, bc, ca = (middle[:, i] for i in range(3))
+    corners = np.concatenate(
+        [
+            np.stack(t, axis=1)
+            for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        ]
+    )
+    finer = TriangleMesh(
+        corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    )
+    assert compare_meshes(mesh, mesh) == []
+    assert compare_meshes(finer, mesh) == []
+
+
+def test_another_shape_in_the_same_box_is_named():
+    mesh = sphere(0.05, subdivisions=3)
+    dented = mesh.vertices.copy()
+    dented[(np.abs(dented) > 0.02).all(axis=1)] *= 0.97
+    assert "another shape" in compare_meshes(TriangleMesh(dented, mesh.faces), mesh)[0]
+    doubled = TriangleMesh(mesh.vertices, np.vstack([mesh.faces, mesh.faces]))
+    assert "area" in compare_meshes(doubled, mesh)[0]
