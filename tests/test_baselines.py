@@ -251,6 +251,18 @@ def test_seam_samples_are_shared_and_border_on_the_other_stretch():
     assert seam.onward[0] > 0.9 * np.linalg.norm(seam.onward)
 
 
+def test_seam_samples_are_in_camera_2s_reach_unless_the_parts_only_touch():
+    points, normals = _wall(1500)
+    adjacent = adjacency(points, normals)
+    for separation, shared in ((0.785, True), (0.8, False)):
+        measured = np.stack(
+            [_in_image(camera, points) for camera in _facing(separation)], axis=1
+        )
+        seam = find_seam(0, 1, points, measured, adjacent)
+        assert np.all(measured[seam.points, 0])
+        assert np.all(measured[seam.points, 1] == shared)
+
+
 def test_every_pair_has_a_seam_in_both_orders_whatever_is_measured():
     rng = np.random.default_rng(1)
     for trial in range(40):

@@ -1,0 +1,287 @@
+"""The program that slides cameras apart, against closed forms and its own rules."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from planning.coverage_triangle import round_body_limit, seam_angles
+from solvers.baseline_program import (
+    BaselineProblem,
+    KeptPoints,
+    SeamPoints,
+    Shell,
+    build_baseline_program,
+    solve_baseline,
+)
+from solvers.status import SolveStatus
+
+THETA = np.radians(60.0)
+RADIUS, RING = 0.2, 1.0
+Z = np.array([0.0, 0.0, 1.0])
+NO_SEAMS = SeamPoints(
+    np.zeros((0, 2), dtype=np.int64),
+    *[np.zeros((0, 3))] * 3,
+    np.zeros(0),
+    np.zeros((0, 2)),
+)
+NOTHING_KEPT = KeptPoints(
+    np.zeros(0, dtype=np.int64),
+    np.zeros((0, 3)),
+    np.zeros((0, 3)),
+    np.zeros(0),
+    np.zeros((0, 3)),
+)
+
+
+def _on_ring(azimuth, radius=RING):
+    return radius * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+
+
+def _problem(centres, **changes):
+    values = {
+        "centres": np.array(centres, dtype=float),
+        "aims": np.zeros((len(centres), 3)),
+        "pairs": np.array([[0, 1]]),
+        "shell": Shell(np.zeros(3), (RING, RING), Z, np.pi, Z),
+        "seams": NO_SEAMS,
+        "kept": NOTHING_KEPT,
+        "max_incidence": THETA,
+        "range_m": (0.1, 5.0),
+        "min_conditioning": 0.1,
+        "max_step": 5.0,
+        **changes,
+    }
+    return BaselineProblem(**values)
+
+
+def _kept(camera, points, normals, *, field=-1.0, rings=None):
+    points = np.array(points, dtype=float)
+    return KeptPoints(
+        np.array(camera, dtype=np.int64),
+        points,
+        np.array(normals, dtype=float),
+        np.full(len(points), field),
+        np.zeros_like(points) if rings is None else np.array(rings, dtype=float),
+    )
+
+
+def _round_body(half1, half2, half_fields=(1.5, 1.5)):
+    """Cameras at -half1 and half2 about a disc; E is where each part truly ends."""
+    eta = round_body_limit(RADIUS, RING, THETA).half_angle
+    ends = np.array([eta - half1, half2 - eta])
+    normals = np.stack([_on_ring(end, 1.0) for end in ends])
+    onward = np.cross(Z, normals) * np.array([[1.0], [-1.0]])
+    seams = SeamPoints(
+        np.array([[0, 1], [1, 0]]),
+        RADIUS * normals,
+        normals,
+        onward,
+        np.zeros(2),
+        np.array([half_fields, half_fields[::-1]]),
+    )
+    return _problem([_on_ring(-half1), _on_ring(half2)], seams=seams)
+
+
+def test_cameras_round_a_disc_slide_to_the_closed_form():
+    limit = round_body_limit(RADIUS, RING, THETA)
+    half = 0.97 * limit.half_angle
+    solution = solve_baseline(_round_body(half, half))
+    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    # The seam moves with the cameras; first order in that, so close to the limit.
+    assert solution.smallest_baseline == pytest.approx(limit.d_max, rel=2e-3)
+    np.testing.assert_allclose(np.linalg.norm(solution.centres, axis=1), RING)
+
+
+def test_cameras_at_the_limit_stay():
+    limit = round_body_limit(RADIUS, RING, THETA)
+    solution = solve_baseline(_round_body(limit.half_angle, limit.half_angle))
+    assert solution.smallest_baseline == pytest.approx(limit.d_max, rel=1e-5)
+
+
+def test_the_field_holds_a_seam_as_incidence_does():
+    """Cameras aim at the axis; E at the end of both fields allows no slide at all."""
+    half = 0.5
+    start = _round_body(half, half)
+    seams = replace(
+        start.seams,
+        points=np.array([[RADIUS, 0.0, 0.0]] * 2),
+        outward=np.array([[1.0, 0.0, 0.0]] * 2),
+        onward=np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]),
+    )
+    ray = np.array([RADIUS, 0.0, 0.0]) - _on_ring(half)
+    off_axis = np.arccos(ray @ -_on_ring(half) / np.linalg.norm(ray))
+    for spare, gains in ((0.0, False), (0.02, True)):
+        # Both orders start with a reserve of camera 1 that it may not spend.
+        fields = np.array([[off_axis, off_axis + spare]] * 2)
+        problem = replace(start, seams=replace(seams, half_fields=fields))
+        solution = solve_baseline(problem)
+        assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+        gained = solution.smallest_baseline - problem.smallest_baseline
+        assert (gained > 1e-4) == gains
+
+
+def test_kept_incidence_ends_where_the_disc_says():
+    """Each camera must keep the same point: the optimum is 2 S sin(eta)."""
+    limit = round_body_limit(RADIUS, RING, THETA)
+    kept = _kept([0, 1], [[RADIUS, 0, 0]] * 2, [[1, 0, 0]] * 2)
+    solution = solve_baseline(_problem([_on_ring(-0.3), _on_ring(0.2)], kept=kept))
+    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    assert solution.smallest_baseline == pytest.approx(limit.d_max, rel=1e-6)
+
+
+def test_kept_field_and_conditioning_hold_at_the_answer():
+    point, ring = np.array([RADIUS, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+    start = [_on_ring(-0.2), _on_ring(0.5)]
+    rings = [-ring, ring]  # m.r > 0 for both at the start.
+    for field, least in ((np.cos(0.11), 0.1), (-1.0, 0.3)):
+        kept = _kept([0, 1], [point] * 2, [[1, 0, 0]] * 2, field=field, rings=rings)
+        problem = _problem(start, kept=kept, min_conditioning=least)
+        solution = solve_baseline(problem)
+        assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+        assert solution.smallest_baseline > problem.smallest_baseline
+        for centre, m, begin in zip(solution.centres, rings, start, strict=True):
+            ray = (point - centre) / np.linalg.norm(point - centre)
+            begin_ray = (point - begin) / np.linalg.norm(point - begin)
+            floor = min(field, begin_ray @ -begin / RING)
+            assert ray @ -centre / np.linalg.norm(centre) >= floor - 1e-7
+            assert ray @ m >= min(least, begin_ray @ m) - 1e-7
+
+
+def test_what_is_past_a_limit_at_the_start_gets_no_worse():
+    point, normal = [RADIUS, 0.0, 0.0], [1.0, 0.0, 0.0]
+    steep = _on_ring(1.3)  # Beyond 60 degrees of incidence already.
+    kept = _kept([1], [point], [normal])
+    solution = solve_baseline(_problem([_on_ring(-0.2), steep], kept=kept))
+    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    assert solution.smallest_baseline > 1.6  # Camera 0 went round on its own.
+    to = solution.centres[1] - point
+    before = (steep - point)[0] / np.linalg.norm(steep - point)
+    assert to[0] / np.linalg.norm(to) >= before - 1e-7
+
+
+def test_workspace_and_step_bound_the_centres():
+    shell = Shell(np.zeros(3), (0.9, 1.2), np.array([1.0, 0, 0]), 0.6, Z, floor=0.1)
+    start = [[1.0, -0.1, 0.2], [1.0, 0.1, 0.2]]
+    solution = solve_baseline(_problem(start, shell=shell))
+    distance = np.linalg.norm(solution.centres, axis=1)
+    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    assert np.all(distance <= 1.2 + 1e-6)
+    assert np.all(solution.centres[:, 0] >= np.cos(0.6) * distance - 1e-6)
+    assert np.all(solution.centres[:, 2] >= 0.1 - 1e-6)
+    # Both go to the rim of the cone at the largest radius, on opposite sides; the
+    # floor makes the chord shorter than the cone's diameter.
+    rim = np.sqrt((1.2 * np.sin(0.6)) ** 2 - 0.1**2)
+    assert solution.smallest_baseline == pytest.approx(2.0 * rim, rel=1e-5)
+    short = solve_baseline(_problem(start, shell=shell, max_step=0.05))
+    moves = np.linalg.norm(short.centres - np.array(start), axis=1)
+    assert np.all(moves <= 0.05 + 1e-6)
+    assert short.smallest_baseline == pytest.approx(0.3, abs=2e-3)
+
+
+def test_the_smallest_of_several_baselines_is_raised():
+    """Three cameras in a plane, free to go: the optimum is the equilateral triangle."""
+    flat = _kept([], np.zeros((0, 3)), np.zeros((0, 3)))
+    centres = [_on_ring(0.0), _on_ring(0.4), _on_ring(2.5)]
+    pairs = np.array([[0, 1], [1, 2], [0, 2]])
+    problem = _problem(centres, pairs=pairs, kept=flat)
+    solution = solve_baseline(problem)
+    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    assert solution.smallest_baseline == pytest.approx(np.sqrt(3.0), rel=1e-5)
+
+
+def test_derivatives_agree_with_finite_differences():
+    kept = _kept(
+        [0, 1], [[RADIUS, 0.01, 0.02]] * 2, [[1, 0, 0]] * 2, rings=[[0, 1.0, 0]] * 2
+    )
+    problem = replace(_round_body(0.5, 0.6), kept=kept)
+    program = build_baseline_program(problem)
+    both = ca.vertcat(program.objective, program.constraints)
+    value = ca.Function("g", [program.x], [both])
+    slope = ca.Function("j", [program.x], [ca.jacobian(both, program.x)])
+    x = program.start + np.random.default_rng(0).normal(0.0, 0.01, len(program.start))
+    exact, step = np.array(slope(x)), 1e-6
+    for i, unit in enumerate(np.eye(len(x))):
+        change = np.array(value(x + step * unit) - value(x - step * unit)).ravel()
+        np.testing.assert_allclose(exact[:, i], change / (2 * step), atol=1e-7)
+
+
+def test_seam_rows_are_what_the_signed_angles_leave():
+    """An edge with a turn of 40 degrees; the margins come from `seam_angles`."""
+    turn, halves = np.radians(40.0), (0.45, 0.6)
+    normals = np.array([[0.0, 1.0, 0.0]]), np.array([[np.sin(turn), np.cos(turn), 0.0]])
+    seams = SeamPoints(
+        np.array([[0, 1]]),
+        np.zeros((1, 3)),
+        normals[0],
+        np.array([[1.0, 0.0, 0.0]]),
+        np.array([turn]),
+        np.array([halves]),
+    )
+    start = np.array([[-0.3, 0.9, 0.0], [0.8, 0.7, 0.0]])
+    aims = np.array([[-0.2, 0.0, 0.0], [0.2, -0.1, 0.0]])
+    problem = _problem(start, aims=aims, seams=seams)
+
+    def margins(centres):
+        axes = (aims - centres) / np.linalg.norm(aims - centres, axis=1, keepdims=True)
+        angles = seam_angles(
+            np.zeros((1, 3)),
+            np.array([1.0, 0.0, 0.0]),
+            centres=tuple(centres),
+            axes=tuple(axes),
+            normals=normals,
+        )
+        left1 = THETA - angles.iota1[0], halves[0] - angles.beta1[0]
+        left2 = THETA - angles.iota2[0], halves[1] - angles.beta2[0]
+        return left1, left2
+
+    program = build_baseline_program(problem)
+    g = ca.Function("g", [program.x], [program.constraints])
+    moved = start + [[-0.1, 0.05, 0.0], [0.15, 0.02, 0.0]]
+    rows = np.array(g(np.append(moved.ravel(), 1.0))).ravel()[-4:]
+    reserve = min(margins(start)[0])
+    left1, left2 = margins(moved)
+    expected = [a - reserve + b for a in left1 for b in left2]
+    assert reserve > 0.05
+    np.testing.assert_allclose(rows, expected)
+
+
+def test_the_start_is_feasible_and_stated_once():
+    program = build_baseline_program(_round_body(0.5, 0.6))
+    g = ca.Function("g", [program.x], [program.constraints])
+    at_start = np.array(g(program.start)).ravel()
+    assert np.all(at_start >= program.low - 1e-12)
+    assert np.all(at_start <= program.high + 1e-12)
+    assert program.start[-1] == pytest.approx(2 * np.sin(0.55))
+
+
+def test_the_same_problem_gives_the_same_answer():
+    first, second = (solve_baseline(_round_body(0.7, 0.9)) for _ in range(2))
+    np.testing.assert_array_equal(first.centres, second.centres)
+
+
+def test_a_failed_solve_is_an_answer_without_a_point():
+    nowhere = Shell(np.zeros(3), (RING, RING), Z, 0.1, Z)  # No start lies in the cone.
+    hopeless = _problem([_on_ring(0.0), _on_ring(0.5)], shell=nowhere, max_step=0.01)
+    solution = solve_baseline(hopeless)
+    assert solution.status is SolveStatus.UNKNOWN
+    assert not solution.status.has_point
+    np.testing.assert_array_equal(solution.centres, hopeless.centres)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"pairs": np.zeros((0, 2), dtype=np.int64)}, "pairs must be"),
+        ({"pairs": np.array([[0, 2]])}, "indices must lie in 0 to 1"),
+        ({"pairs": np.array([[-1, 0]])}, "indices must lie in 0 to 1"),
+        ({"aims": np.zeros((1, 3))}, "centres and aims"),
+        ({"aims": np.stack([_on_ring(0.0)] * 2)}, "coincides"),
+        ({"max_step": np.nan}, "max_step"),
+        ({"max_step": 0.0}, "max_step"),
+    ],
+)
+def test_guards(changes, message):
+    with pytest.raises(ValueError, match=message):
+        _problem([_on_ring(0.0), _on_ring(0.5)], **changes)
