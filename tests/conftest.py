@@ -11,8 +11,18 @@ import pytest
 @pytest.fixture(scope="session")
 def handmade() -> ModuleType:
     """Plans made by hand, whose claims a slow loop over points computes."""
-    path = Path(__file__).with_name("handmade.py")
-    spec = importlib.util.spec_from_file_location("ringrig_tests_handmade", path)
+    return _load("handmade")
+
+
+@pytest.fixture(scope="session")
+def rigs() -> ModuleType:
+    """Plans made by hand for the check from pixels."""
+    return _load("reconstruction_rigs")
+
+
+def _load(name: str) -> ModuleType:
+    path = Path(__file__).with_name(f"{name}.py")
+    spec = importlib.util.spec_from_file_location(f"ringrig_tests_{name}", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

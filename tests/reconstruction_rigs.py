@@ -7,6 +7,7 @@ import numpy as np
 from geometry.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.primitives import sphere
+from geometry.sampling import SurfaceSamples
 from planning.plan import RigPlan
 from planning.surface import Surface
 
@@ -62,7 +63,7 @@ def camera(
 def diverging(
     name: str, position: np.ndarray, reach: float, gap: float
 ) -> dict[str, Any]:
-    """A 1280 x 800 projector of throw 1.4, rings turned by 8 degrees about its centre."""
+    """A 1280 x 800 projector of throw 1.4, its rings turned by 8 degrees."""
     pose = look_at(position, np.zeros(3), UP)
     away = float(np.linalg.norm(position))
     focal = 1.4 * 1280
@@ -168,3 +169,45 @@ def small_rig(mesh: TriangleMesh, light: str = "diverging", focal: float = 3478.
             camera("C3", 1.0 * direction(60.0, 25.0), focal=focal),
         ],
     )
+
+
+def predict_on_sphere(plan: RigPlan, samples: SurfaceSamples) -> np.ndarray:
+    """Samples of a sphere about the origin that some pair measures, with a margin.
+
+    On a convex body what faces a device is seen by it. Incidence up to 55 degrees, and
+    |r.m| and the ring pitch as in docs/semantics.md, 0.11 and 6 px.
+    """
+    measured = np.zeros(len(samples), dtype=bool)
+    p, n = samples.points, samples.normals
+    for projector in plan.projectors:
+        pose, ring = projector.world_from_device, projector.world_from_ring
+        light = np.broadcast_to(pose[:3, 2], p.shape)
+        local = (p - ring[:3, 3]) @ ring[:3, :3]
+        across = np.hypot(local[:, 0], local[:, 1])
+        tilt, scale = np.zeros(len(p)), np.ones(len(p))
+        if projector.light == "diverging":
+            light = (p - pose[:3, 3]) / np.linalg.norm(p - pose[:3, 3], axis=1)[:, None]
+            tilt = across / local[:, 2]
+            scale = local[:, 2] / np.sqrt(1.0 + tilt**2)
+        m = np.column_stack([local[:, :2] / across[:, None], -tilt])
+        m = m / np.sqrt(1.0 + tilt**2)[:, None] @ ring[:3, :3].T
+        gap = scale * np.diff(projector.ring_radii)[0]
+        lit = -np.einsum("ij,ij->i", light, n) > np.cos(np.deg2rad(55.0))
+        lit &= (tilt if scale[0] != 1.0 else across) < projector.ring_radii[-1]
+        for one in plan.cameras:
+            ray = p - one.world_from_device[:3, 3]
+            reach = np.linalg.norm(ray, axis=1)
+            ray /= reach[:, None]
+            facing = -np.einsum("ij,ij->i", ray, n)
+            conditioning = np.abs(np.einsum("ij,ij->i", ray, m))
+            side = np.linalg.norm(np.cross(n, m), axis=1)
+            tangent = np.cross(n, m) / side[:, None]
+            turn = np.sqrt(1.0 - np.einsum("ij,ij->i", ray, tangent) ** 2)
+            pitch = gap * facing * one.device.focal_px / (reach * side * turn)
+            measured |= (
+                lit
+                & (facing > np.cos(np.deg2rad(55.0)))
+                & (conditioning > 0.11)
+                & (pitch > 6.0)
+            )
+    return measured

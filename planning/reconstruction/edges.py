@@ -17,6 +17,9 @@ _MIN_CONTRAST = 10.0
 _SATURATED = 254.5
 # Least |I - I_inv| / (W - K) of every bit beside an edge, and of the root bit on it.
 _MIN_CERTAINTY = 0.25
+# Least contrast of a pixel, as a share of the largest beside it: less is the rim of an
+# object or shadow, whose mixed pixels shift edges.
+_MIN_EVENNESS = 0.6
 # Beyond this an edge is saturated, and its probit says nothing.
 _MAX_LEVEL = 0.98
 
@@ -31,6 +34,8 @@ class Edges:
         roots: Sign of r.m, from the root disc, shape (n,).
         across: Unit direction in the image across the edge, shape (n, 2).
         noise_px: Standard deviation of the position along `across` [px], shape (n,).
+        n_changes: Changes of index between pixels whose bits all stand out.
+        n_labelled: Those that name a ring edge, in either direction of the image.
     """
 
     pixels: NDArray[np.float64]
@@ -38,6 +43,8 @@ class Edges:
     roots: NDArray[np.int8]
     across: NDArray[np.float64]
     noise_px: NDArray[np.float64]
+    n_changes: int
+    n_labelled: int
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -59,6 +66,8 @@ def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[Edges, int]:
         np.concatenate([along_rows.roots[a], along_columns.roots[b]]),
         np.concatenate([along_rows.across[a], swapped[1][b]]),
         np.concatenate([along_rows.noise_px[a], along_columns.noise_px[b]]),
+        along_rows.n_changes + along_columns.n_changes,
+        along_rows.n_labelled + along_columns.n_labelled,
     )
     return edges, int(np.count_nonzero(reader.valid))
 
@@ -71,6 +80,7 @@ class _Reader:
         valid: Pixels bright enough under the white frame and not saturated.
         index: Annulus of each pixel, -1 where there is none.
         sure: Pixels whose every bit stands out.
+        even: Pixels about which the contrast is nearly the same.
     """
 
     def __init__(self, stack: Images, patterns: RingPatterns) -> None:
@@ -88,13 +98,14 @@ class _Reader:
             np.minimum(least, np.abs(difference), out=least)
         self.index = np.where(self.valid, patterns.index_of_code[code], np.int16(-1))
         self.sure = self.valid & (least >= _MIN_CERTAINTY * self.contrast)
+        self.even = _even(contrast, self.grey_noise())
 
     def transposed(self) -> "_Reader":
         """Return the same reader with rows and columns exchanged."""
         other = object.__new__(_Reader)
         other._stack = self._stack.transpose(0, 2, 1)
         other.patterns = self.patterns
-        for name in ("contrast", "valid", "index", "sure"):
+        for name in ("contrast", "valid", "index", "sure", "even"):
             setattr(other, name, getattr(self, name).T)
         return other
 
@@ -114,20 +125,33 @@ class _Reader:
         i, j = i[:: max(1, len(i) // 20_000)], j[:: max(1, len(j) // 20_000)]
         frames = self._stack[:4, i, j].astype(np.float32)
         rest = frames[2] + frames[3] - frames[0] - frames[1]
-        return max(0.5 * 1.4826 * float(np.median(np.abs(rest))), 1e-3)
+        # Mean absolute values: a median of whole grey levels would be a whole one.
+        return max(0.5 * np.sqrt(0.5 * np.pi) * float(np.mean(np.abs(rest))), 1e-3)
 
     def _difference(self, frame: int) -> NDArray[np.float32]:
         return np.subtract(self._stack[frame], self._stack[frame + 1], dtype=np.float32)
+
+
+def _even(contrast: NDArray[np.float32], noise: float) -> NDArray[np.bool_]:
+    """Pixels whose 3 x 3 neighbours' contrast differs by little, noise allowed for."""
+    low, high = np.pad(contrast, 1, mode="edge"), np.pad(contrast, 1, mode="edge")
+    low = np.minimum(np.minimum(low[:-2], low[1:-1]), low[2:])
+    low = np.minimum(np.minimum(low[:, :-2], low[:, 1:-1]), low[:, 2:])
+    high = np.maximum(np.maximum(high[:-2], high[1:-1]), high[2:])
+    high = np.maximum(np.maximum(high[:, :-2], high[:, 1:-1]), high[:, 2:])
+    return low >= np.float32(_MIN_EVENNESS) * high - np.float32(4.0 * noise)
 
 
 def _crossings(reader: _Reader, noise: float) -> Edges:
     """Edges between pixels of one row, in pixels (column, row) of the reader."""
     index, sure = reader.index, reader.sure
     before, after = index[:, 1:-2], index[:, 2:-1]
-    found = (np.abs(after - before) == 1) & (before >= 0) & (after >= 0)
-    found &= (index[:, :-3] == before) & (index[:, 3:] == after)
-    found &= sure[:, :-3] & sure[:, 3:]
+    found = (before != after) & sure[:, :-3] & sure[:, 3:]
+    found &= reader.even[:, 1:-2] & reader.even[:, 2:-1]
     found[:1] = found[-1:] = False
+    n_changes = int(np.count_nonzero(found))
+    found &= (np.abs(after - before) == 1) & (before >= 0) & (after >= 0)
+    found &= (index[:, :-3] == before) & (index[:, 3:] == after)
     i, j = np.nonzero(found)
     j = j + 1
     rings = np.minimum(index[i, j], index[i, j + 1]).astype(np.int64)
@@ -137,23 +161,45 @@ def _crossings(reader: _Reader, noise: float) -> Edges:
     cross = _row_slope(reader, frame, i, j)
     root_frame = 2 + 2 * reader.patterns.n_bits
     root = 0.5 * (reader.level(root_frame, i, j) + reader.level(root_frame, i, j + 1))
-    # A blurred step is an error function: its probit is a straight line.
-    a, b = (
-        erfinv(np.clip(level, -_MAX_LEVEL, _MAX_LEVEL).astype(np.float64))
-        for level in (left, right)
-    )
     good = ((left > 0.0) != (right > 0.0)) & (np.abs(root) >= _MIN_CERTAINTY)
-    i, j, a, b = i[good], j[good], a[good], b[good]
+    i, j, left, right = i[good], j[good], left[good], right[good]
+    part, spread = _zero_between(left, right)
     along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
     slope = np.hypot(along, cross)
     contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
     return Edges(
-        np.column_stack([j + a / (a - b), i.astype(np.float64)]),
+        np.column_stack([j + part, i.astype(np.float64)]),
         rings[good],
         np.where(root[good] > 0.0, 1, -1).astype(np.int8),
         np.column_stack([along, cross]) / slope[:, None],
-        np.sqrt(2.0) * noise / (contrast * slope),
+        np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope,
+        n_changes,
+        n_labelled=int(np.count_nonzero(found)),
     )
+
+
+def _zero_between(
+    left: NDArray[np.float32], right: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where between two pixels a blurred step crosses zero, and how surely.
+
+    A blurred step is an error function, whose inverse makes it a straight line: with
+    a, b = erfinv(left), erfinv(right) the crossing is at a / (a - b).
+
+    Args:
+        left: Level at 0, of the other sign than `right`, shape (n,).
+        right: Level at 1, shape (n,).
+
+    Returns:
+        Position in [0, 1], and its standard deviation for levels that have one of 1.
+    """
+    a, b = (
+        erfinv(np.clip(level, -_MAX_LEVEL, _MAX_LEVEL).astype(np.float64))
+        for level in (left, right)
+    )
+    rise = np.square(a - b)
+    spread = np.hypot(b * np.exp(a * a), a * np.exp(b * b)) / rise
+    return a / (a - b), 0.5 * np.sqrt(np.pi) * spread
 
 
 def _row_slope(

@@ -1,0 +1,268 @@
+"""The whole check: a sound plan passes, a rig that differs fails with a cause."""
+
+import copy
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from geometry.mesh import TriangleMesh
+from geometry.poses import look_at
+from geometry.primitives import sphere
+from geometry.sampling import sample_surface
+from planning.plan import RigPlan
+from planning.reconstruction.check import Reconstruction, reconstruct_plan
+from planning.reconstruction.verdict import nearest_distance
+
+KEYS = {
+    "n_points",
+    "n_merged",
+    "redundant_fraction",
+    "accuracy_rms_m",
+    "accuracy_p95_m",
+    "accuracy_bias_m",
+    "completeness",
+    "predicted_missing",
+    "pixel_noise",
+    "ambient",
+    "passed",
+    "failures",
+}
+
+
+@pytest.fixture(scope="module")
+def ball() -> TriangleMesh:
+    return sphere(0.04, subdivisions=5)
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def plan(rigs, ball, request) -> RigPlan:
+    return rigs.small_rig(ball, request.param)
+
+
+@pytest.fixture(scope="module")
+def one_light(rigs, ball) -> RigPlan:
+    return rigs.small_rig(ball, "diverging")
+
+
+@pytest.fixture(scope="module")
+def samples(ball):
+    return sample_surface(ball, 8000, seed=5)
+
+
+@pytest.fixture(scope="module")
+def check(rigs, plan, samples) -> Reconstruction:
+    predicted = rigs.predict_on_sphere(plan, samples)
+    assert predicted.mean() > 0.3
+    return reconstruct_plan(plan, seed=0, samples=samples, predicted=predicted)
+
+
+def changed(
+    plan: RigPlan,
+    change: Callable[[dict[str, Any]], object],
+    mesh: TriangleMesh | None = None,
+) -> RigPlan:
+    document = copy.deepcopy(plan.document)
+    change(document)
+    surface = plan.surface
+    if mesh is not None:
+        surface = type(surface)(
+            mesh,
+            surface.member,
+            surface.region,
+            surface.steep,
+            surface.reference_projectors,
+            surface.reference_rings,
+            surface.reference_cameras,
+        )
+    return RigPlan(document, surface)
+
+
+def test_a_sound_plan_passes(check):
+    document = check.to_document()
+    assert document["failures"] == []
+    assert document["passed"] is True
+    assert document.keys() >= KEYS
+    assert document["accuracy_rms_m"] < 0.06e-3
+    assert document["accuracy_p95_m"] < 0.12e-3
+    assert abs(document["accuracy_bias_m"]) < 0.01e-3
+    assert document["predicted_missing"] < 0.005
+    half, one, two = document["completeness"]
+    assert (half["threshold_m"], one["threshold_m"]) == (1.75e-3, 3.5e-3)
+    assert half["fraction"] <= one["fraction"] <= two["fraction"] <= 1.0
+    assert one["fraction"] > 0.98
+
+
+def test_few_points_are_wildly_off(check):
+    error = np.abs(check.accuracy.distances)
+    assert np.mean(error > 0.3e-3) < 1e-3
+    assert error.max() < 2e-3
+
+
+def test_redundancy_goes_and_completeness_stays(check, samples):
+    assert 0.3 < check.redundant_fraction < 0.9
+    assert check.n_merged == len(check.merged.cloud) < check.n_points
+    before, after = (
+        np.mean(nearest_distance(cloud, samples, 0.01) <= 3.5e-3)
+        for cloud in (check.everything, check.merged.cloud)
+    )
+    assert before - after < 0.01
+
+
+def test_normals_and_sigma_of_the_merged_cloud_are_those_of_the_sphere(check):
+    cloud, normals = check.merged.cloud, check.merged.normals
+    known = np.isfinite(normals[:, 0])
+    outward = cloud.points / np.linalg.norm(cloud.points, axis=1, keepdims=True)
+    cosine = np.einsum("ij,ij->i", normals, outward)[known]
+    assert known.mean() > 0.95
+    assert np.quantile(cosine, 0.05) > np.cos(np.deg2rad(12.0))
+    ratio = np.abs(check.accuracy.distances) / check.merged.sigma
+    assert 0.5 < np.nanmedian(ratio) / 0.6745 < 1.6
+
+
+def test_each_part_of_the_sphere_keeps_the_squarest_projector(check, plan):
+    """Away from the seam, points left belong to the projector that faces them more."""
+    cloud = check.merged.cloud
+    outward = cloud.points / np.linalg.norm(cloud.points, axis=1, keepdims=True)
+    centres = np.array([p.world_from_device[:3, 3] for p in plan.projectors])
+    if plan.projectors[0].light == "diverging":
+        to = centres[:, None] - cloud.points
+        to /= np.linalg.norm(to, axis=2, keepdims=True)
+    else:
+        axes = np.array([p.world_from_device[:3, 2] for p in plan.projectors])
+        to = np.broadcast_to(-axes[:, None], (2, len(cloud), 3))
+    cosine = np.einsum("pij,ij->ip", to, outward)
+    clear = (cosine.min(axis=1) > 0.5) & (np.abs(cosine[:, 0] - cosine[:, 1]) > 0.15)
+    best = np.argmax(cosine, axis=1)
+    assert clear.sum() > 300
+    assert np.mean(best[clear] == cloud.projector[clear]) > 0.8
+
+
+def test_the_result_does_not_depend_on_threads(plan):
+    one, two = (reconstruct_plan(plan, seed=3, threads=n) for n in (1, 2))
+    assert one.to_document() == two.to_document()
+    assert np.array_equal(one.everything.points, two.everything.points)
+    assert np.array_equal(one.merged.sigma, two.merged.sigma, equal_nan=True)
+
+
+def test_another_seed_is_another_noise(plan, check):
+    other = reconstruct_plan(plan, seed=1)
+    assert other.to_document() != check.to_document()
+    assert other.accuracy.rms_m == pytest.approx(check.accuracy.rms_m, rel=0.2)
+    assert other.passed
+    assert other.to_document()["predicted_missing"] is None
+
+
+def move_camera(document: dict[str, Any]) -> None:
+    document["cameras"][1]["world_from_device"][0][3] += 2e-3
+
+
+def swap_cameras(document: dict[str, Any]) -> None:
+    first, second = document["cameras"][:2]
+    first["id"], second["id"] = second["id"], first["id"]
+
+
+def zoom_camera(document: dict[str, Any]) -> None:
+    for i in range(2):
+        document["cameras"][2]["K"][i][i] *= 1.02
+
+
+def aim_projector_aside(document: dict[str, Any]) -> None:
+    entry = document["projectors"][1]
+    old = np.array(entry["world_from_device"])
+    aside = 0.05 * old[:3, 0]
+    new = look_at(old[:3, 3], aside, np.array([0.0, 0.0, 1.0]))
+    entry["world_from_device"] = new.tolist()
+
+
+def drop_projector(document: dict[str, Any]) -> None:
+    del document["projectors"][1]
+
+
+FAULTS = {
+    "camera moved": (move_camera, r"C2 differs from the plan"),
+    "cameras swapped": (swap_cameras, r"differs? from"),
+    "focal length off": (zoom_camera, r"C3 differs from the plan"),
+    "projector aimed aside": (aim_projector_aside, r"P2"),
+    "projector off": (drop_projector, r"P2 gave no point"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_rig_that_is_not_the_plan_fails(rigs, one_light, samples, fault):
+    change, cause = FAULTS[fault]
+    predicted = rigs.predict_on_sphere(one_light, samples)
+    result = reconstruct_plan(
+        one_light,
+        seed=0,
+        truth=changed(one_light, change),
+        samples=samples,
+        predicted=predicted,
+    )
+    assert not result.passed
+    assert result.to_document()["passed"] is False
+    text = " | ".join(result.failures)
+    assert "limit" in text
+    assert re.search(cause, text), text
+
+
+def test_an_object_one_per_cent_too_large_fails(rigs, one_light, samples, ball):
+    large = TriangleMesh(1.01 * ball.vertices, ball.faces)
+    predicted = rigs.predict_on_sphere(one_light, samples)
+    result = reconstruct_plan(
+        one_light,
+        seed=0,
+        truth=changed(one_light, lambda document: None, large),
+        samples=samples,
+        predicted=predicted,
+    )
+    assert not result.passed
+    assert result.accuracy.bias_m == pytest.approx(0.4e-3, rel=0.1)
+    assert any("mean signed distance is 0." in failure for failure in result.failures)
+    assert "the object isn't the mesh" in result.failures[0]
+
+
+def test_a_claim_on_the_far_side_is_missed(one_light, samples):
+    """Nobody looks at the back: what is predicted there is missing."""
+    back = samples.normals[:, 1] > 0.8
+    result = reconstruct_plan(one_light, seed=0, samples=samples, predicted=back)
+    assert result.completeness.predicted_missing == 1.0
+    assert len(result.failures) == 2
+    assert "100.00 % of the samples predicted measured" in result.failures[1]
+
+
+def test_completeness_counts_points_seen_from_the_samples_own_side(check, samples):
+    """A thin shell: the same points with inner normals are nobody's measurement."""
+    inner = type(samples)(
+        samples.points, -samples.normals, samples.faces, samples.weight
+    )
+    outer = nearest_distance(check.merged.cloud, samples, 0.01) <= 3.5e-3
+    assert outer.mean() > 0.3
+    assert not np.any(nearest_distance(check.merged.cloud, inner, 0.01) <= 3.5e-3)
+
+
+def test_nothing_to_see_is_a_failure_in_words(one_light):
+    def blind(document: dict[str, Any]) -> None:
+        document["projectors"] = []
+
+    result = reconstruct_plan(one_light, seed=0, truth=changed(one_light, blind))
+    assert result.failures == ("no point was measured: no ring edge was decoded",)
+    assert result.to_document()["accuracy_rms_m"] is None
+    assert result.redundant_fraction == 0.0
+
+
+def test_predicted_must_fit_the_samples(one_light, samples):
+    with pytest.raises(ValueError, match="needs the samples"):
+        reconstruct_plan(one_light, seed=0, predicted=np.ones(3, dtype=bool))
+    with pytest.raises(ValueError, match="for 8000 samples"):
+        reconstruct_plan(
+            one_light, seed=0, samples=samples, predicted=np.ones(3, dtype=bool)
+        )
+
+
+def test_progress_counts_every_pair(one_light):
+    calls: list[tuple[int, int]] = []
+    reconstruct_plan(one_light, seed=0, progress=lambda *step: calls.append(step))
+    assert calls == [(n, 6) for n in range(1, 7)]

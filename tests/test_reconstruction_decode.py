@@ -1,0 +1,180 @@
+"""Rendered images to labelled edges: where they are, and what doesn't get through."""
+
+import numpy as np
+import pytest
+
+from geometry.primitives import grid
+from geometry.rays import RayCaster
+from planning.reconstruction.calibration import (
+    PairCalibration,
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.reconstruction.decode import decode
+from planning.reconstruction.edges import find_edges
+from planning.reconstruction.patterns import Frames, RingPatterns, ring_patterns
+from planning.reconstruction.photometry import Photometry
+from planning.reconstruction.render import render_pair, view
+
+CLEAN = Photometry(noisy=False, albedo_variation=0.0)
+
+
+def shot(
+    rigs, light: str, focal: float, photometry: Photometry, *, distortion=(0.0,) * 5
+):
+    """Frames of a plate 120 mm wide before one projector and one camera."""
+    flat = grid(0.12, 0.10, divisions=(6, 5))
+    turned = flat.vertices @ rigs.turn(0, 90.0)[:3, :3].T
+    plate = type(flat)(turned, flat.faces)
+    assert plate.face_normals[0] @ rigs.direction(0.0, 0.0) == pytest.approx(1.0)
+    make = rigs.diverging if light == "diverging" else rigs.parallel
+    plan = rigs.plan_of(
+        plate,
+        [make("P1", rigs.direction(-25.0, 5.0), 0.09, 3.5e-3)],
+        [
+            rigs.camera(
+                "C1", rigs.direction(20.0, 12.0), focal=focal, distortion=distortion
+            )
+        ],
+    )
+    camera = calibrate_camera(plan.cameras[0])
+    projector = calibrate_projector(plan.projectors[0])
+    patterns = ring_patterns(projector, plan.projectors[0].ring_radii, camera)
+    caster = RayCaster(plate, threads=1)
+    seen = view(camera, plate, caster, photometry)
+    frames = render_pair(seen, projector, projector, patterns, caster, photometry, (0,))
+    return frames, patterns, PairCalibration(projector, camera)
+
+
+def ring_coordinate(calibration: PairCalibration, pixels: np.ndarray) -> np.ndarray:
+    """Ring coordinate of the plate y = 0 at pixels, in closed form."""
+    camera, projector = calibration.camera, calibration.projector
+    rays = camera.rays(pixels)
+    points = camera.centre - rays * (camera.centre[1] / rays[:, 1])[:, None]
+    local = projector.to_ring(points)
+    across = np.hypot(local[:, 0], local[:, 1])
+    return across / local[:, 2] if projector.light == "diverging" else across
+
+
+def edge_error_px(edges, patterns, calibration) -> np.ndarray:
+    """Distance of each edge from its ring in the image, across it [px]."""
+    here = ring_coordinate(calibration, edges.pixels) - patterns.radii[edges.rings]
+    ahead, behind = (
+        ring_coordinate(calibration, edges.pixels + side * 0.05 * edges.across)
+        for side in (1.0, -1.0)
+    )
+    return here / ((ahead - behind) / 0.1)
+
+
+@pytest.mark.parametrize("light", ["diverging", "parallel"])
+@pytest.mark.parametrize("focal", [1400.0, 3478.0])
+def test_edges_on_a_plane_are_where_the_rings_are(rigs, light, focal):
+    frames, patterns, calibration = shot(rigs, light, focal, CLEAN)
+    edges, _ = find_edges(frames, patterns)
+    error = edge_error_px(edges, patterns, calibration)
+    assert len(edges) > 3000
+    assert len(np.unique(edges.rings)) > 25
+    assert abs(error.mean()) < 0.005
+    assert np.sqrt(np.mean(error**2)) < 0.015
+    assert np.abs(error).max() < 0.1
+
+
+def test_a_distorting_lens_moves_edges_and_is_undone(rigs):
+    lens = (-0.2, 0.05, 1e-3, -1e-3, 0.0)
+    frames, patterns, calibration = shot(
+        rigs, "diverging", 3478.0, CLEAN, distortion=lens
+    )
+    decoded = decode(frames, patterns, calibration)
+    assert len(decoded.cloud) > 3000
+    assert np.abs(decoded.cloud.points[:, 1]).max() < 3e-5
+    straight = type(calibration.camera)(
+        "C1",
+        calibration.camera.world_from_device,
+        calibration.camera.matrix,
+        (0.0,) * 5,
+        calibration.camera.resolution,
+    )
+    wrong = decode(frames, patterns, PairCalibration(calibration.projector, straight))
+    assert np.abs(wrong.cloud.points[:, 1]).max() > 1.5e-4
+
+
+def test_noise_of_edges_is_what_the_decoder_says_it_is(rigs):
+    frames, patterns, calibration = shot(
+        rigs, "diverging", 3478.0, Photometry(albedo_variation=0.0)
+    )
+    edges, lit = find_edges(frames, patterns)
+    error = edge_error_px(edges, patterns, calibration)
+    assert frames.stack.dtype == np.uint8
+    assert lit > 0.5 * frames.stack[0].size
+    assert 0.005 < np.sqrt(np.mean(error**2)) < 0.05
+    assert 0.8 < np.sqrt(np.mean((error / edges.noise_px) ** 2)) < 1.25
+
+
+def test_every_label_is_the_ring_that_is_there(rigs):
+    frames, patterns, calibration = shot(rigs, "parallel", 3478.0, Photometry())
+    edges, _ = find_edges(frames, patterns)
+    there = ring_coordinate(calibration, edges.pixels)
+    nearest = np.abs(there[:, None] - patterns.radii[None]).argmin(axis=1)
+    assert np.array_equal(nearest, edges.rings)
+
+
+def test_scrambled_bits_give_no_wrong_points(rigs):
+    """Where two frames are exchanged in part of the image, edges are left out there."""
+    frames, patterns, calibration = shot(rigs, "diverging", 3478.0, Photometry())
+    good = decode(frames, patterns, calibration)
+    stack = frames.stack.copy()
+    middle = stack.shape[2] // 2
+    one, other = 2 + 2 * 2, 2 + 2 * 4
+    stack[[one, one + 1, other, other + 1], :, :middle] = stack[
+        [other, other + 1, one, one + 1], :, :middle
+    ]
+    bad = decode(Frames(stack, frames.corner), patterns, calibration)
+    off = np.abs(bad.cloud.points[:, 1]) > 1e-3
+    assert np.abs(good.cloud.points[:, 1]).max() < 3e-4
+    assert len(bad.cloud) < 0.85 * len(good.cloud)
+    # A label survives only where code and flipping bit still agree: in isolated rings.
+    left = bad.cloud.pixels[:, 0] - frames.corner[0] < middle + 2
+    assert not np.any(off & ~left)
+
+
+def test_frames_in_the_wrong_order_give_no_cloud(rigs):
+    frames, patterns, calibration = shot(rigs, "diverging", 3478.0, Photometry())
+    good = decode(frames, patterns, calibration)
+    for order in (np.roll(np.arange(len(frames.stack)), 2), slice(None, None, -1)):
+        shuffled = decode(
+            Frames(frames.stack[order], frames.corner), patterns, calibration
+        )
+        assert len(good.cloud) > 3000
+        assert len(shuffled.cloud) == 0
+        assert shuffled.rejected["labels"] == shuffled.n_edges
+
+
+def test_black_and_saturated_images_give_nothing(rigs):
+    _, patterns, calibration = shot(rigs, "diverging", 1400.0, CLEAN)
+    for level in (0, 128, 255):
+        stack = np.full((patterns.n_frames, 60, 80), level, dtype=np.uint8)
+        decoded = decode(Frames(stack, (900, 700)), patterns, calibration)
+        assert len(decoded.cloud) == decoded.n_edges == decoded.lit_pixels == 0
+    stack[1::2] = 0
+    assert decode(Frames(stack, (900, 700)), patterns, calibration).n_edges == 0
+
+
+def test_a_missing_frame_is_refused(rigs):
+    frames, patterns, calibration = shot(rigs, "diverging", 1400.0, CLEAN)
+    with pytest.raises(ValueError, match=r"frames, but .* rings are coded in"):
+        decode(Frames(frames.stack[:-1], frames.corner), patterns, calibration)
+
+
+@pytest.mark.parametrize("n_rings", [2, 3, 4, 63, 64, 100])
+def test_neighbouring_annuli_differ_in_one_bit(n_rings):
+    radii = np.arange(1.0, n_rings + 1.0)
+    patterns = RingPatterns("parallel", radii, np.zeros(3))
+    codes = patterns.codes
+    changed = codes[1:] ^ codes[:-1]
+    assert patterns.n_annuli == n_rings + 1 <= 2**patterns.n_bits < 2 * (n_rings + 1)
+    assert patterns.n_frames == 2 * int(np.ceil(np.log2(n_rings + 1))) + 2 + 2
+    assert len(np.unique(codes)) == n_rings + 1
+    assert np.array_equal(changed, 1 << patterns.flipping_bit)
+    assert np.array_equal(patterns.index_of_code[codes], np.arange(n_rings + 1))
+    for bit in range(patterns.n_bits):
+        assert np.array_equal(patterns.bit(bit), (codes >> bit) & 1)
