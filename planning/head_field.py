@@ -1,9 +1,10 @@
 """The head as an implicit surface: rounded solids, smoothly joined and carved.
 
 A head is the set where its field is negative. Joins are the cubic smooth minimum, so
-the surface has continuous curvature wherever its solids have. Near the surface the field is
-roughly the distance to it. Lengths in mm, in the frame of `planning.sample_head`. Only
-correctly rounded arithmetic is used, so that every machine gets the same numbers.
+the surface has continuous curvature wherever its solids have. Near the surface the
+field is roughly the distance to it. Lengths in mm, in the frame of
+`planning.sample_head`. Only correctly rounded arithmetic is used, so that every machine
+gets the same numbers.
 """
 
 from typing import TypeAlias
