@@ -12,8 +12,10 @@ from .face_curvature import face_curvature
 from .mesh import TriangleMesh
 from .topology import adjacent_faces, components, mesh_edges
 
-# The cut must not run through a plateau: this share of area within this relative band.
-_PLATEAU_BAND, _PLATEAU_SHARE = 0.05, 0.12
+# The cut must not run through equal curvedness: faces this little below it are taken
+# too, and more of them where this share of the area lies in a wider band about it.
+_TIE_BAND = 0.02
+_PLATEAU_BAND, _PLATEAU_SHARE = 0.1, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,8 @@ def dominant_regions(
             60 degrees of incidence by what position and perspective need.
 
     Raises:
-        ValueError: If a share or angle is out of range, or the field is of another mesh.
+        ValueError: If a share or angle is out of range, or the field is of another
+            mesh.
     """
     if not 0 < area_share <= 1:
         raise ValueError(f"area_share must lie in (0, 1], got {area_share}")
@@ -104,6 +107,9 @@ def dominant_regions(
     curvedness, steep, trusted = face_curvature(mesh, field)
     judged = trusted if trusted.any() else np.ones(len(mesh.faces), dtype=bool)
     dominant = judged & (curvedness >= _cut(mesh, curvedness, judged, area_share))
+    if dominant[judged].all():
+        # Uniform: the rim, whose curvature isn't known, is no less dominant.
+        dominant = judged = np.ones(len(mesh.faces), dtype=bool)
     pairs = adjacent_faces(mesh_edges(mesh.faces), manifold_only=False)
     least = min_region_share * mesh.area
     dominant = _without_specks(mesh, dominant, judged, pairs, least)
@@ -131,15 +137,9 @@ def _cut(
     order = faces[np.argsort(-curvedness[faces], kind="stable")]
     area = np.cumsum(mesh.face_areas[order])
     cut = float(curvedness[order[np.searchsorted(area, area_share * area[-1])]])
-    while True:
-        low, high = cut * (1.0 - _PLATEAU_BAND), cut * (1.0 + _PLATEAU_BAND)
-        near = judged & (curvedness >= low) & (curvedness <= high)
-        if mesh.face_areas[near].sum() < _PLATEAU_SHARE * area[-1]:
-            return cut
-        lowest = float(curvedness[near].min())
-        if lowest == cut:
-            return cut
-        cut = lowest
+    near = judged & (np.abs(curvedness - cut) <= _PLATEAU_BAND * cut)
+    plateau = mesh.face_areas[near].sum() >= _PLATEAU_SHARE * area[-1]
+    return cut * (1.0 - (_PLATEAU_BAND if plateau else _TIE_BAND))
 
 
 def _without_specks(

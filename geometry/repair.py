@@ -19,7 +19,7 @@ def clean(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
     In this order: faces with a corner that isn't finite, and such vertices, are
     removed; vertices at identical positions are welded (texture seams, triangle soups);
     faces without area and faces with the corners of an earlier one are removed;
-    vertices that no face uses are removed. Winding and the order of what stays are kept.
+    vertices that no face uses are removed. Winding and order of what stays are kept.
 
     Args:
         vertices: In any unit, shape (n_v, 3).

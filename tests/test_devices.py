@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+
+from geometry.devices import ParallelModel, PinholeModel
+
+K = np.array([[1200.0, 0, 639.5], [0, 1180.0, 399.5], [0, 0, 1]])
+DISTORTION = (-0.21, 0.08, 0.0011, -0.0007, 0.013)
+
+
+def pinhole(distortion: tuple[float, ...] = (0.0,) * 5) -> PinholeModel:
+    return PinholeModel(K, (1280, 800), (0.2, 2.0), distortion)  # type: ignore[arg-type]
+
+
+def points(n: int = 200) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    z = rng.uniform(0.4, 1.5, n)
+    return np.column_stack([rng.uniform(-0.4, 0.4, n) * z, rng.uniform(-0.3, 0.3, n) * z, z])
+
+
+def brown_conrady(x: float, y: float) -> tuple[float, float]:
+    """OpenCV's formula, written out."""
+    k1, k2, p1, p2, k3 = DISTORTION
+    r2 = x * x + y * y
+    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    return (
+        x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+        y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+    )
+
+
+def test_projection_is_opencvs_formula_point_by_point() -> None:
+    at = points(20)
+    found = pinhole(DISTORTION).project(at)
+    for p, pixel in zip(at, found, strict=True):
+        x, y = brown_conrady(p[0] / p[2], p[1] / p[2])
+        expected = [1200.0 * x + 639.5, 1180.0 * y + 399.5]
+        np.testing.assert_allclose(pixel, expected, rtol=1e-13)
+
+
+def test_a_point_on_the_axis_meets_the_principal_point_right_and_down_are_positive() -> None:
+    camera = pinhole()
+    at = np.array([[0.0, 0, 1], [0.1, 0, 1], [0, 0.1, 1]])
+    np.testing.assert_allclose(
+        camera.project(at), [[639.5, 399.5], [759.5, 399.5], [639.5, 517.5]], rtol=1e-14
+    )
+
+
+@pytest.mark.parametrize("distortion", [(0.0,) * 5, DISTORTION])
+def test_rays_undo_projection(distortion: tuple[float, ...]) -> None:
+    camera = pinhole(distortion)
+    at = points()
+    rays = camera.rays(camera.project(at))
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1.0, rtol=1e-14)
+    unit = at / np.linalg.norm(at, axis=1, keepdims=True)
+    np.testing.assert_allclose(rays, unit, atol=1e-12)
+
+
+@pytest.mark.parametrize("distortion", [(0.0,) * 5, DISTORTION])
+def test_ray_jacobian_is_the_finite_difference_of_rays(
+    distortion: tuple[float, ...],
+) -> None:
+    camera = pinhole(distortion)
+    at = points(50)
+    pixels, h = camera.project(at), 1e-3
+    columns = []
+    for k in range(2):
+        step = h * np.eye(2)[k]
+        columns.append((camera.rays(pixels + step) - camera.rays(pixels - step)) / (2 * h))
+    numeric = np.stack(columns, axis=2)
+    jacobian = camera.ray_jacobian(at)
+    assert jacobian.shape == (50, 3, 2)
+    scale = np.abs(numeric).max()
+    np.testing.assert_allclose(jacobian, numeric, atol=1e-8 * scale)
+
+
+def test_ray_jacobian_does_not_depend_on_depth() -> None:
+    camera = pinhole(DISTORTION)
+    at = points(20)
+    np.testing.assert_allclose(
+        camera.ray_jacobian(at), camera.ray_jacobian(3.0 * at), atol=1e-15
+    )
+
+
+def test_points_at_or_behind_the_centre_have_no_pixel_and_are_not_contained() -> None:
+    camera = pinhole()
+    pixels = camera.project(np.array([[0.0, 0, -1], [0, 0, 0], [0.1, 0, np.nan]]))
+    assert np.isnan(pixels).all()
+    assert not camera.contains(pixels).any()
+
+
+def test_the_image_reaches_half_a_pixel_beyond_the_outer_centres() -> None:
+    camera = pinhole()
+    pixels = np.array([[-0.5, -0.5], [1279.5, 799.5], [-0.51, 5], [5, 799.51], [640, 400]])
+    np.testing.assert_array_equal(
+        camera.contains(pixels), [True, True, False, False, True]
+    )
+
+
+def test_shapes_with_more_axes_go_through() -> None:
+    camera = pinhole(DISTORTION)
+    at = points(12).reshape(3, 4, 3)
+    pixels = camera.project(at)
+    assert pixels.shape == (3, 4, 2)
+    np.testing.assert_array_equal(
+        pixels.reshape(-1, 2), camera.project(at.reshape(-1, 3))
+    )
+    assert camera.rays(pixels).shape == (3, 4, 3)
+
+
+def test_focal_length_and_panel_are_what_they_say() -> None:
+    assert pinhole().focal_px == pytest.approx(np.sqrt(1200.0 * 1180.0))
+    panel = ParallelModel((1000, 600), 2e-4, (0.5, 1.5))
+    np.testing.assert_allclose(panel.half_panel, [0.1, 0.06], rtol=1e-15)
+    assert panel.beam_radius is None
