@@ -17,6 +17,7 @@ References:
 
 import dataclasses
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +60,7 @@ class CoverProblem:
     def __post_init__(self) -> None:
         covers = _boolean(self.covers)
         object.__setattr__(self, "covers", covers)
-        n_e, n_s = int(covers.shape[0]), int(covers.shape[1])
+        n_e, n_s = cast("tuple[int, int]", covers.shape)
         weights = _vector("weights", self.weights, n_e)
         if not np.all((weights >= 0.0) & np.isfinite(weights)):
             raise ValueError("weights must be finite and at least 0")
@@ -72,7 +73,7 @@ class CoverProblem:
             total = float(weights.sum())
         if not np.isfinite(total):
             raise ValueError("weights must have a finite sum")
-        given = self.required_weight
+        given = cast("float | None", self.required_weight)
         required = self.min_coverage * total if given is None else float(given)
         if not (required >= 0.0 and np.isfinite(required)):
             raise ValueError(f"required_weight must be at least 0, got {required}")
@@ -292,7 +293,7 @@ def _boolean(given: object) -> sparse.csr_array:
     rows.sum_duplicates()
     if rows.dtype != bool and not np.all((rows.data == 0) | (rows.data == 1)):
         raise ValueError("covers must be boolean or hold only 0 and 1")
-    rows = rows.astype(bool)
+    rows = cast("sparse.csr_array", rows.astype(bool))
     rows.eliminate_zeros()
     return rows
 

@@ -190,7 +190,7 @@ class _Search:
         """
         indispensable = np.flatnonzero(open_weights > self._total - self.target)
         if indispensable.size == 0:
-            return np.ones(rows.shape[0], dtype=bool)
+            return np.ones(rows.indptr.size - 1, dtype=bool)
         servers = np.asarray(rows.sum(axis=0)).ravel()[indispensable]
         self.budget.spend(float(rows.nnz))
         row = int(indispensable[int(np.argmin(servers))])
@@ -260,7 +260,7 @@ class _Search:
         return upper
 
     def _partners(self, gains: NDArray[np.float64], i: int, covered: float) -> int:
-        """Number of leading columns, sorted by gain, that may reach the target with i."""
+        """Leading columns, sorted by gain, that may reach the target with i."""
         need = self.target - covered - gains[i]
         return int(np.searchsorted(-gains, -need, side="right"))
 

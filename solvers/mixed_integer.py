@@ -8,7 +8,7 @@ by the caller. Only the bound of branch and bound is HiGHS' own word.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,9 +110,9 @@ def _model(cover: ReducedCover, *, integer: bool, budget: WorkBudget) -> Any:  #
                 ]
             )
         )
-    n_columns = int(link.shape[1])
-    lp = highspy.HighsLp()
-    lp.num_col_, lp.num_row_ = n_columns, int(link.shape[0])
+    n_rows, n_columns = cast("tuple[int, int]", link.shape)
+    lp: Any = highspy.HighsLp()
+    lp.num_col_, lp.num_row_ = n_columns, n_rows
     lp.col_cost_ = np.concatenate([cover.costs, np.zeros(n_columns - n_s)])
     lp.col_lower_, lp.col_upper_ = np.zeros(n_columns), np.ones(n_columns)
     needed = cover.required / cover.weights.mean()

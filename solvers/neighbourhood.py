@@ -4,6 +4,8 @@ Every sum is of integer-valued weights, hence exact, and every tie goes to the l
 index: the same seed and budget give the same answer on any machine.
 """
 
+from typing import cast
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -126,7 +128,7 @@ def cheapest(
     return best
 
 
-def _members(cover: ReducedCover, s: int) -> NDArray[np.int32]:
+def _members(cover: ReducedCover, s: int) -> NDArray[np.signedinteger]:
     """Rows that set s covers."""
     return cover.by_set.indices[cover.by_set.indptr[s] : cover.by_set.indptr[s + 1]]
 
@@ -191,7 +193,7 @@ def _swap_gains(
     released = sparse.csr_array(
         (cover.weights[rows], (owner, rows)), shape=(len(chosen), counts.size)
     )
-    regained = (released @ cover.by_row).toarray()
+    regained = cast("sparse.csr_array", released @ cover.by_row).toarray()
     share = rows.size / max(1, counts.size)
     budget.spend(cover.entries * (1.0 + 3.0 * share) + regained.size)
     return open_gain + regained - np.asarray(released.sum(axis=1))[:, None]

@@ -10,8 +10,8 @@ X = R^T (P - Q), light L = (P - Q)/|P - Q| (diverging) or R e_z (parallel)::
                 lo <= |Q - centre| <= hi,  axis.(Q - centre) >= |Q - centre| cos(half)
                 up.Q >= floor
 
-over Q, R and t: smooth and not convex, so an optimum is local. ``pose_nlp`` states it in
-CasADi; this module solves it over an active set and checks the answer in numpy, with
+over Q, R and t: smooth and not convex, so an optimum is local. ``pose_nlp`` states it
+in CasADi; this module solves it over an active set and checks the answer in numpy, with
 its own formulas. Occlusion isn't part of it: rays decide after every move.
 """
 

@@ -117,7 +117,7 @@ def _merge_rows(
     key = np.ascontiguousarray(packed).view(f"V{packed.shape[1]}").ravel()
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
-    summed = np.bincount(inverse.ravel(), weights=weights)
+    summed = np.bincount(inverse.ravel(), weights=weights).astype(np.float64)
     return packed[first[order]], summed[order]
 
 

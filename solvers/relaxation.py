@@ -75,7 +75,7 @@ def cost_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
 
 
 def _cheapest_rows(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
-    """min lambda y over 0 <= y <= 1 with w y >= W: a fractional knapsack."""
+    """Return min lambda y, 0 <= y <= 1, w y >= W: a fractional knapsack."""
     order = np.argsort(multipliers / cover.weights, kind="stable")
     reached = np.cumsum(cover.weights[order])
     last = int(np.searchsorted(reached, cover.required))

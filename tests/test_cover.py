@@ -3,6 +3,9 @@
 import dataclasses
 import gzip
 import itertools
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +20,7 @@ from solvers.reductions import reduce_cover
 from solvers.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.status import SolveStatus
 
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 SETCOVER = Path(__file__).resolve().parents[2] / "shared" / "data" / "setcover"
 
 
@@ -254,7 +258,7 @@ def test_warm_start_is_never_lost():
 def test_same_answer_twice():
     covers, weights = visibility(500, 200, seed=8)
     problem = CoverProblem(covers, weights, min_coverage=0.97)
-    once, again = (solve_cover(problem, seed=3) for _ in range(2))
+    once, again = (solve_cover(problem, seed=3, budget=2e8) for _ in range(2))
     assert once.selected.tolist() == again.selected.tolist()
     assert (once.lower_bound, once.proof) == (again.lower_bound, again.proof)
 
@@ -380,3 +384,28 @@ def test_viewpoints_of_map_1_are_covered_by_25():
     solution = solve_cover(CoverProblem(covers), budget=2e10)
     assert solution.status is SolveStatus.OPTIMAL
     assert solution.lower_bound == solution.cost == 25.0
+
+
+def test_same_answer_with_one_and_two_threads():
+    code = (
+        "from tests.test_cover import visibility\n"
+        "from solvers import CoverProblem, solve_cover\n"
+        "for seed in range(2):\n"
+        "    covers, weights = visibility(500, 200, seed=seed)\n"
+        "    s = solve_cover(CoverProblem(covers, weights, min_coverage=0.95), budget=3e8)\n"
+        "    print(s.selected.tolist(), s.lower_bound, s.proof, s.covered_weight)\n"
+    )
+    root = Path(__file__).resolve().parents[1]
+    answers = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=root,
+            env=os.environ | {name: threads for name in _THREADS},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for threads in ("1", "2")
+    ]
+    assert answers[0].count("\n") == 2
+    assert answers[0] == answers[1]

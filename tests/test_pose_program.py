@@ -273,7 +273,7 @@ def test_never_worse_than_the_start():
     rng = np.random.default_rng(11)
     for _ in range(10):
         points, normals = cap(rng, 60, 0.9)
-        at = unit([0.0, -1.0, 0.0] + rng.normal(0, 0.3, 3))
+        at = unit(np.array([0.0, -1.0, 0.0]) + rng.normal(0, 0.3, 3))
         program = program_of(points, normals, at=at)
         solution = solve_pose(program, max_iterations=int(rng.integers(1, 30)))
         before = pose_margins(program, program.world_from_device).min()
