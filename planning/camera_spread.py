@@ -30,7 +30,8 @@ Measure = Callable[[_Array], NDArray[np.bool_]]
 _STEPS = (1.0, 0.5, 0.25)
 # Reach of the first proposals, as a share of the largest radius of the shell.
 _REACH = 0.4
-_MIN_REACH = 0.02
+_MIN_REACH = 0.005
+_SHRINK = 0.4
 # Proposals from one state, each knowing what the one before lost.
 _REPEATS = 4
 _DEMANDS = 24
@@ -138,8 +139,9 @@ class _Search:
         reach = _REACH * self.limits.workspace.camera_radius_m[1]
         least = _MIN_REACH * self.limits.workspace.camera_radius_m[1]
         while self.pairs and self.spent < self._budget and reach >= least:
-            if not self._improve(reach):
-                reach *= 0.35
+            taken, proposed = self._improve(reach)
+            if not taken:
+                reach = _SHRINK * min(reach, proposed)
         return CameraSpread(
             tuple(at_poses(self.cameras, self.poses)),
             self.measured,
@@ -149,24 +151,25 @@ class _Search:
             self.spent,
         )
 
-    def _improve(self, reach: float) -> bool:
-        """Whether some proposal within reach was taken, whole or in part."""
+    def _improve(self, reach: float) -> tuple[bool, float]:
+        """Whether a proposal within reach was taken, whole or in part; its reach."""
         demanded = np.zeros((0, 2), dtype=np.int64)
         centres = self.poses[:, :3, 3]
         for _ in range(_REPEATS):
             problem = self._problem(demanded, reach)
             solution = solve_baseline(problem)
             if not (solution.status.has_point and self._gains(solution.centres)):
-                return False
+                break
             centres = solution.centres
             taken, lost = self._attempt(self._between(centres, np.ones(len(centres))))
             if taken:
-                return True
+                return True, reach
             fresh = self._demand(lost, centres, demanded)
             if not len(fresh):
                 break
             demanded = np.concatenate([demanded, fresh])
-        return self._step_back(centres)
+        moves = np.linalg.norm(centres - self.poses[:, :3, 3], axis=1)
+        return self._step_back(centres), float(moves.max())
 
     def _step_back(self, centres: _Array) -> bool:
         """Try part of the way for all, then for one camera at a time."""

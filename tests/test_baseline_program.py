@@ -238,7 +238,7 @@ def test_seam_rows_are_what_the_signed_angles_leave():
 
     program = build_baseline_program(problem)
     g = ca.Function("g", [program.x], [program.constraints])
-    moved = start + [[-0.1, 0.05, 0.0], [0.15, 0.02, 0.0]]
+    moved = start + np.array([[-0.1, 0.05, 0.0], [0.15, 0.02, 0.0]])
     rows = np.array(g(np.append(moved.ravel(), 1.0))).ravel()[-4:]
     reserve = min(margins(start)[0])
     left1, left2 = margins(moved)

@@ -1,0 +1,258 @@
+"""Cameras slide apart only as far as what they measure allows."""
+
+import numpy as np
+import pytest
+
+from geometry.devices import PinholeModel
+from geometry.poses import fibonacci_cap, look_at
+from planning.camera_spread import spread_cameras
+from planning.coverage_triangle import round_body_limit
+from planning.plan import PlannedCamera
+from planning.requirements import Workspace
+from planning.spread_problem import SpreadLimits
+
+THETA = np.radians(60.0)
+RADIUS, RING = 0.1, 1.0
+UP = np.array([0.0, 0.0, 1.0])
+DEVICE = PinholeModel(
+    np.array([[2000.0, 0, 319.5], [0, 2000.0, 239.5], [0, 0, 1]]),
+    (640, 480),
+    (0.3, 3.0),
+)
+
+
+def _workspace(**changes):
+    values = {
+        "centre": (0.0, 0.0, 0.0),
+        "object_radius_m": RADIUS,
+        "up": (0.0, 0.0, 1.0),
+        "axis": (0.0, 0.0, 1.0),
+        "half_angle": np.pi,
+        "projector_radius_m": (RING, RING),
+        "camera_radius_m": (RING, RING),
+        "floor_m": None,
+        "n_reference_projectors": 1,
+        "n_reference_cameras": 1,
+        "reference_ring_radius": 1.0,
+        **changes,
+    }
+    return Workspace(**values)
+
+
+def _cameras(*directions, roll=0.3):
+    poses = look_at(RING * np.array(directions), np.zeros(3), UP, roll=roll)
+    return [PlannedCamera(f"C{i}", pose, DEVICE) for i, pose in enumerate(poses, 1)]
+
+
+def _at(azimuth, height=0.0):
+    flat = np.sqrt(1.0 - height * height)
+    return [flat * np.cos(azimuth), flat * np.sin(azimuth), height]
+
+
+class _Ball:
+    """Samples of a band or cap of a sphere; nothing hides behind anything else."""
+
+    def __init__(self, normals):
+        self.normals = normals
+        self.points = RADIUS * normals
+        self.calls = []
+
+    def measure(self, poses):
+        self.calls.append(poses)
+        measured = np.zeros((len(self.points), len(poses)), dtype=bool)
+        for c, pose in enumerate(poses):
+            ray = self.points - pose[:3, 3]
+            facing = -np.einsum("ij,ij->i", ray, self.normals)
+            facing /= np.linalg.norm(ray, axis=1)
+            within = DEVICE.contains(DEVICE.project(ray @ pose[:3, :3]))
+            measured[:, c] = within & (facing >= np.cos(THETA))
+        return measured
+
+    def spread(self, cameras, **changes):
+        values = {
+            "points": self.points,
+            "normals": self.normals,
+            "weights": 1.0 / len(self.points),
+            "limits": SpreadLimits(THETA, 0.1, _workspace()),
+            "max_evaluations": 16,
+            **changes,
+        }
+        return spread_cameras(cameras, self.measure, **values)
+
+
+def _front(half_angle, n=800):
+    return _Ball(fibonacci_cap(n, np.array([1.0, 0.0, 0.0]), half_angle))
+
+
+def _weight(ball, cameras):
+    poses = np.stack([camera.world_from_device for camera in cameras])
+    return ball.measure(poses).any(axis=1).mean()
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """Two cameras too close together for the cap of 70 degrees that they measure."""
+    ball = _front(np.radians(70.0))
+    cameras = _cameras(_at(-0.35), _at(0.3))
+    return ball, cameras, ball.spread(cameras)
+
+
+def test_a_pair_slides_apart_and_loses_nothing(pair):
+    ball, cameras, spread = pair
+    apart = np.linalg.norm(
+        np.subtract(*(camera.world_from_device[:3, 3] for camera in spread.cameras))
+    )
+    assert spread.smallest_before_m == pytest.approx(2 * np.sin(0.325))
+    assert spread.smallest_after_m == pytest.approx(apart)
+    assert spread.smallest_after_m > 1.15 * spread.smallest_before_m
+    assert spread.smallest_after_m < round_body_limit(RADIUS, RING, THETA).d_max
+    assert spread.n_accepted > 0
+    assert _weight(ball, spread.cameras) >= _weight(ball, cameras)
+    poses = np.stack([camera.world_from_device for camera in spread.cameras])
+    np.testing.assert_array_equal(spread.measured_by, ball.measure(poses))
+
+
+def test_moved_cameras_stay_in_the_workspace_keep_their_aim_and_their_roll(pair):
+    ball, cameras, spread = pair
+    part = ball.measure(np.stack([camera.world_from_device for camera in cameras]))
+    for c, (before, after) in enumerate(zip(cameras, spread.cameras, strict=True)):
+        pose = after.world_from_device
+        assert (after.id, after.device) == (before.id, before.device)
+        assert np.linalg.norm(pose[:3, 3]) == pytest.approx(RING)
+        level = look_at(pose[:3, 3], pose[:3, 3] + pose[:3, 2], UP, roll=0.3)
+        np.testing.assert_allclose(pose, level, atol=1e-9)
+        # The axes before and after meet in the point that the camera looks at.
+        old = before.world_from_device
+        across = np.cross(old[:3, 2], pose[:3, 2])
+        gap = (pose[:3, 3] - old[:3, 3]) @ across / np.linalg.norm(across)
+        assert gap == pytest.approx(0.0, abs=1e-9)
+        # Which lies where the middle of its part projects onto the axis.
+        depth = np.mean((ball.points[part[:, c]] - old[:3, 3]) @ old[:3, 2])
+        aim = old[:3, 3] + depth * old[:3, 2]
+        np.testing.assert_allclose(
+            np.cross(aim - pose[:3, 3], pose[:3, 2]), 0.0, atol=1e-9
+        )
+
+
+def test_the_budget_counts_every_call_and_the_answer_repeats(pair):
+    _, cameras, first = pair
+    ball = _front(np.radians(70.0))
+    again = ball.spread(cameras)
+    assert len(ball.calls) == again.n_evaluations == first.n_evaluations <= 16
+    for a, b in zip(first.cameras, again.cameras, strict=True):
+        np.testing.assert_array_equal(a.world_from_device, b.world_from_device)
+    short = _front(np.radians(70.0))
+    assert short.spread(cameras, max_evaluations=3).n_evaluations <= 3
+    assert len(short.calls) <= 3
+
+
+def test_no_move_is_taken_that_loses_coverage():
+    ball = _front(np.radians(70.0))
+    cameras = _cameras(_at(-0.35), _at(0.3))
+    start = np.stack([camera.world_from_device for camera in cameras])
+    honest = ball.measure
+    first = honest(start).any(axis=1)
+
+    def jealous(poses):
+        measured = honest(poses) & first[:, None]
+        if not np.array_equal(poses, start):
+            measured[np.flatnonzero(first)[0]] = False
+        return measured
+
+    ball.measure = jealous
+    spread = ball.spread(cameras)
+    assert spread.n_accepted == 0
+    assert spread.smallest_after_m == spread.smallest_before_m
+    for before, after in zip(cameras, spread.cameras, strict=True):
+        np.testing.assert_array_equal(before.world_from_device, after.world_from_device)
+
+
+def test_what_is_required_but_missing_at_the_start_bars_moves_that_still_miss_it():
+    ball = _front(np.radians(70.0))
+    cameras = _cameras(_at(-0.35), _at(0.3))
+    spread = ball.spread(cameras, required=1.1)
+    assert spread.n_accepted == 0
+
+
+def test_three_cameras_raise_their_smallest_baseline():
+    ball = _front(np.radians(80.0))
+    cameras = _cameras(_at(-0.7, 0.1), _at(0.1, -0.3), _at(0.5, 0.4))
+    spread = ball.spread(cameras)
+    assert spread.smallest_after_m > 1.1 * spread.smallest_before_m
+    assert _weight(ball, spread.cameras) >= _weight(ball, cameras)
+
+
+def test_parts_stay_registered():
+    """Coverage alone would let the overlap shrink below what registration needs."""
+    ball = _front(np.radians(70.0))
+    cameras = _cameras(_at(-0.35), _at(0.3))
+    start = np.stack([camera.world_from_device for camera in cameras])
+    least = 0.8 * np.mean(ball.measure(start).all(axis=1))
+    free = ball.spread(cameras)
+    assert np.mean(free.measured_by.all(axis=1)) < least
+    held = ball.spread(cameras, min_overlap_share=least)
+    assert np.mean(held.measured_by.all(axis=1)) >= least
+    assert held.n_accepted > 0
+
+
+def test_cone_and_floor_hold():
+    ball = _front(np.radians(70.0))
+    space = _workspace(
+        axis=(1.0, 0.0, 0.0),
+        half_angle=0.45,
+        camera_radius_m=(0.95, 1.05),
+        floor_m=-0.05,
+    )
+    cameras = _cameras(_at(-0.35), _at(0.3))
+    spread = ball.spread(cameras, limits=SpreadLimits(THETA, 0.1, space))
+    assert spread.n_accepted > 0
+    for camera in spread.cameras:
+        position = camera.world_from_device[:3, 3]
+        distance = np.linalg.norm(position)
+        assert 0.95 - 1e-6 <= distance <= 1.05 + 1e-6
+        assert position[0] >= np.cos(0.45) * distance - 1e-6
+        assert position[2] >= -0.05 - 1e-6
+
+
+def test_rings_hold_the_conditioning_that_the_caller_demands():
+    """Rings about +x: no camera may come so near its blind curve as to lose samples."""
+    ball = _front(np.radians(60.0))
+    m = ball.points * np.array([0.0, 1.0, 1.0])
+    m /= np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-9)
+    seen = ball.measure
+
+    def conditioned(poses):
+        measured = seen(poses)
+        for c, pose in enumerate(poses):
+            ray = ball.points - pose[:3, 3]
+            ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+            measured[:, c] &= np.abs(np.einsum("ij,ij->i", ray, m)) >= 0.1
+        return measured
+
+    ball.measure = conditioned
+    cameras = _cameras(_at(-0.35), _at(0.3, 0.2))
+    before = _weight(ball, cameras)
+    spread = ball.spread(
+        cameras, ring_normals=m[None], lit=np.ones((len(m), 1), dtype=bool)
+    )
+    assert spread.n_accepted > 0
+    assert _weight(ball, spread.cameras) >= before
+
+
+def test_one_camera_or_strangers_have_no_baseline():
+    ball = _front(np.radians(50.0))
+    alone = ball.spread(_cameras(_at(0.0)))
+    assert alone.smallest_before_m is None
+    assert alone.smallest_after_m is None
+    assert alone.n_evaluations == 1
+    sides = _Ball(
+        np.concatenate(
+            [
+                fibonacci_cap(300, np.array([x, 0.0, 0.0]), np.radians(40.0))
+                for x in (1.0, -1.0)
+            ]
+        )
+    )
+    apart = sides.spread(_cameras(_at(0.0), _at(np.pi)))
+    assert apart.smallest_before_m is None
+    assert apart.n_accepted == 0
