@@ -183,9 +183,9 @@ def drop_projector(document: dict[str, Any]) -> None:
 
 FAULTS = {
     "camera moved": (move_camera, r"C2 differs from the plan"),
-    "cameras swapped": (swap_cameras, r"differs? from"),
+    "cameras swapped": (swap_cameras, r"C1 and C2 differ from the plan"),
     "focal length off": (zoom_camera, r"C3 differs from the plan"),
-    "projector aimed aside": (aim_projector_aside, r"P2"),
+    "projector aimed aside": (aim_projector_aside, r"P2 differs from"),
     "projector off": (drop_projector, r"P2 gave no point"),
 }
 

@@ -18,6 +18,7 @@ from .calibration import (
     calibrate_camera,
     calibrate_projector,
 )
+from .causes import likely_cause
 from .cloud import Cloud
 from .decode import Decoded, decode
 from .merge import Merged, merge
@@ -28,7 +29,6 @@ from .verdict import (
     Accuracy,
     Completeness,
     judge,
-    likely_cause,
     measure_accuracy,
     measure_completeness,
 )
@@ -180,15 +180,16 @@ def reconstruct_plan(
     failures: tuple[str, ...] = ("no point was measured: no ring edge was decoded",)
     if len(merged.cloud):
         accuracy = measure_accuracy(merged.cloud, mesh, threads=threads)
+        failures = judge(accuracy, completeness, limits)
+    if accuracy is not None and failures:
         cause = likely_cause(
-            merged.cloud,
-            accuracy,
+            everything,
             mesh,
             limits,
             projectors=tuple(projector.id for projector in plan.projectors),
             cameras=tuple(camera.id for camera in plan.cameras),
         )
-        failures = judge(accuracy, completeness, limits, cause)
+        failures = tuple(f"{failure}; {cause}" for failure in failures)
     return Reconstruction(
         everything,
         merged,

@@ -14,8 +14,6 @@ from ..requirements import CheckLimits
 from .cloud import Cloud
 
 _MM = 1e3
-# Incidence of light beyond which edges smear, in formulation.md section 2 [rad].
-_GRAZING = np.deg2rad(70.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,18 +137,17 @@ def judge(
     accuracy: Accuracy,
     completeness: Completeness,
     limits: CheckLimits,
-    cause: str,
 ) -> tuple[str, ...]:
-    """Return a sentence for each limit that isn't kept: what, value, limit, cause."""
+    """Return a clause for each limit that isn't kept: what, value, limit."""
     lengths = (
         ("rms distance of the points from the mesh", accuracy.rms_m, limits.max_rms_m),
         ("95th percentile of the distance", accuracy.p95_m, limits.max_p95_m),
-        ("mean signed distance", abs(accuracy.bias_m), limits.max_bias_m),
+        ("mean signed distance", accuracy.bias_m, limits.max_bias_m),
     )
     failures = [
-        f"{name} is {_MM * value:.3f} mm, limit {_MM * limit:.3f} mm; {cause}"
+        f"{name} is {_MM * value:.3f} mm, limit {_MM * limit:.3f} mm"
         for name, value, limit in lengths
-        if not value <= limit
+        if not abs(value) <= limit
     ]
     missing = completeness.predicted_missing
     if missing is None:
@@ -159,85 +156,14 @@ def judge(
     if not share >= limits.min_completeness:
         failures.append(
             f"completeness is {share:.3f} of the target predicted measured at "
-            f"{tau:.2f} mm, limit {limits.min_completeness:.3f}; {cause}"
+            f"{tau:.2f} mm, limit {limits.min_completeness:.3f}"
         )
     if not missing <= limits.max_predicted_missing:
         failures.append(
             f"{100 * missing:.2f} % of the samples predicted measured have no point "
-            f"within {tau:.2f} mm, limit {100 * limits.max_predicted_missing:.2f} %; "
-            f"{cause}"
+            f"within {tau:.2f} mm, limit {100 * limits.max_predicted_missing:.2f} %"
         )
     return tuple(failures)
-
-
-def likely_cause(
-    cloud: Cloud,
-    accuracy: Accuracy,
-    mesh: TriangleMesh,
-    limits: CheckLimits,
-    *,
-    projectors: tuple[str, ...],
-    cameras: tuple[str, ...],
-) -> str:
-    """Return what the errors point at, in words.
-
-    In this order: devices that gave no point; one device that carries the errors;
-    grazing light; the object itself.
-    """
-    silent = [
-        name
-        for names, index in ((projectors, cloud.projector), (cameras, cloud.camera))
-        for i, name in enumerate(names)
-        if not np.any(index == i)
-    ]
-    if silent:
-        return (
-            f"{' and '.join(silent)} gave no point: dark, covered, blocked or aimed "
-            f"elsewhere"
-        )
-    if accuracy.rms_m <= limits.max_rms_m and accuracy.p95_m <= limits.max_p95_m:
-        return (
-            "what was measured is accurate, but surface that the plan counts on is not"
-        )
-    guilty = _guilty_device(cloud, accuracy, projectors, cameras)
-    if guilty is not None:
-        return guilty
-    off = np.abs(accuracy.distances) > limits.max_rms_m
-    cosine = -np.einsum(
-        "ij,ij->i", cloud.beams[off], mesh.face_normals[accuracy.faces[off]]
-    )
-    if float(np.median(cosine)) < np.cos(_GRAZING):
-        return "most of the points that are off were lit at grazing incidence"
-    return (
-        "every pair of devices is off alike: the object isn't the mesh of the plan, or "
-        "several devices differ from it"
-    )
-
-
-def _guilty_device(
-    cloud: Cloud,
-    accuracy: Accuracy,
-    projectors: tuple[str, ...],
-    cameras: tuple[str, ...],
-) -> str | None:
-    """Name the device without which the rest is at least three times as accurate."""
-    error = np.abs(accuracy.distances)
-    best: tuple[float, str] | None = None
-    for names, index in ((projectors, cloud.projector), (cameras, cloud.camera)):
-        for i, name in enumerate(names):
-            own = index == i
-            if len(names) < 2 or not np.any(~own):
-                continue
-            with_it = float(np.median(error[own]))
-            without = float(np.median(error[~own]))
-            text = (
-                f"{name} differs from the plan in pose or optics: median error of its "
-                f"points {_MM * with_it:.3f} mm, of the others {_MM * without:.3f} mm"
-            )
-            ratio = with_it / max(without, 1e-9)
-            if ratio > 3.0 and (best is None or ratio > best[0]):
-                best = ratio, text
-    return None if best is None else best[1]
 
 
 def _share(values: NDArray[np.bool_]) -> float:
