@@ -14,6 +14,7 @@ from planning.draw import draw_mesh, draw_rig, region_colours, save_rig_picture
 from planning.draw_devices import best_direction, device_figures
 from planning.draw_marks import Panel, round_length
 from planning.draw_views import Shader, View, facing, fitted
+from planning.geodesic import geodesic_grid
 from planning.plan import RigPlan
 from planning.sample_head import sample_head
 from planning.surface import Surface
@@ -144,10 +145,8 @@ def status_of(plan):
     return status
 
 
-def sphere(radius=0.1, centre=(0.0, 0.0, 0.0)):
-    from planning.geodesic import geodesic_grid
-
-    grid = geodesic_grid(24)
+def sphere(radius=0.1, centre=(0.0, 0.0, 0.0), frequency=24):
+    grid = geodesic_grid(frequency)
     return TriangleMesh(radius * grid.directions + np.array(centre), grid.faces)
 
 
@@ -252,6 +251,15 @@ def test_flat_faces_keep_their_creases():
     # Three flat faces: three shades, and hardly a pixel in between.
     _, counts = np.unique(seen.reshape(-1, 3), axis=0, return_counts=True)
     assert np.sort(counts)[-4:].sum() > 0.98 * 300 * 300
+
+
+def test_a_coarse_sphere_is_shaded_like_a_fine_one():
+    coarse, fine = (
+        pixels(draw_mesh(sphere(frequency=n), size=(200, 200))) for n in (10, 60)
+    )
+    rows, columns = np.indices(coarse.shape[:2])
+    inside = np.hypot(rows - 99.5, columns - 99.5) < 80
+    assert np.abs(coarse - fine)[inside].max() <= 5
 
 
 @pytest.mark.parametrize(
