@@ -30,7 +30,8 @@ class CurvatureField:
         direction_max: Unit direction of k_max, shape (n_v, 3).
         direction_min: Unit direction of k_min.
         valid: Whether the vertex could be fitted, isn't on an edge of more than two
-            faces, and lies farther than ``radius`` from an open border, shape (n_v,).
+            faces, and lies farther than ``radius`` and ``rings`` from an open border,
+            shape (n_v,).
     """
 
     radius: float
@@ -99,7 +100,7 @@ def principal_curvatures(
     directed = np.linalg.norm(first, axis=1) > 0.5
     fitted[list(bad)] = False
     reach = radius / mesh.mean_edge
-    fitted &= ~_near_border(vertices, mesh_edges(faces), max(reach, 1.0))
+    fitted &= ~_near_border(vertices, mesh_edges(faces), max(reach, 1.0), rings)
     n = len(mesh.vertices)
     valid = np.zeros(n, dtype=bool)
     valid[used] = fitted
@@ -120,9 +121,9 @@ def principal_curvatures(
 
 
 def _near_border(
-    vertices: NDArray[np.float64], edges: Edges, reach: float
+    vertices: NDArray[np.float64], edges: Edges, reach: float, rings: int
 ) -> NDArray[np.bool_]:
-    """Vertices on a border or a branching edge, or within reach of a long border.
+    """Vertices on a border or branching edge, or in reach or rings of a long border.
 
     A neighbourhood that a border cuts in two is fitted on one side only, and the
     border's own teeth look like curvature. A pinhole, whose rim is shorter than the
@@ -147,7 +148,11 @@ def _near_border(
     distance = dijkstra(
         graph, directed=False, indices=sources, min_only=True, limit=reach
     )
-    return near | np.isfinite(distance)
+    touched = np.zeros(n, dtype=bool)
+    touched[sources] = True
+    for _ in range(rings):
+        touched[edges.ends[touched[edges.ends].any(axis=1)]] = True
+    return near | touched | np.isfinite(distance)
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

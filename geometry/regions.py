@@ -82,7 +82,8 @@ def dominant_regions(
     where nothing is trusted, the surface counts as uniform. Curvature tensors are
     averaged over the radius they were fitted at. If the cut at ``area_share``
     would run through a plateau of equal curvedness, the plateau is taken whole: a
-    sphere, a cylinder or a plate is dominant as a whole. Islands and holes below
+    sphere, a cylinder or a plate is dominant as a whole. If less than the share is
+    curved at all, that is all. Islands and holes below
     ``min_region_share`` of the area vanish; what stays is split by its normals until
     each piece fits a cone.
 
@@ -137,6 +138,10 @@ def _cut(
     order = faces[np.argsort(-curvedness[faces], kind="stable")]
     area = np.cumsum(mesh.face_areas[order])
     cut = float(curvedness[order[np.searchsorted(area, area_share * area[-1])]])
+    curved = curvedness[judged & (curvedness > 0.0)]
+    if not cut > 0.0 and len(curved):
+        # Less than the share is curved at all: flat surface doesn't fill it up.
+        return float(curved.min())
     near = judged & (np.abs(curvedness - cut) <= _PLATEAU_BAND * cut)
     plateau = mesh.face_areas[near].sum() >= _PLATEAU_SHARE * area[-1]
     return cut * (1.0 - (_PLATEAU_BAND if plateau else _TIE_BAND))

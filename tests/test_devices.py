@@ -14,7 +14,9 @@ def pinhole(distortion: tuple[float, ...] = (0.0,) * 5) -> PinholeModel:
 def points(n: int = 200) -> np.ndarray:
     rng = np.random.default_rng(0)
     z = rng.uniform(0.4, 1.5, n)
-    return np.column_stack([rng.uniform(-0.4, 0.4, n) * z, rng.uniform(-0.3, 0.3, n) * z, z])
+    return np.column_stack(
+        [rng.uniform(-0.4, 0.4, n) * z, rng.uniform(-0.3, 0.3, n) * z, z]
+    )
 
 
 def brown_conrady(x: float, y: float) -> tuple[float, float]:
@@ -37,7 +39,7 @@ def test_projection_is_opencvs_formula_point_by_point() -> None:
         np.testing.assert_allclose(pixel, expected, rtol=1e-13)
 
 
-def test_a_point_on_the_axis_meets_the_principal_point_right_and_down_are_positive() -> None:
+def test_the_axis_meets_the_principal_point_and_right_and_down_are_positive() -> None:
     camera = pinhole()
     at = np.array([[0.0, 0, 1], [0.1, 0, 1], [0, 0.1, 1]])
     np.testing.assert_allclose(
@@ -65,7 +67,9 @@ def test_ray_jacobian_is_the_finite_difference_of_rays(
     columns = []
     for k in range(2):
         step = h * np.eye(2)[k]
-        columns.append((camera.rays(pixels + step) - camera.rays(pixels - step)) / (2 * h))
+        columns.append(
+            (camera.rays(pixels + step) - camera.rays(pixels - step)) / (2 * h)
+        )
     numeric = np.stack(columns, axis=2)
     jacobian = camera.ray_jacobian(at)
     assert jacobian.shape == (50, 3, 2)
@@ -90,7 +94,9 @@ def test_points_at_or_behind_the_centre_have_no_pixel_and_are_not_contained() ->
 
 def test_the_image_reaches_half_a_pixel_beyond_the_outer_centres() -> None:
     camera = pinhole()
-    pixels = np.array([[-0.5, -0.5], [1279.5, 799.5], [-0.51, 5], [5, 799.51], [640, 400]])
+    pixels = np.array(
+        [[-0.5, -0.5], [1279.5, 799.5], [-0.51, 5], [5, 799.51], [640, 400]]
+    )
     np.testing.assert_array_equal(
         camera.contains(pixels), [True, True, False, False, True]
     )

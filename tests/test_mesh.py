@@ -52,7 +52,7 @@ def test_arrays_are_copies_and_cannot_be_written() -> None:
         (TRIANGLE, ONE[:, :2], r"faces must be \(n, 3\) .* got \(1, 2\)"),
         (TRIANGLE, ONE[:0], r"with n >= 1, got \(0, 3\)"),
         (TRIANGLE * [1, np.nan, 1], ONE, "vertex 0 is .*finite"),
-        (TRIANGLE + [np.inf, 0, 0], ONE, "vertex 0 is .*finite"),
+        (TRIANGLE + np.array([np.inf, 0, 0]), ONE, "vertex 0 is .*finite"),
         (TRIANGLE, ONE + 1, r"indices span 1\.\.3, must lie in 0\.\.2"),
         (TRIANGLE, ONE - 1, r"indices span -1\.\.1"),
     ],

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.poses import fibonacci_cap, look_at, transform
-from geometry import poses
+from geometry.poses import fibonacci_cap, inverse, look_at, transform
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -14,7 +13,9 @@ def test_the_axis_points_at_the_target_and_up_is_up_in_the_image() -> None:
     world_from_device = look_at(positions, targets, UP)
     rotation = world_from_device[:, :3, :3]
     np.testing.assert_allclose(
-        rotation @ np.swapaxes(rotation, 1, 2), np.tile(np.eye(3), (50, 1, 1)), atol=1e-12
+        rotation @ np.swapaxes(rotation, 1, 2),
+        np.tile(np.eye(3), (50, 1, 1)),
+        atol=1e-12,
     )
     np.testing.assert_allclose(np.linalg.det(rotation), 1.0, rtol=1e-12)
     np.testing.assert_array_equal(world_from_device[:, :3, 3], positions)
@@ -29,7 +30,9 @@ def test_the_axis_points_at_the_target_and_up_is_up_in_the_image() -> None:
 def test_one_device_and_common_targets_broadcast() -> None:
     one = look_at(np.array([1.0, 0, 0]), np.zeros(3), UP)
     assert one.shape == (4, 4)
-    np.testing.assert_allclose(one[:3, :3], [[0, 0, -1], [1, 0, 0], [0, -1, 0]], atol=1e-15)
+    np.testing.assert_allclose(
+        one[:3, :3], [[0, 0, -1], [1, 0, 0], [0, -1, 0]], atol=1e-15
+    )
     several = look_at(np.array([[1.0, 0, 0], [0, 1, 0]]), np.zeros(3), UP)
     np.testing.assert_array_equal(several[0], one)
 
@@ -60,14 +63,14 @@ def test_a_target_at_the_position_is_refused() -> None:
 def test_products_cancel_and_inverses_undo() -> None:
     rng = np.random.default_rng(1)
     b_from_a = look_at(rng.normal(size=(4, 3)), rng.normal(size=(4, 3)), UP)
-    product = poses.inverse(b_from_a) @ b_from_a
+    product = inverse(b_from_a) @ b_from_a
     np.testing.assert_allclose(product, np.tile(np.eye(4), (4, 1, 1)), atol=1e-12)
     points = rng.normal(size=(20, 3))
     there = transform(b_from_a[0], points)
     homogeneous = np.column_stack([points, np.ones(20)]) @ b_from_a[0].T
     np.testing.assert_allclose(there, homogeneous[:, :3], atol=1e-12)
     np.testing.assert_allclose(
-        transform(poses.inverse(b_from_a[0]), there), points, atol=1e-12
+        transform(inverse(b_from_a[0]), there), points, atol=1e-12
     )
 
 

@@ -25,7 +25,9 @@ def test_distance_to_a_box_is_exact_at_faces_edges_and_corners_and_inside() -> N
     found = closest_points(mesh, points)
     np.testing.assert_allclose(found.distances, box_distance(points, size), atol=1e-12)
     np.testing.assert_allclose(
-        np.linalg.norm(points - found.points, axis=1), np.abs(found.distances), atol=1e-12
+        np.linalg.norm(points - found.points, axis=1),
+        np.abs(found.distances),
+        atol=1e-12,
     )
 
 
@@ -36,7 +38,8 @@ def test_closest_points_lie_in_the_face_that_is_named() -> None:
     whole = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     p = found.points
     parts = sum(
-        np.linalg.norm(np.cross(s - p, t - p), axis=1) for s, t in ((a, b), (b, c), (c, a))
+        np.linalg.norm(np.cross(s - p, t - p), axis=1)
+        for s, t in ((a, b), (b, c), (c, a))
     )
     np.testing.assert_allclose(parts, whole, rtol=1e-6)
 
@@ -82,6 +85,8 @@ def test_no_points_give_no_answers() -> None:
         (np.zeros((1, 3)), 0, "threads must be at least 1, got 0"),
     ],
 )
-def test_bad_queries_are_refused(points: np.ndarray, threads: int, message: str) -> None:
+def test_bad_queries_are_refused(
+    points: np.ndarray, threads: int, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         closest_points(grid(1.0, 1.0, divisions=(1, 1)), points, threads=threads)

@@ -70,7 +70,8 @@ def test_the_number_of_threads_changes_nothing() -> None:
     mesh = sphere(0.1, subdivisions=3)
     origins, along = 0.3 * directions(5000, 3), directions(5000, 4)
     one, two = RayCaster(mesh, threads=1), RayCaster(mesh, threads=2)
-    for a, b in zip(one.first_hits(origins, along), two.first_hits(origins, along)):
+    hits = one.first_hits(origins, along), two.first_hits(origins, along)
+    for a, b in zip(*hits, strict=True):
         np.testing.assert_array_equal(a, b)
     reach = np.full(5000, 0.25)
     np.testing.assert_array_equal(
@@ -102,7 +103,12 @@ OK = np.tile([0.0, 0.0, 1.0], (2, 1))
         (np.zeros(3), NAN, np.ones(2), "finite"),
         (NAN, OK, np.ones(2), "finite"),
         (np.zeros(3), OK, np.ones(3), r"distances must be \(2,\)"),
-        (np.zeros(3), OK, np.array([1.0, np.inf]), r"distances must be \(2,\) and finite"),
+        (
+            np.zeros(3),
+            OK,
+            np.array([1.0, np.inf]),
+            r"distances must be \(2,\) and finite",
+        ),
     ],
 )
 def test_what_embree_would_swallow_is_refused(

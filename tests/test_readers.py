@@ -58,12 +58,14 @@ def test_every_format_gives_the_same_closed_box(kind: str, tmp_path: Path) -> No
 
 
 def three_mf(unit: str, mesh: trimesh.Trimesh) -> bytes:
-    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in mesh.vertices)
+    vertices = "".join(
+        f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in mesh.vertices
+    )
     faces = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces)
     model = (
         f'<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/'
-        f'core/2015/02"><resources><object id="1" type="model"><mesh><vertices>{vertices}'
-        f"</vertices><triangles>{faces}</triangles></mesh></object></resources>"
+        f'core/2015/02"><resources><object id="1" type="model"><mesh>'
+        f"<vertices>{vertices}</vertices><triangles>{faces}</triangles></mesh></object></resources>"
         f'<build><item objectid="1"/></build></model>'
     )
     return zipped({"3D/3dmodel.model": model.encode()})
@@ -142,7 +144,10 @@ def test_size_sets_the_longest_side(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("unit", "message"),
     [
-        ("m", r"longest side is 321 m in unit m, must be 1 mm to 100 m; --unit mm .* 321 mm"),
+        (
+            "m",
+            r"is 321 m in unit m, must be 1 mm to 100 m; --unit mm .* 321 mm",
+        ),
         ("um", r"longest side is 0\.321 mm in unit um.*--unit mm would make it 321 mm"),
     ],
 )
@@ -206,7 +211,8 @@ def test_off_may_be_wrapped_coloured_or_glued_to_its_header(tmp_path: Path) -> N
     flat = "0 0 0  30 0 0  30 30 0  0 30 0".split()
     texts = [
         "OFF\n4 1 0\n" + "\n".join(flat) + "\n4\n0 1\n2 3\n",
-        "OFF 4 1 4\n" + "\n".join(" ".join(flat[i : i + 3]) for i in (0, 3, 6, 9))
+        "OFF 4 1 4\n"
+        + "\n".join(" ".join(flat[i : i + 3]) for i in (0, 3, 6, 9))
         + "\n4 0 1 2 3 0.1 0.2 0.3\n",
         "COFF\n# colours\n4 1\n"
         + "\n".join(" ".join(flat[i : i + 3]) + " 9 9 9 9" for i in (0, 3, 6, 9))
@@ -244,27 +250,47 @@ STL_TWO = "solid a\n" + 2 * (
         ("a.obj", TRIANGLE_OBJ, "3 points and no faces"),
         ("a.obj", TRIANGLE_OBJ + "f\n", "line 4: a face needs three corners, has 0"),
         ("a.obj", TRIANGLE_OBJ + "f 1 2 9\n", "face 1 names a vertex that isn't there"),
-        ("a.obj", TRIANGLE_OBJ + "f 1 2 -9\n", "face 1 names a vertex that isn't there"),
+        (
+            "a.obj",
+            TRIANGLE_OBJ + "f 1 2 -9\n",
+            "face 1 names a vertex that isn't there",
+        ),
         ("a.obj", TRIANGLE_OBJ + "f 1 2 0\n", "line 4: vertices count from 1"),
         ("a.obj", TRIANGLE_OBJ + "f 1 2 x\n", "line 4: a face's corner isn't a number"),
         ("a.obj", "v 1 2\n", "line 1: a vertex needs three numbers"),
         ("a.obj", "v 1 2 3.1+e2\n", "could not convert"),
         ("a.obj", "cstype bspline\n", "line 1: free-form geometry"),
-        ("a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "none of its 1 faces is usable"),
+        (
+            "a.obj",
+            "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
+            "none of its 1 faces is usable",
+        ),
         ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n", "the header promises 3 vertices"),
-        ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "face 1 names a vertex"),
+        (
+            "a.off",
+            "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n",
+            "face 1 names a vertex",
+        ),
         ("a.off", "OFF\nx\n", "no line with the numbers"),
         ("a.off", "4OFF\n1 1 0\n", "in three dimensions"),
         ("a.off", "OFF BINARY\n1 1 0\n", "binary OFF"),
         ("a.stl", STL_TWO, "0 of 2 facets could be read"),
         ("a.stl", STL_TWO + "endsolid a\n" + STL_TWO, r"2 of 4 facets"),
         ("a.stl", b"\0" * 80 + struct.pack("<I", 2) + b"\1" * 50, "STL"),
-        ("a.glb", b"glTF" + struct.pack("<4I", 2, 999, 4, 0) + b"{}  ", "cut short: 24 of 999"),
+        (
+            "a.glb",
+            b"glTF" + struct.pack("<4I", 2, 999, 4, 0) + b"{}  ",
+            "cut short: 24 of 999",
+        ),
         ("a.glb", b"PK", "no GLB header"),
         ("a.gltf", "{", "JSON can't be read"),
         ("a.gltf", "[1]", "JSON isn't an object"),
         ("a.3mf", b"not a zip", "can't be read as 3MF"),
-        ("a.step", "ISO-10303", r"format '.step' isn't supported; convert it to one of obj"),
+        (
+            "a.step",
+            "ISO-10303",
+            r"format '.step' isn't supported; convert it to one of obj",
+        ),
         ("mesh", "v", r"format '.' isn't supported"),
         ("a.ply.gz", b"not gzip", "can't be unpacked"),
         ("a.ply.gz", gzip.compress(b"ply" * 99)[:-9], "can't be unpacked"),
@@ -286,7 +312,9 @@ def test_what_cannot_be_read_whole_is_refused_in_one_line(
 
 @pytest.mark.parametrize("cut", [0.35, 0.6, 0.95])
 @pytest.mark.parametrize("kind", ["ply", "stl", "glb"])
-def test_a_truncated_binary_file_is_refused(kind: str, cut: float, tmp_path: Path) -> None:
+def test_a_truncated_binary_file_is_refused(
+    kind: str, cut: float, tmp_path: Path
+) -> None:
     data = brick().export(file_type=kind)
     path = write(tmp_path / f"cut.{kind}", data[: int(cut * len(data))])
     with pytest.raises(MeshError):
@@ -310,9 +338,13 @@ def test_compressed_sparse_and_fan_gltf_are_refused_not_read_as_zeros(
     path = tmp_path / "a.gltf"
     draco = {"extensionsRequired": ["KHR_draco_mesh_compression"]}
     fan = {"meshes": [{"primitives": [{"mode": 6, "attributes": {"POSITION": 0}}]}]}
-    sparse = {"accessors": [{"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {}}]}
+    sparse = {
+        "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {}}]
+    }
     buffer = {
-        "buffers": [{"uri": "data:application/octet-stream;base64,AAAA", "byteLength": 3}],
+        "buffers": [
+            {"uri": "data:application/octet-stream;base64,AAAA", "byteLength": 3}
+        ],
         "bufferViews": [{"buffer": 0, "byteLength": 3}],
     }
     cases = [
@@ -342,7 +374,9 @@ def test_bad_paths_and_arguments_say_what_to_do(tmp_path: Path) -> None:
         load_mesh(tmp_path / "absent.obj")
     with pytest.raises(MeshError, match="is a directory; name one mesh file"):
         load_mesh(tmp_path)
-    with pytest.raises(MeshError, match="unit 'yard' isn't known, use one of mm, cm, m"):
+    with pytest.raises(
+        MeshError, match="unit 'yard' isn't known, use one of mm, cm, m"
+    ):
         load_mesh("x.obj", unit="yard")
     with pytest.raises(MeshError, match="give one"):
         load_mesh("x.obj", unit="mm", size_mm=10.0)

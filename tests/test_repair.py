@@ -65,7 +65,9 @@ def test_a_soup_is_welded_back_into_the_mesh_it_came_from() -> None:
 
 
 def test_positive_and_negative_zero_are_one_place() -> None:
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0], [0, -1, 0]])
+    vertices = np.array(
+        [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0], [0, -1, 0]]
+    )
     welded, faces, _ = clean(vertices, np.array([[0, 1, 2], [3, 4, 1]]))
     assert len(welded) == 4
     assert faces[0, 0] == faces[1, 0]
@@ -123,12 +125,16 @@ def test_thin_but_real_triangles_stay() -> None:
 
 def test_a_mesh_with_nothing_left_or_mostly_broken_is_refused() -> None:
     line = np.outer(np.arange(3.0), [1, 1, 1])
-    with pytest.raises(MeshError, match=r"none of its 1 faces .*zero-area faces removed: 1"):
+    with pytest.raises(
+        MeshError, match=r"none of its 1 faces .*zero-area faces removed: 1"
+    ):
         clean(line, np.array([[0, 1, 2]]))
     ball = sphere(0.1, subdivisions=2)
     vertices = ball.vertices.copy()
     vertices[:30] = np.nan
-    with pytest.raises(MeshError, match=r"of 320 faces have corners that aren't finite"):
+    with pytest.raises(
+        MeshError, match=r"of 320 faces have corners that aren't finite"
+    ):
         clean(vertices, ball.faces)
 
 
@@ -136,7 +142,9 @@ def test_a_mesh_with_nothing_left_or_mostly_broken_is_refused() -> None:
 
 
 def test_edges_borders_and_components_of_known_shapes() -> None:
-    two = joined(grid(1.0, 1.0, divisions=(3, 2)), moved(sphere(0.1, subdivisions=1), 9, 0, 0))
+    two = joined(
+        grid(1.0, 1.0, divisions=(3, 2)), moved(sphere(0.1, subdivisions=1), 9, 0, 0)
+    )
     edges = mesh_edges(two.faces)
     assert edges.border.sum() == 10
     assert set(np.unique(edges.n_faces)) == {1, 2}
@@ -220,10 +228,14 @@ def test_a_flat_plate_says_nothing_and_keeps_its_side() -> None:
 
 def test_a_floating_fragment_never_decides_for_the_rest() -> None:
     speck = TriangleMesh(
-        np.array([[0.0, 0, 0.2], [0.001, 0, 0.2], [0, 0.001, 0.2]]), np.array([[0, 1, 2]])
+        np.array([[0.0, 0, 0.2], [0.001, 0, 0.2], [0, 0.001, 0.2]]),
+        np.array([[0, 1, 2]]),
     )
     good = joined(speck, dome())
-    for order in (joined(speck, flipped(dome())), joined(flipped(speck), flipped(dome()))):
+    for order in (
+        joined(speck, flipped(dome())),
+        joined(flipped(speck), flipped(dome())),
+    ):
         mesh, _ = oriented(order)
         # The dome ends up outwards whatever the speck does.
         assert as_sets(mesh.faces[1:]) == as_sets(good.faces[1:])

@@ -31,7 +31,9 @@ def test_a_face_gets_its_share_of_samples_within_one() -> None:
 
 
 def test_samples_are_uniform_inside_a_face() -> None:
-    mesh = TriangleMesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
+    mesh = TriangleMesh(
+        np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    )
     n = 40_000
     points = sample_surface(mesh, n, seed=2).points
     # Mean and second moments of the uniform law on the triangle.
