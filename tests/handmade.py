@@ -613,15 +613,19 @@ def _claim_tables(
 
 
 def _baselines(document: Any, mesh: TriangleMesh) -> list[dict[str, Any]]:
-    meeting = mesh.face_centroids[int(np.argmax(mesh.face_centroids[:, 2]))]
+    top = int(np.argmax(mesh.face_centroids[:, 2]))
+    meeting, normal = mesh.face_centroids[top], mesh.face_normals[top]
     poses = {c["id"]: np.array(c["world_from_device"]) for c in document["cameras"]}
     rows = []
-    for first, second, limit in (("C1", "C2", 1.1), ("C2", "C1", 0.3)):
+    entries = {c["id"]: c for c in document["cameras"]}
+    theta = document["requirements"]["camera"]["max_incidence"]
+    for first, second in (("C1", "C2"), ("C2", "C1")):
         o1, o2, axis = poses[first][:3, 3], poses[second][:3, 3], poses[first][:3, 2]
         d1, d2 = math.dist(o1, meeting), math.dist(o2, meeting)
         d = math.dist(o1, o2)
         phi = math.acos((d1 * d1 + d2 * d2 - d * d) / (2 * d1 * d2))
         axial = float((o2 - o1) @ axis)
+        limit = phi + _slack(o1 - meeting, o2 - meeting, normal, entries[second], theta)
         rows.append(
             {
                 "cameras": [first, second],
@@ -630,6 +634,7 @@ def _baselines(document: Any, mesh: TriangleMesh) -> list[dict[str, Any]]:
                 "D2": d2,
                 "phi": phi,
                 "phi_max": limit,
+                "normals": [normal.tolist(), normal.tolist()],
                 "d": d,
                 "d_lateral": math.sqrt(d * d - axial * axial),
                 "d_axial": axial,
@@ -639,6 +644,30 @@ def _baselines(document: Any, mesh: TriangleMesh) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def _slack(
+    to_first: Any, to_second: Any, normal: Any, camera: Any, theta: float
+) -> float:
+    """Turn of u2 about E, away from u1, until camera 2 loses E, in small steps."""
+    x = to_first / np.linalg.norm(to_first)
+    y = to_second - (to_second @ x) * x
+    y /= np.linalg.norm(y)
+
+    def place(vector: Any) -> float:
+        return math.atan2(vector @ y, vector @ x)
+
+    start = place(to_second)
+    turned = 0.0
+    turn = np.array(camera["world_from_device"])[:3, :3]
+    w, h = camera["resolution"]
+    while start + turned - place(normal) <= theta:
+        ahead = -(math.cos(start + turned) * x + math.sin(start + turned) * y) @ turn
+        u, v = project(camera, ahead)
+        if not (-0.5 <= u <= w - 0.5 and -0.5 <= v <= h - 0.5):
+            break
+        turned += 2e-5
+    return turned
 
 
 def _into(pose: Any, p: Any) -> list[float]:

@@ -233,12 +233,21 @@ FALSE = {
     ),
     "phi": (_at("baselines", 0, "phi", lambda x: x + 0.01), "C1-C2.phi: claimed"),
     "slack": (_at("baselines", 0, "slack", lambda x: -x), "C1-C2.slack: claimed"),
-    "covered": (_at("baselines", 1, "covered", True), "C2-C1.covered: True is claimed"),
+    "covered": (_at("baselines", 1, "covered", False), "C2-C1.covered: False is"),
     "d": (_at("baselines", 1, "d", lambda x: x + 1e-3), "C2-C1.d: claimed"),
     "lateral": (_at("baselines", 0, "d_lateral", lambda x: x + 1e-3), "C2.d_lateral: "),
     "axial": (_at("baselines", 0, "d_axial", lambda x: x + 1e-3), "C1-C2.d_axial: "),
     "d_max": (_at("baselines", 0, "d_max", lambda x: x - 1e-3), "C1-C2.d_max: claimed"),
     "d_max null": (_at("baselines", 0, "phi_max", 3.5), "must be null: phi_max 3.5"),
+    "phi_max": (
+        _at("baselines", 1, "phi_max", lambda x: x + 0.01),
+        "C1.phi_max: claimed",
+    ),
+    "normals": (_at("baselines", 0, "normals", 1, [0, 1, 0]), "C1-C2.normals: "),
+    "mean normal": (
+        _entry("regions", 0, "mean_normal", lambda x: [1, 0, 0]),
+        "mean_normal",
+    ),
     "D1": (_at("baselines", 0, "D1", lambda x: x * 1.001), "C1-C2.D1: claimed"),
     "E": (_at("baselines", 0, "E", 2, lambda x: x + 2e-4), "mm off the surface"),
     "one order": (lambda document: document["baselines"].pop(), "not the order C2, C1"),
@@ -258,6 +267,24 @@ def test_a_false_claim_is_named(handmade, name):
     change, sentence = FALSE[name]
     found = failures(handmade.tampered(handmade.build_plan(), change))
     assert any(sentence in failure for failure in found), found
+
+
+def test_a_region_in_the_dark_is_lit_by_nobody(handmade):
+    plan = handmade.build_plan()
+    region = plan.surface.region.copy()
+    region[plan.surface.mesh.face_centroids[:, 2] < -0.03] = 2
+    dark = {
+        "id": 2,
+        "area_m2": 0.0,
+        "n_faces": 0,
+        "lit_by": ["P2"],
+        "lit_fraction": 0.0,
+    }
+    document = plan.document | {"regions": [*plan.document["regions"], dark]}
+    surface = dataclasses.replace(plan.surface, region=region)
+    found = failures(RigPlan(document, surface))
+    key = "regions.2.lit_by: P2 is named, but can light no part"
+    assert any(sentence.startswith(key) for sentence in found)
 
 
 @pytest.mark.parametrize("name", ["pixel_pitch_m", "beam_radius"])

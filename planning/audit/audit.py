@@ -16,8 +16,9 @@ from .estimates import Estimator
 from .ledger import Ledger, as_number
 from .occlusion import Shadow
 from .recompute import Reach, Recomputed, reach_of, recompute
+from .regions import audit_regions
 from .samples import AuditSamples, draw_samples
-from .serving import audit_serving
+from .serving import audit_margins
 from .tables import audit_certificates, audit_marginal, audit_rest
 from .verdict import unmet_requirements
 
@@ -92,7 +93,8 @@ def audit_plan(
     audit_areas(own, reach, estimator, ledger)
     audit_causes(own, reach, estimator, ledger)
     audit_contributions(plan, own, estimator, ledger)
-    audit_serving(plan, own, estimator, shadow, ledger)
+    audit_margins(plan, own, shadow, ledger)
+    audit_regions(plan, own, estimator, shadow, ledger)
     audit_marginal(own, estimator, ledger)
     audit_certificates(plan, own, estimator, ledger)
     audit_baselines(plan, ledger)
