@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geometry.mesh import TriangleMesh
 from geometry.primitives import grid
 from geometry.rays import RayCaster
 from planning.reconstruction.calibration import (
@@ -19,17 +20,28 @@ from planning.reconstruction.render import render_pair, view
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
 
 
+def plate(rigs, width: float, height: float, y: float = 0.0) -> TriangleMesh:
+    """A rectangle in the plane of a given y, its normal along -y."""
+    flat = grid(width, height, divisions=(6, 5))
+    turned = flat.vertices @ rigs.turn(0, 90.0)[:3, :3].T
+    return TriangleMesh(turned + np.array([0.0, y, 0.0]), flat.faces)
+
+
 def shot(
-    rigs, light: str, focal: float, photometry: Photometry, *, distortion=(0.0,) * 5
+    rigs,
+    light: str,
+    focal: float,
+    photometry: Photometry,
+    *,
+    distortion=(0.0,) * 5,
+    mesh: TriangleMesh | None = None,
 ):
     """Frames of a plate 120 mm wide before one projector and one camera."""
-    flat = grid(0.12, 0.10, divisions=(6, 5))
-    turned = flat.vertices @ rigs.turn(0, 90.0)[:3, :3].T
-    plate = type(flat)(turned, flat.faces)
-    assert plate.face_normals[0] @ rigs.direction(0.0, 0.0) == pytest.approx(1.0)
+    mesh = mesh or plate(rigs, 0.12, 0.10)
+    assert mesh.face_normals[0] @ rigs.direction(0.0, 0.0) == pytest.approx(1.0)
     make = rigs.diverging if light == "diverging" else rigs.parallel
     plan = rigs.plan_of(
-        plate,
+        mesh,
         [make("P1", rigs.direction(-25.0, 5.0), 0.09, 3.5e-3)],
         [
             rigs.camera(
@@ -40,8 +52,8 @@ def shot(
     camera = calibrate_camera(plan.cameras[0])
     projector = calibrate_projector(plan.projectors[0])
     patterns = ring_patterns(projector, plan.projectors[0].ring_radii, camera)
-    caster = RayCaster(plate, threads=1)
-    seen = view(camera, plate, caster, photometry)
+    caster = RayCaster(mesh, threads=1)
+    seen = view(camera, mesh, caster, photometry)
     frames = render_pair(seen, projector, projector, patterns, caster, photometry, (0,))
     return frames, patterns, PairCalibration(projector, camera)
 
@@ -116,6 +128,46 @@ def test_every_label_is_the_ring_that_is_there(rigs):
     there = ring_coordinate(calibration, edges.pixels)
     nearest = np.abs(there[:, None] - patterns.radii[None]).argmin(axis=1)
     assert np.array_equal(nearest, edges.rings)
+
+
+@pytest.mark.parametrize("light", ["diverging", "parallel"])
+def test_a_plate_hides_and_shades_the_one_behind_it(rigs, light):
+    """No point hangs in the air, none lies in the shadow, and the rest is measured."""
+    far, near = plate(rigs, 0.12, 0.10), plate(rigs, 0.05, 0.04, -0.03)
+    turn = rigs.turn(1, 45.0)[:3, :3]
+    both = TriangleMesh(
+        np.concatenate([far.vertices, near.vertices @ turn.T]),
+        np.concatenate([far.faces, near.faces + len(far.vertices)]),
+    )
+    frames, patterns, calibration = shot(rigs, light, 3478.0, Photometry(), mesh=both)
+    decoded = decode(frames, patterns, calibration)
+    x, y, z = (decoded.cloud.points @ turn).T
+    on_near, on_far = np.abs(y + 0.03) < 6e-4, np.abs(y) < 6e-4
+    assert on_near.sum() > 300
+    assert on_far.sum() > 1500
+    assert np.mean(~on_near & ~on_far) < 2e-3
+    assert np.all((np.abs(x[on_near]) < 0.0255) & (np.abs(z[on_near]) < 0.0205))
+    # Where the light that reached the far plate crossed the plane of the near one.
+    beams = decoded.cloud.beams
+    back = decoded.cloud.points - beams * ((y + 0.03) / beams[:, 1])[:, None]
+    back = np.abs(back @ turn)
+    shaded = (back[:, 0] < 0.0245) & (back[:, 2] < 0.0195)
+    assert not np.any(shaded & on_far)
+
+
+def test_false_edges_in_a_step_of_depth_are_found(rigs):
+    far, near = plate(rigs, 0.12, 0.10), plate(rigs, 0.05, 0.04, -0.03)
+    turn = rigs.turn(1, 45.0)[:3, :3]
+    both = TriangleMesh(
+        np.concatenate([far.vertices, near.vertices @ turn.T]),
+        np.concatenate([far.faces, near.faces + len(far.vertices)]),
+    )
+    taken = shot(rigs, "diverging", 3478.0, Photometry(), mesh=both)
+    hanging = []
+    for max_slant in (3.73, np.inf):
+        y = decode(*taken, max_slant=max_slant).cloud.points[:, 1]
+        hanging.append(np.count_nonzero((y < -6e-4) & (np.abs(y + 0.03) > 6e-4)))
+    assert hanging[0] < 0.1 * hanging[1]
 
 
 def test_scrambled_bits_give_no_wrong_points(rigs):

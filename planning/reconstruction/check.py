@@ -36,7 +36,7 @@ from .verdict import (
 _DEFAULT_SAMPLES = 20_000
 # Edges that run more steeply along the viewing ray are steps between surfaces, unless
 # the plan counts on surface seen at such incidence [rad].
-_SLANTED = np.deg2rad(70.0)
+_SLANTED = np.deg2rad(75.0)
 Progress = Callable[[int, int], None]
 
 

@@ -18,10 +18,12 @@ _MIN_NEIGHBOURS = 2
 # Share of the changes of index that must name a ring edge. Rings 6 pixels apart reach
 # 0.98, 3 pixels apart 0.8; two frames exchanged reach 0.6.
 _MIN_LABELLED = 0.75
+# The next ring is looked for this far away [px].
+_NEXT_RING_PX = 100.0
 # Keeps rings apart when neighbours are looked for.
-_RING_APART_PX = 100.0
-# tan(70 degrees).
-_MAX_SLANT = 2.75
+_RING_APART_PX = 1000.0
+# tan(75 degrees).
+_MAX_SLANT = 3.73
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +63,9 @@ def decode(
         patterns: What the projector drew.
         calibration: Of both devices.
         min_conditioning: Least |r.m|; below it a point is left out.
-        max_slant: Most that a ring edge may run along the viewing ray, as the tangent
-            of the incidence at the camera. Where a surface hides another, false edges
-            run down the step between them; this finds them.
+        max_slant: Most that the measured surface may run along the viewing ray, as the
+            tangent of the incidence at the camera. Where one surface hides another,
+            false edges hang in the step between them; this finds them.
 
     Raises:
         ValueError: If the frames aren't as many as the patterns ask for.
@@ -79,13 +81,13 @@ def decode(
     rays = camera.rays(edges.pixels)
     radii = patterns.radii[edges.rings]
     hits = intersect_rings(camera.centre, rays, radii, edges.roots, projector)
-    slant = _slant(edges, hits, camera.focal_px)
+    along, across = _slant(edges, hits, camera.focal_px)
     causes = {
         "no_intersection": ~np.isfinite(hits.distances),
         "conditioning": ~(np.abs(hits.conditioning) >= min_conditioning),
         "outside_panel": ~projector.in_panel(projector.panel(hits.points)[0], 1.0),
-        "isolated": np.isnan(slant),
-        "depth_step": ~(slant <= max_slant),
+        "isolated": np.isnan(along),
+        "depth_step": ~(along <= max_slant) | (across > max_slant),
     }
     kept = np.ones(len(edges), dtype=bool)
     rejected: dict[str, int] = {}
@@ -103,24 +105,42 @@ def decode(
     )
 
 
-def _slant(edges: Edges, hits: RingHits, focal_px: float) -> NDArray[np.float64]:
-    """Steepest change of distance along each edge, in units of a pixel's width there.
+def _slant(
+    edges: Edges, hits: RingHits, focal_px: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How steeply the measured surface runs along the viewing ray at each edge.
 
-    NaN where an edge has too few neighbours of its own ring.
+    Both are changes of distance in units of a pixel's width there: the tangent of the
+    incidence in one direction.
+
+    Returns:
+        The steepest along the edge, NaN where too few neighbours of its ring lie near;
+        and towards the next rings the less steep of both sides, NaN where neither is
+        near.
     """
-    slant = np.full(len(edges), np.nan)
+    along = np.full(len(edges), np.nan)
+    across = np.full(len(edges), np.nan)
     rows = np.flatnonzero(np.isfinite(hits.distances))
     if len(rows) == 0:
-        return slant
+        return along, across
     t = hits.distances[rows]
     place = np.column_stack([edges.pixels[rows], _RING_APART_PX * edges.rings[rows]])
-    apart, other = KDTree(place).query(place, k=7, distance_upper_bound=_NEAR_PX)
-    found = (other < len(rows)) & (apart > 0.5)
-    steps = np.abs(t[np.where(found, other, 0)] - t[:, None])
-    run = np.where(found, apart, np.inf) * (t / focal_px)[:, None]
-    enough = np.count_nonzero(found, axis=1) >= _MIN_NEIGHBOURS
-    slant[rows] = np.where(enough, (steps / run).max(axis=1), np.nan)
-    return slant
+    tree = KDTree(place)
+
+    def steepness(ring: int, k: int, reach: float) -> NDArray[np.float64]:
+        near = place + np.array([0.0, 0.0, ring * _RING_APART_PX])
+        apart, other = tree.query(near, k=k, distance_upper_bound=reach)
+        found = (other < len(rows)) & (apart > 0.5)
+        steps = np.abs(t[np.where(found, other, 0)] - t[:, None])
+        run = np.where(found, apart, 1.0) * (t / focal_px)[:, None]
+        return np.where(found, steps / run, np.nan)
+
+    beside = steepness(0, 7, _NEAR_PX)
+    enough = np.count_nonzero(np.isfinite(beside), axis=1) >= _MIN_NEIGHBOURS
+    along[rows[enough]] = np.nanmax(beside[enough], axis=1)
+    outwards, inwards = (steepness(side, 2, _NEXT_RING_PX)[:, 0] for side in (1, -1))
+    across[rows] = np.fmin(outwards, inwards)
+    return along, across
 
 
 def _cloud(
