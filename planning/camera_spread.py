@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
-from solvers.baseline_program import BaselineProblem, smallest_baseline, solve_baseline
+from solvers.baseline_problem import BaselineProblem, smallest_baseline
+from solvers.baseline_program import solve_baseline
 
 from .plan import PlannedCamera
 from .seams import adjacency, neighbouring_pairs, overlap_components
 from .spread_problem import (
+    RingsOnTarget,
     SampledTarget,
     SpreadLimits,
     at_poses,
@@ -70,8 +72,7 @@ def spread_cameras(
     weights: _Array | float,
     limits: SpreadLimits,
     required: float = 0.0,
-    ring_normals: _Array | None = None,
-    lit: NDArray[np.bool_] | None = None,
+    rings: RingsOnTarget | None = None,
     min_overlap_share: float = 0.01,
     max_evaluations: int = 48,
 ) -> CameraSpread:
@@ -90,20 +91,17 @@ def spread_cameras(
         weights: Weight of each sample in [m^2], shape (n,) or one number.
         limits: What binds a camera.
         required: Weight that must be measured [m^2].
-        ring_normals: Unit ring normals of each projector, (n_p, n, 3); None: no rings.
-        lit: Whether a projector lights a sample, shape (n, n_p); None: all do.
+        rings: Rings of each projector on the samples; None: no rings.
         min_overlap_share: Overlap or contact that makes neighbours.
         max_evaluations: Calls of `measure` at most.
     """
     n = len(points)
-    rings = np.zeros((0, n, 3)) if ring_normals is None else ring_normals
     target = SampledTarget(
         points,
         normals,
         np.broadcast_to(np.asarray(weights, np.float64), (n,)),
         adjacency(points, normals),
         rings,
-        np.ones((n, len(rings)), dtype=bool) if lit is None else lit,
     )
     search = _Search(
         list(cameras), measure, target, limits, min_overlap_share, max_evaluations
@@ -154,22 +152,25 @@ class _Search:
     def _improve(self, reach: float) -> tuple[bool, float]:
         """Whether a proposal within reach was taken, whole or in part; its reach."""
         demanded = np.zeros((0, 2), dtype=np.int64)
-        centres = self.poses[:, :3, 3]
+        proposals: list[_Array] = []
         for _ in range(_REPEATS):
-            problem = self._problem(demanded, reach)
-            solution = solve_baseline(problem)
+            solution = solve_baseline(self._problem(demanded, reach))
             if not (solution.status.has_point and self._gains(solution.centres)):
                 break
-            centres = solution.centres
-            taken, lost = self._attempt(self._between(centres, np.ones(len(centres))))
+            proposals.append(solution.centres)
+            whole = self._between(solution.centres, np.ones(len(solution.centres)))
+            taken, lost = self._attempt(whole)
             if taken:
                 return True, reach
-            fresh = self._demand(lost, centres, demanded)
+            fresh = self._demand(lost, solution.centres, demanded)
             if not len(fresh):
                 break
             demanded = np.concatenate([demanded, fresh])
-        moves = np.linalg.norm(centres - self.poses[:, :3, 3], axis=1)
-        return self._step_back(centres), float(moves.max())
+        # The first is the boldest, the last loses least: part of either may do.
+        ends = proposals[-1:] + proposals[:-1][:1]
+        moves = [np.linalg.norm(c - self.poses[:, :3, 3], axis=1).max() for c in ends]
+        taken = any(self._step_back(centres) for centres in ends)
+        return taken, float(max(moves, default=0.0))
 
     def _step_back(self, centres: _Array) -> bool:
         """Try part of the way for all, then for one camera at a time."""

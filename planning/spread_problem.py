@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.baseline_program import (
+from solvers.baseline_problem import (
     BaselineProblem,
     KeptPoints,
     SeamPoints,
@@ -31,7 +31,26 @@ _KEPT_POINTS = 24
 _SPARE_INCIDENCE = np.radians(0.3)
 _SPARE_FIELD = np.radians(0.1)
 _SPARE_CONDITIONING = 0.002
+_SPARE_RINGS = 0.002
 _COMFORT = np.radians(5.0)
+_EASE = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class RingsOnTarget:
+    """The rings of every projector on n samples.
+
+    Attributes:
+        normals: Unit normals m of the ring surfaces, shape (n_p, n, 3).
+        spacing: h, ring spacing along m in [m], shape (n_p, n).
+        noise_px: s_px, edge noise in [px], shape (n_p, n).
+        lit: Whether a projector lights a sample, shape (n, n_p).
+    """
+
+    normals: _Array
+    spacing: _Array
+    noise_px: _Array
+    lit: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +62,14 @@ class SampledTarget:
         normals: Unit face normals, shape (n, 3).
         weights: Area behind each sample in [m^2], shape (n,).
         adjacent: Near samples of each.
-        ring_normals: Unit ring normals m of each projector, shape (n_p, n, 3).
-        lit: Whether a projector lights a sample, shape (n, n_p).
+        rings: What each projector draws on them; None: no rings.
     """
 
     points: _Array
     normals: _Array
     weights: _Array
     adjacent: Adjacency
-    ring_normals: _Array
-    lit: NDArray[np.bool_]
+    rings: RingsOnTarget | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +80,15 @@ class SpreadLimits:
         max_incidence: theta in [rad].
         min_conditioning: Least |r.m|.
         workspace: Where cameras may stand.
+        min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
+        max_sigma_m: Largest s_N [m].
     """
 
     max_incidence: float
     min_conditioning: float
     workspace: Workspace
+    min_ring_pitch_px: float | None = None
+    max_sigma_m: float | None = None
 
 
 def camera_shell(workspace: Workspace) -> Shell:
@@ -117,7 +138,7 @@ def spread_problem(
         pairs=np.array(pairs, dtype=np.int64),
         shell=camera_shell(limits.workspace),
         seams=_seam_points(cameras, measured_by, pairs, target, limits),
-        kept=_kept_points(cameras, np.concatenate([*kept, demanded]), target),
+        kept=_kept_points(cameras, np.concatenate([*kept, demanded]), target, limits),
         max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
         range_m=cameras[0].device.range_m,
         min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
@@ -180,7 +201,10 @@ def _sole_samples(
         ray = target.points[rows] - camera.world_from_device[:3, 3]
         facing = -np.einsum("ij,ij->i", ray, target.normals[rows])
         facing /= np.linalg.norm(ray, axis=1)
-        rows, facing = rows[facing >= least], facing[facing >= least]
+        eased = facing >= least
+        if target.rings is not None and len(rows):
+            eased &= best_rings(camera, rows, target, target.rings, limits)[3] >= _EASE
+        rows, facing = rows[eased], facing[eased]
         chosen.append(
             rows[_tight_and_spread(facing, target.points[rows], _KEPT_POINTS)]
         )
@@ -191,18 +215,24 @@ def _kept_points(
     cameras: Sequence[PlannedCamera],
     kept: NDArray[np.int64],
     target: SampledTarget,
+    limits: SpreadLimits,
 ) -> KeptPoints:
     kept = np.unique(kept.astype(np.int64).reshape(-1, 2), axis=0)
     index, rows = kept[:, 0], kept[:, 1]
     points = target.points[rows]
-    cosine = np.zeros(len(kept))
+    cosine, sigma, pitch = (np.zeros(len(kept)) for _ in range(3))
     rings = np.zeros((len(kept), 3))
     for c, camera in enumerate(cameras):
         mine = np.flatnonzero(index == c)
-        if len(mine):
-            cosine[mine] = _field_cosines(camera, points[mine])
-            rings[mine] = _best_rings(camera, rows[mine], target)
-    return KeptPoints(index, points, target.normals[rows], cosine, rings)
+        if not len(mine):
+            continue
+        cosine[mine] = _field_cosines(camera, points[mine])
+        if target.rings is not None:
+            rings[mine], sigma[mine], pitch[mine], _ = best_rings(
+                camera, rows[mine], target, target.rings, limits
+            )
+    normals = target.normals[rows]
+    return KeptPoints(index, points, normals, cosine, rings, sigma, pitch)
 
 
 def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
@@ -220,19 +250,61 @@ def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
     return np.cos(half - _SPARE_FIELD)
 
 
-def _best_rings(
-    camera: PlannedCamera, rows: NDArray[np.int64], target: SampledTarget
-) -> _Array:
-    """Ring normal of the projector that conditions each sample best, m.r > 0."""
-    if not len(target.ring_normals):
-        return np.zeros((len(rows), 3))
-    ray = target.points[rows] - camera.world_from_device[:3, 3]
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    along = np.einsum("ij,pij->ip", ray, target.ring_normals[:, rows])
-    best = np.argmax(np.where(target.lit[rows], np.abs(along), -1.0), axis=1)
+def best_rings(
+    camera: PlannedCamera,
+    rows: NDArray[np.int64],
+    target: SampledTarget,
+    rings: RingsOnTarget,
+    limits: SpreadLimits,
+) -> tuple[_Array, _Array, _Array, _Array]:
+    """Return the ring normals that measure samples best, and what s_N and pitch ask.
+
+    With g = J_r^T v, |g| = c |v| / f, where c is 1 on the optical axis and hardly
+    changes as the camera slides; so the limits become m.r >= q t |v| and
+    -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f).
+
+    Args:
+        camera: As it stands.
+        rows: Samples, shape (q,).
+        target: All samples.
+        rings: On all samples.
+        limits: What binds.
+
+    Returns:
+        Ring normals with m.r > 0, (q, 3); q and p in [1/m], 0 where the limit doesn't
+        bind; what the tightest of these limits leaves, in units of a cosine; (q,) each.
+    """
+    pose = camera.world_from_device
+    ray = target.points[rows] - pose[:3, 3]
+    distance = np.linalg.norm(ray, axis=1)
+    r, normal = ray / distance[:, None], target.normals[rows]
+    m = rings.normals[:, rows]
+    along = np.einsum("ij,pij->pi", r, m)
+    facing = -np.einsum("ij,ij->i", r, normal)
+    v = normal * along[..., None] + m * facing[:, None]
+    jacobian = pose[:3, :3] @ camera.device.ray_jacobian(ray @ pose[:3, :3])
+    g = np.linalg.norm(np.einsum("ijk,pij->pik", jacobian, v), axis=2)
+    per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
+    sigma, pitch = np.zeros(along.shape), np.zeros(along.shape)
+    if limits.max_sigma_m is not None:
+        sigma = rings.noise_px[:, rows] * per_length / limits.max_sigma_m
+    if limits.min_ring_pitch_px is not None:
+        pitch = limits.min_ring_pitch_px * per_length / rings.spacing[:, rows]
+    spread = distance * np.linalg.norm(v, axis=2)
+    spare = np.minimum(
+        np.abs(along) - np.maximum(limits.min_conditioning, sigma * spread),
+        facing - pitch * spread,
+    )
+    best = np.argmax(np.where(rings.lit[rows].T, spare, -np.inf), axis=0)
     each = np.arange(len(rows))
-    sign = np.where(along[each, best] < 0.0, -1.0, 1.0)
-    return sign[:, None] * target.ring_normals[best, rows]
+    sign = np.where(along[best, each] < 0.0, -1.0, 1.0)
+    spared = 1.0 + _SPARE_RINGS
+    return (
+        sign[:, None] * m[best, each],
+        spared * sigma[best, each],
+        spared * pitch[best, each],
+        spare[best, each],
+    )
 
 
 def _tight_and_spread(tightness: _Array, points: _Array, n: int) -> NDArray[np.int64]:

@@ -9,11 +9,14 @@ camera must keep, choose centres O_c::
                 N.(O_c - P) >= cos(theta) |O_c - P|           kept points: incidence
                 lo <= |O_c - P| <= hi                         range
                 a_c.(P - O_c) >= cos(b) |O_c - P|             field
-                sign m.(P - O_c) >= e |O_c - P|               ring conditioning
+                m.(P - O_c) >= e |O_c - P|                    ring conditioning
+                m.r >= q t |v|,  -N.r >= p t |v|              s_N and ring pitch
                 O_c in the workspace shell,  |O_c - start| <= step
 
-with a_c the direction from O_c to its aim. At a seam point with its frame (out, on)
-frozen, angles are signed and smooth, g(v) = atan2(v.on, v.out), v_i = O_i - E::
+with a_c the direction from O_c to its aim, r = (P - O_c)/t, t = |P - O_c| and
+v = r x (N x m), so that |v|^2 = (r.m)^2 + (r.N)^2 - 2 (r.m)(r.N)(N.m). At a seam point
+with its frame (out, on) frozen, angles are signed and smooth: with v_i = O_i - E and
+g(v) = atan2(v.on, v.out)::
 
     iota_1 = -g(v_1),  iota_2 = g(v_2) - delta,  beta_1 = g(-a_1) - g(v_1),
     beta_2 = g(v_2) - g(-a_2),   phi = iota_1 + delta + iota_2
@@ -37,6 +40,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from .baseline_problem import BaselineProblem
 from .status import SolveStatus
 
 _Array = NDArray[np.float64]
@@ -44,168 +48,13 @@ _Matrix = ca.SX | ca.DM
 
 _MEAN_WEIGHT = 0.05
 _MAX_ITERATIONS = 150
+# The monotone barrier is robust but creeps, 300 steps against 10: it comes last.
+_BARRIERS = (
+    {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "loqo"},
+    {"ipopt.mu_strategy": "monotone"},
+)
 _THIN = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class Shell:
-    """Where camera centres may stand: a shell, a cone cut from it, a floor.
-
-    Attributes:
-        centre: Centre of the shell in [m], shape (3,).
-        radius: Least and largest distance from the centre in [m].
-        axis: Unit axis of the cone, shape (3,).
-        half_angle: Half opening of the cone in [rad]; pi is the whole shell.
-        up: Unit vector, shape (3,).
-        floor: Least height above the centre along `up` in [m]; None: no floor.
-    """
-
-    centre: _Array
-    radius: tuple[float, float]
-    axis: _Array
-    half_angle: float
-    up: _Array
-    floor: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class SeamPoints:
-    """Points E where the parts of two cameras meet; every array has one row a point.
-
-    Attributes:
-        cameras: Indices of camera 1 and camera 2, shape (s, 2).
-        points: E in [m], shape (s, 3).
-        outward: Unit normal in the plane O1, E, O2 at the start, shape (s, 3).
-        onward: Unit direction in it towards camera 2's stretch, shape (s, 3).
-        turn: delta, turn of the surface at E, convex positive [rad], shape (s,).
-        half_fields: b_1 and b_2 in [rad], shape (s, 2).
-    """
-
-    cameras: NDArray[np.int64]
-    points: _Array
-    outward: _Array
-    onward: _Array
-    turn: _Array
-    half_fields: _Array
-
-
-@dataclass(frozen=True, eq=False)
-class KeptPoints:
-    """Points that one camera must go on to measure; one row a point.
-
-    Attributes:
-        camera: Index of the camera, shape (m,).
-        points: P in [m], shape (m, 3).
-        normals: Unit normals, shape (m, 3).
-        field_cosine: Least cosine between ray and optical axis, shape (m,).
-        ring_normals: Ring normals m, signed so that m.r > 0 at the start, shape (m, 3);
-            zero rows don't bind.
-    """
-
-    camera: NDArray[np.int64]
-    points: _Array
-    normals: _Array
-    field_cosine: _Array
-    ring_normals: _Array
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineProblem:
-    """Data of the program in the module's docstring.
-
-    Attributes:
-        centres: O_c to start from in [m], shape (k, 3).
-        aims: Point that each camera looks at in [m], shape (k, 3).
-        pairs: Indices of neighbouring cameras, shape (p, 2), p >= 1.
-        shell: Where centres may stand.
-        seams: Where parts meet.
-        kept: What each camera must keep.
-        max_incidence: theta in [rad].
-        range_m: Least and largest |O - P| of kept points in [m].
-        min_conditioning: e, least |r.m| of kept points.
-        max_step: Farthest that a centre may move in [m].
-    """
-
-    centres: _Array
-    aims: _Array
-    pairs: NDArray[np.int64]
-    shell: Shell
-    seams: SeamPoints
-    kept: KeptPoints
-    max_incidence: float
-    range_m: tuple[float, float]
-    min_conditioning: float
-    max_step: float
-
-    def __post_init__(self) -> None:
-        k = len(self.centres)
-        if self.centres.shape != (k, 3) or self.aims.shape != (k, 3):
-            raise ValueError(f"centres and aims must be ({k}, 3)")
-        if self.pairs.ndim != 2 or self.pairs.shape[1] != 2 or len(self.pairs) < 1:
-            raise ValueError(
-                f"pairs must be (p, 2) with p >= 1, got {self.pairs.shape}"
-            )
-        indices = (self.pairs, self.seams.cameras, self.kept.camera)
-        if not all(np.all((i >= 0) & (i < k)) for i in indices):
-            raise ValueError(f"camera indices must lie in 0 to {k - 1}")
-        if not 0.0 < self.max_step < np.inf:
-            raise ValueError(f"max_step is {self.max_step} m, must be positive")
-        if not np.all(np.linalg.norm(self.aims - self.centres, axis=1) > 0.0):
-            raise ValueError("an aim coincides with its camera's centre")
-
-    @property
-    def smallest_baseline(self) -> float:
-        """Smallest baseline of neighbours at the start in [m]."""
-        return smallest_baseline(self.centres, self.pairs)
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineSolution:
-    """Answer to a :class:`BaselineProblem`.
-
-    Attributes:
-        problem: The problem this answers.
-        status: `LOCALLY_OPTIMAL`, or `UNKNOWN` where IPOPT failed.
-        centres: O_c in [m], shape (k, 3); those of the start where it failed.
-        iterations: Of IPOPT.
-    """
-
-    problem: BaselineProblem
-    status: SolveStatus
-    centres: _Array
-    iterations: int
-
-    @property
-    def smallest_baseline(self) -> float:
-        """Smallest baseline of neighbours in [m], recomputed from the centres."""
-        return smallest_baseline(self.centres, self.problem.pairs)
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineProgram:
-    """The stated program: x = (O_1, ..., O_k, t), minimise f, low <= g <= high.
-
-    Attributes:
-        x: Variables, (3 k + 1, 1).
-        objective: f, to be minimised.
-        constraints: g.
-        low: Lower bounds of g.
-        high: Upper bounds of g.
-        start: Where to start.
-    """
-
-    x: ca.SX
-    objective: ca.SX
-    constraints: ca.SX
-    low: _Array
-    high: _Array
-    start: _Array
-
-
-def smallest_baseline(centres: _Array, pairs: NDArray[np.int64]) -> float:
-    """Return the smallest distance over pairs of centres in [m]."""
-    apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]
-    return float(np.linalg.norm(apart, axis=1).min())
+_SMOOTH = 1e-12
 
 
 def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
@@ -245,33 +94,47 @@ def solve_baseline(problem: BaselineProblem) -> BaselineSolution:
     A local optimum, the same on every run; no clock is consulted.
     """
     program = build_baseline_program(problem)
+    iterations = 0
+    for barrier in _BARRIERS:
+        found, stats = _run_ipopt(problem, program, barrier)
+        iterations += int(stats["iter_count"])
+        if stats["success"] and np.all(np.isfinite(found)):
+            centres = found[:-1].reshape(-1, 3)
+            status = SolveStatus.LOCALLY_OPTIMAL
+            return BaselineSolution(problem, status, centres, iterations)
+    return BaselineSolution(problem, SolveStatus.UNKNOWN, problem.centres, iterations)
+
+
+def _run_ipopt(
+    problem: BaselineProblem, program: BaselineProgram, barrier: dict[str, str]
+) -> tuple[_Array, dict[str, Any]]:
     solver = ca.nlpsol(
         "baseline",
         "ipopt",
         {"x": program.x, "f": program.objective, "g": program.constraints},
         {
+            **barrier,
             "ipopt.linear_solver": "mumps",
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
             "ipopt.max_iter": _MAX_ITERATIONS,
             "ipopt.tol": 1e-7,
             "ipopt.acceptable_iter": 0,
-            # Monotone barriers creep here: 300 steps and more, against 9 or so.
-            "ipopt.mu_strategy": "adaptive",
             "print_time": False,
             "error_on_fail": False,
         },
     )
-    answer = solver(x0=program.start, lbg=program.low, ubg=program.high)
-    stats: dict[str, Any] = solver.stats()
-    iterations = int(stats["iter_count"])
-    found = np.asarray(answer["x"], dtype=np.float64).ravel()
-    if not (stats["success"] and np.all(np.isfinite(found))):
-        return BaselineSolution(
-            problem, SolveStatus.UNKNOWN, problem.centres, iterations
-        )
-    centres = found[:-1].reshape(-1, 3)
-    return BaselineSolution(problem, SolveStatus.LOCALLY_OPTIMAL, centres, iterations)
+    # The step's ball holds these bounds too; they keep iterates from running away.
+    reach = np.full(len(program.start) - 1, 1.1 * problem.max_step)
+    longest = 2.0 * (np.abs(program.start[:-1]).max() + reach[0])
+    answer = solver(
+        x0=program.start,
+        lbx=np.append(program.start[:-1] - reach, 0.0),
+        ubx=np.append(program.start[:-1] + reach, 2.0 * longest),
+        lbg=program.low,
+        ubg=program.high,
+    )
+    return np.asarray(answer["x"], dtype=np.float64).ravel(), solver.stats()
 
 
 @dataclass
@@ -367,8 +230,28 @@ def _state_kept(
     stated.add(_dot(ray, _rows(axes, kept.camera)) / distance - kept.field_cosine)
     ringed = np.flatnonzero(np.any(kept.ring_normals != 0.0, axis=1))
     if len(ringed):
-        along = _dot(_rows(ray, ringed), ca.DM(kept.ring_normals[ringed]))
-        stated.add(along / _rows(distance, ringed), problem.min_conditioning)
+        _state_rings(stated, problem, _rows(ray, ringed), ringed)
+
+
+def _state_rings(
+    stated: _Stated,
+    problem: BaselineProblem,
+    ray: _Matrix,
+    ringed: NDArray[np.int64],
+) -> None:
+    kept = problem.kept
+    m, normal = kept.ring_normals[ringed], kept.normals[ringed]
+    distance = _norm(ray)
+    along = _dot(ray, ca.DM(m)) / distance
+    facing = -_dot(ray, ca.DM(normal)) / distance
+    stated.add(along, problem.min_conditioning)
+    slant = np.einsum("ij,ij->i", m, normal)
+    square = along**2 + facing**2 + 2.0 * along * facing * ca.DM(slant)
+    # v is null only where ring and surface are parallel; keep the root smooth there.
+    spread = distance * ca.sqrt(square + _SMOOTH)
+    for coefficient, needed in ((kept.sigma, along), (kept.pitch, facing)):
+        if coefficient is not None:
+            stated.add(needed - spread * ca.DM(coefficient[ringed]))
 
 
 def _rows(matrix: _Matrix, index: NDArray[np.int64]) -> _Matrix:

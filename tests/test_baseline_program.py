@@ -5,16 +5,16 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from planning.coverage_triangle import round_body_limit, seam_angles
-from solvers.baseline_program import (
+from solvers.baseline_problem import (
     BaselineProblem,
     KeptPoints,
     SeamPoints,
     Shell,
-    build_baseline_program,
-    solve_baseline,
 )
+from solvers.baseline_program import build_baseline_program, solve_baseline
 from solvers.status import SolveStatus
 
 THETA = np.radians(60.0)
@@ -147,6 +147,31 @@ def test_kept_field_and_conditioning_hold_at_the_answer():
             floor = min(field, begin_ray @ -begin / RING)
             assert ray @ -centre / np.linalg.norm(centre) >= floor - 1e-7
             assert ray @ m >= min(least, begin_ray @ m) - 1e-7
+
+
+@pytest.mark.parametrize("limit", ["sigma", "pitch"])
+def test_kept_ring_limits_bind_at_the_answer_and_nowhere_beyond(limit):
+    point, normal = np.array([RADIUS, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    m = np.array([-0.9, -0.3, np.sqrt(0.1)])  # m.r falls as the camera goes round.
+    start = [_on_ring(-0.35), _on_ring(0.1)]
+
+    def left(centre, coefficient):
+        r = (point - centre) / np.linalg.norm(point - centre)
+        spread = np.linalg.norm(np.cross(r, np.cross(normal, m)))
+        have = r @ m if limit == "sigma" else -normal @ r
+        return have - coefficient * np.linalg.norm(point - centre) * spread
+
+    # A limit that the start keeps with a little to spare, coefficient in 1/m.
+    coefficient = brentq(lambda q: left(start[0], q) - 0.02, 0.0, 10.0)
+    kept = _kept([0], [point], [normal], rings=[m])
+    tight = replace(kept, **{limit: np.array([coefficient])})
+    problem = _problem(start, kept=kept, min_conditioning=-1.0, max_step=0.6)
+    free = solve_baseline(problem)
+    held = solve_baseline(replace(problem, kept=tight))
+    assert held.status is SolveStatus.LOCALLY_OPTIMAL
+    assert left(free.centres[0], coefficient) < -1e-3
+    assert left(held.centres[0], coefficient) == pytest.approx(0.0, abs=1e-5)
+    assert problem.smallest_baseline < held.smallest_baseline < free.smallest_baseline
 
 
 def test_what_is_past_a_limit_at_the_start_gets_no_worse():

@@ -1,5 +1,7 @@
 """Cameras slide apart only as far as what they measure allows."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,9 +9,22 @@ from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap, look_at
 from planning.camera_spread import spread_cameras
 from planning.coverage_triangle import round_body_limit
+from planning.measurability import (
+    MEASURED,
+    Rings,
+    View,
+    first_pair_failure,
+    pair_quality,
+)
 from planning.plan import PlannedCamera
-from planning.requirements import Workspace
-from planning.spread_problem import SpreadLimits
+from planning.requirements import TriangulationLimits, Workspace
+from planning.seams import adjacency
+from planning.spread_problem import (
+    RingsOnTarget,
+    SampledTarget,
+    SpreadLimits,
+    best_rings,
+)
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0
@@ -232,11 +247,60 @@ def test_rings_hold_the_conditioning_that_the_caller_demands():
     ball.measure = conditioned
     cameras = _cameras(_at(-0.35), _at(0.3, 0.2))
     before = _weight(ball, cameras)
-    spread = ball.spread(
-        cameras, ring_normals=m[None], lit=np.ones((len(m), 1), dtype=bool)
+    n = len(m)
+    rings = RingsOnTarget(
+        m[None], np.full((1, n), 4e-3), np.full((1, n), 0.1), np.ones((n, 1), bool)
     )
+    spread = ball.spread(cameras, rings=rings)
     assert spread.n_accepted > 0
     assert _weight(ball, spread.cameras) >= before
+
+
+def test_what_rings_ask_is_what_measurability_says():
+    """q t |v| / m.r and p t |v| / -N.r are s_N and the pitch, each over its limit."""
+    rng = np.random.default_rng(8)
+    ball = _front(np.radians(50.0), n=200)
+    camera = _cameras(_at(0.4, 0.3))[0]
+    pose = camera.world_from_device
+    ring = rng.normal(size=(2, 200, 3))
+    ring /= np.linalg.norm(ring, axis=2, keepdims=True)
+    spacing, light = rng.uniform(2e-3, 5e-3, (2, 200)), rng.uniform(0.5, 1.0, (2, 200))
+    lit = rng.random((200, 2)) < 0.6
+    rings = RingsOnTarget(ring, spacing, 0.1 / light, lit)
+    target = SampledTarget(
+        ball.points,
+        ball.normals,
+        np.ones(200),
+        adjacency(ball.points, ball.normals),
+        rings,
+    )
+    limits = SpreadLimits(THETA, 0.1, _workspace(), 6.0, 3e-4)
+    rows = np.flatnonzero(lit.any(axis=1))
+    m, q, p, spare = best_rings(camera, rows, target, rings, limits)
+
+    ray = ball.points[rows] - pose[:3, 3]
+    t = np.linalg.norm(ray, axis=1)
+    r, normal = ray / t[:, None], ball.normals[rows]
+    jacobian = pose[:3, :3] @ DEVICE.ray_jacobian(ray @ pose[:3, :3])
+    view = View(np.zeros(len(rows)), r, t, -np.sum(r * normal, axis=1), jacobian, t > 0)
+    asked = TriangulationLimits(0.1, 0.1, 3e-4, 6.0)
+    measured = np.zeros((len(rows), 2), dtype=bool)
+    for k in range(2):
+        incidence = SimpleNamespace(incidence_cos=light[k, rows])
+        drawn = Rings(ring[k, rows], spacing[k, rows])
+        quality = pair_quality(normal, incidence, drawn, view, asked)
+        measured[:, k] = first_pair_failure(quality, asked) == MEASURED
+        measured[:, k] &= lit[rows, k]
+        mine = np.all(np.isclose(np.abs(m), np.abs(ring[k, rows])), axis=1)
+        v = normal * np.sum(r * m, axis=1)[:, None] + m * view.facing[:, None]
+        length = (t * np.linalg.norm(v, axis=1))[mine] / 1.002
+        sigma = 3e-4 * q[mine] * length / np.sum(r * m, axis=1)[mine]
+        np.testing.assert_allclose(sigma, quality.sigma[mine])
+        pitch = 6.0 * view.facing[mine] / (p[mine] * length)
+        np.testing.assert_allclose(pitch, quality.pitch[mine])
+    assert np.all(np.sum(r * m, axis=1) > 0.0)
+    assert 0.1 < measured.mean() < 0.9
+    np.testing.assert_array_equal(spare >= 0.0, measured.any(axis=1))
 
 
 def test_one_camera_or_strangers_have_no_baseline():
