@@ -20,8 +20,8 @@ from .reductions import ReducedCover
 from .relaxation import ROUNDING, tighten
 from .status import WorkBudget
 
-# Larger covers aren't searched: the dense copy would exceed 400 MB.
-_MAX_DENSE = 400_000_000
+# Larger covers aren't searched: the dense copy takes a byte an entry.
+_MAX_DENSE = 200_000_000
 _PAIR_BLOCK = 256
 _FIRST_ROWS = 64
 # Pairs are looked at one by one once fewer than this fraction is left.

@@ -94,7 +94,7 @@ def reduce_cover(
     bits, merged = _merge_rows(covers[live], whole[live])
     dense = np.unpackbits(bits, axis=1, count=costs.size).astype(bool)
     kept, stand_in = _undominated(dense, merged, costs)
-    by_row = sparse.csr_array(dense[:, kept].astype(np.float64))
+    by_row = sparse.csr_array(dense[:, kept]).astype(np.float64)
     return ReducedCover(
         by_set=sparse.csr_array(by_row.T),
         by_row=by_row,
@@ -129,7 +129,7 @@ def _undominated(
     The first are column numbers, increasing; the second count among these.
     """
     n_sets = dense.shape[1]
-    gains = np.asarray(weights @ dense, dtype=np.float64)
+    gains = sparse.csr_array(dense.T) @ weights
     # A superset weighs more, so only earlier columns of this order can dominate.
     order = np.lexsort((np.arange(n_sets), costs, -gains))
     order = order[gains[order] > 0]

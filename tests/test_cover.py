@@ -392,7 +392,8 @@ def test_same_answer_with_one_and_two_threads():
         "from solvers import CoverProblem, solve_cover\n"
         "for seed in range(2):\n"
         "    covers, weights = visibility(500, 200, seed=seed)\n"
-        "    s = solve_cover(CoverProblem(covers, weights, min_coverage=0.95), budget=3e8)\n"
+        "    problem = CoverProblem(covers, weights, min_coverage=0.95)\n"
+        "    s = solve_cover(problem, budget=3e8)\n"
         "    print(s.selected.tolist(), s.lower_bound, s.proof, s.covered_weight)\n"
     )
     root = Path(__file__).resolve().parents[1]

@@ -1,0 +1,250 @@
+"""The parts of the cover engine one by one, where the whole would hide a fault."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from solvers.exact_cover import best_tuple
+from solvers.mixed_integer import linear_multipliers, solve_integer
+from solvers.neighbourhood import (
+    cheapest,
+    greedy,
+    most_coverage,
+    prune,
+)
+from solvers.reductions import reduce_cover
+from solvers.relaxation import cost_bound, coverage_bounds, tighten
+from solvers.status import WorkBudget
+
+NONE = np.empty(0, dtype=np.int64)
+
+
+def random_cover(seed, *, n_e=36, n_s=12, density=0.3, share=0.9, costs=None):
+    rng = np.random.default_rng(seed)
+    covers = rng.random((n_e, n_s)) < density
+    weights = rng.integers(1, 9, n_e).astype(float) if seed % 2 else rng.random(n_e)
+    reachable = weights[covers.any(axis=1)].sum()
+    c = np.ones(n_s) if costs is None else costs
+    return reduce_cover(sparse.csr_array(covers), weights, c, share * reachable)
+
+
+def plenty():
+    return WorkBudget(5e9)
+
+
+def most_by_hand(cover, k):
+    tuples = itertools.combinations(range(cover.n_sets), min(k, cover.n_sets))
+    serves = cover.by_set.toarray() > 0
+    return float(np.max(serves[np.array(list(tuples))].any(axis=1) @ cover.weights))
+
+
+def multipliers_of(cover, seed):
+    """Rows' own weights, random ones and good ones: the answer may not depend on it."""
+    rng = np.random.default_rng(seed)
+    return [
+        cover.weights,
+        cover.weights * rng.random(cover.weights.size),
+        tighten(
+            cover.by_set, cover.weights, 3, 0.0, cover.weights, plenty()
+        ).multipliers,
+    ][seed % 3]
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4, 5])
+def test_tuples_equal_brute_force(k):
+    for seed in range(40):
+        cover = random_cover(seed)
+        best = most_by_hand(cover, k)
+        search = best_tuple(
+            cover,
+            k,
+            target=1.0,
+            multipliers=multipliers_of(cover, seed),
+            budget=plenty(),
+        )
+        assert search.complete
+        assert search.weight == best, seed
+        assert cover.weight_of(search.selected) == best
+        assert best <= search.upper_bound <= best * (1 + 1e-10)
+
+
+@pytest.mark.parametrize("k", [2, 3, 4])
+def test_tuples_decide_to_the_last_unit_of_weight(k):
+    """The most weight is reached, one unit more isn't: also when all rows count."""
+    for seed in range(40):
+        cover = random_cover(seed, density=0.2 + 0.02 * (seed % 20))
+        best = most_by_hand(cover, k)
+        for target, reached in ((best, True), (best + 1.0, False)):
+            search = best_tuple(
+                cover,
+                k,
+                target=target,
+                multipliers=multipliers_of(cover, seed),
+                budget=plenty(),
+                first=True,
+            )
+            assert (search.selected is not None) is reached, seed
+            if reached:
+                assert cover.weight_of(search.selected) >= target
+                assert search.selected.size <= k
+            else:
+                assert search.complete
+
+
+def test_full_covers_branch_on_scarce_rows():
+    """A planted exact cover of five among decoys that miss a row each."""
+    rng = np.random.default_rng(2)
+    part = rng.integers(0, 5, 120)
+    covers = np.column_stack([part == i for i in range(5)])
+    for i in range(5):
+        for _ in range(4):
+            decoy = covers[:, i].copy()
+            decoy[rng.choice(np.flatnonzero(decoy))] = False
+            decoy |= rng.random(120) < 0.02
+            covers = np.column_stack([covers, decoy])
+    cover = reduce_cover(sparse.csr_array(covers), np.ones(120), np.ones(25), 120.0)
+    ask = {"multipliers": cover.weights, "budget": plenty(), "first": True}
+    five = best_tuple(cover, 5, target=cover.total, **ask)
+    assert cover.weight_of(five.selected) == cover.total
+    four = best_tuple(cover, 4, target=cover.total, **ask)
+    assert four.selected is None
+    assert four.complete
+
+
+def test_cut_search_returns_a_bound_that_holds():
+    for seed in range(20):
+        cover = random_cover(seed, n_e=80, n_s=30)
+        best = most_by_hand(cover, 3)
+        for units in (0.0, 3e5, 2e6):
+            search = best_tuple(
+                cover,
+                3,
+                target=1.0,
+                multipliers=cover.weights,
+                budget=WorkBudget(units),
+            )
+            assert search.upper_bound >= best
+            assert search.weight <= best
+            if search.complete:
+                assert search.weight == best
+
+
+def test_many_pairs_agree_with_a_dense_product():
+    """More columns than a block, more rows than the first look."""
+    rng = np.random.default_rng(4)
+    covers = rng.random((900, 420)) < rng.uniform(0.2, 0.45, 420)
+    weights = rng.uniform(0.5, 1.5, 900)
+    cover = reduce_cover(sparse.csr_array(covers), weights, np.ones(420), 1.0)
+    a = cover.by_row.toarray()
+    gains = cover.weights @ a
+    pairs = gains[:, None] + gains - (a * cover.weights[:, None]).T @ a
+    best = float(pairs.max())
+    search = best_tuple(
+        cover, 2, target=1.0, multipliers=cover.weights, budget=plenty()
+    )
+    assert search.weight == best
+    assert search.pairs_only
+    beyond = best_tuple(
+        cover, 2, target=best + 1.0, multipliers=cover.weights, budget=plenty()
+    )
+    assert beyond.selected is None
+    assert beyond.complete
+
+
+def test_descent_approaches_the_linear_program():
+    """No bound is below what is covered, and the descent gets near the LP's."""
+    from scipy.optimize import linprog
+
+    for seed in range(6):
+        cover = random_cover(seed, n_e=60, n_s=25, density=0.2)
+        n_s, n_e = cover.by_set.shape
+        link = sparse.hstack([-cover.by_row, sparse.eye_array(n_e)])
+        count = sparse.csr_array(np.concatenate([np.ones(n_s), np.zeros(n_e)])[None])
+        lp = linprog(
+            np.concatenate([np.zeros(n_s), -cover.weights / cover.total]),
+            A_ub=sparse.vstack([link, count]),
+            b_ub=np.append(np.zeros(n_e), 4.0),
+            bounds=(0, 1),
+        )
+        goal = -lp.fun * 0.999 * cover.total
+        step = tighten(cover.by_set, cover.weights, 4, goal, cover.weights, plenty())
+        bound = coverage_bounds(cover, step.multipliers)[4]
+        assert bound == pytest.approx(step.bound, rel=1e-9)
+        assert -lp.fun * (1 - 1e-9) <= bound / cover.total <= -lp.fun * 1.02
+
+
+def test_swaps_reach_a_local_optimum_and_count_right():
+    for seed in range(30):
+        cover = random_cover(seed, n_e=60, n_s=20)
+        start = np.array([0, 1, 2])
+        best = most_coverage(cover, start, plenty(), target=np.inf, seed=0, max_kicks=0)
+        weight = cover.weight_of(best)
+        assert weight >= cover.weight_of(start)
+        for out in best:
+            for into in range(cover.n_sets):
+                swapped = np.append(best[best != out], into)
+                assert cover.weight_of(swapped) <= weight
+
+
+def test_kicks_leave_local_optima():
+    """Over many instances, restarts find what swaps alone miss."""
+    alone = kicked = 0.0
+    for seed in range(30):
+        cover = random_cover(seed, n_e=80, n_s=30)
+        start = greedy(cover, NONE, plenty(), n_sets=4)
+        arguments = {"target": np.inf, "seed": 0}
+        rest = most_coverage(cover, start, plenty(), max_kicks=0, **arguments)
+        best = most_coverage(cover, start, plenty(), max_kicks=40, **arguments)
+        alone += cover.weight_of(rest) / cover.total
+        kicked += cover.weight_of(best) / cover.total
+        assert cover.weight_of(best) == most_by_hand(cover, 4)
+    assert kicked > alone
+
+
+def test_prune_drops_what_isn_t_needed():
+    for seed in range(20):
+        cover = random_cover(seed)
+        pruned = prune(cover, np.arange(cover.n_sets))
+        assert cover.weight_of(pruned) >= cover.required
+        for s in pruned:
+            assert cover.weight_of(pruned[pruned != s]) < cover.required
+
+
+def least_cost_by_hand(cover):
+    return min(
+        cover.costs[list(chosen)].sum()
+        for k in range(1, cover.n_sets + 1)
+        for chosen in itertools.combinations(range(cover.n_sets), k)
+        if cover.weight_of(np.array(chosen)) >= cover.required
+    )
+
+
+@pytest.mark.parametrize("share", [0.8, 0.97, 1.0])
+def test_costs_by_search_linear_bound_and_integers(share):
+    for seed in range(8):
+        costs = np.random.default_rng(seed).uniform(0.5, 2.0, 9)
+        cover = random_cover(seed, n_e=24, n_s=9, share=share, costs=costs)
+        least = least_cost_by_hand(cover)
+        start = greedy(cover, NONE, plenty())
+        found = cheapest(cover, start, plenty(), seed=0, max_kicks=100)
+        cost = cover.costs[found].sum()
+        assert least - 1e-9 <= cost <= cover.costs[start].sum() + 1e-9
+        bound = cost_bound(cover, linear_multipliers(cover, plenty()))
+        assert 0.5 * least < bound <= least + 1e-9
+        answer = solve_integer(cover, start, plenty())
+        assert cover.weight_of(answer.selected) >= cover.required
+        assert cover.costs[answer.selected].sum() == pytest.approx(least)
+        assert answer.lower_bound == pytest.approx(least, rel=1e-5)
+        assert answer.lower_bound <= least
+
+
+def test_loss_of_a_light_row_isn_t_taken_for_a_full_cover():
+    """Two light rows may be lost, a heavy one may not: one set suffices."""
+    covers = np.array([[1, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
+    weights = np.array([10.0, 12.0, 1.0, 1.0])
+    cover = reduce_cover(sparse.csr_array(covers), weights, np.ones(3), 22.0)
+    answer = solve_integer(cover, np.arange(3), plenty())
+    assert answer.selected.tolist() == [0]
+    assert answer.lower_bound == pytest.approx(1.0, abs=1e-5)
