@@ -154,7 +154,7 @@ FALSE = {
         "must list ids",
     ),
     "lit_fraction": (
-        _entry("regions", 1, "lit_fraction", lambda x: x - 0.08),
+        _entry("regions", 1, "lit_fraction", lambda x: x - 0.12),
         "regions.1.lit_fraction",
     ),
     "region area": (
@@ -446,3 +446,21 @@ def test_distance_to_surface_is_exact_on_faces_edges_and_corners():
     ):
         assert distance_to_surface(mesh, np.array(point)) == pytest.approx(expected)
     assert distance_to_surface(mesh, np.array([9.0, 0.0, 0.0])) == np.inf
+
+
+@pytest.mark.parametrize(("fraction", "holds"), [(4 / 11, True), (1.0, False)])
+def test_a_region_of_few_samples_is_judged_by_its_few_samples(
+    handmade, fraction, holds
+):
+    plan = handmade.build_plan()
+    z = plan.surface.mesh.face_centroids[:, 2]
+    # Three faces out of the light: about a dozen samples of either side.
+    few = np.isin(np.arange(len(z)), np.argsort(np.abs(z + 0.02))[:3])
+    region = np.where(few, 2, plan.surface.region)
+    few_claims = {"id": 2, "lit_by": [], "lit_fraction": fraction, "n_faces": 3}
+    few_claims["area_m2"] = float(plan.surface.mesh.face_areas[few].sum())
+    document = plan.document | {"regions": [*plan.document["regions"], few_claims]}
+    surface = dataclasses.replace(plan.surface, region=region)
+    found = audit_plan(RigPlan(document, surface), n_samples=2000).failures
+    named = any(f.startswith("regions.2.lit_fraction: claimed") for f in found)
+    assert named is not holds

@@ -97,10 +97,14 @@ def _audit_fraction(
     estimator: Estimator,
     ledger: Ledger,
 ) -> None:
-    """Lit share of one region: both samplings are conditioned on falling into it."""
+    """Lit share of one region: both samplings are conditioned on falling into it.
+
+    A region may hold a handful of samples, and there may be hundreds of them: the
+    standard error is that of the pooled share, and four of them are tolerated.
+    """
     n = int(inside.sum())
-    if n == 0:
-        value = as_number(claims.get("lit_fraction"))
+    value = as_number(claims.get("lit_fraction"))
+    if n == 0 or value is None or not 0.0 <= value <= 1.0:
         ledger.holds(
             value is not None and 0.0 <= value <= 1.0,
             f"{key}.lit_fraction",
@@ -110,12 +114,10 @@ def _audit_fraction(
     fraction = float((inside & own.lit).sum()) / n
     share = estimator.area(inside) / estimator.target_m2
     n_claimed = max(estimator.n_claimed * share, 1.0)
-    p = (fraction * n + 1.0) / (n + 2.0)
+    p = (fraction * n + value * n_claimed + 1.0) / (n + n_claimed + 2.0)
     error = float(np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / n_claimed)))
-    tolerance = POINT + 3.0 * error
-    ledger.number(
-        f"{key}.lit_fraction", claims.get("lit_fraction"), fraction, tolerance, ""
-    )
+    tolerance = POINT + 4.0 * error
+    ledger.number(f"{key}.lit_fraction", value, fraction, tolerance, "")
 
 
 def _audit_lit_by(
