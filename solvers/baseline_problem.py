@@ -1,4 +1,4 @@
-"""Data of the program that slides cameras apart; `baseline_program` states and solves it.
+"""Data of the program that slides cameras apart; `baseline_program` solves it.
 
 Arrays only: what a point, a seam or a ring is, the caller knows.
 """
@@ -79,7 +79,7 @@ class KeptPoints:
 
 @dataclass(frozen=True, eq=False)
 class BaselineProblem:
-    """Data of the program in the module's docstring.
+    """Data of the program that `baseline_program` states.
 
     Attributes:
         centres: O_c to start from in [m], shape (k, 3).
@@ -125,54 +125,6 @@ class BaselineProblem:
     def smallest_baseline(self) -> float:
         """Smallest baseline of neighbours at the start in [m]."""
         return smallest_baseline(self.centres, self.pairs)
-
-
-def smallest_baseline(self) -> float:
-    """Smallest baseline of neighbours at the start in [m]."""
-    return smallest_baseline(self.centres, self.pairs)
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineSolution:
-    """Answer to a :class:`BaselineProblem`.
-
-    Attributes:
-        problem: The problem this answers.
-        status: `LOCALLY_OPTIMAL`, or `UNKNOWN` where IPOPT failed.
-        centres: O_c in [m], shape (k, 3); those of the start where it failed.
-        iterations: Of IPOPT, over all its runs.
-    """
-
-    problem: BaselineProblem
-    status: SolveStatus
-    centres: _Array
-    iterations: int
-
-    @property
-    def smallest_baseline(self) -> float:
-        """Smallest baseline of neighbours in [m], recomputed from the centres."""
-        return smallest_baseline(self.centres, self.problem.pairs)
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineProgram:
-    """The stated program: x = (O_1, ..., O_k, t), minimise f, low <= g <= high.
-
-    Attributes:
-        x: Variables, (3 k + 1, 1).
-        objective: f, to be minimised.
-        constraints: g.
-        low: Lower bounds of g.
-        high: Upper bounds of g.
-        start: Where to start.
-    """
-
-    x: ca.SX
-    objective: ca.SX
-    constraints: ca.SX
-    low: _Array
-    high: _Array
-    start: _Array
 
 
 def smallest_baseline(centres: _Array, pairs: NDArray[np.int64]) -> float:

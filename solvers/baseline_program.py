@@ -40,7 +40,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from .baseline_problem import BaselineProblem
+from .baseline_problem import BaselineProblem, smallest_baseline
 from .status import SolveStatus
 
 _Array = NDArray[np.float64]
@@ -55,6 +55,49 @@ _BARRIERS = (
 )
 _THIN = 1e-6
 _SMOOTH = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class BaselineSolution:
+    """Answer to a :class:`BaselineProblem`.
+
+    Attributes:
+        problem: The problem this answers.
+        status: `LOCALLY_OPTIMAL`, or `UNKNOWN` where IPOPT failed.
+        centres: O_c in [m], shape (k, 3); those of the start where it failed.
+        iterations: Of IPOPT, over all its runs.
+    """
+
+    problem: BaselineProblem
+    status: SolveStatus
+    centres: _Array
+    iterations: int
+
+    @property
+    def smallest_baseline(self) -> float:
+        """Smallest baseline of neighbours in [m], recomputed from the centres."""
+        return smallest_baseline(self.centres, self.problem.pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class BaselineProgram:
+    """The stated program: x = (O_1, ..., O_k, t), minimise f, low <= g <= high.
+
+    Attributes:
+        x: Variables, (3 k + 1, 1).
+        objective: f, to be minimised.
+        constraints: g.
+        low: Lower bounds of g.
+        high: Upper bounds of g.
+        start: Where to start.
+    """
+
+    x: ca.SX
+    objective: ca.SX
+    constraints: ca.SX
+    low: _Array
+    high: _Array
+    start: _Array
 
 
 def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
