@@ -161,8 +161,8 @@ def rigs(debug: bool) -> None:
 @commands.command()
 @click.option("-o", "--output", type=click.Path(path_type=Path), default="face.obj",
               show_default=True, metavar="FILE", help="Where it goes.")
-@click.option("--faces", type=click.IntRange(500, 2_000_000), default=24_000,
-              show_default=True, metavar="N", help="Triangles, about.")
+@click.option("--faces", type=click.IntRange(500, 2_000_000), default=40_000,
+              show_default=True, metavar="N", help="Triangles of the closed head, about; the neck is then cut open.")
 @click.option("--variant", type=click.IntRange(0), metavar="SEED",
               help="Another head of the population [default: the mean head].")
 @click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")

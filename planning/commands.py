@@ -16,6 +16,7 @@ from .errors import (
     InterruptedPlanError,
     RequirementError,
 )
+from .face_status import face_status
 from .pipeline import plan_rig
 from .plan import RigPlan
 from .progress import Report
@@ -147,7 +148,7 @@ def _save(plan: RigPlan, folder: Path, report: Report | None) -> list[str]:
     plan.save(names[0])
     if report is not None:
         report("drawing")
-    save_rig_picture(plan, names[2])
+    save_rig_picture(plan, names[2], face_status=face_status(plan))
     return [str(name) for name in names]
 
 

@@ -41,10 +41,11 @@ def head_field(shape: HeadShape, points: _Array) -> _Array:
     field = _skull_and_jaw(shape, p)
     for add in (_brow_and_eyes, _nose, _mouth_and_chin):
         field = add(shape, p, field)
-    return _carve(field, z - _base(shape), 14.0)
+    return _carve(field, z - neck_base(shape), 14.0)
 
 
-def _base(s: HeadShape) -> float:
+def neck_base(s: HeadShape) -> float:
+    """Return the height of the plane where the neck ends, in [mm]."""
     return -s.face_length - s.neck_length
 
 
@@ -65,7 +66,7 @@ def _skull_and_jaw(s: HeadShape, p: _Points) -> _Array:
     mouth_floor = _rod(p, (0, 0, -85 * k), (0, front + 34, chin + 16), 22, 14)
     field = _join(field, mouth_floor, 25)
     neck = 0.5 * s.neck_width
-    column = _rod(p, (0, 16, -40), (0, 22, _base(s) - 60), neck, neck + 4)
+    column = _rod(p, (0, 16, -40), (0, 22, neck_base(s) - 60), neck, neck + 4)
     field = _join(field, column, 30)
     cheekbone = _ellipsoid(p, (cheek - 25, front + 42, -24 * k), (19, 20, 13))
     return _join(field, cheekbone, 32)

@@ -27,7 +27,7 @@ _RANGES = {
     "lip_fullness": (5.0, 12.0, 1.3),
     "chin_projection": (-7.0, 6.0, 2.5),
     "ear_height": (50.0, 76.0, 4.0),
-    "ear_standoff": (9.0, 22.0, 2.8),
+    "ear_standoff": (7.0, 22.0, 1.6),
     "neck_width": (86.0, 124.0, 7.0),
     "neck_length": (14.0, 45.0, 4.0),
     "scale": (0.1, 10.0, 0.0),
@@ -81,8 +81,8 @@ class HeadShape:
     mouth_width: float = 51.0
     lip_fullness: float = 8.0
     chin_projection: float = 0.0
-    ear_height: float = 63.0
-    ear_standoff: float = 17.0
+    ear_height: float = 61.0
+    ear_standoff: float = 11.0
     neck_width: float = 104.0
     neck_length: float = 22.0
     scale: float = 1.0

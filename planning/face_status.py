@@ -1,0 +1,49 @@
+"""What a plan does for each face, judged at its centroid; for pictures, not for claims."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.sampling import SurfaceSamples
+
+from . import lighting
+from .cameras import lit_samples, measured_by
+from .draw import MEASURED, NOT_LIT, NOT_MEASURED, OUTSIDE_TARGET
+from .lighting import Target
+from .plan import RigPlan
+from .scene import Scene
+
+
+def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
+    """Return a status of `planning.draw` for each face, shape (n_f,).
+
+    A face is measured if its centroid is; faces outside the target that aren't
+    measured count as such.
+
+    Args:
+        plan: The plan.
+        threads: Worker threads.
+    """
+    mesh, required = plan.surface.mesh, plan.requirements
+    scene = Scene(
+        mesh, plan.surface.region, plan.surface.steep, required, 0, threads
+    )
+    faces = np.arange(len(mesh.faces))
+    centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)
+    target = Target(centroids, plan.surface.steep)
+    lit = np.zeros(len(faces), dtype=bool)
+    for projector in plan.projectors:
+        stage = lighting.first_failure(
+            projector, target, required.projector, scene.visibility
+        )
+        lit |= stage == lighting.LIT
+    measured = np.zeros(len(faces), dtype=bool)
+    if lit.any():
+        rows = lit_samples(scene, plan.projectors, target)
+        seen = measured_by(scene, plan.cameras, rows).any(axis=1)
+        measured[rows.target.samples.faces[seen]] = True
+    inside = plan.surface.target_faces(required.target)
+    status = np.full(len(faces), OUTSIDE_TARGET, dtype=np.int8)
+    status[inside & lit] = NOT_MEASURED
+    status[inside & ~lit] = NOT_LIT
+    status[measured] = MEASURED
+    return status
