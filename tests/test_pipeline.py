@@ -1,0 +1,176 @@
+"""The whole way from mesh to checked plan, on the sample head."""
+
+import json
+
+import numpy as np
+import pytest
+
+from geometry.mesh import TriangleMesh
+from planning import RigPlan, load_rig, plan_rig, verify_plan
+from planning.errors import (
+    InfeasibleLimitsError,
+    InputError,
+    InterruptedPlanError,
+    RequirementError,
+    TimeLimitError,
+)
+from planning.sample_head import sample_head
+from planning.summary import summary
+
+
+@pytest.fixture(scope="module")
+def head():
+    return sample_head(n_faces=8000)
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def plan(request, head):
+    return plan_rig(head, load_rig("default", light=request.param), max_projectors=3)
+
+
+def test_every_requirement_is_met_and_the_check_passed(plan):
+    asked, areas = plan.requirements, plan.coverage["target"]
+    assert len(plan.projectors) <= 3
+    assert areas["lit_m2"] >= 0.90 * areas["reachable_by_projectors_m2"]
+    assert areas["measured_m2"] >= 0.95 * areas["reachable_by_cameras_m2"]
+    assert areas["reachable_by_projectors_m2"] >= 0.90 * areas["area_m2"]
+    check = plan.document["reconstruction"]
+    assert check["passed"]
+    assert check["failures"] == []
+    assert check["accuracy_rms_m"] <= asked.check.max_rms_m
+    assert check["predicted_missing"] <= asked.check.max_predicted_missing
+    assert 1e-3 < asked.check.tau_m < 8e-3
+
+
+def test_areas_are_nested_and_causes_add_up(plan):
+    for part in ("target", "surface"):
+        areas = plan.coverage[part]
+        assert (
+            areas["measured_m2"]
+            <= areas["reachable_by_cameras_m2"]
+            <= areas["lit_m2"]
+            <= areas["reachable_by_projectors_m2"]
+            <= areas["area_m2"] * (1 + 1e-9)
+        )
+    areas = plan.coverage["target"]
+    missing = areas["area_m2"] - areas["measured_m2"]
+    causes = plan.coverage["uncovered_by_cause"]
+    assert sum(causes.values()) == pytest.approx(missing)
+
+
+def test_counts_bounds_and_candidates_are_stated(plan):
+    proofs = plan.document["certificates"]
+    for kind, least in (("projectors", 600), ("cameras", 400)):
+        proof = proofs[kind]
+        assert proof["count"] == len(plan.document[kind])
+        assert 1 <= proof["candidates"]["lower_bound"] <= proof["count"]
+        assert proof["candidates"]["n_candidates"] >= least
+        assert proof["continuous"] is None
+        met = proof["candidates"]["lower_bound"] == proof["count"]
+        assert proof["status"] == ("optimal" if met else "feasible")
+
+
+def test_marginal_table_rises_and_knows_the_plan(plan):
+    for kind, key in (("n_projectors", "lit"), ("n_cameras", "measured")):
+        rows = [row for row in plan.document["marginal"] if kind in row]
+        assert [row[kind] for row in rows] == list(range(1, len(rows) + 1))
+        areas = [row[f"{key}_target_m2"] for row in rows]
+        assert areas == sorted(areas)
+        count = len(getattr(plan, kind.removeprefix("n_")))
+        assert len(rows) >= count + 1
+        assert areas[count - 1] == plan.coverage["target"][f"{key}_m2"]
+
+
+def test_what_was_written_is_what_is_read_and_verified(plan, tmp_path):
+    plan.save(tmp_path / "new" / "plan.json")
+    again = RigPlan.load(tmp_path / "new" / "plan.json")
+    assert again.document == json.loads(plan.to_json())
+    found = verify_plan(again, seed=5, check_pixels=False)
+    assert found.failures == ()
+    assert found.unmet == ()
+
+
+def test_summary_names_devices_counts_and_denominators(plan):
+    text = summary(plan, ["plan.json"], ())
+    for device in (*plan.projectors, *plan.cameras):
+        assert f"\n{device.id} " in text
+    for words in ("PROVED", "candidate poses", "fresh samples", "CHECK    passed"):
+        assert words in text
+
+
+def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(head, tmp_path):
+    path = tmp_path / "frontal.toml"
+    path.write_text(
+        'base = "default"\nname = "frontal"\n[workspace]\nshape = "cone"\n'
+        "axis = [0.0, -1.0, 0.0]\nhalf_angle_deg = 10.0\n"
+    )
+    with pytest.raises(RequirementError, match="can be lit from anywhere") as caught:
+        plan_rig(head, load_rig(path), max_projectors=3, check=False)
+    plan, lines = caught.value.plan, caught.value.shortfalls
+    areas = plan.coverage["target"]
+    share = areas["reachable_by_projectors_m2"] / areas["area_m2"]
+    assert share < 0.9
+    assert f"{100 * share:.1f} %" in lines[0]
+    assert "--min-reachable" in lines[0]
+    axis = np.array([0.0, -1.0, 0.0])
+    for device in (*plan.projectors, *plan.cameras):
+        offset = device.world_from_device[:3, 3] - plan.surface.mesh.centre
+        angle = np.arccos(offset @ axis / np.linalg.norm(offset))
+        assert np.degrees(angle) <= 10.0
+    assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
+
+
+def test_too_few_projectors_say_how_many_are_needed(head):
+    with pytest.raises(RequirementError, match="--max-projectors") as caught:
+        plan_rig(head, load_rig("default"), max_projectors=1, check=False)
+    proof = caught.value.plan.document["certificates"]["projectors"]
+    assert (proof["count"], proof["status"]) == (1, "infeasible")
+    assert proof["needed"]["count"] >= proof["needed"]["lower_bound"] >= 2
+
+
+def test_contradictory_limits_name_the_guilty_one(head, tmp_path):
+    path = tmp_path / "dark.toml"
+    path.write_text(
+        'base = "default"\nname = "dark"\n[projector]\nrange_mm = [912.5, 930.0]\n'
+        '[projector.sources]\nrange_mm = "test"\n'
+    )
+    with pytest.raises(InfeasibleLimitsError, match="projector_range") as caught:
+        plan_rig(head, load_rig(path), max_projectors=3)
+    assert caught.value.exit_code == 4
+
+
+def test_the_clock_cuts_before_a_first_plan(head):
+    with pytest.raises(TimeLimitError, match="time limit"):
+        plan_rig(head, load_rig("default"), max_projectors=3, time_limit=1e-6)
+
+
+def test_an_interrupted_run_keeps_the_plan_it_has(head):
+    def interrupt(line):
+        if line.startswith("baselines"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(InterruptedPlanError) as caught:
+        plan_rig(head, load_rig("default"), max_projectors=3, progress=interrupt)
+    plan = caught.value.plan
+    assert plan.document["truncated"] is True
+    assert plan.document["reconstruction"] is None
+    assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
+
+
+def test_moving_the_mesh_moves_the_plan(head):
+    """A translation changes no count and no area beyond rounding."""
+    shift = np.array([0.5, -2.0, 1.25])
+    rig = load_rig("default")
+    moved = TriangleMesh(head.vertices + shift, head.faces)
+    plans = [plan_rig(m, rig, max_projectors=3, check=False) for m in (head, moved)]
+    for kind in ("projectors", "cameras"):
+        a, b = (getattr(plan, kind) for plan in plans)
+        assert len(a) == len(b)
+    for part in ("lit_m2", "measured_m2", "reachable_by_projectors_m2"):
+        a, b = (plan.coverage["target"][part] for plan in plans)
+        assert a == pytest.approx(b, rel=5e-3)
+
+
+def test_several_meshes_are_refused_until_they_are_built(head):
+    with pytest.raises(InputError, match="isn't built yet"):
+        plan_rig([head, head], load_rig("default"), max_projectors=3)
