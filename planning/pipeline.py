@@ -36,6 +36,7 @@ from .requirements import Requirements
 from .rig import Rig as RigModel
 from .rings import outer_radius, ring_gap, uniform_radii
 from .scene import Scene
+from .selection import larger
 from .shortfall import shortfalls
 from .surface import Surface
 from .verification import verify_plan
@@ -73,6 +74,7 @@ class Draft:
     scene: Scene
     regions: DominantRegions
     curvature_radius_m: float
+    tilt: float
     stage: ProjectorStage
     projectors: tuple[PlannedProjector, ...]
     camera_stage: CameraStage
@@ -159,13 +161,11 @@ def _plan(order: Order, clock: Stopwatch, *, check: bool) -> RigPlan:
     draft = _first_draft(order, clock)
     try:
         draft = _polish(draft, clock)
-    except (KeyboardInterrupt, TimeLimitError) as cut:
-        return _interrupted(draft, clock, cut)
-    plan = _write(draft, clock)
-    if not check:
-        return plan
-    try:
-        return _checked(plan, draft, clock)
+        plan = _write(draft, clock)
+        while (larger := _one_more(draft, plan, clock)) is not None:
+            draft = _polish(larger, clock)
+            plan = _write(draft, clock)
+        return _checked(plan, draft, clock) if check else plan
     except (KeyboardInterrupt, TimeLimitError) as cut:
         return _interrupted(draft, clock, cut)
 
@@ -201,27 +201,72 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
             f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
             f"{stage.certificate['candidates']['lower_bound']} are needed"
         )
+    projectors, cameras = _placed(order, scene, stage, tilt, clock)
+    return Draft(
+        order,
+        scene,
+        regions,
+        field.radius,
+        tilt,
+        stage,
+        projectors,
+        cameras,
+        cameras.cameras,
+    )
+
+
+def _placed(
+    order: Order, scene: Scene, stage: ProjectorStage, tilt: float, clock: Stopwatch
+) -> tuple[tuple[PlannedProjector, ...], CameraStage]:
+    """Poses of widest margin for chosen projectors, and the cameras for them."""
+    rig = order.rig
     with clock.stage("projector_poses", "projector poses: widest margins"):
         projectors = widen_margins(scene, stage)
     with clock.stage("cameras", "cameras: candidates, measurability and cover"):
         n_cameras = max(rig.n_candidate_cameras, rig.n_reference_cameras)
         camera = PlannedCamera("", np.eye(4), rig.camera_device())
         solution = place_cameras(scene, projectors, camera, n_cameras, tilt)
+        cameras = solution.stage
         clock.say(
-            f"  {len(solution.stage.cameras)} of {len(solution.stage.reference)} "
-            f"candidates; at least "
-            f"{solution.stage.certificate['candidates']['lower_bound']} are needed"
+            f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "
+            f"least {cameras.certificate['candidates']['lower_bound']} are needed"
         )
-    return Draft(
-        order,
-        scene,
-        regions,
-        field.radius,
-        stage,
-        solution.projectors,
-        solution.stage,
-        solution.stage.cameras,
-    )
+    return solution.projectors, cameras
+
+
+def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
+    """One device more where fresh samples don't confirm a cover that met its rows.
+
+    The proved bound stays what it is; the count is then above it, and says so.
+    """
+    asked, areas = plan.requirements, plan.coverage["target"]
+    if _short(areas, "lit_m2", "reachable_by_projectors_m2", asked.dominant_coverage):
+        stage = larger(draft.stage, draft.stage.projectors, asked.max_projectors)
+        if stage is not None:
+            clock.say("  fresh samples fall short: one projector more")
+            stage = replace(stage, projectors=stage.by_count[stage.certificate["count"]])
+            projectors, cameras = _placed(
+                draft.order, draft.scene, stage, draft.tilt, clock
+            )
+            return replace(
+                draft,
+                stage=stage,
+                projectors=projectors,
+                camera_stage=cameras,
+                cameras=cameras.cameras,
+            )
+    if _short(areas, "measured_m2", "reachable_by_cameras_m2", asked.coverage):
+        cameras = larger(draft.camera_stage, draft.cameras, asked.max_cameras)
+        if cameras is not None:
+            clock.say("  fresh samples fall short: one camera more")
+            chosen = cameras.by_count[cameras.certificate["count"]]
+            cameras = replace(cameras, cameras=chosen)
+            return replace(draft, camera_stage=cameras, cameras=chosen)
+    return None
+
+
+def _short(areas: dict[str, float], part: str, whole: str, share: float) -> bool:
+    return areas[part] < share * areas[whole]
 
 
 def _polish(draft: Draft, clock: Stopwatch) -> Draft:
@@ -304,18 +349,14 @@ def _write(draft: Draft, clock: Stopwatch) -> RigPlan:
     requirements = _final_requirements(draft, claims, rig)
     document = _document(draft, clock, rig, claims, requirements, marginal, surface)
     plan = RigPlan(document, surface)
-    if _misses_reach(document, requirements):
+    areas = document["coverage"]["target"]
+    reachable, whole = "reachable_by_projectors_m2", "area_m2"
+    if _short(areas, reachable, whole, requirements.min_reachable):
         with clock.stage("relaxations", "what would help"):
             document["coverage"]["relaxations"] = reachability_relaxations(
                 scene, reference
             )
     return plan
-
-
-def _misses_reach(document: dict[str, Any], asked: Requirements) -> bool:
-    areas = document["coverage"]["target"]
-    reachable = areas["reachable_by_projectors_m2"]
-    return reachable < asked.min_reachable * areas["area_m2"]
 
 
 def _final_requirements(draft: Draft, claims: Claims, rig: Rig) -> Requirements:

@@ -59,7 +59,7 @@ def pose_program(
 ) -> PoseProgram:
     """State the pose program of one projector over the samples that it serves."""
     required, device = scene.requirements, projector.device
-    workspace = required.workspace
+    workspace = scene.safe_workspace
     pinhole = isinstance(device, PinholeModel)
     up = np.array(workspace.up)
     centre = np.array(workspace.centre)

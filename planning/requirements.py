@@ -4,7 +4,8 @@ These values are written into the plan file, so that each claim can be recompute
 the plan and the surface alone. A limit that is None doesn't bind.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from math import pi
 from typing import Any, Literal, Self, TypeVar
 
 _T = TypeVar("_T")
@@ -116,6 +117,26 @@ class Workspace:
     n_reference_projectors: int
     n_reference_cameras: int
     reference_ring_radius: float
+
+    def inset(self, by_m: float) -> "Workspace":
+        """Return the workspace shrunk on all sides.
+
+        Poses that are optimised inside it stay admissible when they are rounded.
+        """
+        projector, camera = (
+            (low + by_m, high - by_m) if high - low > 2.0 * by_m else (low, high)
+            for low, high in (self.projector_radius_m, self.camera_radius_m)
+        )
+        least = min(projector[0], camera[0])
+        return replace(
+            self,
+            projector_radius_m=projector,
+            camera_radius_m=camera,
+            half_angle=self.half_angle
+            if self.half_angle >= pi
+            else max(0.0, self.half_angle - by_m / least),
+            floor_m=None if self.floor_m is None else self.floor_m + by_m,
+        )
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,10 @@ from geometry.sampling import sample_surface
 from geometry.visibility import Visibility
 
 from .lighting import Target
-from .requirements import Requirements
+from .requirements import Requirements, Workspace
+
+# Positions are written to 0.01 mm; twice the half diagonal of that cube.
+_ROUNDING_M = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,11 @@ class Scene:
     requirements: Requirements
     seed: int
     threads: int
+
+    @cached_property
+    def safe_workspace(self) -> Workspace:
+        """The workspace less what rounding a position may cost."""
+        return self.requirements.workspace.inset(_ROUNDING_M)
 
     @cached_property
     def visibility(self) -> Visibility:

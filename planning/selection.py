@@ -4,8 +4,9 @@ Both stages pose the same program: rows are area-true samples, all of equal weig
 weights are counts and every comparison is exact.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,3 +141,42 @@ def certificate(
         },
         "one_fewer": {"upper_bound_m2": selection.one_fewer_bound * row_area_m2},
     }
+
+
+class Stage(Protocol):
+    """What projector and camera stages have in common."""
+
+    @property
+    def certificate(self) -> dict[str, Any]:
+        """What was proved."""
+        ...
+
+    @property
+    def by_count(self) -> Mapping[int, Sequence[Any]]:
+        """Best devices for each number of them."""
+        ...
+
+
+_S = TypeVar("_S", bound=Stage)
+
+
+def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | None:
+    """Return a stage whose certificate counts one device more, if that is possible.
+
+    Only for a cover that met its own rows: one that is short of devices anyway has
+    said so.
+
+    Args:
+        stage: Projector or camera stage, a dataclass.
+        present: Devices in it now.
+        allowed: Devices at most; None for no limit.
+    """
+    count = len(present) + 1
+    met = stage.certificate["status"] != "infeasible"
+    if not met or count not in stage.by_count or (allowed or count) < count:
+        return None
+    if len(stage.by_count[count]) < count:
+        return None
+    proof = stage.certificate | {"count": count, "status": "feasible"}
+    proof["needed"] = proof["needed"] | {"count": count}
+    return replace(stage, certificate=proof)  # type: ignore[type-var]
