@@ -19,6 +19,8 @@ _MIN_POINTS = 12
 _MIN_SPREAD = 0.02
 # A projector may stand for another in a tile if it measured this share as many points.
 _MIN_SUPPORT = 0.4
+# Directions that a surface may face, and one for surface whose direction isn't known.
+_SIDES = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ def merge(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Merged:
         square[rows] = _squarest_projector(part, tiles, normals[rows])
     cloud, normals = cloud.take(square), normals[square]
     sigma = cloud.sigma(normals)
-    best = _sharpest_camera(cloud, sigma, 0.5 * gap_m)
+    best = _sharpest_camera(cloud, sigma, _side(normals), 0.5 * gap_m)
     return Merged(cloud.take(best), normals[best], sigma[best])
 
 
@@ -73,6 +75,11 @@ class _Tiles:
         place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
         columns, rows = (place.max(axis=0) + 2).tolist()
         return cls(place[:, 1] * columns + place[:, 0], (rows, columns))
+
+    def occupied(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return whether each tile holds one of the chosen points, (n_tiles,)."""
+        rows, columns = self.shape
+        return np.bincount(self.of_point[chosen], minlength=rows * columns) > 0
 
     def sum_around(
         self, values: NDArray[np.float64] | None = None
@@ -118,6 +125,7 @@ def _squarest_projector(
     for projector in projectors:
         own = cloud.projector == projector
         count = tiles.sum_around(own.astype(np.float64))
+        count[~tiles.occupied(own)] = 0.0
         weighed = tiles.sum_around((own & known).astype(np.float64))
         total = tiles.sum_around(np.where(own & known, cosine, 0.0))
         score.append(total / np.maximum(weighed, 1.0))
@@ -128,10 +136,25 @@ def _squarest_projector(
     return ~known | (cloud.projector == winner[tiles.of_point])
 
 
+def _side(normals: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Which of the six directions of the axes each normal is nearest to; 6 for none."""
+    known = np.isfinite(normals[:, 0])
+    steepest = np.argmax(np.abs(np.where(known[:, None], normals, 0.0)), axis=1)
+    sign = np.take_along_axis(normals, steepest[:, None], axis=1)[:, 0] > 0.0
+    return np.where(known, 2 * steepest + sign, _SIDES - 1)
+
+
 def _sharpest_camera(
-    cloud: Cloud, sigma: NDArray[np.float64], cell_m: float
+    cloud: Cloud,
+    sigma: NDArray[np.float64],
+    side: NDArray[np.int64],
+    cell_m: float,
 ) -> NDArray[np.bool_]:
-    """Points of the camera with the least mean sigma in each cell of space, (n,)."""
+    """Points of the camera with the least mean sigma in each cell of space, (n,).
+
+    Points whose surface faces another way aren't compared: on a thin part they are
+    of its other side.
+    """
     if len(cloud) == 0:
         return np.zeros(0, dtype=bool)
     place = np.floor((cloud.points - cloud.points.min(axis=0)) / cell_m).astype(
@@ -139,6 +162,7 @@ def _sharpest_camera(
     )
     rows, columns = place[:, 1].max() + 1, place[:, 2].max() + 1
     key = (place[:, 0] * rows + place[:, 1]) * columns + place[:, 2]
+    key = key * _SIDES + side
     _, cell = np.unique(key, return_inverse=True)
     cameras = int(cloud.camera.max()) + 1
     slot = cell * cameras + cloud.camera
