@@ -47,35 +47,55 @@ def _merged(
     least: float,
     half_angle: float,
 ) -> list[NDArray[np.int64]]:
-    """Give pieces below the least area to the neighbour with which they fit best."""
-    owner = np.full(len(mesh.faces), -1, dtype=np.int64)
+    """Give pieces below the least area to the neighbour with which they fit best.
+
+    Passes over the small ones, smallest first, until none fits any neighbour.
+    """
+    neighbours = _neighbours(pieces, pairs, len(mesh.faces))
+    pieces = list(pieces)
+    areas = [float(mesh.face_areas[faces].sum()) for faces in pieces]
+    waiting = True
+    while waiting:
+        waiting = False
+        small = [i for i in range(len(pieces)) if neighbours[i] and areas[i] < least]
+        for i in sorted(small, key=lambda i: (areas[i], i)):
+            if not neighbours[i] or areas[i] >= least:
+                continue
+            unions = {
+                j: np.sort(np.concatenate([pieces[i], pieces[j]]))
+                for j in neighbours[i]
+            }
+            angle, j = min(
+                (normal_cone(mesh, faces)[1], j) for j, faces in unions.items()
+            )
+            if angle > half_angle:
+                continue
+            pieces[j], areas[j] = unions[j], areas[j] + areas[i]
+            pieces[i] = pieces[i][:0]
+            for k in neighbours[i]:
+                neighbours[k].discard(i)
+                if k != j:
+                    neighbours[k].add(j)
+                    neighbours[j].add(k)
+            neighbours[i] = set()
+            waiting = True
+    return [faces for faces in pieces if len(faces)]
+
+
+def _neighbours(
+    pieces: list[NDArray[np.int64]], pairs: NDArray[np.int64], n_faces: int
+) -> list[set[int]]:
+    """For each piece, the pieces that it shares an edge with."""
+    owner = np.full(n_faces, -1, dtype=np.int64)
     for i, faces in enumerate(pieces):
         owner[faces] = i
     met = owner[pairs]
-    met = np.unique(
-        np.sort(met[(met.min(axis=1) >= 0) & (met[:, 0] != met[:, 1])]), axis=0
-    )
+    met = np.unique(met[(met.min(axis=1) >= 0) & (met[:, 0] != met[:, 1])], axis=0)
     neighbours: list[set[int]] = [set() for _ in pieces]
     for a, b in met.tolist():
         neighbours[a].add(b)
         neighbours[b].add(a)
-    areas = [float(mesh.face_areas[faces].sum()) for faces in pieces]
-    kept = list(pieces)
-    for i in sorted(range(len(pieces)), key=lambda i: (areas[i], i)):
-        if areas[i] >= least or not neighbours[i]:
-            continue
-        unions = {j: np.sort(np.concatenate([kept[i], kept[j]])) for j in neighbours[i]}
-        angle, j = min((normal_cone(mesh, faces)[1], j) for j, faces in unions.items())
-        if angle > half_angle:
-            continue
-        kept[j], areas[j] = unions[j], areas[j] + areas[i]
-        kept[i] = kept[i][:0]
-        for k in neighbours[i] - {j}:
-            neighbours[k].discard(i)
-            neighbours[k].add(j)
-            neighbours[j].add(k)
-        neighbours[j].discard(i)
-    return [faces for faces in kept if len(faces)]
+    return neighbours
 
 
 _Part = tuple[NDArray[np.int64], NDArray[np.int64]]

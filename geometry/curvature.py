@@ -85,39 +85,45 @@ def principal_curvatures(
         radius = DEFAULT_RADIUS_SHARE * float(diagonal)
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
-    rings = int(np.clip(round(radius / mesh.mean_edge), _MIN_RINGS, _MAX_RINGS))
+    n = len(mesh.vertices)
+    rings = _MIN_RINGS
+    valid = np.zeros(n, dtype=bool)
+    k, directions = np.zeros((2, n)), np.zeros((2, n, 3))
+    directions[0], directions[1] = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
     # libigl reads out of bounds at faces without area and at vertices without a face.
     solid = mesh.faces[mesh.face_areas > 0]
-    used, local_faces = np.unique(solid, return_inverse=True)
-    faces = np.ascontiguousarray(local_faces.reshape(-1, 3), dtype=np.int64)
-    # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
-    vertices = (mesh.vertices[used] - mesh.centre) / mesh.mean_edge
-    first, second, k_first, k_second, bad = igl.principal_curvature(
-        np.ascontiguousarray(vertices), faces, radius=rings, useKring=True
-    )
-    fitted = np.isfinite(k_first) & np.isfinite(k_second)
-    fitted &= np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
-    directed = np.linalg.norm(first, axis=1) > 0.5
-    fitted[list(bad)] = False
-    reach = radius / mesh.mean_edge
-    fitted &= ~_near_border(vertices, mesh_edges(faces), max(reach, 1.0), rings)
-    n = len(mesh.vertices)
-    valid = np.zeros(n, dtype=bool)
-    valid[used] = fitted
-    k = np.zeros((2, n))
-    k[:, used[fitted]] = np.stack([k_first, k_second])[:, fitted] / mesh.mean_edge
-    directions = np.zeros((2, n, 3))
-    directions[0], directions[1] = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
-    directed &= fitted
-    directions[:, used[directed]] = _unit(np.stack([first, second])[:, directed])
-    swapped = k[1] > k[0]
-    k[:, swapped] = k[::-1][:, swapped]
-    directions[:, swapped] = directions[::-1][:, swapped]
+    if len(solid):
+        # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
+        edge = mesh.mean_edge
+        rings = int(np.clip(round(radius / edge), _MIN_RINGS, _MAX_RINGS))
+        used, local_faces = np.unique(solid, return_inverse=True)
+        vertices = np.ascontiguousarray((mesh.vertices[used] - mesh.centre) / edge)
+        faces = np.ascontiguousarray(local_faces.reshape(-1, 3), dtype=np.int64)
+        found, ways, fitted = _fit(vertices, faces, rings)
+        fitted &= ~_near_border(vertices, mesh_edges(faces), radius / edge, rings)
+        valid[used] = fitted
+        k[:, valid] = found[:, fitted] / edge
+        # An exactly flat neighbourhood has no direction of its own.
+        directed = fitted & np.all(np.linalg.norm(ways, axis=2) > 0.5, axis=0)
+        directions[:, used[directed]] = _unit(ways[:, directed])
     for values in (k, directions, valid):
         values.setflags(write=False)
     return CurvatureField(
         radius, rings, k[0], k[1], directions[0], directions[1], valid
     )
+
+
+def _fit(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], rings: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,)."""
+    first, second, k_first, k_second, bad = igl.principal_curvature(
+        vertices, faces, radius=rings, useKring=True
+    )
+    k, ways = np.stack([k_first, k_second]), np.stack([first, second])
+    fitted = np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
+    fitted[list(bad)] = False
+    return k, ways, fitted
 
 
 def _near_border(

@@ -69,7 +69,7 @@ def _smoothed(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.float64]:
     """Curvature tensors averaged along edges over a physical length, (n_v, 3, 3).
 
     One step averages a vertex with its neighbours, weighted by area; n steps reach
-    about sqrt(n) mean edges. Vertices that aren't valid neither give nor take.
+    about sqrt(n) mean edges. Vertices that aren't valid give nothing.
     """
     length = _SMOOTHING_SHARE * field.radius / mesh.mean_edge
     steps = int(np.clip(round(length**2), 1, _MAX_SMOOTHING_STEPS))
@@ -86,7 +86,6 @@ def _smoothed(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.float64]:
     values = field.tensors[:, upper[0], upper[1]]
     for _ in range(steps):
         values = average @ values
-    values[~field.valid] = 0.0
     tensors = np.empty((n, 3, 3))
     tensors[:, upper[0], upper[1]] = values
     tensors[:, upper[1], upper[0]] = values

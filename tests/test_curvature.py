@@ -111,6 +111,14 @@ def test_a_plane_is_flat_up_to_its_border_strip() -> None:
     assert not principal_curvatures(mesh, 1e-6).valid[inset < 0.0101].any()
 
 
+def test_a_radius_beyond_the_rings_still_keeps_its_distance_from_the_border() -> None:
+    mesh = grid(0.2, 0.2, divisions=(100, 100))
+    field = principal_curvatures(mesh, radius=0.04)
+    assert field.rings == 10
+    inset = 0.1 - np.abs(mesh.vertices[:, :2]).max(axis=1)
+    np.testing.assert_array_equal(field.valid, inset > 0.04 + 1e-9)
+
+
 def test_an_open_border_never_looks_curved() -> None:
     rng = np.random.default_rng(0)
     mesh = grid(0.2, 0.2, divisions=(60, 60))
@@ -197,6 +205,7 @@ SOUP = np.random.default_rng(5)
         (SOUP.normal(size=(9, 3)), np.array([[0, 1, 2]])),
         (np.eye(4, 3), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])),
         (np.eye(3), np.array([[0, 1, 1], [0, 1, 2]])),
+        (SOUP.normal(size=(30, 3)), SOUP.integers(0, 30, (80, 2))[:, [0, 1, 1]]),
     ],
     ids=[
         "tangle",
@@ -205,6 +214,7 @@ SOUP = np.random.default_rng(5)
         "unused vertices",
         "tetrahedron",
         "degenerate",
+        "no area",
     ],
 )
 def test_what_crashes_libigl_comes_back_finite(
@@ -216,6 +226,7 @@ def test_what_crashes_libigl_comes_back_finite(
     assert len(field.valid) == len(mesh.vertices)
     for values in (field.k_max, field.k_min, field.direction_max, field.direction_min):
         assert np.isfinite(values).all()
+    assert np.all(field.k_max >= field.k_min)
     np.testing.assert_array_equal(field.k_max[~field.valid], 0.0)
     np.testing.assert_allclose(np.linalg.norm(field.direction_max, axis=1), 1.0)
     unused = np.setdiff1d(np.arange(len(vertices)), faces)

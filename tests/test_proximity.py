@@ -44,19 +44,35 @@ def test_closest_points_lie_in_the_face_that_is_named() -> None:
     np.testing.assert_allclose(parts, whole, rtol=1e-6)
 
 
-def test_the_sign_holds_at_edges_sharper_than_a_right_angle() -> None:
-    # A thin wedge: beyond its edge, one face's normal alone says inside.
-    x = np.array([[0.0, 0, 0], [0, 1, 0], [-1, 0, 0.1], [-1, 1, 0.1], [-1, 0, -0.1]])
-    vertices = np.vstack([x, [[-1, 1, -0.1]]])
-    top, bottom = [[0, 1, 3], [0, 3, 2]], [[0, 5, 1], [0, 4, 5]]
-    mesh = TriangleMesh(vertices, np.array(top + bottom))
-    assert np.all(mesh.face_normals[:2, 2] > 0)
-    points = np.array([[0.1, 0.5, 0.3], [0.1, 0.5, -0.3], [0.2, 0.5, 0.0]])
-    expected = np.hypot(points[:, 0], points[:, 2])
-    np.testing.assert_allclose(closest_points(mesh, points).distances[2], expected[2])
-    assert np.all(closest_points(mesh, points).distances > 0)
-    inside = np.array([[-0.5, 0.5, 0.0]])
-    assert closest_points(mesh, inside).distances[0] < 0
+def convex_inside(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
+    away = points[:, None] - mesh.corners[None, :, 0]
+    return np.all(np.einsum("ijk,jk->ij", away, mesh.face_normals) <= 0, axis=1)
+
+
+def spike() -> TriangleMesh:
+    """A sharp pyramid; one side is a fan of slivers that would outvote the others."""
+    base = np.array([[-0.03, -0.03, 0.0], [0.03, -0.03, 0], [0.03, 0.03, 0]])
+    base = np.vstack([base, [[-0.03, 0.03, 0]], [[0, 0, 0.3]]])
+    t = np.linspace(0, 1, 41)[1:-1, None]
+    vertices = np.vstack([base, base[0] + t * (base[1] - base[0])])
+    chain = np.array([0, *range(5, 44), 1])
+    fan = np.column_stack([chain[:-1], chain[1:], np.full(40, 4)])
+    floor = np.column_stack([chain[1:], chain[:-1], np.full(40, 2)])
+    sides = [[1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 3, 2]]
+    return TriangleMesh(vertices, np.vstack([fan, floor, sides]))
+
+
+def test_the_sign_holds_at_edges_and_corners_sharper_than_a_right_angle() -> None:
+    mesh = spike()
+    rng = np.random.default_rng(0)
+    centres = np.array([[0, 0, 0.3], [0, 0, 0.15], [0, 0, 0]])
+    points = centres[:, None] + rng.uniform(-0.1, 0.1, (3, 4000, 3))
+    points = points.reshape(-1, 3)
+    distances = closest_points(mesh, points).distances
+    sure = np.abs(distances) > 1e-9
+    np.testing.assert_array_equal(
+        distances[sure] < 0, convex_inside(mesh, points)[sure]
+    )
 
 
 def test_far_from_the_origin_it_is_as_precise_and_threads_change_nothing() -> None:

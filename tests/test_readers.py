@@ -359,13 +359,25 @@ def test_compressed_sparse_and_fan_gltf_are_refused_not_read_as_zeros(
             load_mesh(path, unit="m")
 
 
+def test_text_numbers_that_break_off_are_refused_not_dropped(tmp_path: Path) -> None:
+    # The last vertex is used by no face: everything else looks whole.
+    whole = three_mf("millimeter", brick())
+    with zipfile.ZipFile(io.BytesIO(whole)) as archive:
+        model = archive.read("3D/3dmodel.model")
+    assert load_mesh(write(tmp_path / "a.3mf", whole)).area > 0
+    broken = model.replace(b"</vertices>", b'<vertex x="a" y="0" z="0"/></vertices>')
+    path = write(tmp_path / "b.3mf", zipped({"3D/3dmodel.model": broken}))
+    with pytest.raises(MeshError, match="can't be read as 3MF"):
+        load_mesh(path)
+
+
 def test_a_gltf_reads_no_file_outside_its_folder(tmp_path: Path) -> None:
     secret = write(tmp_path / "secret.bin", b"\0" * 36)
     folder = tmp_path / "model"
     folder.mkdir()
     for uri in (str(secret), "../secret.bin", "missing.bin"):
         text = gltf(buffers=[{"uri": uri, "byteLength": 36}])
-        with pytest.raises(MeshError):
+        with pytest.raises(MeshError, match=r"isn't beside it|No such file"):
             load_mesh(write(folder / "a.gltf", text))
 
 

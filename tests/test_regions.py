@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry.cones import normal_cone
 from geometry.curvature import CurvatureField, principal_curvatures
 from geometry.face_curvature import face_curvature, steep_directions
 from geometry.mesh import TriangleMesh
@@ -102,11 +103,18 @@ def test_where_nothing_is_trusted_everything_counts_as_uniform() -> None:
     np.testing.assert_array_equal(found.steep, np.zeros((1, 3)))
 
 
+def crumpled() -> TriangleMesh:
+    """Noise of a fifth of an edge: normals scatter, splitting leaves crumbs."""
+    ball = sphere(0.1, subdivisions=4)
+    noise = np.random.default_rng(0).normal(size=ball.vertices.shape)
+    return TriangleMesh(ball.vertices + 0.2 * ball.mean_edge * noise, ball.faces)
+
+
 @pytest.mark.parametrize("limit", [30.0, 50.0])
 @pytest.mark.parametrize(
     "mesh",
-    [sphere(0.1, subdivisions=4), torus(0.1, 0.04), bumpy()],
-    ids=["sphere", "torus", "bumps"],
+    [sphere(0.1, subdivisions=4), torus(0.1, 0.04), bumpy(), crumpled()],
+    ids=["sphere", "torus", "bumps", "crumpled"],
 )
 def test_regions_are_connected_disjoint_and_fit_the_cone(
     mesh: TriangleMesh, limit: float
@@ -135,6 +143,21 @@ def test_regions_are_connected_disjoint_and_fit_the_cone(
     areas = [region.area_m2 for region in found]
     assert areas == sorted(areas, reverse=True)
     assert found[0].area_m2 == areas[0]
+
+
+def test_a_crumb_is_left_alone_only_if_it_fits_no_neighbour() -> None:
+    mesh = crumpled()
+    least, limit = 0.01, np.deg2rad(50.0)
+    found = regions_of(mesh, area_share=1.0, min_region_share=least)
+    assert np.all(found.face_region >= 0)
+    met = found.face_region[adjacent_faces(mesh_edges(mesh.faces))]
+    met = np.unique(np.sort(met[met[:, 0] != met[:, 1]], axis=1), axis=0)
+    assert min(region.area_m2 for region in found) < least * mesh.area
+    for a, b in met:
+        if min(found[a].area_m2, found[b].area_m2) >= least * mesh.area:
+            continue
+        union = np.concatenate([found[a].faces, found[b].faces])
+        assert normal_cone(mesh, union)[1] > limit
 
 
 def test_mean_curvedness_is_that_of_the_shape() -> None:

@@ -178,6 +178,17 @@ def test_random_winding_is_made_consistent_and_outward(seed: int) -> None:
     assert repairs == {"faces rewound like their neighbours": int(flip.sum())}
 
 
+@pytest.mark.parametrize("first_is_flipped", [False, True])
+def test_winding_follows_the_majority_of_a_patch(first_is_flipped: bool) -> None:
+    plate = grid(0.2, 0.1, divisions=(6, 4))
+    flip = np.random.default_rng(0).random(len(plate.faces)) < 0.3
+    flip[0] = first_is_flipped
+    mixed = np.where(flip[:, None], plate.faces[:, ::-1], plate.faces)
+    mesh, repairs = oriented(TriangleMesh(plate.vertices, mixed))
+    assert as_sets(mesh.faces) == as_sets(plate.faces)
+    assert repairs == {"faces rewound like their neighbours": int(flip.sum())}
+
+
 def test_each_closed_body_is_turned_on_its_own() -> None:
     good, bad = sphere(0.1, subdivisions=2), moved(box((0.1, 0.1, 0.1)), 0.5, 0, 0)
     mesh, repairs = oriented(joined(good, flipped(bad)))
