@@ -134,7 +134,7 @@ def test_cut_search_returns_a_bound_that_holds():
 def test_many_pairs_agree_with_a_dense_product():
     """More columns than a block, more rows than the first look."""
     rng = np.random.default_rng(4)
-    covers = rng.random((900, 420)) < rng.uniform(0.2, 0.45, 420)
+    covers = rng.random((900, 420)) < 0.32
     weights = rng.uniform(0.5, 1.5, 900)
     cover = reduce_cover(sparse.csr_array(covers), weights, np.ones(420), 1.0)
     a = cover.by_row.toarray()
@@ -146,6 +146,22 @@ def test_many_pairs_agree_with_a_dense_product():
     )
     assert search.weight == best
     assert search.pairs_only
+    known = best_tuple(
+        cover, 2, target=best, multipliers=cover.weights, budget=plenty()
+    )
+    assert known.weight == best
+    cuts = 0
+    for units in np.linspace(1e6, 3e7, 30):
+        cut = best_tuple(
+            cover,
+            2,
+            target=1.0,
+            multipliers=cover.weights,
+            budget=WorkBudget(float(units)),
+        )
+        assert cut.upper_bound >= best
+        cuts += not cut.complete and cut.selected is not None
+    assert cuts > 0
     beyond = best_tuple(
         cover, 2, target=best + 1.0, multipliers=cover.weights, budget=plenty()
     )
