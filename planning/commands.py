@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
-from geometry.readers import load_mesh
+from geometry.mesh import TriangleMesh
+from geometry.readers import UNITS, load_mesh
 
 from .draw import save_rig_picture
 from .errors import (
@@ -74,8 +76,7 @@ def verify_command(options: Mapping[str, Any]) -> int:
     plan = RigPlan.load(options["plan_file"])
     mesh = None
     if options["mesh"] is not None:
-        source = plan.document["meshes"][0]
-        mesh = load_mesh(options["mesh"], unit=source["unit"])
+        mesh = _same_scale(options["mesh"], plan)
     truth = None if options["truth"] is None else RigPlan.load(options["truth"])
     seed = {} if options["seed"] is None else {"seed": options["seed"]}
     found = verify_plan(
@@ -91,6 +92,15 @@ def verify_command(options: Mapping[str, Any]) -> int:
     else:
         click.echo(found.summary())
     return 0 if found.passed else 1
+
+
+def _same_scale(path: Path, plan: RigPlan) -> TriangleMesh:
+    """Read a mesh in the unit of the plan's, or at its size where a size was given."""
+    unit = plan.document["meshes"][0]["unit"]
+    if unit in UNITS:
+        return load_mesh(path, unit=unit)
+    size = np.ptp(plan.surface.mesh.bounds, axis=0).max()
+    return load_mesh(path, size_mm=1e3 * float(size))
 
 
 def rigs_command() -> int:
