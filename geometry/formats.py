@@ -21,7 +21,7 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.resolvers import Resolver
 
-from .text_formats import FormatError, read_obj, read_off
+from .text_formats import FormatError, decode, read_obj, read_off
 
 SUPPORTED = ("obj", "ply", "stl", "off", "glb", "gltf", "3mf")
 
@@ -73,6 +73,9 @@ def read_format(
     elif kind == "off":
         raw = RawMesh(*read_off(data), None)
     else:
+        if kind == "stl" and not _is_binary_stl(data):
+            # For other encodings the library wants a package that guesses them.
+            data = decode(data).encode()
         _CHECKS[kind](data)
         raw = _through_library(kind, data, fetch)
         _compare(kind, data, raw)

@@ -359,6 +359,13 @@ def test_compressed_sparse_and_fan_gltf_are_refused_not_read_as_zeros(
             load_mesh(path, unit="m")
 
 
+def test_an_ascii_stl_may_be_named_in_any_encoding(tmp_path: Path) -> None:
+    text = STL_TWO.replace("solid a", "solid Gehäuse") + "endsolid\n"
+    for encoding in ("utf-8", "latin-1", "utf-16"):
+        mesh = load_mesh(write(tmp_path / "a.stl", text.encode(encoding)))
+        assert mesh.area == pytest.approx(4.5e-4, rel=1e-9)
+
+
 def test_text_numbers_that_break_off_are_refused_not_dropped(tmp_path: Path) -> None:
     # The last vertex is used by no face: everything else looks whole.
     whole = three_mf("millimeter", brick())
