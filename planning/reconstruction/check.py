@@ -34,9 +34,10 @@ from .verdict import (
 )
 
 _DEFAULT_SAMPLES = 20_000
-# Edges that run more steeply along the viewing ray are steps between surfaces, unless
+# Rings that run more steeply along the viewing ray cross steps between surfaces, unless
 # the plan counts on surface seen at such incidence [rad].
-_SLANTED = np.deg2rad(75.0)
+_SLANTED = np.deg2rad(65.0)
+_SLANT_MARGIN = np.deg2rad(5.0)
 Progress = Callable[[int, int], None]
 
 
@@ -242,7 +243,8 @@ def _decode_pairs(
     designed = [calibrate_projector(projector) for projector in plan.projectors]
     radii = [projector.ring_radii for projector in plan.projectors]
     requirements = plan.requirements
-    max_slant = float(np.tan(max(requirements.camera.max_incidence, _SLANTED)))
+    steepest = max(requirements.camera.max_incidence - _SLANT_MARGIN, _SLANTED)
+    max_slant = float(np.tan(steepest))
 
     def look(c: int) -> View | None:
         camera = standing.get(believed[c].id)

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from .calibration import PairCalibration
@@ -14,7 +16,8 @@ from .triangulate import RingHits, intersect_rings
 
 # Neighbours along a ring edge are looked for this far away in the image [px].
 _NEAR_PX = 2.6
-_MIN_NEIGHBOURS = 2
+# Edges in a row that make a piece of surface.
+_MIN_CHAIN = 12
 # Share of the changes of index that must name a ring edge. Rings 6 pixels apart reach
 # 0.98, 3 pixels apart 0.8; two frames exchanged reach 0.6.
 _MIN_LABELLED = 0.75
@@ -22,8 +25,10 @@ _MIN_LABELLED = 0.75
 _NEXT_RING_PX = 100.0
 # Keeps rings apart when neighbours are looked for.
 _RING_APART_PX = 1000.0
-# tan(75 degrees).
-_MAX_SLANT = 3.73
+# tan(65 degrees) along a ring, tan(75 degrees) from ring to ring, where a gap is wide
+# enough to mix surface with step.
+_MAX_SLANT = 2.14
+_STEPS_STEEPER = 1.74
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +68,7 @@ def decode(
         patterns: What the projector drew.
         calibration: Of both devices.
         min_conditioning: Least |r.m|; below it a point is left out.
-        max_slant: Most that the measured surface may run along the viewing ray, as the
+        max_slant: Most that a ring may run along the viewing ray on one surface, as the
             tangent of the incidence at the camera. Where one surface hides another,
             false edges hang in the step between them; this finds them.
 
@@ -81,13 +86,13 @@ def decode(
     rays = camera.rays(edges.pixels)
     radii = patterns.radii[edges.rings]
     hits = intersect_rings(camera.centre, rays, radii, edges.roots, projector)
-    along, across = _slant(edges, hits, camera.focal_px)
+    length, across = _chains(edges, hits, camera.focal_px, max_slant)
     causes = {
         "no_intersection": ~np.isfinite(hits.distances),
         "conditioning": ~(np.abs(hits.conditioning) >= min_conditioning),
         "outside_panel": ~projector.in_panel(projector.panel(hits.points)[0], 1.0),
-        "isolated": np.isnan(along),
-        "depth_step": ~(along <= max_slant) | (across > max_slant),
+        "isolated": length < _MIN_CHAIN,
+        "depth_step": across > _STEPS_STEEPER * max_slant,
     }
     kept = np.ones(len(edges), dtype=bool)
     rejected: dict[str, int] = {}
@@ -105,42 +110,46 @@ def decode(
     )
 
 
-def _slant(
-    edges: Edges, hits: RingHits, focal_px: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How steeply the measured surface runs along the viewing ray at each edge.
+def _chains(
+    edges: Edges, hits: RingHits, focal_px: float, max_slant: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """How far edges go on as a surface, along their rings and from ring to ring.
 
-    Both are changes of distance in units of a pixel's width there: the tangent of the
-    incidence in one direction.
+    Slant is the change of distance between edges in units of a pixel's width there:
+    the tangent of the incidence in one direction.
 
     Returns:
-        The steepest along the edge, NaN where too few neighbours of its ring lie near;
-        and towards the next rings the less steep of both sides, NaN where neither is
-        near.
+        Edges in the unbroken chain of each, links steeper than `max_slant` left out;
+        and the slant towards the next rings, the lesser of both sides, NaN where
+        neither is near. Both (n,).
     """
-    along = np.full(len(edges), np.nan)
+    length = np.zeros(len(edges), dtype=np.int64)
     across = np.full(len(edges), np.nan)
     rows = np.flatnonzero(np.isfinite(hits.distances))
     if len(rows) == 0:
-        return along, across
+        return length, across
     t = hits.distances[rows]
     place = np.column_stack([edges.pixels[rows], _RING_APART_PX * edges.rings[rows]])
     tree = KDTree(place)
+    one, other = tree.query_pairs(_NEAR_PX, output_type="ndarray").T
+    run = np.linalg.norm(place[one] - place[other], axis=1) * (t[one] / focal_px)
+    linked = np.abs(t[one] - t[other]) <= max_slant * run
+    ends = one[linked], other[linked]
+    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(rows), len(rows)))
+    _, chain = connected_components(links, directed=False)
+    length[rows] = np.bincount(chain)[chain]
 
-    def steepness(ring: int, k: int, reach: float) -> NDArray[np.float64]:
+    def towards(ring: int) -> NDArray[np.float64]:
         near = place + np.array([0.0, 0.0, ring * _RING_APART_PX])
-        apart, other = tree.query(near, k=k, distance_upper_bound=reach)
-        found = (other < len(rows)) & (apart > 0.5)
-        steps = np.abs(t[np.where(found, other, 0)] - t[:, None])
-        run = np.where(found, apart, 1.0) * (t / focal_px)[:, None]
-        return np.where(found, steps / run, np.nan)
+        apart, nearest = tree.query(near, distance_upper_bound=_NEXT_RING_PX)
+        found = (nearest < len(rows)) & (apart > 0.5)
+        steps = np.abs(t[np.where(found, nearest, 0)] - t)
+        return np.where(
+            found, steps * focal_px / (np.where(found, apart, 1.0) * t), np.nan
+        )
 
-    beside = steepness(0, 7, _NEAR_PX)
-    enough = np.count_nonzero(np.isfinite(beside), axis=1) >= _MIN_NEIGHBOURS
-    along[rows[enough]] = np.nanmax(beside[enough], axis=1)
-    outwards, inwards = (steepness(side, 2, _NEXT_RING_PX)[:, 0] for side in (1, -1))
-    across[rows] = np.fmin(outwards, inwards)
-    return along, across
+    across[rows] = np.fmin(towards(1), towards(-1))
+    return length, across
 
 
 def _cloud(
