@@ -94,7 +94,7 @@ def reduce_cover(
     bits, merged = _merge_rows(covers[live], whole[live])
     dense = np.unpackbits(bits, axis=1, count=costs.size).astype(bool)
     kept, stand_in = _undominated(dense, merged, costs)
-    by_row = sparse.csr_array(dense[:, kept]).astype(np.float64)
+    by_row = sparse.csr_array(sparse.csr_array(dense[:, kept]), dtype=np.float64)
     return ReducedCover(
         by_set=sparse.csr_array(by_row.T),
         by_row=by_row,
