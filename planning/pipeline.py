@@ -36,6 +36,7 @@ from .requirements import Requirements
 from .rig import Rig as RigModel
 from .rings import outer_radius, ring_gap, uniform_radii
 from .scene import Scene
+from .seams import overlap_components
 from .selection import larger
 from .shortfall import shortfalls
 from .surface import Surface
@@ -430,6 +431,12 @@ def _document(
             samples.weight,
             requirements.camera.max_incidence,
         ),
+        "camera_groups": [
+            [rig.cameras[c].id for c in group]
+            for group in overlap_components(
+                claims.measured_by, samples.weight
+            )
+        ],
         "cost": cost_entry(rig.cameras, greedy, clock.seconds),
         "members": [
             {

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 
 from . import optics
-from .errors import RigError
+from .errors import InfeasibleLimitsError, RigError
 from .requirements import Requirements
 from .rig_devices import (
     parallel_device,
@@ -45,6 +45,7 @@ def load_rig(name: str | Path = "default", light: Light | None = None) -> "Rig":
 
     Raises:
         RigError: One line for each fault: where it is, the value, the rule, what to do.
+        InfeasibleLimitsError: If a device isn't sharp at the standoff.
     """
     if light not in (None, "diverging", "parallel"):
         raise RigError(f"light = {light!r} must be 'diverging' or 'parallel'")
@@ -309,7 +310,7 @@ def _check_devices(rig: Rig) -> None:
     for role, device in devices.items():
         low, high = device.range_m
         if not low <= rig.standoff_m <= high:
-            raise RigError(
+            raise InfeasibleLimitsError(
                 f"rig {rig.name}: placement.standoff_mm = {rig.standoff_m * 1e3:g} is "
                 f"outside the distances at which the {role} is sharp, {low * 1e3:.0f} "
                 f"to {high * 1e3:.0f} mm; move the standoff or refocus"

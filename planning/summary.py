@@ -184,6 +184,13 @@ def _coverage(plan: RigPlan) -> str:
     left = coverage["uncovered_by_cause"]
     if left:
         lines.append(f"         not measured: {causes_line(left, target['area_m2'])}")
+    groups = plan.document["camera_groups"]
+    if len(groups) > 1:
+        names = ", ".join("{" + " ".join(group) + "}" for group in groups)
+        lines.append(
+            f"         the parts of {names} don't overlap: register them by the "
+            f"calibrated poses, not by the surface"
+        )
     return "\n".join(lines)
 
 

@@ -131,7 +131,7 @@ def test_too_few_projectors_say_how_many_are_needed(head):
 def test_contradictory_limits_name_the_guilty_one(head, tmp_path):
     path = tmp_path / "dark.toml"
     path.write_text(
-        'base = "default"\nname = "dark"\n[projector]\nrange_mm = [912.5, 930.0]\n'
+        'base = "default"\nname = "dark"\n[projector]\nrange_mm = [912.5, 1000.0]\n'
         '[projector.sources]\nrange_mm = "test"\n'
     )
     with pytest.raises(InfeasibleLimitsError, match="projector_range") as caught:

@@ -366,8 +366,6 @@ def test_files_that_cannot_be_read(tmp_path, write):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[placement]\nstandoff_mm = 700.0", "standoff_mm = 700 is outside.*projector"),
-        ("[placement]\nstandoff_mm = 1700.0", "standoff_mm = 1700 is outside.*camera"),
         ("[placement]\nstandoff_play_mm = 1000.0", "must be less than"),
         ("[placement]\nn_reference_cameras = 10", "greater than or equal to 400"),
         ("[camera]\nrange_mm = [2000.0, 3000.0]", "no distance is sharp"),
@@ -390,6 +388,15 @@ def test_files_that_cannot_be_read(tmp_path, write):
 def test_contradictory_rigs_are_refused(write, text, message):
     with pytest.raises(RigError, match=message):
         load_rig(write(f'base = "default"\n{text}\n'))
+
+
+@pytest.mark.parametrize(("standoff", "role"), [(700, "projector"), (1700, "camera")])
+def test_a_standoff_out_of_focus_serves_nothing(write, standoff, role):
+    text = f'base = "default"\n[placement]\nstandoff_mm = {standoff}.0\n'
+    expected = f"standoff_mm = {standoff} is outside.*{role}"
+    with pytest.raises(InfeasibleLimitsError, match=expected) as caught:
+        load_rig(write(text))
+    assert caught.value.exit_code == 4
 
 
 def test_endless_depth_of_field_needs_an_end(write):
