@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,17 +20,12 @@ from .calibration import (
 from .causes import likely_cause
 from .cloud import Cloud
 from .decode import Decoded, decode
-from .merge import Merged, merge
+from .merge import merge
 from .patterns import ring_patterns
 from .photometry import Photometry
 from .render import View, render_pair, view
-from .verdict import (
-    Accuracy,
-    Completeness,
-    judge,
-    measure_accuracy,
-    measure_completeness,
-)
+from .result import PairCount, Reconstruction
+from .verdict import judge, measure_accuracy, measure_completeness
 
 _DEFAULT_SAMPLES = 20_000
 # Rings that run more steeply along the viewing ray cross steps between surfaces, unless
@@ -39,94 +33,6 @@ _DEFAULT_SAMPLES = 20_000
 _SLANTED = np.deg2rad(65.0)
 _SLANT_MARGIN = np.deg2rad(5.0)
 Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class PairCount:
-    """What one pair of devices gave.
-
-    Attributes:
-        projector: Id of the projector.
-        camera: Id of the camera.
-        lit_pixels: Pixels with enough contrast.
-        n_edges: Ring edges found.
-        n_points: Points triangulated.
-        rejected: Edges without a point, by cause.
-    """
-
-    projector: str
-    camera: str
-    lit_pixels: int
-    n_edges: int
-    n_points: int
-    rejected: dict[str, int]
-
-
-@dataclass(frozen=True, eq=False)
-class Reconstruction:
-    """What the rig measured of the object, judged against the plan's limits.
-
-    Attributes:
-        everything: All points, before redundancy was removed.
-        merged: The cloud that stays, with normals and standard deviations.
-        accuracy: Of the merged cloud; None if it is empty.
-        completeness: Of the target.
-        pairs: What each pair gave.
-        photometry: The simulated light and sensor.
-        failures: One sentence for each limit that isn't kept.
-    """
-
-    everything: Cloud
-    merged: Merged
-    accuracy: Accuracy | None
-    completeness: Completeness
-    pairs: tuple[PairCount, ...]
-    photometry: Photometry
-    failures: tuple[str, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether every limit is kept."""
-        return not self.failures
-
-    @property
-    def n_points(self) -> int:
-        """Points before redundancy was removed."""
-        return len(self.everything)
-
-    @property
-    def n_merged(self) -> int:
-        """Points that stay."""
-        return len(self.merged.cloud)
-
-    @property
-    def redundant_fraction(self) -> float:
-        """Share of the points that was removed as redundant."""
-        return 1.0 - self.n_merged / self.n_points if self.n_points else 0.0
-
-    def to_document(self) -> dict[str, Any]:
-        """Return the `reconstruction` object of `plan.json`."""
-        accuracy, complete = self.accuracy, self.completeness
-        return {
-            "n_points": self.n_points,
-            "n_merged": self.n_merged,
-            "redundant_fraction": self.redundant_fraction,
-            "accuracy_rms_m": accuracy and accuracy.rms_m,
-            "accuracy_p95_m": accuracy and accuracy.p95_m,
-            "accuracy_bias_m": accuracy and accuracy.bias_m,
-            "accuracy_max_m": accuracy and accuracy.max_m,
-            "completeness": [
-                {"threshold_m": threshold, "fraction": fraction}
-                for threshold, fraction in zip(
-                    complete.thresholds_m, complete.fractions, strict=True
-                )
-            ],
-            "predicted_missing": complete.predicted_missing,
-            "pixel_noise": self.photometry.pixel_noise,
-            "ambient": self.photometry.ambient,
-            "passed": self.passed,
-            "failures": list(self.failures),
-        }
 
 
 def reconstruct_plan(
