@@ -91,3 +91,5 @@ def test_panel_ends_at_its_edges_and_its_beam(plan):
     # 0.2 mm pixels, beam radius 200 mm about the centre of 2000 x 2000 pixels.
     inside = beam.in_panel(np.array([[999.5, 0.0], [100.0, 100.0], [np.nan, 0.0]]))
     assert inside.tolist() == [True, False, False]
+    middle = beam.panel_coordinates(np.array([[999.5, 999.5], [1000.5, 999.5]]))
+    np.testing.assert_allclose(middle, [[0.0, 0.0], [0.2e-3, 0.0]], atol=1e-15)

@@ -3,6 +3,7 @@
 import copy
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -66,17 +67,7 @@ def changed(
 ) -> RigPlan:
     document = copy.deepcopy(plan.document)
     change(document)
-    surface = plan.surface
-    if mesh is not None:
-        surface = type(surface)(
-            mesh,
-            surface.member,
-            surface.region,
-            surface.steep,
-            surface.reference_projectors,
-            surface.reference_rings,
-            surface.reference_cameras,
-        )
+    surface = plan.surface if mesh is None else replace(plan.surface, mesh=mesh)
     return RigPlan(document, surface)
 
 
@@ -208,20 +199,51 @@ def test_a_rig_that_is_not_the_plan_fails(rigs, one_light, samples, fault):
     assert re.search(cause, text), text
 
 
-def test_an_object_one_per_cent_too_large_fails(rigs, one_light, samples, ball):
-    large = TriangleMesh(1.01 * ball.vertices, ball.faces)
+@pytest.mark.parametrize("scale", [1.01, 0.99])
+def test_an_object_one_per_cent_off_in_size_fails(
+    rigs, one_light, samples, ball, scale
+):
+    other = TriangleMesh(scale * ball.vertices, ball.faces)
     predicted = rigs.predict_on_sphere(one_light, samples)
     result = reconstruct_plan(
         one_light,
         seed=0,
-        truth=changed(one_light, lambda document: None, large),
+        truth=changed(one_light, lambda document: None, other),
         samples=samples,
         predicted=predicted,
     )
+    bias = 0.04 * (scale - 1.0)
     assert not result.passed
-    assert result.accuracy.bias_m == pytest.approx(0.4e-3, rel=0.1)
-    assert any("mean signed distance is 0." in failure for failure in result.failures)
+    assert result.accuracy.bias_m == pytest.approx(bias, rel=0.1)
+    assert any(f"distance is {1e3 * bias:.1f}"[:-1] in text for text in result.failures)
+    assert len(result.failures) == 3
     assert "the object isn't the mesh" in result.failures[0]
+
+
+def test_two_equal_cameras_have_noise_of_their_own(rigs, one_light):
+    def twin(document: dict[str, Any]) -> None:
+        document["cameras"] = [document["cameras"][0], dict(document["cameras"][0])]
+        document["cameras"][1]["id"] = "C2"
+
+    cloud = reconstruct_plan(changed(one_light, twin), seed=0).everything
+    first, second = (cloud.points[cloud.camera == c] for c in (0, 1))
+    shared = {tuple(point) for point in first} & {tuple(point) for point in second}
+    assert len(first) > 1000
+    assert len(shared) < 0.01 * len(first)
+
+
+def test_samples_outside_the_target_are_left_aside(rigs, one_light, samples, ball):
+    """Claims about the back would fail, but the target is the front."""
+    front = ball.face_centroids[:, 1] < 0.0
+    document = copy.deepcopy(one_light.document)
+    document["requirements"]["target"] = "dominant"
+    surface = replace(one_light.surface, region=np.where(front, 0, -1))
+    claimed = rigs.predict_on_sphere(one_light, samples) | (samples.normals[:, 1] > 0.8)
+    result = reconstruct_plan(
+        RigPlan(document, surface), seed=0, samples=samples, predicted=claimed
+    )
+    assert result.passed, result.failures
+    assert len(result.completeness.missing) == np.count_nonzero(front[samples.faces])
 
 
 def test_a_claim_on_the_far_side_is_missed(one_light, samples):
@@ -229,6 +251,7 @@ def test_a_claim_on_the_far_side_is_missed(one_light, samples):
     back = samples.normals[:, 1] > 0.8
     result = reconstruct_plan(one_light, seed=0, samples=samples, predicted=back)
     assert result.completeness.predicted_missing == 1.0
+    assert np.array_equal(result.completeness.missing, back)
     assert len(result.failures) == 2
     assert "100.00 % of the samples predicted measured" in result.failures[1]
 

@@ -1,5 +1,7 @@
 """Rendered images to labelled edges: where they are, and what doesn't get through."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -130,17 +132,22 @@ def test_every_label_is_the_ring_that_is_there(rigs):
     assert np.array_equal(nearest, edges.rings)
 
 
-@pytest.mark.parametrize("light", ["diverging", "parallel"])
-def test_a_plate_hides_and_shades_the_one_behind_it(rigs, light):
-    """No point hangs in the air, none lies in the shadow, and the rest is measured."""
+def step(rigs, degrees: float) -> tuple[TriangleMesh, np.ndarray]:
+    """A plate turned in its plane, 30 mm before a larger one; and the turn."""
     far, near = plate(rigs, 0.12, 0.10), plate(rigs, 0.05, 0.04, -0.03)
-    turn = rigs.turn(1, 45.0)[:3, :3]
+    turn = rigs.turn(1, degrees)[:3, :3]
     both = TriangleMesh(
         np.concatenate([far.vertices, near.vertices @ turn.T]),
         np.concatenate([far.faces, near.faces + len(far.vertices)]),
     )
-    frames, patterns, calibration = shot(rigs, light, 3478.0, Photometry(), mesh=both)
-    decoded = decode(frames, patterns, calibration)
+    return both, turn
+
+
+@pytest.mark.parametrize("light", ["diverging", "parallel"])
+def test_a_plate_hides_and_shades_the_one_behind_it(rigs, light):
+    """No point hangs in the air, none lies in the shadow, and the rest is measured."""
+    both, turn = step(rigs, 45.0)
+    decoded = decode(*shot(rigs, light, 3478.0, Photometry(), mesh=both))
     x, y, z = (decoded.cloud.points @ turn).T
     on_near, on_far = np.abs(y + 0.03) < 6e-4, np.abs(y) < 6e-4
     assert on_near.sum() > 300
@@ -155,19 +162,61 @@ def test_a_plate_hides_and_shades_the_one_behind_it(rigs, light):
     assert not np.any(shaded & on_far)
 
 
-def test_false_edges_in_a_step_of_depth_are_found(rigs):
-    far, near = plate(rigs, 0.12, 0.10), plate(rigs, 0.05, 0.04, -0.03)
-    turn = rigs.turn(1, 45.0)[:3, :3]
-    both = TriangleMesh(
-        np.concatenate([far.vertices, near.vertices @ turn.T]),
-        np.concatenate([far.faces, near.faces + len(far.vertices)]),
-    )
-    taken = shot(rigs, "diverging", 3478.0, Photometry(), mesh=both)
+@pytest.mark.parametrize(("degrees", "left"), [(45.0, 0.1), (5.0, 0.4)])
+def test_false_edges_in_a_step_of_depth_are_found(rigs, degrees, left):
+    """Across the rings few are left; nearly along them the next rings must tell."""
+    taken = shot(rigs, "diverging", 3478.0, Photometry(), mesh=step(rigs, degrees)[0])
     hanging = []
     for max_slant in (2.14, 1e6):
         y = decode(*taken, max_slant=max_slant).cloud.points[:, 1]
         hanging.append(np.count_nonzero((y < -6e-4) & (np.abs(y + 0.03) > 6e-4)))
-    assert hanging[0] < 0.1 * hanging[1]
+    assert hanging[1] > 40
+    assert hanging[0] < left * hanging[1]
+
+
+def test_points_outside_the_projectors_image_are_left_out(rigs):
+    frames, patterns, calibration = shot(rigs, "diverging", 3478.0, Photometry())
+    narrow = replace(calibration.projector, resolution=(640, 800))
+    whole = decode(frames, patterns, calibration)
+    half = decode(frames, patterns, PairCalibration(narrow, calibration.camera))
+    assert whole.rejected["outside_panel"] == 0
+    assert half.rejected["outside_panel"] > 0.2 * len(whole.cloud)
+    pixels, _ = calibration.projector.panel(half.cloud.points)
+    assert pixels[:, 0].max() <= 640.5
+
+
+def test_light_from_behind_stays_behind(rigs):
+    """A plate whose back is lit looks the same under white and black."""
+    mesh = plate(rigs, 0.12, 0.10)
+    plan = rigs.plan_of(
+        mesh,
+        [rigs.diverging("P1", rigs.direction(160.0, 5.0), 0.09, 3.5e-3)],
+        [rigs.camera("C1", rigs.direction(20.0, 12.0))],
+    )
+    projector = calibrate_projector(plan.projectors[0])
+    camera = calibrate_camera(plan.cameras[0])
+    patterns = ring_patterns(projector, plan.projectors[0].ring_radii, camera)
+    caster = RayCaster(mesh, threads=1)
+    seen = view(camera, mesh, caster, CLEAN)
+    frames = render_pair(seen, projector, projector, patterns, caster, CLEAN, (0,))
+    assert frames.stack[0].max() > 0.0
+    assert np.array_equal(frames.stack[0], frames.stack[1])
+
+
+def test_noise_is_shot_and_read_noise_of_its_own_key():
+    sensor = Photometry(full_well=10_000.0, read_noise=1.0)
+    grey = np.full((300, 300), 0.5, dtype=np.float32)
+    one, again, other, third = (
+        sensor.capture(grey, key, 255.0).astype(float)
+        for key in ((0, 0, 1), (0, 0, 1), (0, 1, 1), (1, 0, 1))
+    )
+    assert np.array_equal(one, again)
+    assert not np.array_equal(one, other)
+    assert not np.array_equal(one, third)
+    assert one.mean() == pytest.approx(127.5, abs=0.1)
+    # 255 * 127.5 / 10^4 + 1, and 1/12 of the rounding.
+    assert one.var() == pytest.approx(3.25 + 1.0 + 1.0 / 12.0, rel=0.03)
+    assert sensor.pixel_noise == pytest.approx(np.sqrt(4.25125))
 
 
 def test_scrambled_bits_give_no_wrong_points(rigs):
@@ -208,7 +257,10 @@ def test_black_and_saturated_images_give_nothing(rigs):
         decoded = decode(Frames(stack, (900, 700)), patterns, calibration)
         assert len(decoded.cloud) == decoded.n_edges == decoded.lit_pixels == 0
     stack[1::2] = 0
-    assert decode(Frames(stack, (900, 700)), patterns, calibration).n_edges == 0
+    blown = decode(Frames(stack, (900, 700)), patterns, calibration)
+    assert blown.n_edges == blown.lit_pixels == 0
+    stack[0] = 250
+    assert decode(Frames(stack, (900, 700)), patterns, calibration).lit_pixels == 4800
 
 
 def test_a_missing_frame_is_refused(rigs):
@@ -223,6 +275,7 @@ def test_neighbouring_annuli_differ_in_one_bit(n_rings):
     patterns = RingPatterns("parallel", radii, np.zeros(3))
     codes = patterns.codes
     changed = codes[1:] ^ codes[:-1]
+    assert patterns.outer_radius == n_rings + 1.0
     assert patterns.n_annuli == n_rings + 1 <= 2**patterns.n_bits < 2 * (n_rings + 1)
     assert patterns.n_frames == 2 * int(np.ceil(np.log2(n_rings + 1))) + 2 + 2
     assert len(np.unique(codes)) == n_rings + 1
