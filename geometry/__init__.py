@@ -24,7 +24,15 @@ _EXPORTS = {
     "load_mesh": "readers",
     "principal_curvatures": "curvature",
 }
-__all__ = sorted(_EXPORTS)
+__all__ = [
+    "CurvatureField",
+    "RayCaster",
+    "Region",
+    "TriangleMesh",
+    "dominant_regions",
+    "load_mesh",
+    "principal_curvatures",
+]
 
 
 def __getattr__(name: str) -> object:

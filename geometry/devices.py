@@ -58,9 +58,13 @@ class PinholeModel:
         if any(self.distortion):
             for _ in range(_UNDISTORT_STEPS):
                 error = self._distort(normalised) - target
-                step = np.linalg.solve(self._distort_slope(normalised), error[..., None])
+                step = np.linalg.solve(
+                    self._distort_slope(normalised), error[..., None]
+                )
                 normalised = normalised - step[..., 0]
-        rays = np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
+        rays = np.concatenate(
+            [normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1
+        )
         return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
     def ray_jacobian(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

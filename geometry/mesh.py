@@ -96,10 +96,12 @@ class TriangleMesh:
 
     @cached_property
     def face_normals(self) -> NDArray[np.float64]:
-        """Outward unit normal of each face, shape (n_f, 3); zero where it has no area."""
+        """Outward unit normal of each face, (n_f, 3); zero where it has no area."""
         length = 2.0 * self.face_areas[:, None]
         return _read_only(
-            np.divide(self._cross, length, out=np.zeros_like(self._cross), where=length > 0)
+            np.divide(
+                self._cross, length, out=np.zeros_like(self._cross), where=length > 0
+            )
         )
 
     @cached_property

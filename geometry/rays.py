@@ -92,7 +92,7 @@ class RayCaster:
             directions: Unit directions, shape (n, 3).
 
         Returns:
-            Face indices, -1 for a miss, and distances in [m], inf for a miss; (n,) each.
+            Face indices, -1 for a miss; distances in [m], inf for a miss; (n,) each.
 
         Raises:
             ValueError: If shapes disagree or a number isn't finite.

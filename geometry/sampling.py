@@ -57,7 +57,9 @@ def sample_surface(
     Raises:
         ValueError: If n < 1 or the faces have no area.
     """
-    areas = mesh.face_areas if within is None else np.where(within, mesh.face_areas, 0.0)
+    areas = (
+        mesh.face_areas if within is None else np.where(within, mesh.face_areas, 0.0)
+    )
     cumulated = np.cumsum(areas)
     total = float(cumulated[-1])
     if n < 1:
@@ -72,6 +74,8 @@ def sample_surface(
     root = np.sqrt(u)
     a, b, c = np.moveaxis(mesh.corners[faces], 1, 0)
     points = (
-        (1.0 - root)[:, None] * a + (root * (1.0 - v))[:, None] * b + (root * v)[:, None] * c
+        (1.0 - root)[:, None] * a
+        + (root * (1.0 - v))[:, None] * b
+        + (root * v)[:, None] * c
     )
     return SurfaceSamples(points, mesh.face_normals[faces], faces, total / n)

@@ -1,10 +1,10 @@
 """The planner's visibility: whether the segment from a device to a sample is free.
 
-Policy (measured, see the evidence page of the design): the mesh is centred in float64,
-rays are cast *from the device to the sample* and stop a little short of it. Casting from
-the sample needs an offset along the normal, which trades falsely blocked samples for
-falsely clear ones; stopping short needs none. The slack is a twentieth of the mean edge,
-so that it scales with the mesh.
+Policy, from measurements: the mesh is centred in float64, rays are cast *from the
+device to the sample* and stop a little short of it. Casting from the sample needs an
+offset along the normal, which trades falsely blocked samples for falsely clear ones;
+stopping short needs none. The slack is a twentieth of the mean edge, so it scales with
+the mesh.
 """
 
 import numpy as np

@@ -31,7 +31,18 @@ _EXPORTS = {
     "plan_rig": "planning.pipeline",
     "verify_plan": "planning.verification",
 }
-__all__ = sorted(_EXPORTS)
+__all__ = [
+    "InputError",
+    "PlanningError",
+    "RequirementError",
+    "Rig",
+    "RigPlan",
+    "Verification",
+    "load_mesh",
+    "load_rig",
+    "plan_rig",
+    "verify_plan",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -11,15 +11,18 @@ from pathlib import Path
 _HOME = Path(__file__).resolve().parent.parent
 
 
-def check_siblings(names: tuple[str, ...] = ("geometry", "solvers", "planning")) -> None:
+def check_siblings(
+    names: tuple[str, ...] = ("geometry", "solvers", "planning"),
+) -> None:
     """Raise ImportError if a sibling package is not the one shipped with us."""
     for name in names:
         spec = find_spec(name)
         origin = None if spec is None else spec.origin
         if origin is None or Path(origin).resolve().parent.parent != _HOME:
             raise ImportError(
-                f"'{name}' would be imported from {origin}, not from ringrig in {_HOME}: "
-                f"another '{name}' shadows or overwrote ours. Leave that directory, "
-                f"run python -P, or install ringrig into an environment of its own.",
+                f"'{name}' would be imported from {origin}, not from ringrig in "
+                f"{_HOME}: another '{name}' shadows or overwrote ours. Leave that "
+                f"directory, run python -P, or install ringrig into an environment of "
+                f"its own.",
                 name=name,
             )

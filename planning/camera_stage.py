@@ -55,9 +55,7 @@ def place_cameras(
     )
     for _ in range(_ROUNDS):
         rows = best.stage.rows
-        turned = turn_ring_axes(
-            scene, best.projectors, best.stage.cameras, rows, tilt
-        )
+        turned = turn_ring_axes(scene, best.projectors, best.stage.cameras, rows, tilt)
         if all(a is b for a, b in zip(turned, best.projectors, strict=True)):
             break
         stage = plan_cameras(scene, turned, template, n_candidates)

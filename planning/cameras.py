@@ -1,4 +1,4 @@
-"""Section VI of the paper: the fewest cameras that measure what the projectors light."""
+"""Section VI of the paper: the fewest cameras that measure what is lit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -65,10 +65,11 @@ def lit_samples(
         ],
         axis=1,
     )
-    kept = target.take(lit.any(axis=1))
+    some = np.flatnonzero(lit.any(axis=1))
+    kept = target.take(some)
     return LitSamples(
         kept,
-        lit[lit.any(axis=1)],
+        lit[some],
         tuple(lighting.light_on(projector, kept) for projector in projectors),
         rings_of(projectors, kept),
     )
@@ -117,7 +118,9 @@ def plan_cameras(
             f"field, incidence, conditioning, sigma and pitch exclude each other; "
             f"relax the first of {_failing(scene, candidates, rows)}"
         )
-    for attempt in range(1, _ROUNDS + 1):
+    attempt = 0
+    while True:
+        attempt += 1
         selection = select_fewest(
             measured, required.coverage, max_count=required.max_cameras, seed=scene.seed
         )
@@ -125,10 +128,8 @@ def plan_cameras(
         fresh = lit_samples(scene, projectors, fresh_target)
         seen = measured_by(scene, candidates, fresh)
         covered = seen[:, selection.chosen].any(axis=1).sum()
-        if (
-            selection.status == "infeasible"
-            or covered >= required.coverage * seen.any(axis=1).sum()
-        ):
+        confirmed = covered >= required.coverage * seen.any(axis=1).sum()
+        if confirmed or selection.status == "infeasible" or attempt == _ROUNDS:
             break
         target = merged(target, fresh_target)
         rows = lit_samples(scene, projectors, target)
@@ -138,8 +139,8 @@ def plan_cameras(
         candidates,
         rows,
         {
-            count: tuple(candidates[i] for i in chosen)
-            for count, chosen in selection.by_count.items()
+            number: tuple(candidates[i] for i in chosen)
+            for number, chosen in selection.by_count.items()
         },
         certificate(
             selection, len(rows.target), target.samples.weight, len(candidates)

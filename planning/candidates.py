@@ -1,4 +1,4 @@
-"""Poses offered to the cover programs: spread evenly over the workspace, aimed at it."""
+"""Poses offered to the cover programs, spread evenly over the workspace."""
 
 from dataclasses import replace
 
@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import fibonacci_cap, look_at
 
+from .errors import InfeasibleLimitsError
 from .plan import PlannedCamera, PlannedProjector
 from .requirements import Workspace
 from .rings import ring_frame
 
 _QUARTER = float(np.pi / 2)
+# A floor may leave a sliver of the cone; finer lattices than this aren't tried for it.
+_MOST_OFFERED = 1000
 
 
 def shell_positions(
@@ -30,21 +33,16 @@ def shell_positions(
     """
     radius = 0.5 * (radius_m[0] + radius_m[1])
     centre = np.array(workspace.centre)
+    floor = -np.inf if workspace.floor_m is None else workspace.floor_m
     offered = n
-    for _ in range(8):
+    while True:
         directions = fibonacci_cap(
             offered, np.array(workspace.axis), workspace.half_angle
         )
-        height = radius * (directions @ np.array(workspace.up))
-        keep = (
-            np.ones(offered, dtype=bool)
-            if workspace.floor_m is None
-            else height >= workspace.floor_m
-        )
-        if keep.sum() >= n or not keep.any():
-            break
-        offered = int(np.ceil(1.1 * offered * n / keep.sum()))
-    return centre + radius * directions[keep]
+        kept = directions[radius * (directions @ np.array(workspace.up)) >= floor]
+        if len(kept) >= n or not len(kept) or offered > _MOST_OFFERED * n:
+            return centre + radius * kept
+        offered = int(np.ceil(1.1 * offered * n / len(kept)))
 
 
 def aimed_poses(
@@ -67,7 +65,9 @@ def aimed_poses(
 def rolls_for(
     device: PinholeModel | ParallelModel, object_radius: float, distance: float
 ) -> tuple[float, ...]:
-    """Return the rolls worth offering: upright; on its side too if the object overflows.
+    """Return the rolls worth offering: upright, and on its side if that helps.
+
+    A device lies on its side where the object overflows its shorter field.
 
     Args:
         device: Optics.
@@ -81,7 +81,9 @@ def rolls_for(
     edges = np.array([[-0.5, (height - 1) / 2], [(width - 1) / 2, -0.5]])
     middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
     half_angle = np.arccos(np.clip(device.rays(edges) @ middle, -1.0, 1.0)).min()
-    fits = object_radius < distance and np.arcsin(object_radius / distance) <= half_angle
+    fits = (
+        object_radius < distance and np.arcsin(object_radius / distance) <= half_angle
+    )
     return (0.0,) if fits else (0.0, _QUARTER)
 
 
@@ -100,9 +102,7 @@ def projector_candidates(
         n: Candidates wanted, at least.
         ring_offset: Tilt and azimuth of the ring axis, as `ring_frame` takes them.
     """
-    poses = _poses(
-        template.device, workspace, workspace.projector_radius_m, n
-    )
+    poses = _poses(template.device, workspace, workspace.projector_radius_m, n)
     return tuple(
         replace(
             template,
@@ -131,6 +131,11 @@ def _poses(
     rolls = rolls_for(device, workspace.object_radius_m, distance)
     positions = shell_positions(workspace, radius_m, -(-n // len(rolls)))
     centre, up = np.array(workspace.centre), np.array(workspace.up)
+    if not len(positions):
+        raise InfeasibleLimitsError(
+            "the workspace holds no position: its floor, cone and shell exclude each "
+            "other; lower the floor or widen the cone"
+        )
     return np.concatenate(
         [aimed_poses(positions, centre, up, device, roll=roll) for roll in rolls]
     )

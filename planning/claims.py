@@ -1,6 +1,6 @@
-"""What a plan may claim: areas recomputed from its poses on samples never used before."""
+"""What a plan may claim: areas recomputed from its poses on fresh samples."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,17 +81,15 @@ def make_claims(scene: Scene, rig: Rig) -> Claims:
     stages = _light_stages(scene, rig.projectors, target)
     lit = stages == lighting.LIT
     seen = _measured_by(scene, rig, target, lit)
-    measured = seen.any(axis=1)
-    reachable, furthest = _reachable_by_projectors(scene, rig, target, lit.any(axis=1))
+    measured = _any(seen)
+    reachable, furthest = _reachable_by_projectors(scene, rig, target, _any(lit))
     areas = _areas(scene, rig, target, reachable, lit, measured)
     served = lighting.served_by(lit, _margins(scene, rig.projectors, target))
     return Claims(
         _surface_areas(scene, rig),
         areas,
         _by_cause(_uncovered(scene, rig, target, stages, measured), weight),
-        _by_cause(
-            [lighting.CAUSES[stage] for stage in furthest[~reachable]], weight
-        ),
+        _by_cause([lighting.CAUSES[stage] for stage in furthest[~reachable]], weight),
         tuple(weight * lit.sum(axis=0)),
         _least_margins(scene, rig, target, served),
         tuple(weight * seen.sum(axis=0)),
@@ -118,12 +116,14 @@ def measured_area(
 
     def measured(target: Target) -> NDArray[np.bool_]:
         rows = lit_samples(scene, projectors, target)
-        return measured_by(scene, cameras, rows).any(axis=1)
+        return _any(measured_by(scene, cameras, rows))
 
     return _union(scene, measured)
 
 
-def _union(scene: Scene, covered: Any) -> tuple[float, float]:  # noqa: ANN401
+def _union(
+    scene: Scene, covered: Callable[[Target], NDArray[np.bool_]]
+) -> tuple[float, float]:
     sets = (
         scene.target_samples(N_SAMPLES, _TARGET_STREAM),
         scene.surface_samples(N_SAMPLES, _SURFACE_STREAM),
@@ -135,8 +135,8 @@ def _union(scene: Scene, covered: Any) -> tuple[float, float]:  # noqa: ANN401
 def _surface_areas(scene: Scene, rig: Rig) -> Areas:
     surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
     lit = _light_stages(scene, rig.projectors, surface) == lighting.LIT
-    measured = _measured_by(scene, rig, surface, lit).any(axis=1)
-    reachable, _ = _reachable_by_projectors(scene, rig, surface, lit.any(axis=1))
+    measured = _any(_measured_by(scene, rig, surface, lit))
+    reachable, _ = _reachable_by_projectors(scene, rig, surface, _any(lit))
     return _areas(scene, rig, surface, reachable, lit, measured)
 
 
@@ -151,7 +151,7 @@ def _areas(
     weight = target.samples.weight
     by_cameras = measured.copy()
     for camera in rig.reference_cameras:
-        left = np.flatnonzero(lit.any(axis=1) & ~by_cameras)
+        left = np.flatnonzero(_any(lit) & ~by_cameras)
         if not len(left):
             break
         rows = _lit_rows(rig.projectors, target.take(left), lit[left])
@@ -159,7 +159,7 @@ def _areas(
     counts = (
         len(target),
         reachable.sum(),
-        lit.any(axis=1).sum(),
+        _any(lit).sum(),
         by_cameras.sum(),
         measured.sum(),
     )
@@ -179,7 +179,7 @@ def _light_stages(
 def _lit(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.bool_]:
-    return (_light_stages(scene, projectors, target) == lighting.LIT).any(axis=1)
+    return _any(_light_stages(scene, projectors, target) == lighting.LIT)
 
 
 def _lit_rows(
@@ -247,9 +247,9 @@ def _uncovered(
 ) -> list[str]:
     """The cause of each sample that isn't measured."""
     lit = stages == lighting.LIT
-    dark = ~lit.any(axis=1)
+    dark = ~_any(lit)
     causes = [lighting.CAUSES[stage] for stage in stages[dark].max(axis=1)]
-    left = np.flatnonzero(lit.any(axis=1) & ~measured)
+    left = np.flatnonzero(_any(lit) & ~measured)
     rows = _lit_rows(rig.projectors, target.take(left), lit[left])
     furthest = np.zeros(len(left), dtype=np.int8)
     required = scene.requirements
@@ -271,6 +271,11 @@ def _uncovered(
             stage = measurability.first_pair_failure(quality, required.triangulation)
             furthest[pairs] = np.maximum(furthest[pairs], stage)
     return causes + [measurability.CAUSES[stage] for stage in furthest]
+
+
+def _any(table: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether any column holds, for each row."""
+    return np.asarray(np.any(table, axis=1))
 
 
 def _by_cause(causes: list[str], weight: float) -> dict[str, float]:

@@ -3,6 +3,7 @@
 Heavy packages are imported inside the commands, so that `plan --help` stays quick.
 """
 
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -16,6 +17,25 @@ _NOT_BUILT = {
     "report": "writes one self-contained HTML file",
     "export": "writes poses for OpenCV, COLMAP, glTF, Blender, ROS, USD, CSV",
 }
+
+
+class _Positive(click.FloatRange):
+    """A positive number, perhaps with a largest; NaN and infinity are none."""
+
+    def __init__(self, largest: float | None = None) -> None:
+        super().__init__(0.0, largest, min_open=True)
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401
+        """Return the number, or fail as usage."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} isn't a finite number.", param, ctx)
+        return number
 
 
 class _DefaultCommand(click.Command):
@@ -63,11 +83,11 @@ class _DefaultGroup(click.Group):
 )
 @click.version_option(package_name="ringrig", prog_name="plan")
 def commands() -> None:
-    """Plan a structured-light scanner: how many projectors and cameras, and where.
+    r"""Plan a structured-light scanner: how many projectors and cameras, and where.
 
     \b
-    plan --mesh face.obj --max-projectors 3     plans, checks from pixels, writes ./face-plan/
-    plan verify face-plan/plan.json             recomputes every claim, then checks again
+    plan --mesh face.obj --max-projectors 3   plans, checks, writes ./face-plan/
+    plan verify face-plan/plan.json           recomputes every claim, checks again
 
     Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
     4 nothing can be served, 5 time limit, 130 interrupted.
@@ -75,42 +95,121 @@ def commands() -> None:
 
 
 @commands.command("rig", cls=_DefaultCommand)
-@click.option("--mesh", "meshes", multiple=True, required=True, metavar="FILE",
-              help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.")
-@click.option("--max-projectors", type=click.IntRange(1), required=True, metavar="N",
-              help="Projectors at most.")
-@click.option("--max-cameras", type=click.IntRange(1), metavar="N",
-              help="Cameras at most [default: as many as needed].")
-@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in", "um"]),
-              help="Unit of a file that states none [default: mm].")
-@click.option("--size-mm", type=float, metavar="S",
-              help="Instead of --unit: longest side of the bounding box.")
-@click.option("--up", type=click.Choice(["x", "y", "z", "-x", "-y", "-z"]),
-              help="Axis that points up [default: z].")
-@click.option("--rig", "rig_name", default="default", show_default=True,
-              metavar="NAME|rig.toml", help="Devices and limits.")
-@click.option("--light", type=click.Choice(["diverging", "parallel"]),
-              help="A real projector, or the paper's collimated light [default: the rig's].")
-@click.option("--pattern", type=click.Choice(["rings", "dense", "none"]),
-              default="rings", show_default=True, help="What is projected.")
-@click.option("--target", type=click.Choice(["dominant", "surface"]),
-              default="dominant", show_default=True, help="What must be covered.")
-@click.option("--dominant-coverage", type=click.FloatRange(0, 1, min_open=True),
-              metavar="F", help="Lit share of the reachable target [default: 0.90].")
-@click.option("--coverage", type=click.FloatRange(0, 1, min_open=True), metavar="F",
-              help="Measured share of the reachable target [default: 0.95].")
-@click.option("--min-reachable", type=click.FloatRange(0, 1, min_open=True),
-              metavar="F", help="Share of the target that must be reachable [default: 0.90].")
-@click.option("--accuracy", "accuracy_mm", type=click.FloatRange(0, min_open=True),
-              metavar="MM", help="Largest standard deviation along the normal [default: 0.3].")
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="DIR",
-              help="Output folder [default: ./NAME-plan].")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
-              help="Of every random draw.")
-@click.option("--time-limit", type=click.FloatRange(0, min_open=True), metavar="S",
-              help="Cut the run after S seconds; the plan is marked truncated.")
-@click.option("--threads", type=click.IntRange(1), metavar="N",
-              help="Worker threads; no result depends on it [default: all cores].")
+@click.option(
+    "--mesh",
+    "meshes",
+    multiple=True,
+    required=True,
+    metavar="FILE",
+    help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.",
+)
+@click.option(
+    "--max-projectors",
+    type=click.IntRange(1),
+    required=True,
+    metavar="N",
+    help="Projectors at most.",
+)
+@click.option(
+    "--max-cameras",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Cameras at most [default: as many as needed].",
+)
+@click.option(
+    "--unit",
+    type=click.Choice(["mm", "cm", "m", "in", "um"]),
+    help="Unit of a file that states none [default: mm].",
+)
+@click.option(
+    "--size-mm",
+    type=_Positive(),
+    metavar="S",
+    help="Instead of --unit: longest side of the bounding box.",
+)
+@click.option(
+    "--up",
+    type=click.Choice(["x", "y", "z", "-x", "-y", "-z"]),
+    help="Axis that points up [default: z].",
+)
+@click.option(
+    "--rig",
+    "rig_name",
+    default="default",
+    show_default=True,
+    metavar="NAME|rig.toml",
+    help="Devices and limits.",
+)
+@click.option(
+    "--light",
+    type=click.Choice(["diverging", "parallel"]),
+    help="A real projector, or the paper's collimated light [default: the rig's].",
+)
+@click.option(
+    "--pattern",
+    type=click.Choice(["rings", "dense", "none"]),
+    default="rings",
+    show_default=True,
+    help="What is projected.",
+)
+@click.option(
+    "--target",
+    type=click.Choice(["dominant", "surface"]),
+    default="dominant",
+    show_default=True,
+    help="What must be covered.",
+)
+@click.option(
+    "--dominant-coverage",
+    type=_Positive(1.0),
+    metavar="F",
+    help="Lit share of the reachable target [default: 0.90].",
+)
+@click.option(
+    "--coverage",
+    type=_Positive(1.0),
+    metavar="F",
+    help="Measured share of the reachable target [default: 0.95].",
+)
+@click.option(
+    "--min-reachable",
+    type=_Positive(1.0),
+    metavar="F",
+    help="Share of the target that must be reachable [default: 0.90].",
+)
+@click.option(
+    "--accuracy",
+    "accuracy_mm",
+    type=_Positive(),
+    metavar="MM",
+    help="Largest standard deviation along the normal [default: 0.3].",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Output folder [default: ./NAME-plan].",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Of every random draw.",
+)
+@click.option(
+    "--time-limit",
+    type=_Positive(),
+    metavar="S",
+    help="Cut the run after S seconds; the plan is marked truncated.",
+)
+@click.option(
+    "--threads",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Worker threads; no result depends on it [default: all cores].",
+)
 @click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
 @click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
@@ -123,21 +222,37 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     if options["prove"]:
-        raise click.UsageError("--prove isn't built yet: bounds over all poses come later")
+        raise click.UsageError(
+            "--prove isn't built yet: bounds over all poses come later"
+        )
     if options["pattern"] != "rings":
-        raise click.UsageError(f"--pattern {options['pattern']} isn't built yet: use rings")
+        raise click.UsageError(
+            f"--pattern {options['pattern']} isn't built yet: use rings"
+        )
     if len(options["meshes"]) > 1 or Path(options["meshes"][0]).is_dir():
-        raise click.UsageError("several meshes on one rig aren't built yet: give one file")
+        raise click.UsageError(
+            "several meshes on one rig aren't built yet: give one file"
+        )
     _run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
 
 
 @commands.command()
 @click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
-@click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE",
-              help="Also hold the plan's surface against this mesh, read anew.")
-@click.option("--truth", type=click.Path(path_type=Path), metavar="other-plan.json",
-              help="Render with the devices of another plan: what really stands there.")
-@click.option("--seed", type=click.IntRange(0), help="Of the audit [default: the plan's].")
+@click.option(
+    "--mesh",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Also hold the plan's surface against this mesh, read anew.",
+)
+@click.option(
+    "--truth",
+    type=click.Path(path_type=Path),
+    metavar="other-plan.json",
+    help="Render with the devices of another plan: what really stands there.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), help="Of the audit [default: the plan's]."
+)
 @click.option("--threads", type=click.IntRange(1), metavar="N", help="Worker threads.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
@@ -159,12 +274,29 @@ def rigs(debug: bool) -> None:
 
 
 @commands.command()
-@click.option("-o", "--output", type=click.Path(path_type=Path), default="face.obj",
-              show_default=True, metavar="FILE", help="Where it goes.")
-@click.option("--faces", type=click.IntRange(500, 2_000_000), default=40_000,
-              show_default=True, metavar="N", help="Triangles of the closed head, about; the neck is then cut open.")
-@click.option("--variant", type=click.IntRange(0), metavar="SEED",
-              help="Another head of the population [default: the mean head].")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default="face.obj",
+    show_default=True,
+    metavar="FILE",
+    help="Where it goes.",
+)
+@click.option(
+    "--faces",
+    type=click.IntRange(500, 2_000_000),
+    default=40_000,
+    show_default=True,
+    metavar="N",
+    help="Triangles of the closed head, about; the neck is then cut open.",
+)
+@click.option(
+    "--variant",
+    type=click.IntRange(0),
+    metavar="SEED",
+    help="Another head of the population [default: the mean head].",
+)
 @click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
 def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
     """Write the sample head, an OBJ file in millimetres."""
@@ -177,7 +309,10 @@ def _not_built(name: str, purpose: str) -> None:
     @commands.command(
         name,
         short_help=f"(not built yet) {purpose}",
-        context_settings={"ignore_unknown_options": True, "help_option_names": ["--help"]},
+        context_settings={
+            "ignore_unknown_options": True,
+            "help_option_names": ["--help"],
+        },
     )
     @click.argument("anything", nargs=-1, type=click.UNPROCESSED)
     def command(anything: tuple[str, ...]) -> None:

@@ -168,5 +168,3 @@ def _cores() -> int:
 
 def _print_json(document: Mapping[str, Any]) -> None:
     click.echo(json.dumps(document, indent=1, allow_nan=False))
-
-

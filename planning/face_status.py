@@ -1,4 +1,4 @@
-"""What a plan does for each face, judged at its centroid; for pictures, not for claims."""
+"""What a plan does for each face, judged at its centroid: for pictures only."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,7 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
         threads: Worker threads.
     """
     mesh, required = plan.surface.mesh, plan.requirements
-    scene = Scene(
-        mesh, plan.surface.region, plan.surface.steep, required, 0, threads
-    )
+    scene = Scene(mesh, plan.surface.region, plan.surface.steep, required, 0, threads)
     faces = np.arange(len(mesh.faces))
     centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)
     target = Target(centroids, plan.surface.steep)

@@ -1,4 +1,4 @@
-"""Eq. (2) with margins: what a projector lights, and the first limit that forbids it."""
+"""Eq. (2) with margins: what a projector lights, and which limit forbids it."""
 
 from dataclasses import dataclass
 
@@ -148,7 +148,7 @@ def first_failure(
 def light_sources(
     projector: PlannedProjector, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return where the light of each point leaves the device: its plane or its centre."""
+    """Return where each point's light leaves the device: its plane or centre."""
     pose = projector.world_from_device
     if projector.light == "diverging":
         return pose[:3, 3]
@@ -168,9 +168,7 @@ def margins(light: Light, limits: ProjectorLimits) -> NDArray[np.float64]:
     return np.where(light.tangent_cos > 0, np.minimum(margin, tangent), margin)
 
 
-def served_by(
-    lit: NDArray[np.bool_], margin: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def served_by(lit: NDArray[np.bool_], margin: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the projector that serves each sample, -1 where none lights it.
 
     Args:
@@ -196,5 +194,3 @@ def _in_beam(
     if device.beam_radius is not None:
         inside &= np.hypot(local[:, 0], local[:, 1]) <= device.beam_radius
     return inside
-
-

@@ -183,7 +183,7 @@ def pair_quality(
 def first_pair_failure(
     quality: PairQuality, limits: TriangulationLimits
 ) -> NDArray[np.int8]:
-    """Return the index in `CAUSES` of the first pair limit that fails, or `MEASURED`."""
+    """Return the index in `CAUSES` of the first limit that fails, or `MEASURED`."""
     stage = np.full(len(quality.sigma), MEASURED, dtype=np.int8)
     if limits.min_ring_pitch_px is not None:
         stage[~(quality.pitch >= limits.min_ring_pitch_px)] = SEEN + 2

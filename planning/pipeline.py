@@ -1,4 +1,4 @@
-"""From mesh to checked plan; reads top to bottom like the paper's sections III to VI."""
+"""From mesh to checked plan, read top to bottom like the paper's III to VI."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,6 @@ from .errors import (
     TimeLimitError,
 )
 from .marginal import camera_table, projector_table
-from .ring_axes import widest_gap
 from .plan import FORMAT, VERSION, PlannedCamera, PlannedProjector, RigPlan
 from .progress import Report, Stopwatch
 from .projector_poses import widen_margins
@@ -34,6 +33,7 @@ from .projectors import ProjectorStage, plan_projectors
 from .relaxations import reachability_relaxations
 from .requirements import Requirements
 from .rig import Rig as RigModel
+from .ring_axes import widest_gap
 from .rings import outer_radius, ring_gap, uniform_radii
 from .scene import Scene
 from .seams import overlap_components
@@ -245,7 +245,9 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
         stage = larger(draft.stage, draft.stage.projectors, asked.max_projectors)
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
-            stage = replace(stage, projectors=stage.by_count[stage.certificate["count"]])
+            stage = replace(
+                stage, projectors=stage.by_count[stage.certificate["count"]]
+            )
             projectors, cameras = _placed(
                 draft.order, draft.scene, stage, draft.tilt, clock
             )
@@ -433,9 +435,7 @@ def _document(
         ),
         "camera_groups": [
             [rig.cameras[c].id for c in group]
-            for group in overlap_components(
-                claims.measured_by, samples.weight
-            )
+            for group in overlap_components(claims.measured_by, samples.weight)
         ],
         "cost": cost_entry(rig.cameras, greedy, clock.seconds),
         "members": [

@@ -225,6 +225,9 @@ def _camera(entry: dict[str, Any]) -> PlannedCamera:
     low, high = entry["range_m"]
     k1, k2, p1, p2, k3 = entry["distortion"]
     device = PinholeModel(
-        np.array(entry["K"], dtype=float), (width, height), (low, high), (k1, k2, p1, p2, k3)
+        np.array(entry["K"], dtype=float),
+        (width, height),
+        (low, high),
+        (k1, k2, p1, p2, k3),
     )
     return PlannedCamera(entry["id"], _pose(entry, "world_from_device"), device)

@@ -1,7 +1,7 @@
 """Progress, stage times, and the limits that end a run early."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 from .errors import TimeLimitError
@@ -26,7 +26,7 @@ class Stopwatch:
         self.seconds: dict[str, float] = {}
 
     @contextmanager
-    def stage(self, name: str, line: str) -> Iterator[None]:
+    def stage(self, name: str, line: str) -> Generator[None]:
         """Time a stage; it starts only while there is time left.
 
         Raises:

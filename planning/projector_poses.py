@@ -23,9 +23,7 @@ _PIXEL_MARGIN = 1.0
 _MAX_MOVE_M = 0.3
 
 
-def widen_margins(
-    scene: Scene, stage: ProjectorStage
-) -> tuple[PlannedProjector, ...]:
+def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector, ...]:
     """Return the projectors at the poses where their served samples have most margin.
 
     Each projector in turn solves the pose program over the samples that it serves.

@@ -66,16 +66,13 @@ def plan_projectors(
     candidates = projector_candidates(
         template, required.workspace, n_candidates, ring_offset=ring_offset
     )
-    if not candidates:
-        raise InfeasibleLimitsError(
-            "the workspace holds no position: its floor, cone and shell exclude each "
-            "other; lower the floor or widen the cone"
-        )
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
         raise InfeasibleLimitsError(_nothing_lit(stages, len(candidates)))
-    for attempt in range(1, _ROUNDS + 1):
+    attempt = 0
+    while True:
+        attempt += 1
         selection = select_fewest(
             stages == lighting.LIT,
             required.dominant_coverage,
@@ -86,10 +83,8 @@ def plan_projectors(
         fresh_stages = lit_stages(scene, candidates, fresh)
         lit = fresh_stages == lighting.LIT
         covered = lit[:, selection.chosen].any(axis=1).sum()
-        if (
-            selection.status == "infeasible"
-            or covered >= required.dominant_coverage * lit.any(axis=1).sum()
-        ):
+        confirmed = covered >= required.dominant_coverage * lit.any(axis=1).sum()
+        if confirmed or selection.status == "infeasible" or attempt == _ROUNDS:
             break
         rows = merged(rows, fresh)
         stages = np.concatenate([stages, fresh_stages])
@@ -139,8 +134,8 @@ def _stage(
         candidates,
         rows,
         {
-            count: tuple(candidates[i] for i in chosen)
-            for count, chosen in selection.by_count.items()
+            number: tuple(candidates[i] for i in chosen)
+            for number, chosen in selection.by_count.items()
         },
         proof,
     )

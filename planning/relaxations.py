@@ -32,7 +32,9 @@ def reachability_relaxations(
     limits = scene.requirements.projector
     offers = {
         "projector incidence up to 75 degrees (grazing light: about three times the "
-        "error)": replace(limits, max_incidence=max(limits.max_incidence, _WIDER_INCIDENCE)),
+        "error)": replace(
+            limits, max_incidence=max(limits.max_incidence, _WIDER_INCIDENCE)
+        ),
         "no tangent limit": replace(limits, min_tangent_angle=0.0),
     }
     base = _share(scene, reference, target, limits)

@@ -1,4 +1,4 @@
-"""Turn the ring axes so that no blind curve (|r.m| = 0) crosses what must be measured."""
+"""Turn the ring axes so that no blind curve (r.m = 0) crosses the target."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -62,9 +62,7 @@ class Scene:
         """Return n area-true samples of the whole surface."""
         return self._samples(n, stream, None)
 
-    def _samples(
-        self, n: int, stream: int, within: NDArray[np.bool_] | None
-    ) -> Target:
+    def _samples(self, n: int, stream: int, within: NDArray[np.bool_] | None) -> Target:
         # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.
         seed = int(np.random.SeedSequence([self.seed, stream]).generate_state(1)[0])
         samples = sample_surface(self.mesh, n, seed=seed, within=within)

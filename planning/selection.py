@@ -26,7 +26,7 @@ class Selection:
 
     Attributes:
         chosen: Candidates taken, at most the number allowed, shape (k,).
-        needed: Candidates of the smallest cover found; more than k when it isn't allowed.
+        needed: Candidates of the smallest cover found, allowed or not.
         lower_bound: Proven least number of candidates for these rows.
         status: `optimal`, `feasible` or `infeasible`.
         proof: What proves the bound.
@@ -84,7 +84,9 @@ def select_fewest(
             count,
             warm_start=start,
             seed=seed,
-            budget=DEFAULT_BUDGET if allowed - 1 <= count <= allowed else _MARGINAL_BUDGET,
+            budget=DEFAULT_BUDGET
+            if allowed - 1 <= count <= allowed
+            else _MARGINAL_BUDGET,
         )
         by_count[count] = warm = best.selected
         bounds[count] = best.upper_bound
@@ -177,6 +179,7 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
         return None
     if len(stage.by_count[count]) < count:
         return None
-    proof = stage.certificate | {"count": count, "status": "feasible"}
-    proof["needed"] = proof["needed"] | {"count": count}
+    needed = {**stage.certificate["needed"], "count": count}
+    changed = {"count": count, "status": "feasible", "needed": needed}
+    proof = stage.certificate | changed
     return replace(stage, certificate=proof)  # type: ignore[type-var]

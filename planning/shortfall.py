@@ -1,4 +1,4 @@
-"""Which requirements a plan misses, why, and the smallest relaxation that would help."""
+"""Which requirements a plan misses, why, and what would help."""
 
 import math
 from typing import Any
@@ -35,9 +35,7 @@ def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
     )
 
 
-def shortfalls(
-    document: dict[str, Any], requirements: Requirements
-) -> tuple[str, ...]:
+def shortfalls(document: dict[str, Any], requirements: Requirements) -> tuple[str, ...]:
     """Return one sentence for each requirement that a plan misses.
 
     Args:
@@ -83,8 +81,8 @@ def _lit(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
     needed = document["certificates"]["projectors"]["needed"]
     count = len(document["projectors"])
     line = (
-        f"{count} projector{'s' * (count > 1)} light {_percent(share)} of the reachable "
-        f"target, {_percent(asked.dominant_coverage)} is required"
+        f"{count} projector{'s' * (count > 1)} light {_percent(share)} of the "
+        f"reachable target, {_percent(asked.dominant_coverage)} is required"
     )
     return (f"{line}. What would help: {_more('projectors', needed, asked, share)}",)
 

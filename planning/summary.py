@@ -38,7 +38,9 @@ def _head(plan: RigPlan) -> str:
     document, workspace = plan.document, plan.requirements.workspace
     mesh = document["meshes"][0]
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
-    cut = "; TRUNCATED, not the best that could be found" if document["truncated"] else ""
+    cut = (
+        "; TRUNCATED, not the best that could be found" if document["truncated"] else ""
+    )
     where = (
         "the whole shell about it (no floor)"
         if workspace.half_angle >= np.pi and workspace.floor_m is None
@@ -63,8 +65,8 @@ def _axis(up: Sequence[float]) -> str:
 
 def _devices(plan: RigPlan) -> str:
     lines = [
-        "\n     position x, y, z [mm]            image centre aims along         roll   "
-        "standoff",
+        "\n     position x, y, z [mm]            image centre aims along         roll"
+        "   standoff",
         "                                      azimuth   elevation [deg]     [deg]   "
         "to centre [mm]",
     ]
@@ -139,8 +141,8 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
     candidates, needed = proof["candidates"], proof["needed"]
     count = proof["count"]
     scope = (
-        f"to {verb} {100 * share:g} % of what the {candidates['n_candidates']} candidate "
-        f"poses reach of {proof['n_samples']} samples"
+        f"to {verb} {100 * share:g} % of what the {candidates['n_candidates']} "
+        f"candidate poses reach of {proof['n_samples']} samples"
     )
     name = f"{kind}s"
     if needed["count"] > count:
@@ -152,9 +154,8 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
             f"PROVED   {count} {kind if one else name} {'is' if one else 'are'} the "
             f"fewest {scope}"
         )
-    return (
-        f"BOUND    {count} {name}; at least {candidates['lower_bound']} are needed {scope}"
-    )
+    least = candidates["lower_bound"]
+    return f"BOUND    {count} {name}; at least {least} are needed {scope}"
 
 
 def _coverage(plan: RigPlan) -> str:
@@ -178,8 +179,8 @@ def _coverage(plan: RigPlan) -> str:
     lit = _ratio(target["lit_m2"], target["reachable_by_projectors_m2"])
     measured = _ratio(target["measured_m2"], target["reachable_by_cameras_m2"])
     lines.append(
-        f"COVERAGE lit / reachable by projectors {lit}, measured / reachable by cameras "
-        f"{measured}, on the target, {coverage['samples']} fresh samples"
+        f"COVERAGE lit / reachable by projectors {lit}, measured / reachable by "
+        f"cameras {measured}, on the target, {coverage['samples']} fresh samples"
     )
     left = coverage["uncovered_by_cause"]
     if left:
@@ -219,8 +220,9 @@ def _marginal(plan: RigPlan) -> str:
         ]
         label = kind.removeprefix("n_")
         lines.append(f"         {label:<10} {verb} of the target   {'   '.join(cells)}")
-    return "\nMARGINAL what one more or fewer would change (* as planned)\n" + "\n".join(
-        lines
+    return (
+        "\nMARGINAL what one more or fewer would change (* as planned)\n"
+        + "\n".join(lines)
     )
 
 
@@ -229,8 +231,10 @@ def _check(plan: RigPlan) -> str:
     if check is None:
         return "\nNOT CHECKED (--no-check): no reconstruction from pixels was made"
     limits = plan.requirements.check
-    whole = [f"{100 * c['fraction']:.1f} % within {1e3 * c['threshold_m']:.1f} mm"
-             for c in check["completeness"]]
+    whole = [
+        f"{100 * c['fraction']:.1f} % within {1e3 * c['threshold_m']:.1f} mm"
+        for c in check["completeness"]
+    ]
     verdict = "passed" if check["passed"] else "FAILED"
     return (
         f"\nCHECK    {verdict}: reconstructed from rendered pixels, "

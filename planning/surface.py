@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from geometry.mesh import MeshError, TriangleMesh
 
 from .errors import PlanFileError
-from .files import sha256_of, write_atomically
+from .files import write_atomically
 
 _ARRAYS = (
     "vertices",
@@ -57,7 +57,9 @@ class Surface:
 
     def target_faces(self, target: str) -> NDArray[np.bool_]:
         """Return whether each face is in the target, `dominant` or `surface`."""
-        return self.in_dominant if target == "dominant" else np.ones_like(self.in_dominant)
+        return (
+            self.in_dominant if target == "dominant" else np.ones_like(self.in_dominant)
+        )
 
     def save(self, path: Path) -> None:
         """Write `surface.npz`, byte for byte the same for equal values."""

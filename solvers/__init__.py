@@ -18,7 +18,12 @@ _EXPORTS = {
     "SolveStatus": "status",
     "solve_cover": "cover",
 }
-__all__ = sorted(_EXPORTS)
+__all__ = [
+    "CoverProblem",
+    "CoverSolution",
+    "SolveStatus",
+    "solve_cover",
+]
 
 
 def __getattr__(name: str) -> object:

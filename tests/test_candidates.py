@@ -13,16 +13,19 @@ from planning.candidates import (
     shell_positions,
 )
 from planning.plan import PlannedCamera, PlannedProjector
-from planning.requirements import Workspace
+from planning.requirements import TriangulationLimits, Workspace
 from planning.rings import outer_radius, ring_frame, ring_gap, uniform_radii
-from planning.requirements import TriangulationLimits
 
 CENTRE = (0.1, -0.2, 0.3)
 SHIFTED = PinholeModel(
-    np.array([[1500.0, 0, 511.5], [0, 1500.0, 880.0], [0, 0, 1]]), (1024, 768), (0.9, 2.0)
+    np.array([[1500.0, 0, 511.5], [0, 1500.0, 880.0], [0, 0, 1]]),
+    (1024, 768),
+    (0.9, 2.0),
 )
 CAMERA = PinholeModel(
-    np.array([[3478.0, 0, 1023.5], [0, 3478.0, 767.5], [0, 0, 1]]), (2048, 1536), (0.9, 2)
+    np.array([[3478.0, 0, 1023.5], [0, 3478.0, 767.5], [0, 0, 1]]),
+    (2048, 1536),
+    (0.9, 2),
 )
 BEAM = ParallelModel((1024, 768), 8e-4, (0.4, 2.5))
 
@@ -30,7 +33,17 @@ BEAM = ParallelModel((1024, 768), 8e-4, (0.4, 2.5))
 def workspace(half_angle=np.pi, floor=None, axis=(0.0, -1.0, 0.0), radius=0.2):
     shell = (0.95 + radius, 1.05 + radius)
     return Workspace(
-        CENTRE, radius, (0.0, 0.0, 1.0), axis, half_angle, shell, shell, floor, 1, 1, 0.5
+        CENTRE,
+        radius,
+        (0.0, 0.0, 1.0),
+        axis,
+        half_angle,
+        shell,
+        shell,
+        floor,
+        1,
+        1,
+        0.5,
     )
 
 
@@ -64,7 +77,9 @@ def test_positions_leave_no_gap_in_the_shell():
 @pytest.mark.parametrize("device", [SHIFTED, CAMERA, BEAM])
 def test_the_middle_of_the_image_meets_the_aim(device, roll):
     positions = shell_positions(workspace(), (1.2, 1.2), 50)
-    poses = aimed_poses(positions, np.array(CENTRE), np.array([0, 0, 1.0]), device, roll=roll)
+    poses = aimed_poses(
+        positions, np.array(CENTRE), np.array([0, 0, 1.0]), device, roll=roll
+    )
     for pose, position in zip(poses, positions, strict=True):
         assert np.allclose(pose[:3, :3].T @ pose[:3, :3], np.eye(3), atol=1e-12)
         assert np.linalg.det(pose[:3, :3]) == pytest.approx(1.0)

@@ -120,7 +120,9 @@ def test_beam_ends_at_image_panel_and_largest_ring():
     y, x = np.abs(target.samples.points[:, :2]).T
     limits = replace(LIMITS, max_incidence=np.radians(85.0))
     narrow = PinholeModel(
-        np.array([[1000.0, 0, 199.5], [0, 1000.0, 99.5], [0, 0, 1]]), (400, 200), (0.2, 3)
+        np.array([[1000.0, 0, 199.5], [0, 1000.0, 99.5], [0, 0, 1]]),
+        (400, 200),
+        (0.2, 3),
     )
     lit = stages(diverging([0, 1e-9, 1], device=narrow), plate, target, limits) == LIT
     assert np.array_equal(lit, (x <= 0.2) & (y <= 0.1))
