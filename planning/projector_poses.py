@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
-from solvers.pose_program import PoseProgram, pose_margins, solve_pose
+from solvers.pose_program import PoseProgram, pose_margins, pose_slack, solve_pose
 
 from . import lighting
 from .lighting import Target
@@ -109,7 +109,9 @@ def _improved(
         pose = _part_of_the_way(
             projector.world_from_device, solution.world_from_device, step
         )
-        if not float(pose_margins(program, pose).min()) > before:
+        # On a straight way between two poses the shell may be left in between.
+        inside = float(pose_slack(program, pose).min()) >= 0.0
+        if not (inside and float(pose_margins(program, pose).min()) > before):
             continue
         offered = moved_to(projector, pose)
         lights = _lit(scene, [offered], rows)[:, 0]

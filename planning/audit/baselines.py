@@ -1,6 +1,7 @@
 """Claims of the baseline table: eqs. (9) and (10), row by row."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from geometry.mesh import TriangleMesh
 from planning.plan import PlannedCamera, RigPlan
 
 from .ledger import Ledger, as_number, entries
-from .seams import Section, distance_to_surface, limit_of_row
+from .seams import Section, distance_to_surface, normals_of_row, onward_of_row
 
 # Room for lengths and angles written with a few digits, and for E among them.
 _LENGTH_M = 5e-5
@@ -56,22 +57,31 @@ def _audit_row(
     meeting = _meeting_point(key, row, plan.surface.mesh, ledger)
     if meeting is None:
         return
-    section = Section(camera1, camera2, meeting)
+    normals = normals_of_row(row, meeting, plan.surface.mesh)
+    if normals is None:
+        ledger.fail(
+            f"{key}.normals",
+            f"{row.get('normals')!r} must be two normals of the surface",
+        )
+        return
+    section = Section(camera1, camera2, meeting, normals)
+    if row.get("onward") is not None:
+        onward = onward_of_row(row, section)
+        if onward is None:
+            ledger.fail(f"{key}.onward", f"{row['onward']!r} isn't along the surface")
+            return
+        section = replace(section, onward=onward)
     for name, value in section.lengths().items():
         claimed = row.get(name)
         if name == "d_axial" and as_number(claimed) is not None:
             claimed = abs(row[name])
         ledger.number(f"{key}.{name}", claimed, value, _LENGTH_M, "m")
-    phi = section.phi
-    ledger.number(f"{key}.phi", row.get("phi"), phi, _ANGLE, "rad")
-    limit = limit_of_row(section, row, plan)
-    if limit is None:
-        ledger.fail(
-            f"{key}.normals",
-            f"{row.get('normals')!r} must be two normals of the surface",
-        )
-    else:
-        ledger.number(f"{key}.phi_max", row.get("phi_max"), limit, _ANGLE, "rad")
+    ledger.number(f"{key}.phi", row.get("phi"), section.phi, _ANGLE, "rad")
+    largest = plan.requirements.camera.max_incidence
+    room = min(section.field_slack(), section.incidence_slack(largest))
+    ledger.number(
+        f"{key}.phi_max", row.get("phi_max"), section.phi + room, _ANGLE, "rad"
+    )
     _audit_limit(key, row, section, ledger)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import TriangleMesh
-from planning.plan import PlannedCamera, RigPlan
+from planning.plan import PlannedCamera
 
 from .optics import in_image, pixels_of
 
@@ -30,15 +30,23 @@ class Section:
 
     so that phi_max - phi = min(b_2 - beta_2, theta_2 - iota_2). Source: eqs. (9), (10).
 
+    The turns are added one by one: round a sharp edge their sum passes pi, and where
+    the lines of sight cross it is negative.
+
     Attributes:
         camera1: First camera, held where it stands.
         camera2: Second camera, which could stand farther away.
         meeting: E, shape (3,) [m].
+        normals: Normals at E on camera 1's and on camera 2's side, shape (2, 3).
+        onward: Along the surface from camera 1's stretch into camera 2's, shape (3,);
+            None: turning leads from O1 to O2 the short way.
     """
 
     camera1: PlannedCamera
     camera2: PlannedCamera
     meeting: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    onward: NDArray[np.float64] | None = None
 
     @property
     def to_first(self) -> NDArray[np.float64]:
@@ -52,15 +60,22 @@ class Section:
 
     @cached_property
     def pole(self) -> NDArray[np.float64]:
-        """Unit normal of the plane; turning about it leads from O1 to O2, (3,)."""
+        """Unit normal of the plane; turning about it leads N1 towards onward, (3,)."""
         pole = np.cross(self.to_first, self.to_second)
-        return pole / np.linalg.norm(pole)
+        pole = pole / np.linalg.norm(pole)
+        if self.onward is None:
+            return pole
+        return pole if np.cross(self.normals[0], self.onward) @ pole >= 0.0 else -pole
 
     @property
     def phi(self) -> float:
-        """Angle O1 E O2 in [rad]."""
-        across = np.linalg.norm(np.cross(self.to_first, self.to_second))
-        return float(np.arctan2(across, self.to_first @ self.to_second))
+        """Signed angle O1 E O2 in [rad]: iota_1 + delta_E + iota_2."""
+        first, second = self.normals
+        return (
+            self._turn(self.to_first, first)
+            + self._turn(first, second)
+            + self._turn(second, self.to_second)
+        )
 
     def lengths(self) -> dict[str, float]:
         """Return D1, D2, d, d_lateral and d_axial in [m].
@@ -83,11 +98,14 @@ class Section:
         d1, d2 = np.linalg.norm(self.to_first), np.linalg.norm(self.to_second)
         return float(np.sqrt(d1 * d1 + d2 * d2 - 2.0 * d1 * d2 * np.cos(phi)))
 
-    def turn_to_second(self, direction: NDArray[np.float64]) -> float:
-        """Return the signed angle from a direction, projected, to u2 in [rad]."""
-        flat = direction - (direction @ self.pole) * self.pole
-        across = np.cross(flat, self.to_second) @ self.pole
-        return float(np.arctan2(across, flat @ self.to_second))
+    def incidence_slack(self, largest: float) -> float:
+        """Return theta_2 - iota_2 in [rad]."""
+        return largest - self._turn(self.normals[1], self.to_second)
+
+    def _turn(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> float:
+        """Signed angle between projections of two directions, in (-pi, pi]."""
+        flat, other = (v - (v @ self.pole) * self.pole for v in (start, end))
+        return float(np.arctan2(np.cross(flat, other) @ self.pole, flat @ other))
 
     def field_slack(self) -> float:
         """Return b_2 - beta_2: how far E may turn until camera 2's image ends [rad].
@@ -124,32 +142,19 @@ class Section:
         return inside
 
 
-def limit_of_row(
-    section: Section, row: Mapping[str, Any], plan: RigPlan
-) -> float | None:
-    """Return phi_max of a row of the table in [rad]; None if its normals are strange.
-
-    The row says which normals meet at E (on camera 1's side, on camera 2's); both must
-    be those of faces beside E. Without them the nearest face serves.
-    """
-    normal = _second_normal(section.meeting, row, plan.surface.mesh)
-    if normal is None:
-        return None
-    incidence = plan.requirements.camera.max_incidence - section.turn_to_second(normal)
-    return section.phi + min(section.field_slack(), incidence)
-
-
-def _second_normal(
-    meeting: NDArray[np.float64], row: Mapping[str, Any], mesh: TriangleMesh
+def normals_of_row(
+    row: Mapping[str, Any], meeting: NDArray[np.float64], mesh: TriangleMesh
 ) -> NDArray[np.float64] | None:
+    """Return the normals that meet at E, shape (2, 3); None if they are strange.
+
+    The row names them, camera 1's side first; both must be those of faces beside E.
+    Where it names none the nearest face serves for both.
+    """
     apart = np.linalg.norm(mesh.face_centroids - meeting, axis=1)
     if row.get("normals") is None:
-        return mesh.face_normals[np.argmin(apart)]
-    try:
-        normals = np.asarray(row["normals"], dtype=np.float64)
-    except (TypeError, ValueError):
-        return None
-    if normals.shape != (2, 3):
+        return np.tile(mesh.face_normals[np.argmin(apart)], (2, 1))
+    normals = _vectors(row["normals"], (2, 3))
+    if normals is None:
         return None
     reach = np.linalg.norm(mesh.corners - mesh.face_centroids[:, None], axis=2).max(
         axis=1
@@ -158,7 +163,31 @@ def _second_normal(
     for normal in normals:
         if not np.any(np.abs(beside - normal).max(axis=1) <= 1e-3):
             return None
-    return normals[1]
+    return normals
+
+
+def onward_of_row(
+    row: Mapping[str, Any], section: Section
+) -> NDArray[np.float64] | None:
+    """Return the row's direction along the surface; None if it isn't one.
+
+    It must be a unit vector in the plane O1, E, O2, square to the projection of N1.
+    """
+    onward = _vectors(row.get("onward"), (3,))
+    if onward is None:
+        return None
+    out = section.normals[0] - (section.normals[0] @ section.pole) * section.pole
+    size = float(np.linalg.norm(out))
+    square = max(abs(onward @ section.pole), abs(onward @ out) / max(size, 1e-9))
+    return onward if abs(np.linalg.norm(onward) - 1.0) <= 1e-3 >= square else None
+
+
+def _vectors(value: object, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+    try:
+        vectors = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return vectors if vectors.shape == shape and np.isfinite(vectors).all() else None
 
 
 def distance_to_surface(mesh: TriangleMesh, point: NDArray[np.float64]) -> float:
