@@ -33,6 +33,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     report = _report(quiet=options["quiet"])
     path = Path(options["meshes"][0])
     rig = load_rig(options["rig_name"], light=options["light"])
+    if report is not None:
+        report(f"reading {path}")
     mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
     _check_writable(folder)

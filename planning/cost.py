@@ -25,8 +25,8 @@ def cost_entry(
     Args:
         cameras: As planned.
         n_before: Cameras of the greedy cover.
-        seconds: Measured times, with keys `render`, `decode`, `merge`, `projectors`
-            and `cameras`.
+        seconds: Measured times in [s]: `projectors` and `cameras`, and where a check
+            was made processor times of `render`, `decode` and `merge`.
     """
     sizes = [c.device.resolution[0] * c.device.resolution[1] for c in cameras]
     pixels = sum(sizes)

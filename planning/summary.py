@@ -51,11 +51,17 @@ def _head(plan: RigPlan) -> str:
     return (
         f"PLAN     {len(plan.projectors)} projectors, {len(plan.cameras)} cameras for "
         f"{mesh['path']}{cut}\n"
-        f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, unit "
-        f"{mesh['unit']}, up {_axis(workspace.up)}; rig {document['rig']['name']}, "
+        f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
+        f"{_unit(mesh)}, up {_axis(workspace.up)}; rig {document['rig']['name']}, "
         f"{document['rig']['light']} light\n"
         f"         devices may stand in {where}"
     )
+
+
+def _unit(mesh: dict[str, Any]) -> str:
+    if mesh["unit"] == "size_mm":
+        return f"scaled to that size ({1e3 * mesh['scale_to_m']:.6g} mm a file unit)"
+    return f"unit {mesh['unit']}"
 
 
 def _axis(up: Sequence[float]) -> str:

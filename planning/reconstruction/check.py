@@ -1,8 +1,11 @@
 """The check of a plan from pixels: render, decode, triangulate, merge, compare."""
 
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +69,8 @@ def reconstruct_plan(
     """
     light = photometry or Photometry()
     samples, predicted = _target_samples(plan, samples, predicted, seed)
-    decoded = _decode_pairs(plan, truth or plan, light, seed, threads, progress)
+    spent = _Spent()
+    decoded = _decode_pairs(plan, truth or plan, light, seed, threads, progress, spent)
     parts = [
         replace(
             pair.cloud,
@@ -77,7 +81,8 @@ def reconstruct_plan(
     ]
     everything = Cloud.join(parts)
     gap_m, pitch_px = _ring_gap(plan, everything)
-    merged = merge(everything, gap_m=gap_m, pitch_px=pitch_px)
+    with spent.on("merge"):
+        merged = merge(everything, gap_m=gap_m, pitch_px=pitch_px)
     limits = plan.requirements.check
     mesh = plan.surface.mesh
     completeness = measure_completeness(
@@ -105,6 +110,7 @@ def reconstruct_plan(
         tuple(_count(plan, p, c, pair) for (p, c), pair in decoded),
         light,
         failures,
+        spent.seconds,
     )
 
 
@@ -137,6 +143,7 @@ def _decode_pairs(
     seed: int,
     threads: int,
     progress: Progress | None,
+    spent: "_Spent",
 ) -> list[tuple[tuple[int, int], Decoded]]:
     """Render and decode every pair; the order, and every number, is always the same."""
     mesh = truth.surface.mesh
@@ -154,7 +161,8 @@ def _decode_pairs(
 
     def look(c: int) -> View | None:
         camera = standing.get(believed[c].id)
-        return camera and view(camera, mesh, caster, photometry)
+        with spent.on("render"):
+            return camera and view(camera, mesh, caster, photometry)
 
     def measure(pair: tuple[int, int]) -> Decoded:
         p, c = pair
@@ -163,22 +171,41 @@ def _decode_pairs(
         if seen is None or projector is None:
             return Decoded.nothing()
         patterns = ring_patterns(design, radii[p], believed[c])
-        frames = render_pair(
-            seen, projector, design, patterns, caster, photometry, (seed, p, c)
-        )
-        return decode(
-            frames,
-            patterns,
-            PairCalibration(design, believed[c]),
-            min_conditioning=requirements.triangulation.min_conditioning,
-            max_slant=max_slant,
-        )
+        with spent.on("render"):
+            frames = render_pair(
+                seen, projector, design, patterns, caster, photometry, (seed, p, c)
+            )
+        with spent.on("decode"):
+            return decode(
+                frames,
+                patterns,
+                PairCalibration(design, believed[c]),
+                min_conditioning=requirements.triangulation.min_conditioning,
+                max_slant=max_slant,
+            )
 
     pairs = [(p, c) for c in range(len(believed)) for p in range(len(designed))]
     with ThreadPoolExecutor(threads) as pool:
         views = list(pool.map(look, range(len(believed))))
         done = list(_reported(pool.map(measure, pairs), len(pairs), progress))
     return list(zip(pairs, done, strict=True))
+
+
+class _Spent:
+    """Processor time by stage, over all threads: what eq. (8) calls t1, t2 and t3."""
+
+    def __init__(self) -> None:
+        self.seconds = {"render": 0.0, "decode": 0.0, "merge": 0.0}
+        self._lock = Lock()
+
+    @contextmanager
+    def on(self, stage: str) -> Generator[None]:
+        begin = time.thread_time()
+        try:
+            yield
+        finally:
+            with self._lock:
+                self.seconds[stage] += time.thread_time() - begin
 
 
 def _reported(

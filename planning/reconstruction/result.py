@@ -42,6 +42,7 @@ class Reconstruction:
         pairs: What each pair gave.
         photometry: The simulated light and sensor.
         failures: One sentence for each limit that isn't kept.
+        seconds: Processor time of `render`, `decode` and `merge` over all pairs [s].
     """
 
     everything: Cloud
@@ -51,6 +52,7 @@ class Reconstruction:
     pairs: tuple[PairCount, ...]
     photometry: Photometry
     failures: tuple[str, ...]
+    seconds: dict[str, float]
 
     @property
     def passed(self) -> bool:
