@@ -19,7 +19,7 @@ _SURFACE_STREAM = 901
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class Devices:
     """The devices of a plan and the reference sets that reachability refers to."""
 
     projectors: tuple[PlannedProjector, ...]
@@ -74,27 +74,27 @@ class Claims:
     measured_by: NDArray[np.bool_]
 
 
-def make_claims(scene: Scene, rig: Rig) -> Claims:
+def make_claims(scene: Scene, devices: Devices) -> Claims:
     """Recompute every area from poses as they will be written."""
     target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
     weight = target.samples.weight
-    stages = _light_stages(scene, rig.projectors, target)
+    stages = _light_stages(scene, devices.projectors, target)
     lit = stages == lighting.LIT
-    seen = _measured_by(scene, rig, target, lit)
+    seen = _measured_by(scene, devices, target, lit)
     measured = _any(seen)
-    reachable, furthest = _reachable_by_projectors(scene, rig, target, _any(lit))
-    areas = _areas(scene, rig, target, reachable, lit, measured)
-    served = lighting.served_by(lit, _margins(scene, rig.projectors, target))
+    reachable, furthest = _reachable_by_projectors(scene, devices, target, _any(lit))
+    areas = _areas(scene, devices, target, reachable, lit, measured)
+    served = lighting.served_by(lit, _margins(scene, devices.projectors, target))
     return Claims(
-        _surface_areas(scene, rig),
+        _surface_areas(scene, devices),
         areas,
-        _by_cause(_uncovered(scene, rig, target, stages, measured), weight),
+        _by_cause(_uncovered(scene, devices, target, stages, measured), weight),
         _by_cause([lighting.CAUSES[stage] for stage in furthest[~reachable]], weight),
         tuple(weight * lit.sum(axis=0)),
-        _least_margins(scene, rig, target, served),
+        _least_margins(scene, devices, target, served),
         tuple(weight * seen.sum(axis=0)),
         tuple(weight * (seen & (seen.sum(axis=1) == 1)[:, None]).sum(axis=0)),
-        _regions(scene, rig, target, lit, served),
+        _regions(scene, devices, target, lit, served),
         target,
         seen,
     )
@@ -112,7 +112,7 @@ def measured_area(
     projectors: Sequence[PlannedProjector],
     cameras: Sequence[PlannedCamera],
 ) -> tuple[float, float]:
-    """Return the area of target and surface that a rig measures, in [m²]."""
+    """Return the area of target and surface that devices measure, in [m²]."""
 
     def measured(target: Target) -> NDArray[np.bool_]:
         rows = lit_samples(scene, projectors, target)
@@ -132,17 +132,17 @@ def _union(
     return a, b
 
 
-def _surface_areas(scene: Scene, rig: Rig) -> Areas:
+def _surface_areas(scene: Scene, devices: Devices) -> Areas:
     surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
-    lit = _light_stages(scene, rig.projectors, surface) == lighting.LIT
-    measured = _any(_measured_by(scene, rig, surface, lit))
-    reachable, _ = _reachable_by_projectors(scene, rig, surface, _any(lit))
-    return _areas(scene, rig, surface, reachable, lit, measured)
+    lit = _light_stages(scene, devices.projectors, surface) == lighting.LIT
+    measured = _any(_measured_by(scene, devices, surface, lit))
+    reachable, _ = _reachable_by_projectors(scene, devices, surface, _any(lit))
+    return _areas(scene, devices, surface, reachable, lit, measured)
 
 
 def _areas(
     scene: Scene,
-    rig: Rig,
+    devices: Devices,
     target: Target,
     reachable: NDArray[np.bool_],
     lit: NDArray[np.bool_],
@@ -150,11 +150,11 @@ def _areas(
 ) -> Areas:
     weight = target.samples.weight
     by_cameras = measured.copy()
-    for camera in rig.reference_cameras:
+    for camera in devices.reference_cameras:
         left = np.flatnonzero(_any(lit) & ~by_cameras)
         if not len(left):
             break
-        rows = _lit_rows(rig.projectors, target.take(left), lit[left])
+        rows = _lit_rows(devices.projectors, target.take(left), lit[left])
         by_cameras[left] = measured_by(scene, [camera], rows)[:, 0]
     counts = (
         len(target),
@@ -195,18 +195,20 @@ def _lit_rows(
 
 
 def _measured_by(
-    scene: Scene, rig: Rig, target: Target, lit: NDArray[np.bool_]
+    scene: Scene, devices: Devices, target: Target, lit: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    return measured_by(scene, rig.cameras, _lit_rows(rig.projectors, target, lit))
+    return measured_by(
+        scene, devices.cameras, _lit_rows(devices.projectors, target, lit)
+    )
 
 
 def _reachable_by_projectors(
-    scene: Scene, rig: Rig, target: Target, lit: NDArray[np.bool_]
+    scene: Scene, devices: Devices, target: Target, lit: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
     """Which samples some pose lights, and how far the others came over all poses."""
     reachable = lit.copy()
     furthest = np.zeros(len(target), dtype=np.int8)
-    for projector in rig.reference_projectors:
+    for projector in devices.reference_projectors:
         left = np.flatnonzero(~reachable)
         if not len(left):
             break
@@ -229,18 +231,18 @@ def _margins(
 
 
 def _least_margins(
-    scene: Scene, rig: Rig, target: Target, served: NDArray[np.int64]
+    scene: Scene, devices: Devices, target: Target, served: NDArray[np.int64]
 ) -> tuple[float, ...]:
-    margin = _margins(scene, rig.projectors, target)
+    margin = _margins(scene, devices.projectors, target)
     return tuple(
         float(margin[served == p, p].min()) if np.any(served == p) else 0.0
-        for p in range(len(rig.projectors))
+        for p in range(len(devices.projectors))
     )
 
 
 def _uncovered(
     scene: Scene,
-    rig: Rig,
+    devices: Devices,
     target: Target,
     stages: NDArray[np.int8],
     measured: NDArray[np.bool_],
@@ -250,10 +252,10 @@ def _uncovered(
     dark = ~_any(lit)
     causes = [lighting.CAUSES[stage] for stage in stages[dark].max(axis=1)]
     left = np.flatnonzero(_any(lit) & ~measured)
-    rows = _lit_rows(rig.projectors, target.take(left), lit[left])
+    rows = _lit_rows(devices.projectors, target.take(left), lit[left])
     furthest = np.zeros(len(left), dtype=np.int8)
     required = scene.requirements
-    for camera in rig.cameras:
+    for camera in devices.cameras:
         seen = measurability.view(
             camera, rows.target, required.camera, scene.visibility
         )
@@ -285,7 +287,7 @@ def _by_cause(causes: list[str], weight: float) -> dict[str, float]:
 
 def _regions(
     scene: Scene,
-    rig: Rig,
+    devices: Devices,
     target: Target,
     lit: NDArray[np.bool_],
     served: NDArray[np.int64],
@@ -297,6 +299,6 @@ def _regions(
         by = np.unique(served[inside & (served >= 0)])
         share = float(lit[inside].any(axis=1).mean()) if inside.any() else 0.0
         entries.append(
-            {"lit_by": [rig.projectors[p].id for p in by], "lit_fraction": share}
+            {"lit_by": [devices.projectors[p].id for p in by], "lit_fraction": share}
         )
     return tuple(entries)

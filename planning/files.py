@@ -3,7 +3,8 @@
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import BinaryIO
 
@@ -15,17 +16,29 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
         path: Where the file goes; its folder must exist.
         write: Receives the open binary file.
     """
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+    write_together({path: write})
+
+
+def write_together(files: Mapping[Path, Callable[[BinaryIO], object]]) -> None:
+    """Write files that belong to each other; none is moved before all are complete.
+
+    Args:
+        files: For each path what receives the open binary file; folders must exist.
+    """
+    with ExitStack() as undo:
+        complete: list[tuple[str, Path]] = []
+        for path, write in files.items():
+            handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+            undo.callback(Path(name).unlink, missing_ok=True)
+            with os.fdopen(handle, "wb") as file:
+                write(file)
+            # mkstemp lets only the owner read; give what a plain open would have given.
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(name, 0o666 & ~umask)
+            complete.append((name, path))
+        for name, path in complete:
+            os.replace(name, path)
 
 
 def sha256_of(path: Path) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from .claims import Claims, Rig, lit_area, measured_area
+from .claims import Claims, Devices, lit_area, measured_area
 from .plan import PlannedCamera, PlannedProjector
 from .scene import Scene
 
@@ -12,14 +12,14 @@ _D = TypeVar("_D")
 
 def projector_table(
     scene: Scene,
-    rig: Rig,
+    devices: Devices,
     by_count: Mapping[int, Sequence[PlannedProjector]],
     claims: Claims,
 ) -> list[dict[str, Any]]:
     """Return the lit areas with 1, 2, ... projectors, on the claims' own samples."""
     areas = _areas(
         by_count,
-        len(rig.projectors),
+        len(devices.projectors),
         (claims.target.lit_m2, claims.surface.lit_m2),
         lambda projectors: lit_area(scene, projectors),
     )
@@ -31,16 +31,16 @@ def projector_table(
 
 def camera_table(
     scene: Scene,
-    rig: Rig,
+    devices: Devices,
     by_count: Mapping[int, Sequence[PlannedCamera]],
     claims: Claims,
 ) -> list[dict[str, Any]]:
     """Return the measured areas with 1, 2, ... cameras, given the projectors."""
     areas = _areas(
         by_count,
-        len(rig.cameras),
+        len(devices.cameras),
         (claims.target.measured_m2, claims.surface.measured_m2),
-        lambda cameras: measured_area(scene, rig.projectors, cameras),
+        lambda cameras: measured_area(scene, devices.projectors, cameras),
     )
     return [
         {"n_cameras": n, "measured_target_m2": target, "measured_surface_m2": surface}

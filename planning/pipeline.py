@@ -1,8 +1,7 @@
 """From mesh to checked plan, read top to bottom like the paper's III to VI."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -13,79 +12,36 @@ from geometry.curvature import principal_curvatures
 from geometry.mesh import TriangleMesh
 from geometry.regions import DominantRegions, dominant_regions
 
-from . import document as write
-from .baselines import baseline_rows
+from .assemble import falls_short, write_plan
 from .camera_stage import place_cameras, spread
 from .cameras import CameraStage
-from .claims import Claims, Rig, make_claims
 from .cost import cost_entry
+from .draft import Draft, Order
 from .errors import (
     InputError,
     InterruptedPlanError,
     RequirementError,
     TimeLimitError,
 )
-from .marginal import camera_table, projector_table
-from .plan import FORMAT, VERSION, PlannedCamera, PlannedProjector, RigPlan
+from .plan import PlannedCamera, PlannedProjector, RigPlan
 from .progress import Report, Stopwatch
 from .projector_poses import widen_margins
 from .projectors import ProjectorStage, plan_projectors
-from .relaxations import reachability_relaxations
 from .requirements import Requirements
-from .rig import Rig as RigModel
-from .ring_axes import widest_gap
+from .rig import Rig
 from .rings import outer_radius, ring_gap, uniform_radii
 from .scene import Scene
-from .seams import overlap_components
 from .selection import larger
 from .shortfall import shortfalls
-from .surface import Surface
 from .verification import verify_plan
 
 # Upwards in the image: where the ring axis points until the cameras are known.
 _FIRST_AZIMUTH = -float(np.pi / 2)
 
 
-@dataclass(frozen=True, eq=False)
-class Order:
-    """What was ordered: the mesh, the rig, and how to go about it.
-
-    Attributes:
-        mesh: The surface.
-        rig: Devices and limits.
-        asked: Keyword arguments of `Rig.requirements`.
-        seed: Of every random draw.
-        threads: Worker threads.
-        command: Words of the command line, for the record.
-    """
-
-    mesh: TriangleMesh
-    rig: RigModel
-    asked: dict[str, Any]
-    seed: int
-    threads: int
-    command: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Draft:
-    """All stages as far as they came; enough to write a plan from."""
-
-    order: Order
-    scene: Scene
-    regions: DominantRegions
-    curvature_radius_m: float
-    tilt: float
-    stage: ProjectorStage
-    projectors: tuple[PlannedProjector, ...]
-    camera_stage: CameraStage
-    cameras: tuple[PlannedCamera, ...]
-    truncated: bool = False
-
-
 def plan_rig(
     mesh: TriangleMesh | Sequence[TriangleMesh],
-    rig: RigModel,
+    rig: Rig,
     *,
     max_projectors: int,
     max_cameras: int | None = None,
@@ -162,10 +118,10 @@ def _plan(order: Order, clock: Stopwatch, *, check: bool) -> RigPlan:
     draft = _first_draft(order, clock)
     try:
         draft = _polish(draft, clock)
-        plan = _write(draft, clock)
-        while (larger := _one_more(draft, plan, clock)) is not None:
-            draft = _polish(larger, clock)
-            plan = _write(draft, clock)
+        plan = write_plan(draft, clock)
+        while (more := _one_more(draft, plan, clock)) is not None:
+            draft = _polish(more, clock)
+            plan = write_plan(draft, clock)
         return _checked(plan, draft, clock) if check else plan
     except (KeyboardInterrupt, TimeLimitError) as cut:
         return _interrupted(draft, clock, cut)
@@ -241,7 +197,9 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
     The proved bound stays what it is; the count is then above it, and says so.
     """
     asked, areas = plan.requirements, plan.coverage["target"]
-    if _short(areas, "lit_m2", "reachable_by_projectors_m2", asked.dominant_coverage):
+    if falls_short(
+        areas, "lit_m2", "reachable_by_projectors_m2", asked.dominant_coverage
+    ):
         stage = larger(draft.stage, draft.stage.projectors, asked.max_projectors)
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
@@ -258,7 +216,7 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
                 camera_stage=cameras,
                 cameras=cameras.cameras,
             )
-    if _short(areas, "measured_m2", "reachable_by_cameras_m2", asked.coverage):
+    if falls_short(areas, "measured_m2", "reachable_by_cameras_m2", asked.coverage):
         cameras = larger(draft.camera_stage, draft.cameras, asked.max_cameras)
         if cameras is not None:
             clock.say("  fresh samples fall short: one camera more")
@@ -266,10 +224,6 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
             cameras = replace(cameras, cameras=chosen)
             return replace(draft, camera_stage=cameras, cameras=chosen)
     return None
-
-
-def _short(areas: dict[str, float], part: str, whole: str, share: float) -> bool:
-    return areas[part] < share * areas[whole]
 
 
 def _polish(draft: Draft, clock: Stopwatch) -> Draft:
@@ -289,7 +243,7 @@ def _interrupted(
 ) -> RigPlan:
     """Write the best plan so far, marked truncated."""
     clock.lift()
-    plan = _write(replace(draft, truncated=True), clock)
+    plan = write_plan(replace(draft, truncated=True), clock)
     if isinstance(cut, KeyboardInterrupt):
         raise InterruptedPlanError(plan) from None
     return plan
@@ -318,137 +272,6 @@ def _resolve(order: Order) -> tuple[Requirements, Any, float]:
     radii = uniform_radii(outer, gap if parallel else gap / rig.standoff_m)
     workspace = replace(workspace, reference_ring_radius=float(radii[-1]))
     return replace(requirements, workspace=workspace), radii, tilt
-
-
-def _write(draft: Draft, clock: Stopwatch) -> RigPlan:
-    """Round the poses, recompute every claim from them, and write the document."""
-    projectors = tuple(
-        write.rounded_projector(p, f"P{i}") for i, p in enumerate(draft.projectors, 1)
-    )
-    cameras = tuple(
-        write.rounded_camera(c, f"C{i}") for i, c in enumerate(draft.cameras, 1)
-    )
-    reference = tuple(write.rounded_projector(p, "") for p in draft.stage.reference)
-    reference_cameras = tuple(
-        write.rounded_camera(c, "") for c in draft.camera_stage.reference
-    )
-    rig = Rig(projectors, cameras, reference, reference_cameras)
-    scene = draft.scene
-    with clock.stage("claims", "coverage, recomputed from the rounded poses"):
-        claims = make_claims(scene, rig)
-        marginal = [
-            *projector_table(scene, rig, draft.stage.by_count, claims),
-            *camera_table(scene, rig, draft.camera_stage.by_count, claims),
-        ]
-    surface = Surface(
-        scene.mesh,
-        np.zeros(len(scene.mesh.faces), dtype=np.int64),
-        scene.region,
-        scene.steep,
-        np.stack([p.world_from_device for p in reference]),
-        np.stack([p.world_from_ring for p in reference]),
-        np.stack([c.world_from_device for c in reference_cameras]),
-    )
-    requirements = _final_requirements(draft, claims, rig)
-    document = _document(draft, clock, rig, claims, requirements, marginal, surface)
-    plan = RigPlan(document, surface)
-    areas = document["coverage"]["target"]
-    reachable, whole = "reachable_by_projectors_m2", "area_m2"
-    if _short(areas, reachable, whole, requirements.min_reachable):
-        with clock.stage("relaxations", "what would help"):
-            document["coverage"]["relaxations"] = reachability_relaxations(
-                scene, reference
-            )
-    return plan
-
-
-def _final_requirements(draft: Draft, claims: Claims, rig: Rig) -> Requirements:
-    """State tau, one ring gap, and the reference sets as they are."""
-    requirements = draft.scene.requirements
-    workspace = replace(
-        requirements.workspace,
-        n_reference_projectors=len(rig.reference_projectors),
-        n_reference_cameras=len(rig.reference_cameras),
-    )
-    gap = widest_gap(draft.scene, rig.projectors, claims.target_samples)
-    check = replace(requirements.check, tau_m=round(gap, 6))
-    return replace(requirements, workspace=workspace, check=check)
-
-
-def _document(
-    draft: Draft,
-    clock: Stopwatch,
-    rig: Rig,
-    claims: Claims,
-    requirements: Requirements,
-    marginal: list[dict[str, Any]],
-    surface: Surface,
-) -> dict[str, Any]:
-    samples = claims.target_samples.samples
-    coverage = write.coverage_entry(claims)
-    regions = [
-        {
-            "id": region.id,
-            "area_m2": region.area_m2,
-            "n_faces": len(region.faces),
-            "mean_normal": region.mean_normal.tolist(),
-            "cone_angle": region.cone_angle,
-            "mean_curvedness": region.mean_curvedness,
-            **entry,
-        }
-        for region, entry in zip(draft.regions, claims.regions, strict=True)
-    ]
-    greedy = draft.camera_stage.certificate["greedy_count"]
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "units": {"length": "m", "angle": "rad"},
-        "seed": draft.order.seed,
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": list(draft.order.command),
-        "truncated": draft.truncated,
-        "meshes": [write.mesh_entry(draft.scene.mesh)],
-        "surface": {
-            "path": "surface.npz",
-            "sha256": surface.sha256(),
-            "curvature_radius_m": draft.curvature_radius_m,
-            "dominant_share": draft.regions.dominant_share,
-        },
-        "rig": draft.order.rig.to_document(),
-        "requirements": requirements.to_document(),
-        "regions": regions,
-        "projectors": write.projector_entries(rig.projectors, claims),
-        "cameras": write.camera_entries(rig.cameras, claims),
-        "coverage": coverage,
-        "marginal": marginal,
-        "certificates": {
-            "projectors": draft.stage.certificate,
-            "cameras": draft.camera_stage.certificate,
-        },
-        "baselines": baseline_rows(
-            rig.cameras,
-            samples.points,
-            samples.normals,
-            claims.measured_by,
-            samples.weight,
-            requirements.camera.max_incidence,
-        ),
-        "camera_groups": [
-            [rig.cameras[c].id for c in group]
-            for group in overlap_components(claims.measured_by, samples.weight)
-        ],
-        "cost": cost_entry(rig.cameras, greedy, clock.seconds),
-        "members": [
-            {
-                "mesh": 0,
-                "coverage": coverage,
-                "regions": [region["id"] for region in regions],
-                "reconstruction": None,
-            }
-        ],
-        "reconstruction": None,
-        "timings_s": dict(clock.seconds),
-    }
 
 
 def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 
 from .errors import PlanFileError
-from .files import sha256_of, write_atomically
+from .files import sha256_of, write_together
 from .requirements import Requirements
 from .surface import Surface
 
@@ -126,17 +126,19 @@ class RigPlan:
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         surface = path.parent / self.document["surface"]["path"]
-        if not surface.exists() or sha256_of(surface) != self._surface_sha256:
-            self.surface.save(surface)
-        write_atomically(path, lambda file: file.write(self.to_json().encode()))
+        write_together(
+            {
+                surface: lambda file: file.write(self.surface.content),
+                path: lambda file: file.write(self.to_json().encode()),
+            }
+        )
 
     def to_json(self) -> str:
         """Return the document as JSON text."""
-        return json.dumps(self.document, indent=1, allow_nan=False) + "\n"
-
-    @property
-    def _surface_sha256(self) -> str:
-        return self.document["surface"]["sha256"]
+        # A surface that was read may be packed otherwise by this numpy.
+        packed = self.document["surface"] | {"sha256": self.surface.sha256()}
+        document = self.document | {"surface": packed}
+        return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from geometry.mesh import MeshError, TriangleMesh
 
 from .errors import PlanFileError
-from .files import write_atomically
 
 _ARRAYS = (
     "vertices",
@@ -61,16 +60,13 @@ class Surface:
             self.in_dominant if target == "dominant" else np.ones_like(self.in_dominant)
         )
 
-    def save(self, path: Path) -> None:
-        """Write `surface.npz`, byte for byte the same for equal values."""
-        write_atomically(path, lambda file: file.write(self._bytes))
-
     def sha256(self) -> str:
-        """Return the digest of the file that `save` writes."""
-        return hashlib.sha256(self._bytes).hexdigest()
+        """Return the hexadecimal SHA-256 digest of `content`."""
+        return hashlib.sha256(self.content).hexdigest()
 
     @cached_property
-    def _bytes(self) -> bytes:
+    def content(self) -> bytes:
+        """What `surface.npz` holds, the same bytes for equal values."""
         buffer = BytesIO()
         np.savez_compressed(
             buffer,

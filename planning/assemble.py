@@ -1,0 +1,157 @@
+"""Turns a draft into a plan: poses rounded, every claim recomputed from them."""
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from . import document as entries
+from .baselines import baseline_rows
+from .claims import Claims, Devices, make_claims
+from .cost import cost_entry
+from .draft import Draft
+from .marginal import camera_table, projector_table
+from .plan import FORMAT, VERSION, RigPlan
+from .progress import Stopwatch
+from .relaxations import reachability_relaxations
+from .requirements import Requirements
+from .ring_axes import widest_gap
+from .seams import overlap_components
+from .surface import Surface
+
+
+def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
+    """Round the poses, recompute every claim from them, and write the document."""
+    projectors = tuple(
+        entries.rounded_projector(p, f"P{i}") for i, p in enumerate(draft.projectors, 1)
+    )
+    cameras = tuple(
+        entries.rounded_camera(c, f"C{i}") for i, c in enumerate(draft.cameras, 1)
+    )
+    reference = tuple(entries.rounded_projector(p, "") for p in draft.stage.reference)
+    reference_cameras = tuple(
+        entries.rounded_camera(c, "") for c in draft.camera_stage.reference
+    )
+    devices = Devices(projectors, cameras, reference, reference_cameras)
+    scene = draft.scene
+    with clock.stage("claims", "coverage, recomputed from the rounded poses"):
+        claims = make_claims(scene, devices)
+        marginal = [
+            *projector_table(scene, devices, draft.stage.by_count, claims),
+            *camera_table(scene, devices, draft.camera_stage.by_count, claims),
+        ]
+    surface = Surface(
+        scene.mesh,
+        np.zeros(len(scene.mesh.faces), dtype=np.int64),
+        scene.region,
+        scene.steep,
+        np.stack([p.world_from_device for p in reference]),
+        np.stack([p.world_from_ring for p in reference]),
+        np.stack([c.world_from_device for c in reference_cameras]),
+    )
+    requirements = _final_requirements(draft, claims, devices)
+    document = _document(draft, clock, devices, claims, requirements, marginal, surface)
+    plan = RigPlan(document, surface)
+    areas = document["coverage"]["target"]
+    reachable, whole = "reachable_by_projectors_m2", "area_m2"
+    if falls_short(areas, reachable, whole, requirements.min_reachable):
+        with clock.stage("relaxations", "what would help"):
+            document["coverage"]["relaxations"] = reachability_relaxations(
+                scene, reference
+            )
+    return plan
+
+
+def _final_requirements(draft: Draft, claims: Claims, devices: Devices) -> Requirements:
+    """State tau, one ring gap, and the reference sets as they are."""
+    requirements = draft.scene.requirements
+    workspace = replace(
+        requirements.workspace,
+        n_reference_projectors=len(devices.reference_projectors),
+        n_reference_cameras=len(devices.reference_cameras),
+    )
+    gap = widest_gap(draft.scene, devices.projectors, claims.target_samples)
+    check = replace(requirements.check, tau_m=round(gap, 6))
+    return replace(requirements, workspace=workspace, check=check)
+
+
+def _document(
+    draft: Draft,
+    clock: Stopwatch,
+    devices: Devices,
+    claims: Claims,
+    requirements: Requirements,
+    marginal: list[dict[str, Any]],
+    surface: Surface,
+) -> dict[str, Any]:
+    samples = claims.target_samples.samples
+    coverage = entries.coverage_entry(claims)
+    regions = [
+        {
+            "id": region.id,
+            "area_m2": region.area_m2,
+            "n_faces": len(region.faces),
+            "mean_normal": region.mean_normal.tolist(),
+            "cone_angle": region.cone_angle,
+            "mean_curvedness": region.mean_curvedness,
+            **entry,
+        }
+        for region, entry in zip(draft.regions, claims.regions, strict=True)
+    ]
+    greedy = draft.camera_stage.certificate["greedy_count"]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "units": {"length": "m", "angle": "rad"},
+        "seed": draft.order.seed,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": list(draft.order.command),
+        "truncated": draft.truncated,
+        "meshes": [entries.mesh_entry(draft.scene.mesh)],
+        "surface": {
+            "path": "surface.npz",
+            "sha256": surface.sha256(),
+            "curvature_radius_m": draft.curvature_radius_m,
+            "dominant_share": draft.regions.dominant_share,
+        },
+        "rig": draft.order.rig.to_document(),
+        "requirements": requirements.to_document(),
+        "regions": regions,
+        "projectors": entries.projector_entries(devices.projectors, claims),
+        "cameras": entries.camera_entries(devices.cameras, claims),
+        "coverage": coverage,
+        "marginal": marginal,
+        "certificates": {
+            "projectors": draft.stage.certificate,
+            "cameras": draft.camera_stage.certificate,
+        },
+        "baselines": baseline_rows(
+            devices.cameras,
+            samples.points,
+            samples.normals,
+            claims.measured_by,
+            samples.weight,
+            requirements.camera.max_incidence,
+        ),
+        "camera_groups": [
+            [devices.cameras[c].id for c in group]
+            for group in overlap_components(claims.measured_by, samples.weight)
+        ],
+        "cost": cost_entry(devices.cameras, greedy, clock.seconds),
+        "members": [
+            {
+                "mesh": 0,
+                "coverage": coverage,
+                "regions": [region["id"] for region in regions],
+                "reconstruction": None,
+            }
+        ],
+        "reconstruction": None,
+        "timings_s": dict(clock.seconds),
+    }
+
+
+def falls_short(areas: dict[str, float], part: str, whole: str, share: float) -> bool:
+    """Return whether an area is less than a share of another."""
+    return areas[part] < share * areas[whole]

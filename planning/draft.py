@@ -1,0 +1,50 @@
+"""A plan in the making: what was ordered, and the stages as far as they came."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from geometry.mesh import TriangleMesh
+from geometry.regions import DominantRegions
+
+from .cameras import CameraStage
+from .plan import PlannedCamera, PlannedProjector
+from .projectors import ProjectorStage
+from .rig import Rig
+from .scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What was ordered: the mesh, the rig, and how to go about it.
+
+    Attributes:
+        mesh: The surface.
+        rig: Devices and limits.
+        asked: Keyword arguments of `Rig.requirements`.
+        seed: Of every random draw.
+        threads: Worker threads.
+        command: Words of the command line, for the record.
+    """
+
+    mesh: TriangleMesh
+    rig: Rig
+    asked: dict[str, Any]
+    seed: int
+    threads: int
+    command: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """All stages as far as they came; enough to write a plan from."""
+
+    order: Order
+    scene: Scene
+    regions: DominantRegions
+    curvature_radius_m: float
+    tilt: float
+    stage: ProjectorStage
+    projectors: tuple[PlannedProjector, ...]
+    camera_stage: CameraStage
+    cameras: tuple[PlannedCamera, ...]
+    truncated: bool = False

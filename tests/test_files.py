@@ -1,0 +1,56 @@
+"""Outputs appear whole or not at all, and what stood there stays until then."""
+
+import os
+
+import pytest
+
+from planning.files import sha256_of, write_atomically, write_together
+
+
+def test_a_failed_write_keeps_the_old_content_and_leaves_no_litter(tmp_path):
+    path = tmp_path / "plan.json"
+    path.write_text("old")
+
+    def fail(file):
+        file.write(b"half")
+        raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        write_atomically(path, fail)
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["plan.json"]
+
+
+def test_files_that_belong_together_move_together(tmp_path):
+    """The second fails, so the first isn't replaced either."""
+    first, second = tmp_path / "a", tmp_path / "b"
+    first.write_text("old a")
+    second.write_text("old b")
+
+    def fail(file):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_together({first: lambda file: file.write(b"new a"), second: fail})
+    assert (first.read_text(), second.read_text()) == ("old a", "old b")
+    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
+    write_together(
+        {
+            first: lambda file: file.write(b"new a"),
+            second: lambda file: file.write(b"new b"),
+        }
+    )
+    assert (first.read_text(), second.read_text()) == ("new a", "new b")
+    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
+
+
+def test_files_are_readable_by_others_as_a_plain_open_makes_them(tmp_path):
+    write_atomically(tmp_path / "a", lambda file: file.write(b"x"))
+    (tmp_path / "b").write_bytes(b"x")
+    assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
+
+
+def test_digest_of_a_file(tmp_path):
+    path = tmp_path / "abc"
+    path.write_bytes(b"abc")
+    assert sha256_of(path).startswith("ba7816bf8f01cfea414140de5dae2223")
