@@ -13,7 +13,7 @@ from .errors import InfeasibleLimitsError
 from .lighting import Light, Target
 from .measurability import Rings
 from .plan import PlannedCamera, PlannedProjector
-from .projectors import merged
+from .projectors import lit_stages, merged
 from .scene import Scene
 from .selection import certificate, select_fewest
 
@@ -55,16 +55,7 @@ def lit_samples(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> LitSamples:
     """Return the samples that the projectors light, with their light and rings."""
-    lit = np.stack(
-        [
-            lighting.first_failure(
-                projector, target, scene.requirements.projector, scene.visibility
-            )
-            == lighting.LIT
-            for projector in projectors
-        ],
-        axis=1,
-    )
+    lit = lit_stages(scene, projectors, target) == lighting.LIT
     some = np.flatnonzero(lit.any(axis=1))
     kept = target.take(some)
     return LitSamples(

@@ -11,6 +11,7 @@ from . import lighting, measurability
 from .cameras import LitSamples, lit_samples, measured_by
 from .lighting import Target
 from .plan import PlannedCamera, PlannedProjector
+from .projectors import lit_stages, margins_of
 from .scene import Scene
 
 N_SAMPLES = 12_000
@@ -78,13 +79,13 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
     """Recompute every area from poses as they will be written."""
     target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
     weight = target.samples.weight
-    stages = _light_stages(scene, devices.projectors, target)
+    stages = lit_stages(scene, devices.projectors, target)
     lit = stages == lighting.LIT
     seen = _measured_by(scene, devices, target, lit)
     measured = _any(seen)
     reachable, furthest = _reachable_by_projectors(scene, devices, target, _any(lit))
     areas = _areas(scene, devices, target, reachable, lit, measured)
-    served = lighting.served_by(lit, _margins(scene, devices.projectors, target))
+    served = lighting.served_by(lit, margins_of(scene, devices.projectors, target))
     return Claims(
         _surface_areas(scene, devices),
         areas,
@@ -134,7 +135,7 @@ def _union(
 
 def _surface_areas(scene: Scene, devices: Devices) -> Areas:
     surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
-    lit = _light_stages(scene, devices.projectors, surface) == lighting.LIT
+    lit = lit_stages(scene, devices.projectors, surface) == lighting.LIT
     measured = _any(_measured_by(scene, devices, surface, lit))
     reachable, _ = _reachable_by_projectors(scene, devices, surface, _any(lit))
     return _areas(scene, devices, surface, reachable, lit, measured)
@@ -166,20 +167,10 @@ def _areas(
     return Areas(*(float(weight * count) for count in counts))
 
 
-def _light_stages(
-    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
-) -> NDArray[np.int8]:
-    limits, visibility = scene.requirements.projector, scene.visibility
-    return np.stack(
-        [lighting.first_failure(p, target, limits, visibility) for p in projectors],
-        axis=1,
-    )
-
-
 def _lit(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.bool_]:
-    return _any(_light_stages(scene, projectors, target) == lighting.LIT)
+    return _any(lit_stages(scene, projectors, target) == lighting.LIT)
 
 
 def _lit_rows(
@@ -220,20 +211,10 @@ def _reachable_by_projectors(
     return reachable, furthest
 
 
-def _margins(
-    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
-) -> NDArray[np.float64]:
-    limits = scene.requirements.projector
-    return np.stack(
-        [lighting.margins(lighting.light_on(p, target), limits) for p in projectors],
-        axis=1,
-    )
-
-
 def _least_margins(
     scene: Scene, devices: Devices, target: Target, served: NDArray[np.int64]
 ) -> tuple[float, ...]:
-    margin = _margins(scene, devices.projectors, target)
+    margin = margins_of(scene, devices.projectors, target)
     return tuple(
         float(margin[served == p, p].min()) if np.any(served == p) else 0.0
         for p in range(len(devices.projectors))

@@ -10,6 +10,7 @@ from .cameras import lit_samples, measured_by
 from .draw import MEASURED, NOT_LIT, NOT_MEASURED, OUTSIDE_TARGET
 from .lighting import Target
 from .plan import RigPlan
+from .projectors import lit_stages
 from .scene import Scene
 
 
@@ -28,12 +29,8 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
     faces = np.arange(len(mesh.faces))
     centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)
     target = Target(centroids, plan.surface.steep)
-    lit = np.zeros(len(faces), dtype=bool)
-    for projector in plan.projectors:
-        stage = lighting.first_failure(
-            projector, target, required.projector, scene.visibility
-        )
-        lit |= stage == lighting.LIT
+    stages = lit_stages(scene, plan.projectors, target)
+    lit = (stages == lighting.LIT).any(axis=1)
     measured = np.zeros(len(faces), dtype=bool)
     if lit.any():
         rows = lit_samples(scene, plan.projectors, target)

@@ -13,7 +13,7 @@ from solvers.pose_program import PoseProgram, pose_margins, pose_slack, solve_po
 from . import lighting
 from .lighting import Target
 from .plan import PlannedProjector
-from .projectors import ProjectorStage
+from .projectors import ProjectorStage, lit_stages, margins_of
 from .scene import Scene
 
 _SWEEPS = 2
@@ -36,11 +36,11 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     """
     rows = stage.rows
     projectors = list(stage.projectors)
-    lit = _lit(scene, projectors, rows)
+    lit = lit_stages(scene, projectors, rows) == lighting.LIT
     for _ in range(_SWEEPS):
         moved = False
         for p, projector in enumerate(projectors):
-            served = lighting.served_by(lit, _margins(scene, projectors, rows)) == p
+            served = lighting.served_by(lit, margins_of(scene, projectors, rows)) == p
             if not served.any():
                 continue
             better = _improved(scene, projector, rows, served, lit, p)
@@ -114,7 +114,7 @@ def _improved(
         if not (inside and float(pose_margins(program, pose).min()) > before):
             continue
         offered = moved_to(projector, pose)
-        lights = _lit(scene, [offered], rows)[:, 0]
+        lights = lit_stages(scene, [offered], rows)[:, 0] == lighting.LIT
         if np.all((lights | others)[lit.any(axis=1)]):
             return offered, lights
     return None
@@ -142,26 +142,3 @@ def _part_of_the_way(
     pose[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
     pose[:3, 3] = (1.0 - share) * start[:3, 3] + share * end[:3, 3]
     return pose
-
-
-def _lit(
-    scene: Scene, projectors: list[PlannedProjector], rows: Target
-) -> NDArray[np.bool_]:
-    limits, visibility = scene.requirements.projector, scene.visibility
-    return np.stack(
-        [
-            lighting.first_failure(projector, rows, limits, visibility) == lighting.LIT
-            for projector in projectors
-        ],
-        axis=1,
-    )
-
-
-def _margins(
-    scene: Scene, projectors: list[PlannedProjector], rows: Target
-) -> NDArray[np.float64]:
-    limits = scene.requirements.projector
-    return np.stack(
-        [lighting.margins(lighting.light_on(p, rows), limits) for p in projectors],
-        axis=1,
-    )

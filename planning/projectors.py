@@ -92,15 +92,28 @@ def plan_projectors(
 
 
 def lit_stages(
-    scene: Scene, candidates: Sequence[PlannedProjector], rows: Target
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.int8]:
-    """Return the first failing limit of every sample (row) and candidate (column)."""
-    stages = np.empty((len(rows), len(candidates)), dtype=np.int8)
-    for column, candidate in enumerate(candidates):
+    """Return the first failing limit of each sample (row) and projector (column)."""
+    stages = np.empty((len(target), len(projectors)), dtype=np.int8)
+    limits, visibility = scene.requirements.projector, scene.visibility
+    for column, projector in enumerate(projectors):
         stages[:, column] = lighting.first_failure(
-            candidate, rows, scene.requirements.projector, scene.visibility
+            projector, target, limits, visibility
         )
     return stages
+
+
+def margins_of(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.float64]:
+    """Return the smaller margin of each sample (row) and projector (column) [rad]."""
+    margin = np.empty((len(target), len(projectors)))
+    limits = scene.requirements.projector
+    for column, projector in enumerate(projectors):
+        light = lighting.light_on(projector, target)
+        margin[:, column] = lighting.margins(light, limits)
+    return margin
 
 
 def merged(first: Target, second: Target) -> Target:

@@ -1,6 +1,7 @@
 """Which requirements a plan misses, why, and what would help."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 from .requirements import Requirements
@@ -44,8 +45,7 @@ def shortfalls(document: dict[str, Any], requirements: Requirements) -> tuple[st
     """
     return (
         *_reachable(document, requirements),
-        *_lit(document, requirements),
-        *_measured(document, requirements),
+        *_covered(document, requirements),
         *_check(document),
     )
 
@@ -72,34 +72,35 @@ def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]
     return (f"{line}. What would help: {'; '.join(steps)}",)
 
 
-def _lit(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
     areas = document["coverage"]["target"]
-    reachable = areas["reachable_by_projectors_m2"]
-    share = areas["lit_m2"] / reachable if reachable > 0 else 0.0
-    if share >= asked.dominant_coverage:
-        return ()
-    needed = document["certificates"]["projectors"]["needed"]
-    count = len(document["projectors"])
-    line = (
-        f"{count} projector{'s' * (count > 1)} light {_percent(share)} of the "
-        f"reachable target, {_percent(asked.dominant_coverage)} is required"
-    )
-    return (f"{line}. What would help: {_more('projectors', needed, asked, share)}",)
-
-
-def _measured(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
-    areas = document["coverage"]["target"]
-    reachable = areas["reachable_by_cameras_m2"]
-    share = areas["measured_m2"] / reachable if reachable > 0 else 0.0
-    if share >= asked.coverage:
-        return ()
-    needed = document["certificates"]["cameras"]["needed"]
-    count = len(document["cameras"])
-    line = (
-        f"{count} camera{'s' * (count > 1)} measure {_percent(share)} of what is lit "
-        f"and measurable, {_percent(asked.coverage)} is required"
-    )
-    return (f"{line}. What would help: {_more('cameras', needed, asked, share)}",)
+    for kind, part, whole, required, deed in (
+        (
+            "projectors",
+            areas["lit_m2"],
+            areas["reachable_by_projectors_m2"],
+            asked.dominant_coverage,
+            "light {} of the reachable target",
+        ),
+        (
+            "cameras",
+            areas["measured_m2"],
+            areas["reachable_by_cameras_m2"],
+            asked.coverage,
+            "measure {} of what is lit and measurable",
+        ),
+    ):
+        share = part / whole if whole > 0 else 0.0
+        if share >= required:
+            continue
+        proof = document["certificates"][kind]
+        devices = kind if proof["count"] > 1 else kind.removesuffix("s")
+        verb = deed if proof["count"] > 1 else deed.replace(" ", "s ", 1)
+        yield (
+            f"{proof['count']} {devices} {verb.format(_percent(share))}, "
+            f"{_percent(required)} is required. What would help: "
+            f"{_more(kind, proof['needed'], asked, share)}"
+        )
 
 
 def _more(kind: str, needed: dict[str, Any], asked: Requirements, share: float) -> str:

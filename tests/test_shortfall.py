@@ -1,0 +1,74 @@
+"""Each missed requirement: how much, why, and the smallest relaxation that helps."""
+
+import copy
+import dataclasses
+
+import pytest
+
+from planning.shortfall import shortfalls
+
+
+@pytest.fixture
+def plan(handmade):
+    return handmade.build_plan()
+
+
+def missed(plan, **areas):
+    document = copy.deepcopy(plan.document)
+    target = document["coverage"]["target"]
+    target |= {
+        "area_m2": 1.0,
+        "reachable_by_projectors_m2": 1.0,
+        "lit_m2": 1.0,
+        "reachable_by_cameras_m2": 1.0,
+        "measured_m2": 1.0,
+    }
+    target |= areas
+    document["coverage"]["unreachable_by_cause"] = {
+        "projector_occlusion": 0.2,
+        "projector_incidence": 0.05,
+    }
+    document["certificates"]["projectors"] |= {
+        "count": 1,
+        "needed": {"count": 5, "lower_bound": 4},
+    }
+    document["certificates"]["cameras"] |= {
+        "count": 3,
+        "needed": {"count": 3, "lower_bound": 3},
+    }
+    document["reconstruction"] = None
+    asked = dataclasses.replace(
+        plan.requirements, coverage=0.95, dominant_coverage=0.9, min_reachable=0.9
+    )
+    return shortfalls(document, asked)
+
+
+def test_nothing_is_missed_where_everything_is_covered(plan):
+    assert missed(plan) == ()
+
+
+def test_out_of_reach_says_how_much_why_and_what_helps(plan):
+    (line,) = missed(plan, reachable_by_projectors_m2=0.75, lit_m2=0.75)
+    for words in ("75.0 %", "20.0 % shadowed", "5.0 % met by the light", "2500.0 cm²"):
+        assert words in line
+    assert "--min-reachable 0.75" in line
+
+
+def test_one_projector_short_of_light_names_how_many_would_do(plan):
+    (line,) = missed(plan, lit_m2=0.4)
+    assert line.startswith("1 projector lights 40.0 %")
+    assert "--max-projectors 5 (at least 4 proved over the candidates)" in line
+    assert "--dominant-coverage 0.40" in line
+
+
+def test_cameras_that_miss_by_a_hair_offer_the_share_they_reach(plan):
+    (line,) = missed(plan, measured_m2=0.9399)
+    assert line.startswith("3 cameras measure 94.0 %")
+    assert "--coverage 0.93 accepts this plan" in line
+    assert "--max-cameras" not in line
+
+
+def test_a_failed_check_lists_its_own_sentences(plan):
+    document = copy.deepcopy(plan.document)
+    document["reconstruction"] = {"passed": False, "failures": ["rms too large"]}
+    assert "rms too large" in shortfalls(document, plan.requirements)
