@@ -1,0 +1,114 @@
+"""Ring axes turn where the blind curves do least harm; claims and reach follow."""
+
+import numpy as np
+import pytest
+
+from geometry.primitives import sphere
+from planning.cameras import lit_samples, measured_by, plan_cameras
+from planning.claims import Devices, make_claims
+from planning.plan import PlannedCamera, PlannedProjector
+from planning.projectors import lit_stages, margins_of, merged, plan_projectors
+from planning.relaxations import reachability_relaxations
+from planning.rig import load_rig
+from planning.ring_axes import turn_ring_axes, widest_gap
+from planning.rings import uniform_radii
+from planning.scene import Scene
+
+RADIUS = 0.1
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def scene(request):
+    ball = sphere(RADIUS, subdivisions=4)
+    rig = load_rig("default", light=request.param)
+    required = rig.requirements(
+        ball.centre, ball.radius, max_projectors=6, target="surface", tau_m=0.004
+    )
+    n = len(ball.faces)
+    made = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    return rig, made
+
+
+@pytest.fixture(scope="module")
+def stages(scene):
+    rig, made = scene
+    parallel = rig.light == "parallel"
+    tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
+    radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
+    eye = np.eye(4)
+    template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
+    projectors = plan_projectors(made, template, 600, ring_offset=(tilt, -np.pi / 2))
+    camera = PlannedCamera("", eye, rig.camera_device())
+    cameras = plan_cameras(made, projectors.projectors, camera, 400)
+    return made, projectors, cameras, tilt
+
+
+def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
+    """Caps of 60 degrees (parallel) hold a quarter of the area: 0.9 takes 5 or more."""
+    _, projectors, cameras, _ = stages
+    least = projectors.certificate["candidates"]["lower_bound"]
+    assert 4 <= least <= len(projectors.projectors) <= 7
+    assert len(cameras.cameras) >= 3
+
+
+def test_turned_axes_measure_no_less_and_light_the_same(stages):
+    made, projectors, cameras, tilt = stages
+    before = projectors.projectors
+    after = turn_ring_axes(made, before, cameras.cameras, cameras.rows, tilt)
+    target = made.target_samples(3000, 7)
+    rows = [lit_samples(made, p, target) for p in (before, after)]
+    assert np.array_equal(rows[0].lit, rows[1].lit)
+    counts = [measured_by(made, cameras.cameras, lit).any(axis=1).sum() for lit in rows]
+    assert counts[1] >= 0.995 * counts[0]
+    for old, new in zip(before, after, strict=True):
+        assert np.array_equal(old.world_from_device, new.world_from_device)
+
+
+def test_widest_gap_is_that_of_the_farthest_lit_sample(stages):
+    made, projectors, _, _ = stages
+    target = made.target_samples(3000, 8)
+    gap = widest_gap(made, projectors.projectors, target)
+    radii = projectors.projectors[0].ring_radii
+    step = radii[1] - radii[0]
+    if projectors.projectors[0].light == "parallel":
+        assert gap == pytest.approx(step)
+    else:
+        assert step * 1.0 < gap < step * 1.3
+
+
+def test_claims_of_a_ball_follow_from_its_caps(stages):
+    """Everything is reachable; a projector lights its cap as seen from where it is."""
+    made, projectors, cameras, _ = stages
+    devices = Devices(
+        projectors.projectors, cameras.cameras, projectors.reference, cameras.reference
+    )
+    claims = make_claims(made, devices)
+    area = 4 * np.pi * RADIUS**2
+    assert claims.target.area_m2 == pytest.approx(area, rel=5e-3)
+    assert claims.target.reachable_by_projectors_m2 == claims.target.area_m2
+    theta = np.radians(60.0)
+    for projector, lit in zip(devices.projectors, claims.lit_area_m2, strict=True):
+        cap = theta
+        if projector.light == "diverging":
+            distance = np.linalg.norm(projector.world_from_device[:3, 3])
+            cap = theta - np.arcsin(RADIUS / distance * np.sin(theta))
+        assert lit / area == pytest.approx((1 - np.cos(cap)) / 2, abs=0.01)
+    assert claims.unreachable_by_cause == {}
+    assert sum(claims.sole_area_m2) <= claims.target.measured_m2 + 1e-12
+    assert claims.target.measured_m2 <= sum(claims.seen_area_m2) + 1e-12
+
+
+def test_no_relaxation_is_offered_where_nothing_is_out_of_reach(stages):
+    made, projectors, _, _ = stages
+    assert reachability_relaxations(made, projectors.reference[::20]) == []
+
+
+def test_merged_samples_stand_for_the_same_area(stages):
+    made, projectors, _, _ = stages
+    a, b = made.target_samples(500, 1), made.target_samples(1500, 2)
+    both = merged(a, b)
+    assert len(both) == 2000
+    assert both.samples.weight * 2000 == pytest.approx(a.samples.weight * 500)
+    stages_of = lit_stages(made, projectors.projectors, both)
+    assert stages_of.shape == (2000, len(projectors.projectors))
+    assert margins_of(made, projectors.projectors, both).shape == stages_of.shape

@@ -1,0 +1,98 @@
+"""Angles as a designer reads them off the printout, and eq. (8)."""
+
+import numpy as np
+import pytest
+
+from geometry.devices import PinholeModel
+from geometry.poses import look_at
+from planning.candidates import aimed_poses
+from planning.cost import cost_entry
+from planning.plan import PlannedCamera
+from planning.summary import aim_angles
+
+Z = np.array([0.0, 0.0, 1.0])
+CAMERA = PinholeModel(
+    np.array([[3000.0, 0, 999.5], [0, 3000.0, 749.5], [0, 0, 1]]),
+    (2000, 1500),
+    (0.5, 2),
+)
+SHIFTED = PinholeModel(
+    np.array([[1500.0, 0, 511.5], [0, 1500.0, 880.0], [0, 0, 1]]), (1024, 768), (0.5, 2)
+)
+
+
+def looking(position, up=Z, roll=0.0, device=CAMERA):
+    pose = aimed_poses(np.array([position]), np.zeros(3), up, device, roll=roll)[0]
+    return PlannedCamera("C1", pose, device)
+
+
+@pytest.mark.parametrize("device", [CAMERA, SHIFTED])
+@pytest.mark.parametrize(
+    ("position", "azimuth", "elevation"),
+    [
+        ([0.0, -1.0, 0.0], 90.0, 0.0),
+        ([-1.0, 0.0, 0.0], 0.0, 0.0),
+        ([1.0, 0.0, 1.0], 180.0, -45.0),
+        ([-1.0, -1.0, -np.sqrt(2.0)], 45.0, 45.0),
+    ],
+)
+def test_azimuth_and_elevation_are_those_of_the_middle_of_the_image(
+    position, azimuth, elevation, device
+):
+    found = aim_angles(looking(position, device=device), Z)
+    assert found[0] == pytest.approx(azimuth, abs=1e-6)
+    assert found[1] == pytest.approx(elevation, abs=1e-6)
+    assert found[2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_azimuth_counts_from_the_axis_after_up():
+    """With y up, from z towards x."""
+    y = np.array([0.0, 1.0, 0.0])
+    assert aim_angles(looking([0.0, 0.0, -1.0], y), y)[0] == pytest.approx(0.0)
+    assert aim_angles(looking([-1.0, 0.0, 0.0], y), y)[0] == pytest.approx(90.0)
+
+
+@pytest.mark.parametrize("degrees", [-120.0, -30.0, 45.0, 90.0])
+def test_roll_turns_the_image_and_nothing_else(degrees):
+    upright = aim_angles(looking([0.3, -1.0, 0.4]), Z)
+    rolled = aim_angles(looking([0.3, -1.0, 0.4], roll=np.radians(degrees)), Z)
+    assert rolled[:2] == pytest.approx(upright[:2])
+    assert rolled[2] == pytest.approx(degrees)
+
+
+def test_roll_is_clockwise_as_the_device_sees_it():
+    """Rolled by +30 degrees, the world's up leans left by as much in the image."""
+    camera = looking([0.0, -1.0, 0.0], roll=np.radians(30.0))
+    up_in_image = camera.world_from_device[:3, :2].T @ Z
+    assert up_in_image == pytest.approx([-np.sin(np.pi / 6), -np.cos(np.pi / 6)])
+
+
+def test_a_device_that_looks_straight_up_has_roll_0():
+    pose = look_at(np.array([0.0, 0.0, -1.0]), np.zeros(3), Z)
+    azimuth, elevation, roll = aim_angles(PlannedCamera("C1", pose, CAMERA), Z)
+    assert elevation == pytest.approx(90.0)
+    assert (roll, np.isfinite(azimuth)) == (0.0, True)
+
+
+def test_eq_8_before_and_after_the_number_of_cameras_was_minimised():
+    """C = (sum M N)(t1 + t2) + t3 + t4 + t5, term by term."""
+    cameras = [looking([0.0, -1.0, 0.0]), looking([1.0, 0.0, 0.0])]
+    seconds = {
+        "render": 6.0,
+        "decode": 3.0,
+        "merge": 0.5,
+        "projectors": 2,
+        "cameras": 4,
+    }
+    cost = cost_entry(cameras, 3, seconds)
+    assert cost["pixels"] == 2 * 2000 * 1500
+    assert cost["t1"] * cost["pixels"] == pytest.approx(6.0)
+    assert cost["t2"] * cost["pixels"] == pytest.approx(3.0)
+    assert cost["C"] == pytest.approx(6.0 + 3.0 + 0.5 + 2.0 + 4.0)
+    assert cost["C_before"] == pytest.approx(1.5 * 9.0 + 0.5 + 2.0 + 4.0)
+
+
+def test_eq_8_is_unknown_without_a_check():
+    cost = cost_entry([looking([0.0, -1.0, 0.0])], 1, {"projectors": 2, "cameras": 4})
+    assert cost["C"] is None
+    assert cost["t4"] == 2
