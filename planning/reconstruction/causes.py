@@ -8,6 +8,7 @@ from geometry.proximity import closest_points
 
 from ..requirements import CheckLimits
 from .cloud import Cloud
+from .result import PairCount
 
 _MM = 1e3
 # Incidence of light beyond which edges smear: formulation.md section 2 [rad].
@@ -16,26 +17,56 @@ _GRAZING = np.deg2rad(70.0)
 _POINTS_A_PAIR = 1000
 
 
+_WORDS = {
+    "labels": "the codes contradict the patterns: frames out of order or of another "
+    "projector",
+    "no_intersection": "the rays miss the rings: a pose isn't that of the plan",
+    "conditioning": "the rays run along the rings' cones",
+    "outside_panel": "the points lie outside the projector's image",
+    "isolated": "the edges are scattered: little light, or nearly hidden",
+    "depth_step": "the edges hang between surfaces, or the surface is too slanted",
+}
+
+
+def rejection(pairs: tuple[PairCount, ...]) -> str | None:
+    """Return in words what most edges of pairs were left out for, None without any."""
+    count: dict[str, int] = {}
+    for pair in pairs:
+        for cause, n in pair.rejected.items():
+            count[cause] = count.get(cause, 0) + n
+    cause = max(count, key=lambda name: count[name], default="labels")
+    n_edges = sum(pair.n_edges for pair in pairs)
+    if not count.get(cause, 0):
+        return None
+    return f"{count[cause]} of {n_edges} edges left out as `{cause}`, {_WORDS[cause]}"
+
+
 def likely_cause(
     cloud: Cloud,
     mesh: TriangleMesh,
     limits: CheckLimits,
+    pairs: tuple[PairCount, ...],
     *,
     projectors: tuple[str, ...],
     cameras: tuple[str, ...],
 ) -> str:
     """Return the likely cause of a failed check.
 
-    In this order: devices that gave no point; devices whose every pair is off while
-    others are not; grazing light; the object itself.
+    In this order: pairs whose labels contradict each other; devices that gave no point;
+    devices whose every pair is off while others are not; grazing light; the object.
 
     Args:
         cloud: All points, before redundancy was removed.
         mesh: The mesh of the plan.
         limits: Of the check.
+        pairs: What each pair gave.
         projectors: Ids, in the order of the cloud's indices.
         cameras: Likewise.
     """
+    unordered = tuple(p for p in pairs if 2 * p.rejected.get("labels", 0) > p.n_edges)
+    if unordered:
+        names = ", ".join(f"{pair.projector} with {pair.camera}" for pair in unordered)
+        return f"{names}: {rejection(unordered)}"
     silent = [
         name
         for names, index in ((projectors, cloud.projector), (cameras, cloud.camera))
@@ -43,10 +74,9 @@ def likely_cause(
         if not np.any(index == i)
     ]
     if silent:
-        return (
-            f"{' and '.join(silent)} gave no point: dark, covered, blocked or aimed "
-            f"elsewhere"
-        )
+        own = (p for p in pairs if p.projector in silent or p.camera in silent)
+        why = rejection(tuple(own)) or "dark, covered, blocked or aimed elsewhere"
+        return f"{' and '.join(silent)} gave no point: {why}"
     few = cloud.take(_some_of_each_pair(cloud))
     nearest = closest_points(mesh, few.points)
     error = np.abs(nearest.distances)

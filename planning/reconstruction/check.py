@@ -20,7 +20,7 @@ from .calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from .causes import likely_cause
+from .causes import likely_cause, rejection
 from .cloud import Cloud
 from .decode import Decoded, decode
 from .merge import merge
@@ -88,8 +88,9 @@ def reconstruct_plan(
     completeness = measure_completeness(
         everything, merged.cloud, samples, predicted, limits.tau_m
     )
-    accuracy = None
-    failures: tuple[str, ...] = ("no point was measured: no ring edge was decoded",)
+    pairs = tuple(_count(plan, p, c, pair) for (p, c), pair in decoded)
+    accuracy, why = None, rejection(pairs) or "no ring edge was decoded"
+    failures: tuple[str, ...] = (f"no point was measured: {why}",)
     if len(merged.cloud):
         accuracy = measure_accuracy(merged.cloud, mesh, threads=threads)
         failures = judge(accuracy, completeness, limits)
@@ -98,6 +99,7 @@ def reconstruct_plan(
             everything,
             mesh,
             limits,
+            pairs,
             projectors=tuple(projector.id for projector in plan.projectors),
             cameras=tuple(camera.id for camera in plan.cameras),
         )
@@ -107,7 +109,7 @@ def reconstruct_plan(
         merged,
         accuracy,
         completeness,
-        tuple(_count(plan, p, c, pair) for (p, c), pair in decoded),
+        pairs,
         light,
         failures,
         spent.seconds,

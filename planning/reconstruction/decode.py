@@ -18,9 +18,14 @@ from .triangulate import RingHits, intersect_rings
 _NEAR_PX = 2.6
 # Edges in a row that make a piece of surface.
 _MIN_CHAIN = 12
-# Share of the changes of index that must name a ring edge. Rings 6 pixels apart reach
-# 0.98, 3 pixels apart 0.8; two frames exchanged reach 0.6.
-_MIN_LABELLED = 0.75
+# Share of the changes of one bit alone that must name a ring. Rings, however fine and
+# dim, reach 0.95 in every bit, steps of depth included; in the frame that stands in
+# another's place hardly any do. Between the two is an image disordered in part.
+_MIN_NAMED = 1.0 / 3.0
+# A bit is judged by more changes without a name than this share of all, and this many:
+# where few rings flip it, steps of depth may outnumber them.
+_UNNAMED_SHARE = 0.02
+_UNNAMED_LEAST = 10
 # The next ring is looked for this far away [px].
 _NEXT_RING_PX = 100.0
 # Keeps rings apart when neighbours are looked for.
@@ -96,8 +101,8 @@ def decode(
     }
     kept = np.ones(len(edges), dtype=bool)
     rejected: dict[str, int] = {}
-    if edges.n_labelled < _MIN_LABELLED * edges.n_changes:
-        # Frames out of order, or rings too fine: what labels are left are chance.
+    if _out_of_order(edges):
+        # What labels are left are chance.
         causes = {"labels": kept.copy()}
     for cause, fails in causes.items():
         rejected[cause] = int(np.count_nonzero(kept & fails))
@@ -108,6 +113,18 @@ def decode(
         len(edges),
         rejected,
     )
+
+
+def _out_of_order(edges: Edges) -> bool:
+    """Whether some frame isn't the bit that it is taken for.
+
+    In a Gray code any change of one bit alone between neighbouring annuli is a ring;
+    with bits exchanged, those of some frames lead to annuli far apart, or to none.
+    """
+    unnamed = edges.flips - edges.named
+    least = max(_UNNAMED_LEAST, _UNNAMED_SHARE * int(edges.flips.sum()))
+    contradicted = (unnamed > least) & (edges.named < _MIN_NAMED * edges.flips)
+    return bool(np.any(contradicted))
 
 
 def _chains(

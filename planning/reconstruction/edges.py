@@ -34,8 +34,8 @@ class Edges:
         roots: Sign of r.m, from the root disc, shape (n,).
         across: Unit direction in the image across the edge, shape (n, 2).
         noise_px: Standard deviation of the position along `across` [px], shape (n,).
-        n_changes: Changes of index between pixels whose bits all stand out.
-        n_labelled: Those that name a ring edge, in either direction of the image.
+        flips: Changes of one bit alone between lit pixels, by bit, shape (n_bits,).
+        named: Those of them that name a ring, shape (n_bits,).
     """
 
     pixels: NDArray[np.float64]
@@ -43,8 +43,8 @@ class Edges:
     roots: NDArray[np.int8]
     across: NDArray[np.float64]
     noise_px: NDArray[np.float64]
-    n_changes: int
-    n_labelled: int
+    flips: NDArray[np.int64]
+    named: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -66,8 +66,8 @@ def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[Edges, int]:
         np.concatenate([along_rows.roots[a], along_columns.roots[b]]),
         np.concatenate([along_rows.across[a], swapped[1][b]]),
         np.concatenate([along_rows.noise_px[a], along_columns.noise_px[b]]),
-        along_rows.n_changes + along_columns.n_changes,
-        along_rows.n_labelled + along_columns.n_labelled,
+        along_rows.flips + along_columns.flips,
+        along_rows.named + along_columns.named,
     )
     return edges, int(np.count_nonzero(reader.valid))
 
@@ -78,6 +78,7 @@ class _Reader:
     Attributes:
         contrast: White - black, at least 1, shape (h, w).
         valid: Pixels bright enough under the white frame and not saturated.
+        code: Bits of each pixel.
         index: Annulus of each pixel, -1 where there is none.
         sure: Pixels whose every bit stands out.
         even: Pixels about which the contrast is nearly the same.
@@ -96,6 +97,7 @@ class _Reader:
             difference = self._difference(2 + 2 * bit)
             code |= (difference > 0.0).astype(np.int16) << bit
             np.minimum(least, np.abs(difference), out=least)
+        self.code = code
         self.index = np.where(self.valid, patterns.index_of_code[code], np.int16(-1))
         self.sure = self.valid & (least >= _MIN_CERTAINTY * self.contrast)
         self.even = _even(contrast, self.grey_noise())
@@ -105,7 +107,7 @@ class _Reader:
         other = object.__new__(_Reader)
         other._stack = self._stack.transpose(0, 2, 1)
         other.patterns = self.patterns
-        for name in ("contrast", "valid", "index", "sure", "even"):
+        for name in ("contrast", "valid", "code", "index", "sure", "even"):
             setattr(other, name, getattr(self, name).T)
         return other
 
@@ -146,11 +148,14 @@ def _crossings(reader: _Reader, noise: float) -> Edges:
     """Edges between pixels of one row, in pixels (column, row) of the reader."""
     index, sure = reader.index, reader.sure
     before, after = index[:, 1:-2], index[:, 2:-1]
-    found = (before != after) & sure[:, :-3] & sure[:, 3:]
-    found &= reader.even[:, 1:-2] & reader.even[:, 2:-1]
+    code, usable = reader.code, reader.valid & reader.even
+    found = (code[:, 1:-2] != code[:, 2:-1]) & sure[:, :-3] & sure[:, 3:]
+    found &= usable[:, 1:-2] & usable[:, 2:-1]
     found[:1] = found[-1:] = False
-    n_changes = int(np.count_nonzero(found))
+    flipped = code[:, 1:-2] ^ code[:, 2:-1]
+    flips = _count_single(flipped[found], reader.patterns.n_bits)
     found &= (np.abs(after - before) == 1) & (before >= 0) & (after >= 0)
+    named = _count_single(flipped[found], reader.patterns.n_bits)
     found &= (index[:, :-3] == before) & (index[:, 3:] == after)
     i, j = np.nonzero(found)
     j = j + 1
@@ -173,9 +178,15 @@ def _crossings(reader: _Reader, noise: float) -> Edges:
         np.where(root[good] > 0.0, 1, -1).astype(np.int8),
         np.column_stack([along, cross]) / slope[:, None],
         np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope,
-        n_changes,
-        n_labelled=int(np.count_nonzero(found)),
+        flips,
+        named,
     )
+
+
+def _count_single(flipped: NDArray[np.int16], n_bits: int) -> NDArray[np.int64]:
+    """Count the changes of one bit alone, by bit; between rings there are no others."""
+    count = np.bincount(flipped, minlength=1 << n_bits)
+    return count[1 << np.arange(n_bits)].astype(np.int64)
 
 
 def _zero_between(
