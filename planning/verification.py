@@ -36,25 +36,27 @@ class Verification:
     """Whether a plan's claims hold.
 
     Attributes:
-        failures: One sentence for each false claim and each limit of the check that
-            isn't kept.
+        failures: One sentence for each false claim, and for each limit of the check
+            that isn't kept and that the plan doesn't own up to.
         audit: The geometric audit.
         reconstruction: The check from pixels; None if it wasn't asked for.
+        missed: Limits of the check that aren't kept, as the plan records itself.
     """
 
     failures: tuple[str, ...]
     audit: Audit
     reconstruction: Reconstruction | None
+    missed: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
-        """Whether every claim holds and the check kept its limits."""
+        """Whether every claim holds; a plan may claim that it misses something."""
         return not self.failures
 
     @property
     def unmet(self) -> tuple[str, ...]:
-        """Requirements that the plan misses and says so: no false claims."""
-        return self.audit.unmet
+        """Requirements and limits that the plan misses and says so: nothing false."""
+        return self.audit.unmet + self.missed
 
     @property
     def coverage(self) -> dict[str, dict[str, float]]:
@@ -107,7 +109,8 @@ def verify_plan(
         plan: The plan, as written.
         mesh: If given, it must be the surface that the plan speaks of.
         check_pixels: Whether the reconstruction is run.
-        truth: What really stands there; the plan by default.
+        truth: What really stands there; the plan by default. With it, every limit of
+            the check that isn't kept is a failure.
         seed: Of the audit's samples and the pixel noise; the plan's own by default.
         threads: Worker threads; the result doesn't depend on them.
         progress: Receives a line when a stage begins.
@@ -122,14 +125,16 @@ def verify_plan(
     failures = list(audit.failures)
     if mesh is not None:
         failures += compare_meshes(mesh, plan.surface.mesh, threads=threads)
-    found = None
-    if check_pixels:
-        found = _reconstruct(plan, audit, truth, seed, threads, say)
-        failures += found.failures
-        failures += compare_figures(
-            plan.document["reconstruction"], found.to_document()
-        )
-    return Verification(tuple(failures), audit, found)
+    recorded = plan.document["reconstruction"]
+    failures += _contradictions(recorded)
+    if not check_pixels:
+        return Verification(tuple(failures), audit, None)
+    found = _reconstruct(plan, audit, truth, seed, threads, say)
+    false = compare_figures(recorded, found.to_document())
+    owned_up = recorded is not None and recorded.get("passed") is False
+    if owned_up and not false and truth is None:
+        return Verification(tuple(failures), audit, found, found.failures)
+    return Verification((*failures, *found.failures, *false), audit, found)
 
 
 def compare_meshes(
@@ -208,6 +213,19 @@ def compare_figures(
             "reconstruction.passed: claimed true, the check run again fails"
         )
     return failures
+
+
+def _contradictions(recorded: Mapping[str, Any] | None) -> list[str]:
+    """Return where a recorded check contradicts itself: passed, but with failures."""
+    if recorded is None:
+        return []
+    passed, missed = recorded.get("passed"), recorded.get("failures")
+    if isinstance(missed, list) and passed is (not missed):
+        return []
+    return [
+        f"reconstruction.passed: claimed {passed!r}, but reconstruction.failures is "
+        f"{missed!r}"
+    ]
 
 
 def _silent(line: str) -> None:

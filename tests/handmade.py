@@ -147,11 +147,33 @@ def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
         "truncated": False,
         "meshes": [_mesh_entry(surface.mesh)],
         "surface": {"path": "surface.npz", "sha256": "", "curvature_radius_m": 0.01},
-        "rig": {"light": light, "projector": dict(projector), "camera": dict(camera)},
+        "rig": {
+            "light": light,
+            "projector": dict(projector),
+            "camera": dict(camera),
+            "limits": {
+                "projector_max_incidence_deg": 60.0,
+                "min_tangent_angle_deg": 40.0,
+                "camera_max_incidence_deg": 70.0,
+                "min_conditioning": 0.1,
+                "noise_px": 0.1,
+                "min_ring_pitch_px": 7.0,
+            },
+        },
         "requirements": _requirements(light, target, surface),
         "projectors": projectors,
         "cameras": cameras,
-        "cost": {"pixels": 2 * 640 * 480},
+        "cost": {
+            "pixels": 2 * 640 * 480,
+            "t1": 2e-7,
+            "t2": 1e-7,
+            "t3": 0.25,
+            "t4": 2.0,
+            "t5": 7.0,
+            "n_cameras_before": 3,
+            "C": 614_400 * 3e-7 + 9.25,
+            "C_before": 921_600 * 3e-7 + 9.25,
+        },
         "members": [],
         "reconstruction": None,
         "timings_s": {},
@@ -275,6 +297,9 @@ def _claim(document: dict[str, Any], surface: Surface) -> None:
     _claim_regions(document, surface, rows, faces)
     _claim_tables(document, surface, area, everything, inside)
     document["baselines"] = _baselines(document, surface.mesh)
+    shared = area(lambda row: all(row["seen"]), inside)
+    together = shared >= 0.01 * coverage["target"]["area_m2"]
+    document["camera_groups"] = [["C1", "C2"]] if together else [["C1"], ["C2"]]
     document["members"] = [{"mesh": 0, "coverage": coverage, "regions": [0, 1]}]
 
 
@@ -593,21 +618,27 @@ def _claim_tables(
             "status": "feasible",
             "required_m2": share * target[of],
             "n_samples": document["coverage"]["samples"],
-            "candidates": {"lower_bound": 1, "n_candidates": 10},
+            "candidates": {"lower_bound": 1, "n_candidates": candidates},
             "continuous": None,
-            "best_area": {
-                "value_m2": target[have],
-                "upper_bound_m2": target["area_m2"],
-            },
+            "needed": {"count": 2, "lower_bound": 1},
+            "best_area": {"value_m2": target[have], "upper_bound_m2": target[of]},
+            "one_fewer": {"upper_bound_m2": target[of]},
         }
-        for kind, share, of, have in (
+        for kind, share, of, have, candidates in (
             (
                 "projectors",
                 limits["dominant_coverage"],
                 "reachable_by_projectors_m2",
                 "lit_m2",
+                10,
             ),
-            ("cameras", limits["coverage"], "reachable_by_cameras_m2", "measured_m2"),
+            (
+                "cameras",
+                limits["coverage"],
+                "reachable_by_cameras_m2",
+                "measured_m2",
+                4,
+            ),
         )
     }
 
@@ -625,7 +656,17 @@ def _baselines(document: Any, mesh: TriangleMesh) -> list[dict[str, Any]]:
         d = math.dist(o1, o2)
         phi = math.acos((d1 * d1 + d2 * d2 - d * d) / (2 * d1 * d2))
         axial = float((o2 - o1) @ axis)
-        limit = phi + _slack(o1 - meeting, o2 - meeting, normal, entries[second], theta)
+        one, two = o1 - meeting, o2 - meeting
+        field, incidence = _slacks(one, two, normal, entries[second], theta)
+        before, _ = _slacks(two, one, normal, entries[first], theta)
+        limit = phi + min(field, incidence)
+        axes = axis, poses[second][:3, 2]
+        beta = [
+            _signed(one, -axes[0], one, two),
+            _signed(-axes[1], two, one, two),
+        ]
+        half = [beta[0] + before, beta[1] + field]
+        depth = [float(-one @ axes[0]), float(-two @ axes[1])]
         rows.append(
             {
                 "cameras": [first, second],
@@ -641,33 +682,55 @@ def _baselines(document: Any, mesh: TriangleMesh) -> list[dict[str, Any]]:
                 "d_max": math.sqrt(d1 * d1 + d2 * d2 - 2 * d1 * d2 * math.cos(limit)),
                 "slack": limit - phi,
                 "covered": phi < limit,
+                "limit": "camera_field" if field < incidence else "camera_incidence",
+                "standoff1": depth[0],
+                "standoff2": depth[1],
+                "C1": depth[0] * math.tan(half[0]),
+                "C2": depth[1] * math.tan(half[1]),
+                "beta": beta,
+                "iota": [
+                    _signed(one, normal, one, two),
+                    _signed(normal, two, one, two),
+                ],
+                "half_field": half,
+                "max_incidence": theta,
+                "delta_axes": phi - beta[0] - beta[1],
+                "delta_surface": 0.0,
+                "shares_border": True,
+                "n_seam": 12,
             }
         )
     return rows
 
 
-def _slack(
-    to_first: Any, to_second: Any, normal: Any, camera: Any, theta: float
-) -> float:
-    """Turn of u2 about E, away from u1, until camera 2 loses E, in small steps."""
+def _signed(start: Any, end: Any, to_first: Any, to_second: Any) -> float:
+    """Angle from one direction to another in the plane, positive from u1 to u2."""
     x = to_first / np.linalg.norm(to_first)
     y = to_second - (to_second @ x) * x
     y /= np.linalg.norm(y)
+    turn = math.atan2(end @ y, end @ x) - math.atan2(start @ y, start @ x)
+    return math.remainder(turn, 2.0 * math.pi)
 
-    def place(vector: Any) -> float:
-        return math.atan2(vector @ y, vector @ x)
 
-    start = place(to_second)
+def _slacks(
+    to_first: Any, to_second: Any, normal: Any, camera: Any, theta: float
+) -> tuple[float, float]:
+    """Turns of u2 about E, away from u1, until E leaves the field or the incidence."""
+    x = to_first / np.linalg.norm(to_first)
+    y = to_second - (to_second @ x) * x
+    y /= np.linalg.norm(y)
+    start = math.atan2(to_second @ y, to_second @ x)
     turned = 0.0
     turn = np.array(camera["world_from_device"])[:3, :3]
     w, h = camera["resolution"]
-    while start + turned - place(normal) <= theta:
+    while True:
         ahead = -(math.cos(start + turned) * x + math.sin(start + turned) * y) @ turn
         u, v = project(camera, ahead)
         if not (-0.5 <= u <= w - 0.5 and -0.5 <= v <= h - 0.5):
             break
         turned += 2e-5
-    return turned
+    incidence = theta - _signed(normal, to_second, to_first, to_second)
+    return turned, incidence
 
 
 def _into(pose: Any, p: Any) -> list[float]:

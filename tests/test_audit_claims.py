@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from geometry.mesh import TriangleMesh
 from planning.audit import audit_plan
 from planning.audit.baselines import distance_to_surface
+from planning.audit.groups import audit_groups
+from planning.audit.ledger import Ledger
 from planning.errors import PlanFileError
 from planning.plan import RigPlan
 
@@ -228,8 +231,12 @@ FALSE = {
         "marginal.projectors.2.lit_target_m2: claimed",
     ),
     "marginal falls": (
-        _at("marginal", "cameras", 0, "measured_surface_m2", 1.0),
-        "measured_surface_m2 falls from 1",
+        _at("marginal", "cameras", 0, "measured_target_m2", 0.009),
+        "measured_target_m2 falls from 90.00 cm² with 1 camera to ",
+    ),
+    "marginal too large": (
+        _at("marginal", "projectors", 0, "lit_surface_m2", 1.0),
+        "marginal.projectors.1.lit_surface_m2: 1.0 is claimed, must be an area",
     ),
     "phi": (_at("baselines", 0, "phi", lambda x: x + 0.01), "C1-C2.phi: claimed"),
     "slack": (_at("baselines", 0, "slack", lambda x: -x), "C1-C2.slack: claimed"),
@@ -255,10 +262,120 @@ FALSE = {
         _at("baselines", 0, "cameras", ["C1", "C9"]),
         "two cameras of the plan",
     ),
+    "standoff1": (_at("baselines", 0, "standoff1", lambda x: x + 2e-4), "standoff1: "),
+    "standoff2": (_at("baselines", 1, "standoff2", lambda x: x - 2e-4), "standoff2: "),
+    "C1": (_at("baselines", 0, "C1", lambda x: x + 2e-4), "C1-C2.C1: claimed"),
+    "C2": (_at("baselines", 0, "C2", lambda x: x * 1.1), "C1-C2.C2: claimed"),
+    "beta": (_at("baselines", 0, "beta", 1, lambda x: -x), "C1-C2.beta.1: claimed"),
+    "beta list": (_at("baselines", 0, "beta", 0.1), "C1-C2.beta.0: None is claimed"),
+    "iota": (_at("baselines", 1, "iota", 0, lambda x: x + 0.01), "C2-C1.iota.0: "),
+    "half_field": (
+        _at("baselines", 0, "half_field", 0, lambda x: x + 0.01),
+        "C1-C2.half_field.0: claimed",
+    ),
+    "theta": (_at("baselines", 0, "max_incidence", 1.3), "C2.max_incidence: claimed"),
+    "delta_axes": (_at("baselines", 0, "delta_axes", 0.0), "C2.delta_axes: claimed 0"),
+    "delta_surface": (_at("baselines", 0, "delta_surface", 0.1), "delta_surface: "),
+    "n_seam": (_at("baselines", 0, "n_seam", 0), "C2.n_seam: 0 must be a positive"),
+    "limit": (_at("baselines", 0, "limit", "weather"), "'weather' is claimed, it is"),
+    "other limit": (
+        _at(
+            "baselines",
+            1,
+            "limit",
+            lambda x: "camera_field" if x == "camera_incidence" else "camera_incidence",
+        ),
+        "is claimed, it is camera_",
+    ),
+    "groups": (
+        _at("camera_groups", [["C1"], ["C2"]]),
+        "C1 and C2 stand in two groups, but share",
+    ),
+    "group twice": (
+        _at("camera_groups", [["C1", "C2"], ["C2"]]),
+        "must name each of C1, C2 exactly once",
+    ),
+    "no groups": (_at("camera_groups", None), "camera_groups: None must name each"),
+    "candidates": (
+        _at("certificates", "cameras", "candidates", "n_candidates", 480),
+        "n_candidates: claimed 480 poses, recomputed 4 poses",
+    ),
+    "needed": (
+        _at("certificates", "cameras", "needed", "count", 3),
+        "needed.count: 3 is claimed for a plan of 2 that is 'feasible'",
+    ),
+    "needed bound": (
+        _at("certificates", "cameras", "needed", "lower_bound", 3),
+        "needed.lower_bound: 3 exceeds the count of 2",
+    ),
+    "best bound": (
+        _at("certificates", "projectors", "best_area", "upper_bound_m2", 0.02),
+        "best_area.upper_bound_m2: 200.00 cm² exceeds the ",
+    ),
+    "one fewer": (
+        _at("certificates", "projectors", "candidates", "lower_bound", 2),
+        "2 are claimed to be the fewest",
+    ),
+    "light": (_at("rig", "light", "parallel"), "but rig.light is 'parallel'"),
+    "limits": (_at("rig", "limits", None), "rig.limits: is missing"),
+    "incidence limit": (
+        _at("rig", "limits", "projector_max_incidence_deg", 50.0),
+        "requirements.projector.max_incidence: claimed",
+    ),
+    "tangent limit": (
+        _at("rig", "limits", "min_tangent_angle_deg", 41.0),
+        "requirements.projector.min_tangent_angle: claimed",
+    ),
+    "camera limit": (
+        _at("rig", "limits", "camera_max_incidence_deg", 60.0),
+        "requirements.camera.max_incidence: claimed",
+    ),
+    "conditioning limit": (
+        _at("rig", "limits", "min_conditioning", 0.2),
+        "requirements.triangulation.min_conditioning: claimed",
+    ),
+    "noise": (
+        _at("rig", "limits", "noise_px", 0.2),
+        "requirements.triangulation.noise_px: claimed",
+    ),
+    "pitch limit": (
+        _at("rig", "limits", "min_ring_pitch_px", None),
+        "requirements.triangulation.min_ring_pitch_px: claimed 7.0, but",
+    ),
+    "up": (_at("requirements", "workspace", "up", [0, 2, 0]), "workspace.up: [0, 2, 0"),
+    "axis": (
+        _at("requirements", "workspace", "axis", [0, 0, 2]),
+        "workspace.axis: [0, 0, 2] must be a unit vector",
+    ),
+    "half_angle": (
+        _at("requirements", "workspace", "half_angle", 4.0),
+        "workspace.half_angle: 4 rad must lie in (0, pi]",
+    ),
+    "shell": (
+        _at("requirements", "workspace", "camera_radius_m", [1.1, 0.9]),
+        "workspace.camera_radius_m: [1.1, 0.9] m must be positive and rise",
+    ),
+    "scale": (_at("meshes", 0, "scale_to_m", 0.0), "scale_to_m: 0.0 must be positive"),
+    "scale of unit": (
+        _at("meshes", 0, "unit", "mm"),
+        "meshes.0.scale_to_m: claimed 1 m (mm), recomputed 0.001 m (mm)",
+    ),
+    "unit": (_at("meshes", 0, "unit", "cubit"), "meshes.0.unit: 'cubit' isn't one of"),
+    "last ring": (
+        _at("requirements", "workspace", "reference_ring_radius", 0.2),
+        "P1.ring_radii (last): claimed",
+    ),
+    "C": (_at("cost", "C", 5.0), "cost.C: claimed 5 s"),
+    "C before": (_at("cost", "C_before", 5.0), "cost.C_before: claimed 5 s"),
+    "times": (_at("cost", "t3", None), "cost.C: is claimed with the times"),
     "pixels": (_at("cost", "pixels", 12), "cost.pixels: claimed 12"),
     "share": (_at("surface", "dominant_share", 0.5), "surface.dominant_share: claimed"),
     "mesh area": (_at("meshes", 0, "area_m2", 0.04), "meshes.area_m2 (sum): claimed"),
     "member": (_at("members", 0, "coverage", {}), "members.0.coverage: differs"),
+    "member check": (
+        _at("members", 0, "reconstruction", {"passed": True}),
+        "members.0.reconstruction: differs",
+    ),
 }
 
 
@@ -267,6 +384,48 @@ def test_a_false_claim_is_named(handmade, name):
     change, sentence = FALSE[name]
     found = failures(handmade.tampered(handmade.build_plan(), change))
     assert any(sentence in failure for failure in found), found
+
+
+@pytest.mark.parametrize(
+    ("overlap", "groups", "sentence"),
+    [
+        (0.030, [["A", "B", "C"]], None),
+        (0.030, [["A", "C", "B"]], None),
+        (0.030, [["A", "B"], ["C"]], "B and C stand in two groups"),
+        (0.010, [["A", "B", "C"]], None),
+        (0.010, [["A", "B"], ["C"]], None),
+        (0.001, [["A", "B"], ["C"]], None),
+        (0.001, [["A", "B", "C"]], "C stand in the group of A, but"),
+        (0.001, [["A", "B"], []], "must name each of A, B, C exactly once"),
+    ],
+)
+def test_groups_hang_together_by_overlaps_of_one_percent(overlap, groups, sentence):
+    """A and B share a tenth of the target, B and C the given share, A and C nothing."""
+    n = 10_000
+    place = np.arange(n) / n
+    measured = np.stack(
+        [place < 0.4, (place >= 0.3) & (place < 0.7), place >= 0.7 - overlap]
+    )
+    samples = SimpleNamespace(in_target=np.ones(n, dtype=bool))
+    own = SimpleNamespace(measured_by=measured, samples=samples)
+    plan = SimpleNamespace(cameras=[SimpleNamespace(id=name) for name in "ABC"])
+    ledger = Ledger({"camera_groups": groups})
+    audit_groups(plan, own, 12_000, ledger)
+    assert [sentence in failure for failure in ledger.failures] == (
+        [] if sentence is None else [True]
+    )
+
+
+def test_one_device_more_may_add_less_to_the_surface(handmade):
+    """Covers are chosen for the target; on it alone must more devices do more."""
+
+    def change(document):
+        rows = document["marginal"]["cameras"]
+        more = {**rows[1], "n_cameras": 3}
+        more["measured_surface_m2"] = 0.5 * rows[1]["measured_surface_m2"]
+        rows.append(more)
+
+    assert failures(handmade.tampered(handmade.build_plan(), change)) == ()
 
 
 def test_a_region_in_the_dark_is_lit_by_nobody(handmade):
@@ -324,6 +483,7 @@ def test_a_superfluous_device_refutes_the_bound(handmade):
     def change(document):
         document["certificates"]["projectors"]["candidates"]["lower_bound"] = 2
         document["certificates"]["projectors"]["status"] = "optimal"
+        document["certificates"]["projectors"]["one_fewer"]["upper_bound_m2"] = 0.0
         document["requirements"]["dominant_coverage"] = 0.1
         document["certificates"]["projectors"]["required_m2"] = (
             0.1 * document["coverage"]["target"]["reachable_by_projectors_m2"]

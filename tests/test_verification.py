@@ -50,6 +50,70 @@ def test_recorded_figures_are_held_against_a_run_with_other_noise(handmade, veri
     assert verify_plan(plan, seed=7).failures == ()
 
 
+def _strict(handmade, reconstruction):
+    """The plan with a limit on the distances that no check can keep."""
+
+    def change(document):
+        document["requirements"]["check"]["max_rms_m"] = 1e-6
+        document["reconstruction"] = reconstruction
+
+    return handmade.tampered(handmade.build_plan(), change)
+
+
+def test_a_limit_that_the_plan_says_it_misses_is_no_false_claim(handmade, verified):
+    figures = verified[0].reconstruction.to_document()
+    honest = figures | {"passed": False, "failures": ["rms distance too large"]}
+    found = verify_plan(_strict(handmade, honest), seed=7)
+    assert found.failures == ()
+    assert found.passed
+    assert [sentence for sentence in found.unmet if "rms distance" in sentence]
+    assert "not met: rms distance" in found.summary()
+    assert "FALSE" not in found.summary()
+    assert found.to_document()["unmet"] == list(found.unmet)
+    assert not found.reconstruction.passed
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (None, "rms distance"),
+        ({}, "reconstruction.passed: claimed true, the check run again fails"),
+        (
+            {"passed": False, "failures": ["rms"], "accuracy_rms_m": 1e-6},
+            "reconstruction.accuracy_rms_m: claimed 1e-06",
+        ),
+        ({"passed": False}, "reconstruction.passed: claimed False, but"),
+    ],
+    ids=["not recorded", "claimed kept", "other figures", "no reason"],
+)
+def test_a_missed_limit_is_a_failure_unless_owned_up(
+    handmade, verified, change, sentence
+):
+    figures = verified[0].reconstruction.to_document()
+    recorded = None if change is None else figures | change
+    found = verify_plan(_strict(handmade, recorded))
+    assert not found.passed
+    assert any(sentence in failure for failure in found.failures)
+
+
+def test_a_missed_limit_of_what_really_stands_there_is_a_failure(handmade, verified):
+    figures = verified[0].reconstruction.to_document()
+    honest = figures | {"passed": False, "failures": ["rms distance too large"]}
+    plan = _strict(handmade, honest)
+    found = verify_plan(plan, truth=handmade.build_plan())
+    assert any("rms distance" in failure for failure in found.failures)
+
+
+def test_a_pass_with_failures_contradicts_itself_without_the_pixels(handmade):
+    recorded = {"passed": True, "failures": ["rms distance too large"]}
+    plan = handmade.tampered(
+        handmade.build_plan(), lambda document: document.update(reconstruction=recorded)
+    )
+    found = verify_plan(plan, check_pixels=False)
+    assert len(found.failures) == 1
+    assert found.failures[0].startswith("reconstruction.passed: claimed True, but")
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

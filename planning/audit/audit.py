@@ -11,15 +11,18 @@ from planning.surface import Surface
 
 from .areas import audit_areas, audit_causes, audit_contributions, recomputed_areas
 from .baselines import audit_baselines
+from .certificates import audit_certificates
+from .consistency import audit_consistency
 from .devices import audit_devices, audit_workspace
 from .estimates import Estimator
+from .groups import audit_groups
 from .ledger import Ledger, as_number
 from .occlusion import Shadow
 from .recompute import Reach, Recomputed, reach_of, recompute
 from .regions import audit_regions
 from .samples import AuditSamples, draw_samples
 from .serving import audit_margins
-from .tables import audit_certificates, audit_marginal, audit_rest
+from .tables import audit_marginal, audit_rest
 from .verdict import unmet_requirements
 
 
@@ -98,6 +101,8 @@ def audit_plan(
     audit_marginal(own, estimator, ledger)
     audit_certificates(plan, own, estimator, ledger)
     audit_baselines(plan, ledger)
+    audit_groups(plan, own, estimator.n_claimed, ledger)
+    audit_consistency(plan, ledger)
     audit_rest(plan, ledger)
     return _result(plan, own, reach, estimator, ledger)
 

@@ -16,6 +16,7 @@ from .seams import Section, distance_to_surface, normals_of_row, onward_of_row
 # Room for lengths and angles written with a few digits, and for E among them.
 _LENGTH_M = 5e-5
 _ANGLE = 1e-3
+_LIMITS = ("camera_field", "camera_incidence")
 
 
 def audit_baselines(plan: RigPlan, ledger: Ledger) -> None:
@@ -83,6 +84,76 @@ def _audit_row(
         f"{key}.phi_max", row.get("phi_max"), section.phi + room, _ANGLE, "rad"
     )
     _audit_limit(key, row, section, ledger)
+    _audit_angles(key, row, section, ledger)
+    _audit_standoffs(key, row, section, ledger)
+    _audit_seam(key, row, section, largest, ledger)
+
+
+def _audit_angles(
+    key: str, row: Mapping[str, Any], section: Section, ledger: Ledger
+) -> None:
+    """Check beta, iota and half_field of both cameras, delta_axes, delta_surface."""
+    for name, truth in (
+        ("beta", section.beta),
+        ("iota", section.iota),
+        ("half_field", section.half_field),
+    ):
+        claimed = _pair(row.get(name))
+        for side in (0, 1):
+            ledger.number(
+                f"{key}.{name}.{side}", claimed[side], truth[side], _ANGLE, "rad"
+            )
+    turn = section.phi - sum(section.beta)
+    ledger.number(f"{key}.delta_axes", row.get("delta_axes"), turn, _ANGLE, "rad")
+    bend = section.delta_surface
+    ledger.number(f"{key}.delta_surface", row.get("delta_surface"), bend, _ANGLE, "rad")
+
+
+def _audit_standoffs(
+    key: str, row: Mapping[str, Any], section: Section, ledger: Ledger
+) -> None:
+    """Check the depths of E, and C_i = standoff_i tan(b_i) with the row's own b_i."""
+    fields = _pair(row.get("half_field"))
+    for side in (0, 1):
+        depth, name = section.standoffs[side], f"standoff{side + 1}"
+        ledger.number(f"{key}.{name}", row.get(name), depth, _LENGTH_M, "m")
+        half = as_number(fields[side])
+        if half is not None and abs(half) < np.pi / 2.0:
+            extent, name = depth * float(np.tan(half)), f"C{side + 1}"
+            slack = _LENGTH_M * (1.0 + abs(float(np.tan(half))))
+            ledger.number(f"{key}.{name}", row.get(name), extent, slack, "m")
+
+
+def _audit_seam(
+    key: str,
+    row: Mapping[str, Any],
+    section: Section,
+    largest: float,
+    ledger: Ledger,
+) -> None:
+    """Check max_incidence, which limit binds, and the number of seam samples."""
+    ledger.number(
+        f"{key}.max_incidence", row.get("max_incidence"), largest, _ANGLE, "rad"
+    )
+    count = row.get("n_seam")
+    ledger.holds(
+        isinstance(count, int) and not isinstance(count, bool) and count >= 1,
+        f"{key}.n_seam",
+        f"{count!r} must be a positive whole number",
+    )
+    ahead = section.incidence_slack(largest) - section.field_slack()
+    first = _LIMITS[0] if ahead > 0.0 else _LIMITS[1]
+    # Where both limits bind at once, rounding may name either.
+    known = _LIMITS if abs(ahead) <= 2.0 * _ANGLE else (first,)
+    limit = row.get("limit")
+    ledger.holds(limit in known, f"{key}.limit", f"{limit!r} is claimed, it is {first}")
+
+
+def _pair(value: object) -> tuple[object, object]:
+    """Two values of a row, for camera 1 and camera 2; None for what isn't there."""
+    if isinstance(value, list) and len(value) == 2:
+        return value[0], value[1]
+    return None, None
 
 
 def _meeting_point(

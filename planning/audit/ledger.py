@@ -93,6 +93,11 @@ def as_number(value: object) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
+def square_centimetres(area_m2: float) -> str:
+    """Return an area as a person reads it: in cm², with two decimals."""
+    return f"{1e4 * area_m2:.2f} cm²"
+
+
 def entries(value: object) -> Sequence[Mapping[str, Any]]:
     """Return the tables of a list of the document; anything else is left out."""
     if not isinstance(value, list):

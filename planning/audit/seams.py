@@ -70,12 +70,38 @@ class Section:
     @property
     def phi(self) -> float:
         """Signed angle O1 E O2 in [rad]: iota_1 + delta_E + iota_2."""
+        iota1, iota2 = self.iota
+        return iota1 + self.delta_surface + iota2
+
+    @property
+    def iota(self) -> tuple[float, float]:
+        """Incidence at E on each camera's own side of the seam [rad]."""
         first, second = self.normals
-        return (
-            self._turn(self.to_first, first)
-            + self._turn(first, second)
-            + self._turn(second, self.to_second)
-        )
+        return self._turn(self.to_first, first), self._turn(second, self.to_second)
+
+    @property
+    def beta(self) -> tuple[float, float]:
+        """Off-axis angle of E in each camera [rad]."""
+        one, two = (c.world_from_device[:3, 2] for c in (self.camera1, self.camera2))
+        return self._turn(self.to_first, -one), self._turn(-two, self.to_second)
+
+    @property
+    def delta_surface(self) -> float:
+        """Turn of the surface at E, convex positive [rad]."""
+        return self._turn(self.normals[0], self.normals[1])
+
+    @property
+    def half_field(self) -> tuple[float, float]:
+        """b_1 and b_2: where each camera's image ends on the side of E [rad]."""
+        beta1, beta2 = self.beta
+        one = _room(self.camera1, self.to_first, -self.pole)
+        return beta1 + one, beta2 + self.field_slack()
+
+    @property
+    def standoffs(self) -> tuple[float, float]:
+        """Depth of E along the optical axis of each camera [m]."""
+        one, two = (c.world_from_device[:3, 2] for c in (self.camera1, self.camera2))
+        return float(-self.to_first @ one), float(-self.to_second @ two)
 
     def lengths(self) -> dict[str, float]:
         """Return D1, D2, d, d_lateral and d_axial in [m].
@@ -112,34 +138,50 @@ class Section:
 
         Negative where E itself lies outside the image.
         """
-        turns = np.linspace(0.0, np.pi, _STEPS + 1)
-        inside = self._inside(turns)
-        if not inside[0]:
-            back = self._inside(-turns)
-            return -float(turns[np.argmax(back)]) if np.any(back) else -np.pi
-        if np.all(inside):
-            return float(np.pi)
-        low = float(turns[int(np.argmin(inside)) - 1])
-        high = float(turns[int(np.argmin(inside))])
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            if self._inside(np.array([middle]))[0]:
-                low = middle
-            else:
-                high = middle
-        return low
+        return _room(self.camera2, self.to_second, self.pole)
 
-    def _inside(self, turns: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether camera 2 has rays in its image that are turned on from E."""
-        toward = -self.to_second / np.linalg.norm(self.to_second)
-        aside = np.cross(self.pole, toward)
-        rays = np.cos(turns)[:, None] * toward + np.sin(turns)[:, None] * aside
-        local = rays @ self.camera2.world_from_device[:3, :3]
-        ahead = local[:, 2] > 1e-9
-        inside = np.zeros(len(turns), dtype=bool)
-        device = self.camera2.device
-        inside[ahead] = in_image(device.resolution, pixels_of(device, local[ahead]))
-        return inside
+
+def _room(
+    camera: PlannedCamera, to_centre: NDArray[np.float64], pole: NDArray[np.float64]
+) -> float:
+    """How far E's ray may turn about a pole until the image of a camera ends [rad].
+
+    Negative where E lies outside the image: how far it must turn back.
+    """
+    turns = np.linspace(0.0, np.pi, _STEPS + 1)
+    start = bool(_inside(camera, to_centre, pole, turns[:1])[0])
+    sense = 1.0 if start else -1.0
+    changed = _inside(camera, to_centre, pole, sense * turns) != start
+    if not np.any(changed):
+        return sense * np.pi
+    high = float(turns[int(np.argmax(changed))])
+    low = float(turns[int(np.argmax(changed)) - 1])
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        at = np.array([sense * middle])
+        if bool(_inside(camera, to_centre, pole, at)[0]) == start:
+            low = middle
+        else:
+            high = middle
+    return sense * low
+
+
+def _inside(
+    camera: PlannedCamera,
+    to_centre: NDArray[np.float64],
+    pole: NDArray[np.float64],
+    turns: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Whether a camera has rays in its image that are turned on from E."""
+    toward = -to_centre / np.linalg.norm(to_centre)
+    aside = np.cross(pole, toward)
+    rays = np.cos(turns)[:, None] * toward + np.sin(turns)[:, None] * aside
+    local = rays @ camera.world_from_device[:3, :3]
+    ahead = local[:, 2] > 1e-9
+    inside = np.zeros(len(turns), dtype=bool)
+    device = camera.device
+    inside[ahead] = in_image(device.resolution, pixels_of(device, local[ahead]))
+    return inside
 
 
 def normals_of_row(

@@ -1,0 +1,235 @@
+"""Claims of the certificates: counts, bounds and what the plan itself refutes."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.plan import RigPlan
+
+from .areas import ROUNDING
+from .estimates import POINT, Estimator
+from .ledger import Ledger, as_number, square_centimetres
+from .recompute import Recomputed
+
+_STATUSES = ("optimal", "feasible", "infeasible")
+# Covers are chosen on fewer samples than areas are claimed from.
+_FEWEST_ROWS = 1000
+# Such a proof counts sets; it leaves no bound on the area of one set fewer behind it.
+_COUNTING_PROOF = "branch and bound"
+
+
+def audit_certificates(
+    plan: RigPlan, own: Recomputed, estimator: Estimator, ledger: Ledger
+) -> None:
+    """Check counts, bounds and statuses, and that the plan doesn't refute them."""
+    limits = plan.requirements
+    poses = {
+        "projectors": plan.surface.reference_projectors,
+        "cameras": plan.surface.reference_cameras,
+    }
+    for kind, share, of, covers, area in (
+        (
+            "projectors",
+            limits.dominant_coverage,
+            "reachable_by_projectors_m2",
+            own.lit_by,
+            own.lit,
+        ),
+        (
+            "cameras",
+            limits.coverage,
+            "reachable_by_cameras_m2",
+            own.measured_by,
+            own.measured,
+        ),
+    ):
+        key = f"certificates.{kind}"
+        claims = ledger.read("certificates", kind)
+        if not ledger.holds(isinstance(claims, dict), key, "is missing"):
+            continue
+        ledger.number(f"{key}.count", claims.get("count"), float(len(covers)), 0.0, "")
+        _audit_bounds(key, claims, len(covers), ledger)
+        reachable = as_number(ledger.read("coverage", "target", of)) or 0.0
+        slack = estimator.tolerance(area & own.samples.in_target, estimator.target_m2)
+        _audit_candidates(key, claims, len(poses[kind]), ledger)
+        _audit_needed(key, claims, len(covers), ledger)
+        _audit_best_area(key, claims, reachable, estimator.target_m2, ledger)
+        _audit_one_fewer(key, claims, len(covers), slack, ledger)
+        ledger.number(
+            f"{key}.required_m2", claims.get("required_m2"), share * reachable, slack
+        )
+        required = as_number(claims.get("required_m2"))
+        bound = _best_bound(claims)
+        if required is not None and bound is not None:
+            target = own.samples.in_target
+            _audit_refuted(
+                key, covers & target, bound, required + slack, estimator, ledger
+            )
+
+
+def _audit_bounds(key: str, claims: dict[str, Any], count: int, ledger: Ledger) -> None:
+    status = claims.get("status")
+    ledger.holds(
+        status in _STATUSES, f"{key}.status", f"{status!r} isn't one of {_STATUSES}"
+    )
+    met = status != "infeasible"
+    for scope in ("candidates", "continuous"):
+        table = claims.get(scope)
+        if table is None and scope == "continuous":
+            continue
+        bound = as_number(table.get("lower_bound")) if isinstance(table, dict) else None
+        name = f"{key}.{scope}.lower_bound"
+        if bound is None:
+            ledger.fail(name, "is missing")
+            continue
+        ledger.holds(bound >= 0, name, f"{bound:g} is negative")
+        if met:
+            ledger.holds(
+                bound <= count, name, f"{bound:g} exceeds the count of {count}"
+            )
+    best = _best_bound(claims)
+    if status == "optimal" and best is not None:
+        ledger.holds(
+            best == count,
+            f"{key}.status",
+            f"optimal is claimed, but {count} devices stand against a bound of "
+            f"{best:g}",
+        )
+
+
+def _audit_candidates(
+    key: str, claims: dict[str, Any], n_poses: int, ledger: Ledger
+) -> None:
+    """The candidates are the reference poses: a proof over fewer proves less."""
+    table = claims.get("candidates")
+    if isinstance(table, dict):
+        ledger.number(
+            f"{key}.candidates.n_candidates",
+            table.get("n_candidates"),
+            float(n_poses),
+            0.0,
+            "poses",
+        )
+
+
+def _audit_needed(key: str, claims: dict[str, Any], count: int, ledger: Ledger) -> None:
+    needed = claims.get("needed")
+    if not isinstance(needed, dict):
+        return
+    number = as_number(needed.get("count"))
+    bound = as_number(needed.get("lower_bound"))
+    if not ledger.holds(
+        number is not None and bound is not None,
+        f"{key}.needed",
+        f"{needed!r} must hold count and lower_bound",
+    ):
+        return
+    assert number is not None
+    assert bound is not None
+    met = claims.get("status") != "infeasible"
+    ledger.holds(
+        number == count if met else number >= count,
+        f"{key}.needed.count",
+        f"{number:g} is claimed for a plan of {count} that is {claims.get('status')!r}",
+    )
+    ledger.holds(
+        bound <= number,
+        f"{key}.needed.lower_bound",
+        f"{bound:g} exceeds the count of {number:g}",
+    )
+
+
+def _audit_best_area(
+    key: str,
+    claims: dict[str, Any],
+    reachable: float,
+    whole: float,
+    ledger: Ledger,
+) -> None:
+    """value_m2 <= upper_bound_m2 <= what can be reached at all, as far as sampled."""
+    area = claims.get("best_area")
+    if not isinstance(area, dict):
+        return
+    value = as_number(area.get("value_m2"))
+    upper = as_number(area.get("upper_bound_m2"))
+    name = f"{key}.best_area"
+    if value is None or upper is None:
+        ledger.fail(name, f"{area!r} must hold value_m2 and upper_bound_m2")
+        return
+    ledger.holds(
+        0.0 <= value <= upper * (1.0 + ROUNDING),
+        name,
+        f"value_m2 {square_centimetres(value)} exceeds upper_bound_m2 "
+        f"{square_centimetres(upper)}",
+    )
+    n = max(as_number(claims.get("n_samples")) or 0.0, _FEWEST_ROWS)
+    p = min(max(reachable / whole, 1.0 / n), 1.0 - 1.0 / n)
+    slack = whole * (POINT + 3.0 * float(np.sqrt(p * (1.0 - p) / n)))
+    ledger.holds(
+        upper <= reachable + slack,
+        f"{key}.best_area.upper_bound_m2",
+        f"{square_centimetres(upper)} exceeds the {square_centimetres(reachable)} "
+        f"that can be reached (tolerance {square_centimetres(slack)})",
+    )
+
+
+def _audit_one_fewer(
+    key: str, claims: dict[str, Any], count: int, slack: float, ledger: Ledger
+) -> None:
+    """If no fewer devices suffice, the bound on one fewer must fall short too."""
+    table = claims.get("one_fewer")
+    if not isinstance(table, dict):
+        return
+    upper = as_number(table.get("upper_bound_m2"))
+    name = f"{key}.one_fewer.upper_bound_m2"
+    if upper is None or not upper >= 0.0:
+        ledger.fail(name, f"{table.get('upper_bound_m2')!r} must be an area")
+        return
+    required = as_number(claims.get("required_m2"))
+    bounds = claims.get("candidates")
+    proof = str(bounds.get("proof")) if isinstance(bounds, dict) else ""
+    if required is None or _best_bound(claims) != count or _COUNTING_PROOF in proof:
+        return
+    ledger.holds(
+        upper <= required + slack,
+        name,
+        f"{square_centimetres(upper)}, which is enough for the "
+        f"{square_centimetres(required)} required (tolerance "
+        f"{square_centimetres(slack)}), but {count} are claimed to be the fewest",
+    )
+
+
+def _best_bound(claims: dict[str, Any]) -> float | None:
+    """The bound that speaks of the plan's own count; None if nothing was proved."""
+    table = claims.get("candidates")
+    return as_number(table.get("lower_bound")) if isinstance(table, dict) else None
+
+
+def _audit_refuted(
+    key: str,
+    covers: NDArray[np.bool_],
+    bound: float,
+    enough_m2: float,
+    estimator: Estimator,
+    ledger: Ledger,
+) -> None:
+    """A bound is false if the plan meets the requirement with fewer devices than that.
+
+    Devices are left out one after the other, always the one that is missed least.
+    """
+    left = list(range(len(covers)))
+    while len(left) >= bound and left:
+        areas = [
+            estimator.area(np.any(covers[[i for i in left if i != out]], axis=0))
+            for out in left
+        ]
+        best = int(np.argmax(areas))
+        del left[best]
+        if len(left) < bound and not areas[best] <= enough_m2:
+            ledger.fail(
+                f"{key}.candidates.lower_bound",
+                f"{bound:g} is claimed, but {len(left)} of the plan's devices cover "
+                f"{areas[best]:.6g} m², more than the {enough_m2:.6g} m² required",
+            )
+            return
