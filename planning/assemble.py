@@ -58,7 +58,7 @@ def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
     if falls_short(areas, reachable, whole, requirements.min_reachable):
         with clock.stage("relaxations", "what would help"):
             document["coverage"]["relaxations"] = reachability_relaxations(
-                scene, reference
+                scene, reference, (draft.tilt, 0.0)
             )
     return plan
 

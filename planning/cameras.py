@@ -104,11 +104,7 @@ def plan_cameras(
     rows = lit_samples(scene, projectors, target)
     measured = measured_by(scene, candidates, rows)
     if not measured.any():
-        raise InfeasibleLimitsError(
-            f"no camera of {len(candidates)} poses measures any lit sample: range, "
-            f"field, incidence, conditioning, sigma and pitch exclude each other; "
-            f"relax the first of {_failing(scene, candidates, rows)}"
-        )
+        raise InfeasibleLimitsError(_nothing_measured(scene, candidates, rows))
     attempt = 0
     while True:
         attempt += 1
@@ -143,6 +139,7 @@ def _measured(
     scene: Scene, camera: PlannedCamera, rows: LitSamples
 ) -> NDArray[np.bool_]:
     """Whether a camera measures each sample; rays come last, as they cost most."""
+    scene.pulse()
     required = scene.requirements
     seen = measurability.view(camera, rows.target, required.camera, None)
     wanted = np.zeros(len(rows.target), dtype=bool)
@@ -167,16 +164,49 @@ def _measured(
     return wanted
 
 
-def _failing(
+def furthest_failure(
+    scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
+) -> NDArray[np.int8]:
+    """Return how far each sample comes over all pairs: an index in `CAUSES`.
+
+    It is `MEASURED` where some pair measures the sample.
+    """
+    furthest = np.zeros(len(rows.target), dtype=np.int8)
+    required = scene.requirements
+    for camera in cameras:
+        scene.pulse()
+        seen = measurability.view(
+            camera, rows.target, required.camera, scene.visibility
+        )
+        furthest = np.maximum(furthest, seen.stage)
+        clear = np.flatnonzero(seen.stage == measurability.SEEN)
+        for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
+            pairs = clear[rows.lit[clear, p]]
+            quality = measurability.pair_quality(
+                rows.target.samples.normals[pairs],
+                light.take(pairs),
+                rings.take(pairs),
+                seen.take(pairs),
+                required.triangulation,
+            )
+            stage = measurability.first_pair_failure(quality, required.triangulation)
+            furthest[pairs] = np.maximum(furthest[pairs], stage)
+    return furthest
+
+
+def _nothing_measured(
     scene: Scene, candidates: Sequence[PlannedCamera], rows: LitSamples
 ) -> str:
-    counts = np.zeros(measurability.SEEN, dtype=np.int64)
-    for camera in candidates:
-        stage = measurability.view(
-            camera, rows.target, scene.requirements.camera, scene.visibility
-        ).stage
-        counts += np.bincount(stage, minlength=measurability.SEEN + 1)[:-1]
-    if not counts.any():
-        return ", ".join(measurability.PAIR_CAUSES)
+    causes = furthest_failure(scene, candidates, rows)
+    counts = np.bincount(causes, minlength=measurability.MEASURED)
     order = np.argsort(-counts, kind="stable")
-    return ", ".join(measurability.SEEN_CAUSES[i] for i in order if counts[i])
+    named = ", ".join(
+        f"{measurability.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} %"
+        for i in order
+        if counts[i] >= 0.01 * len(causes)
+    )
+    return (
+        f"no camera of {len(candidates)} poses measures any lit sample; the limit that "
+        f"stops each sample where it comes furthest is {named}; relax it (sigma is "
+        f"--accuracy, the others stand in the rig file)"
+    )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import lighting, measurability
-from .cameras import LitSamples, lit_samples, measured_by
+from .cameras import LitSamples, furthest_failure, lit_samples, measured_by
 from .lighting import Target
 from .plan import PlannedCamera, PlannedProjector
 from .projectors import lit_stages, margins_of
@@ -234,25 +234,7 @@ def _uncovered(
     causes = [lighting.CAUSES[stage] for stage in stages[dark].max(axis=1)]
     left = np.flatnonzero(_any(lit) & ~measured)
     rows = _lit_rows(devices.projectors, target.take(left), lit[left])
-    furthest = np.zeros(len(left), dtype=np.int8)
-    required = scene.requirements
-    for camera in devices.cameras:
-        seen = measurability.view(
-            camera, rows.target, required.camera, scene.visibility
-        )
-        furthest = np.maximum(furthest, np.minimum(seen.stage, measurability.SEEN))
-        clear = np.flatnonzero(seen.stage == measurability.SEEN)
-        for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
-            pairs = clear[rows.lit[clear, p]]
-            quality = measurability.pair_quality(
-                rows.target.samples.normals[pairs],
-                light.take(pairs),
-                rings.take(pairs),
-                seen.take(pairs),
-                required.triangulation,
-            )
-            stage = measurability.first_pair_failure(quality, required.triangulation)
-            furthest[pairs] = np.maximum(furthest[pairs], stage)
+    furthest = furthest_failure(scene, devices.cameras, rows)
     return causes + [measurability.CAUSES[stage] for stage in furthest]
 
 

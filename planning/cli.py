@@ -5,6 +5,7 @@ Heavy packages are imported inside the commands, so that `plan --help` stays qui
 
 import math
 import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,10 @@ _NOT_BUILT = {
     "report": "writes one self-contained HTML file",
     "export": "writes poses for OpenCV, COLMAP, glTF, Blender, ROS, USD, CSV",
 }
+
+
+# As in sysexits.h: a bug of ours, nothing that the user did.
+_INTERNAL = 70
 
 
 class _Positive(click.FloatRange):
@@ -229,6 +234,8 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
         raise click.UsageError(
             f"--pattern {options['pattern']} isn't built yet: use rings"
         )
+    if not options["meshes"][0]:
+        raise click.UsageError("--mesh '' names no file")
     if len(options["meshes"]) > 1 or Path(options["meshes"][0]).is_dir():
         raise click.UsageError(
             "several meshes on one rig aren't built yet: give one file"
@@ -332,13 +339,27 @@ def _run(command: Callable[[], int], *, debug: bool) -> None:
     from .errors import PlanningError
 
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.exit(command())
     except KeyboardInterrupt:
         _stop("interrupted before a first plan stood; nothing was written", 130)
+    except BrokenPipeError:
+        # Whoever reads stdout has had enough; Python must not complain at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
     except (PlanningError, MeshError, OSError) as error:
         if debug:
             raise
         _stop(str(error), 2 if isinstance(error, OSError) else _exit_code(error))
+    except Exception as error:
+        if debug or isinstance(error, click.ClickException):
+            raise
+        name = type(error).__name__
+        _stop(
+            f"internal error ({name}: {error}); this is a bug: run again with --debug "
+            f"and report it",
+            _INTERNAL,
+        )
 
 
 def _exit_code(error: Exception) -> int:
@@ -356,6 +377,7 @@ def main() -> None:
     # and IPOPT are loaded. Rays have threads of their own.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
+    before = signal.signal(signal.SIGINT, _quit)
     try:
         sys.exit(commands.main(prog_name="plan", standalone_mode=False))
     except click.exceptions.NoArgsIsHelpError as error:
@@ -365,3 +387,11 @@ def main() -> None:
         _stop(f"{error.format_message()} (see `plan --help`)", error.exit_code)
     except (click.Abort, KeyboardInterrupt):
         _stop("interrupted", 130)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _quit(number: int, frame: object) -> NoReturn:
+    """Leave at once: while packages are imported, an exception would be swallowed."""
+    os.write(2, b"plan: interrupted before anything was done\n")
+    os._exit(130)

@@ -2,8 +2,11 @@
 
 import json
 import os
+import signal
 import tempfile
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,46 +33,56 @@ from .verification import verify_plan
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan, write the output folder, print the result; return the exit code."""
+    begin = time.monotonic()
     report = _report(quiet=options["quiet"])
     path = Path(options["meshes"][0])
-    rig = load_rig(options["rig_name"], light=options["light"])
-    if report is not None:
-        report(f"reading {path}")
-    mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
-    _check_writable(folder)
-    _say_size(report, mesh)
-    missed: tuple[str, ...] = ()
-    code = 0
-    try:
-        plan = plan_rig(
-            mesh,
-            rig,
-            max_projectors=options["max_projectors"],
-            max_cameras=options["max_cameras"],
-            target=options["target"],
-            dominant_coverage=options["dominant_coverage"],
-            coverage=options["coverage"],
-            min_reachable=options["min_reachable"],
-            accuracy_mm=options["accuracy_mm"],
-            up=options["up"],
-            seed=options["seed"],
-            threads=options["threads"] or _cores(),
-            check=not options["no_check"],
-            time_limit=options["time_limit"],
-            progress=report,
-            command=("plan", *command),
-        )
-    except RequirementError as error:
-        plan, missed, code = error.plan, error.shortfalls, error.exit_code
-    except InterruptedPlanError as error:
-        plan, code = error.plan, error.exit_code
-    files = _save(plan, folder, report)
+    with _writable(folder):
+        rig = load_rig(options["rig_name"], light=options["light"])
+        if report is not None:
+            report(f"reading {path}")
+        mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
+        _say_size(report, mesh)
+        missed: tuple[str, ...] = ()
+        code = 0
+        try:
+            plan = plan_rig(
+                mesh,
+                rig,
+                max_projectors=options["max_projectors"],
+                max_cameras=options["max_cameras"],
+                target=options["target"],
+                dominant_coverage=options["dominant_coverage"],
+                coverage=options["coverage"],
+                min_reachable=options["min_reachable"],
+                accuracy_mm=options["accuracy_mm"],
+                up=options["up"],
+                seed=options["seed"],
+                threads=options["threads"] or _cores(),
+                check=not options["no_check"],
+                time_limit=_left(options["time_limit"], begin),
+                progress=report,
+                command=("plan", *command),
+            )
+        except RequirementError as error:
+            plan, missed, code = error.plan, error.shortfalls, error.exit_code
+        except InterruptedPlanError as error:
+            plan, code = error.plan, error.exit_code
+        # From here on the work is done; a second Ctrl-C must not lose it.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        files = _save(plan, folder, report)
     if options["as_json"]:
         _print_json(plan.document | {"files": files, "missed": list(missed)})
     else:
         click.echo(summary(plan, files, missed))
     return code
+
+
+def _left(limit: float | None, begin: float) -> float | None:
+    """What is left of a time limit; reading the mesh counts too."""
+    if limit is None:
+        return None
+    return max(limit - (time.monotonic() - begin), 1e-9)
 
 
 def verify_command(options: Mapping[str, Any]) -> int:
@@ -143,8 +156,10 @@ def _say_size(report: Report | None, mesh: Any) -> None:  # noqa: ANN401
         report(f"  repaired: {repair.kind}, {repair.count}")
 
 
-def _check_writable(folder: Path) -> None:
-    """Fail before the work, not after it."""
+@contextmanager
+def _writable(folder: Path) -> Generator[None]:
+    """Fail before the work, not after it; leave no empty folder where it fails."""
+    missing = [f for f in (folder, *folder.parents) if not f.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -153,6 +168,13 @@ def _check_writable(folder: Path) -> None:
         raise click.UsageError(
             f"can't write to {folder}: {error.strerror}; choose another folder with -o"
         ) from None
+    try:
+        yield
+    except BaseException:
+        for made in missing:
+            with suppress(OSError):
+                made.rmdir()
+        raise
 
 
 def _save(plan: RigPlan, folder: Path, report: Report | None) -> list[str]:

@@ -109,6 +109,8 @@ def plan_rig(
     with threadpool_limits(1):
         plan = _plan(order, clock, check=check)
     missed = shortfalls(plan.document, plan.requirements)
+    if check and plan.document["reconstruction"] is None:
+        missed += ("the check wasn't made: the time limit came first",)
     if missed:
         raise RequirementError(plan, missed)
     return plan
@@ -134,6 +136,11 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
         field = principal_curvatures(mesh)
         regions = dominant_regions(mesh, field)
         target = order.asked["target"]
+        if not len(regions):
+            raise InputError(
+                "no dominant region: the surface is flat where its curvature can be "
+                "trusted; use --target surface"
+            )
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
     requirements, radii, tilt = _resolve(order)
     scene = Scene(
@@ -143,6 +150,7 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
         requirements,
         order.seed,
         order.threads,
+        clock.check,
     )
     with clock.stage("projectors", "projectors: candidates and cover"):
         template = PlannedProjector(
@@ -278,7 +286,7 @@ def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:
     """Audit the written plan and reconstruct it from pixels, with foreign code."""
     with clock.stage("check", "check: audit, then reconstruction from pixels"):
         verification = verify_plan(
-            plan, threads=draft.order.threads, progress=clock.say
+            plan, threads=draft.order.threads, progress=clock.say_in_time
         )
     found = verification.reconstruction
     entry = None if found is None else found.to_document()

@@ -46,12 +46,18 @@ class Stopwatch:
         if self._report is not None:
             self._report(line)
 
+    def say_in_time(self, line: str) -> None:
+        """Report one line of progress, unless the time limit has passed."""
+        self.check()
+        self.say(line)
+
     def check(self) -> None:
         """Raise TimeLimitError once the time limit has passed."""
         spent = time.monotonic() - self._begin
         if self._limit is not None and spent > self._limit:
             raise TimeLimitError(
-                f"the time limit of {self._limit:g} s passed after {spent:.1f} s"
+                f"the time limit came before a first plan stood, after {spent:.1f} s "
+                f"of planning; allow more (--time-limit)"
             )
 
     def lift(self) -> None:

@@ -98,6 +98,7 @@ def lit_stages(
     stages = np.empty((len(target), len(projectors)), dtype=np.int8)
     limits, visibility = scene.requirements.projector, scene.visibility
     for column, projector in enumerate(projectors):
+        scene.pulse()
         stages[:, column] = lighting.first_failure(
             projector, target, limits, visibility
         )

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from . import lighting
+from .candidates import projector_candidates
 from .plan import PlannedProjector
 from .scene import Scene
 
@@ -16,13 +17,16 @@ _WIDER_INCIDENCE = np.radians(75.0)
 
 
 def reachability_relaxations(
-    scene: Scene, reference: Sequence[PlannedProjector]
+    scene: Scene,
+    reference: Sequence[PlannedProjector],
+    ring_offset: tuple[float, float],
 ) -> list[dict[str, Any]]:
     """Return the share of the target that each single relaxation would make reachable.
 
     Args:
         scene: Surface and requirements.
         reference: The projectors' reference set.
+        ring_offset: Tilt and azimuth of its ring axes.
 
     Returns:
         One entry for each relaxation that gains at least a percentage point, the
@@ -38,10 +42,21 @@ def reachability_relaxations(
         "no tangent limit": replace(limits, min_tangent_angle=0.0),
     }
     base = _share(scene, reference, target, limits)
+    shares = {
+        change: _share(scene, reference, target, offered)
+        for change, offered in offers.items()
+    }
+    workspace = scene.requirements.workspace
+    if workspace.half_angle < np.pi or workspace.floor_m is not None:
+        whole = replace(workspace, half_angle=float(np.pi), floor_m=None)
+        anywhere = projector_candidates(
+            reference[0], whole, len(reference), ring_offset=ring_offset
+        )
+        shares["the whole shell as workspace"] = _share(scene, anywhere, target, limits)
     gains = [
         {"change": change, "reachable_share": share}
-        for change, offered in offers.items()
-        if (share := _share(scene, reference, target, offered)) >= base + 0.01
+        for change, share in shares.items()
+        if share >= base + 0.01
     ]
     return sorted(gains, key=lambda entry: entry["reachable_share"])
 

@@ -1,5 +1,6 @@
 """What both planning stages look at: the surface, its target, and how rays see it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +29,7 @@ class Scene:
         requirements: What is asked.
         seed: Of every random draw.
         threads: Worker threads; no result depends on it.
+        pulse: Called between pieces of work; raises when the run is to be cut.
     """
 
     mesh: TriangleMesh
@@ -36,6 +38,7 @@ class Scene:
     requirements: Requirements
     seed: int
     threads: int
+    pulse: Callable[[], None] = lambda: None
 
     @cached_property
     def safe_workspace(self) -> Workspace:

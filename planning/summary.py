@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .plan import PlannedCamera, PlannedProjector, RigPlan
+from .requirements import Workspace
 from .shortfall import causes_line
 
 _AXES = "xyz"
@@ -41,21 +42,35 @@ def _head(plan: RigPlan) -> str:
     cut = (
         "; TRUNCATED, not the best that could be found" if document["truncated"] else ""
     )
-    where = (
-        "the whole shell about it (no floor)"
-        if workspace.half_angle >= np.pi and workspace.floor_m is None
-        else f"a cone of {np.degrees(workspace.half_angle):.0f} degrees"
-        if workspace.floor_m is None
-        else f"the shell above {1e3 * workspace.floor_m:.0f} mm from its centre"
-    )
+    where = _where(workspace)
     return (
-        f"PLAN     {len(plan.projectors)} projectors, {len(plan.cameras)} cameras for "
+        f"PLAN     {_number(plan.projectors, 'projector')}, "
+        f"{_number(plan.cameras, 'camera')} for "
         f"{mesh['path']}{cut}\n"
         f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
         f"{_unit(mesh)}, up {_axis(workspace.up)}; rig {document['rig']['name']}, "
         f"{document['rig']['light']} light\n"
         f"         devices may stand in {where}"
     )
+
+
+def _number(devices: Sequence[object], name: str) -> str:
+    return f"{len(devices)} {name}{'s' * (len(devices) != 1)}"
+
+
+def _where(workspace: Workspace) -> str:
+    if workspace.half_angle >= np.pi and workspace.floor_m is None:
+        return "the whole shell about it (no floor)"
+    parts: list[str] = []
+    if workspace.half_angle < np.pi:
+        x, y, z = workspace.axis
+        parts.append(
+            f"within {np.degrees(workspace.half_angle):.0f} degrees of the axis "
+            f"({x:.3g}, {y:.3g}, {z:.3g}) from its centre"
+        )
+    if workspace.floor_m is not None:
+        parts.append(f"at least {1e3 * workspace.floor_m:.0f} mm above its centre")
+    return f"the shell about it, {', '.join(parts)}"
 
 
 def _unit(mesh: dict[str, Any]) -> str:
@@ -235,7 +250,10 @@ def _marginal(plan: RigPlan) -> str:
 def _check(plan: RigPlan) -> str:
     check = plan.document["reconstruction"]
     if check is None:
-        return "\nNOT CHECKED (--no-check): no reconstruction from pixels was made"
+        why = "the run was cut" if plan.document["truncated"] else "--no-check"
+        return f"\nNOT CHECKED ({why}): no reconstruction from pixels was made"
+    if check["n_merged"] == 0:
+        return "\nCHECK    FAILED: no point was measured in the rendered pixels"
     limits = plan.requirements.check
     whole = [
         f"{100 * c['fraction']:.1f} % within {1e3 * c['threshold_m']:.1f} mm"

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .baseline_problem import BaselineProblem, smallest_baseline
-from .status import SolveStatus
+from .status import SolveStatus, interruptible
 
 _Array = NDArray[np.float64]
 _Matrix = ca.SX | ca.DM
@@ -164,19 +164,21 @@ def _run_ipopt(
             "ipopt.tol": 1e-7,
             "ipopt.acceptable_iter": 0,
             "print_time": False,
+            "show_eval_warnings": False,
             "error_on_fail": False,
         },
     )
     # The step's ball holds these bounds too; they keep iterates from running away.
     reach = np.full(len(program.start) - 1, 1.1 * problem.max_step)
     longest = 2.0 * (np.abs(program.start[:-1]).max() + reach[0])
-    answer = solver(
-        x0=program.start,
-        lbx=np.append(program.start[:-1] - reach, 0.0),
-        ubx=np.append(program.start[:-1] + reach, 2.0 * longest),
-        lbg=program.low,
-        ubg=program.high,
-    )
+    with interruptible():
+        answer = solver(
+            x0=program.start,
+            lbx=np.append(program.start[:-1] - reach, 0.0),
+            ubx=np.append(program.start[:-1] + reach, 2.0 * longest),
+            lbg=program.low,
+            ubg=program.high,
+        )
     return np.asarray(answer["x"], dtype=np.float64).ravel(), solver.stats()
 
 

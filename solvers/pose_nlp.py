@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .pose_program import INSET, Light, PoseProgram, pose_margins
+from .status import interruptible
 
 RIDGE = 1e-6
 _N_SCALARS = 44
@@ -225,14 +226,15 @@ def run_ipopt(
     x0 = variables_of(program, start)
     reach = program.max_move_m / size
     box = np.array([*[reach] * 3, *[_MAX_GIBBS] * 3, np.inf])
-    result = solver(
-        x0=x0,
-        p=p,
-        lbg=lower,
-        ubg=np.inf,
-        lbx=np.append(-box[:6], -0.5 * np.pi),
-        ubx=np.append(box[:6], program.max_incidence),
-    )
+    with interruptible():
+        result = solver(
+            x0=x0,
+            p=p,
+            lbg=lower,
+            ubg=np.inf,
+            lbx=np.append(-box[:6], -0.5 * np.pi),
+            ubx=np.append(box[:6], program.max_incidence),
+        )
     x = np.asarray(result["x"], dtype=np.float64).ravel()
     success = bool(solver.stats()["success"])
     return IpoptOutcome(pose_of(program, x), float(x[6]), success)
@@ -270,6 +272,7 @@ def _solver(light: Light, slots: int, max_iterations: int) -> Any:  # noqa: ANN4
     nlp = build_pose_nlp(light, slots)
     options = {
         "print_time": False,
+        "show_eval_warnings": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
         "ipopt.linear_solver": "mumps",

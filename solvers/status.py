@@ -1,7 +1,12 @@
 """How a solve ended, and the work that it may spend."""
 
 import enum
+import signal
 import time
+from collections.abc import Generator
+from contextlib import contextmanager
+from threading import current_thread, main_thread
+from types import FrameType
 
 
 class SolveStatus(enum.Enum):
@@ -81,3 +86,32 @@ class WorkBudget:
     def reason(self) -> str:
         """What ended the work, for people."""
         return "time limit" if self.out_of_time else "work budget"
+
+
+@contextmanager
+def interruptible() -> Generator[None]:
+    """Let a Ctrl-C through that CasADi takes for itself and then forgets.
+
+    CasADi catches the KeyboardInterrupt that a signal raises inside a callback, warns,
+    and lets the solve end as if it had failed; here it is raised again.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if (
+        before is not signal.default_int_handler
+        or current_thread() is not main_thread()
+    ):
+        yield
+        return
+    seen: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        seen.append(number)
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if seen:
+        raise KeyboardInterrupt

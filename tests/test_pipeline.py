@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.mesh import TriangleMesh
+from geometry.primitives import box
 from planning import RigPlan, load_rig, plan_rig, verify_plan
 from planning.errors import (
     InfeasibleLimitsError,
@@ -112,6 +113,7 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(head, tmp_pa
     assert share < 0.9
     assert f"{100 * share:.1f} %" in lines[0]
     assert "--min-reachable" in lines[0]
+    assert "the whole shell as workspace would reach 100.0 %" in lines[0]
     axis = np.array([0.0, -1.0, 0.0])
     for device in (*plan.projectors, *plan.cameras):
         offset = device.world_from_device[:3, 3] - plan.surface.mesh.centre
@@ -155,6 +157,31 @@ def test_an_interrupted_run_keeps_the_plan_it_has(head):
     assert plan.document["truncated"] is True
     assert plan.document["reconstruction"] is None
     assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
+
+
+def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(head):
+    def cut(line):
+        if line.startswith("check"):
+            raise TimeLimitError("the time limit came")
+
+    with pytest.raises(RequirementError, match="check wasn't made") as caught:
+        plan_rig(head, load_rig("default"), max_projectors=3, progress=cut)
+    plan = caught.value.plan
+    assert plan.document["truncated"] is True
+    text = summary(plan, [], caught.value.shortfalls)
+    assert "NOT CHECKED (the run was cut)" in text
+    assert "--no-check" not in text
+
+
+def test_a_plate_without_curvature_has_no_dominant_region():
+    plate = box((2.0, 2.0, 0.001), divisions=8)
+    with pytest.raises(InputError, match="--target surface"):
+        plan_rig(plate, load_rig("default"), max_projectors=3)
+
+
+def test_impossible_accuracy_is_named_as_the_limit_that_forbids(head):
+    with pytest.raises(InfeasibleLimitsError, match=r"sigma 100 %.*--accuracy"):
+        plan_rig(head, load_rig("default"), max_projectors=3, accuracy_mm=1e-9)
 
 
 def test_moving_the_mesh_moves_the_plan(head):

@@ -99,8 +99,8 @@ def test_claims_of_a_ball_follow_from_its_caps(stages):
 
 
 def test_no_relaxation_is_offered_where_nothing_is_out_of_reach(stages):
-    made, projectors, _, _ = stages
-    assert reachability_relaxations(made, projectors.reference[::20]) == []
+    made, projectors, _, tilt = stages
+    assert reachability_relaxations(made, projectors.reference[::20], (tilt, 0.0)) == []
 
 
 def test_merged_samples_stand_for_the_same_area(stages):

@@ -1,8 +1,11 @@
 """What a status claims, and that budgets count."""
 
+import contextlib
+import signal
+
 import pytest
 
-from solvers.status import SolveStatus, WorkBudget
+from solvers.status import SolveStatus, WorkBudget, interruptible
 
 
 def test_only_points_that_hold_count_as_points():
@@ -44,3 +47,21 @@ def test_bad_limits_are_refused(bad):
         WorkBudget(bad)
     with pytest.raises(ValueError, match="time limit is"):
         WorkBudget(1.0, time_limit=bad)
+
+
+def test_a_ctrl_c_that_casadi_took_is_raised_again():
+    """Swallowed inside, as CasADi does, it comes out at the end."""
+
+    def solve(interrupted):
+        with interruptible(), contextlib.suppress(KeyboardInterrupt):
+            if interrupted:
+                signal.raise_signal(signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        solve(interrupted=False)
+        with pytest.raises(KeyboardInterrupt):
+            solve(interrupted=True)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
