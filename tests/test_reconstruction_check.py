@@ -11,10 +11,12 @@ import pytest
 
 from geometry.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import sphere
+from geometry.primitives import box, sphere
 from geometry.sampling import sample_surface
 from planning.plan import RigPlan
+from planning.reconstruction import check as check_module
 from planning.reconstruction.check import Reconstruction, reconstruct_plan
+from planning.reconstruction.patterns import Frames
 from planning.reconstruction.verdict import nearest_distance
 
 KEYS = {
@@ -264,6 +266,60 @@ def test_completeness_counts_points_seen_from_the_samples_own_side(check, sample
     outer = nearest_distance(check.merged.cloud, samples, 0.01) <= 3.5e-3
     assert outer.mean() > 0.3
     assert not np.any(nearest_distance(check.merged.cloud, inner, 0.01) <= 3.5e-3)
+
+
+@pytest.mark.parametrize(("azimuth", "elevation"), [(-6.0, 5.0), (-8.0, 7.0)])
+def test_faces_of_a_cube_in_grazing_light_cost_nothing_elsewhere(
+    rigs, azimuth, elevation
+):
+    """Two faces are lit at about 85 degrees: too dim to read, and large."""
+    cube = box((0.1, 0.1, 0.1), divisions=8)
+    plan = rigs.plan_of(
+        cube,
+        [rigs.diverging("P1", rigs.direction(azimuth, elevation), cube.radius, 3.5e-3)],
+        [rigs.camera("C1", rigs.direction(-42.0, 32.0))],
+    )
+    samples = sample_surface(cube, 4000, seed=5)
+    predicted = rigs.predict_on_sphere(plan, samples)
+    result = reconstruct_plan(plan, seed=0, samples=samples, predicted=predicted)
+    assert predicted.mean() > 0.15
+    assert result.passed, result.failures
+    assert result.completeness.predicted_missing == 0.0
+    assert result.completeness.fractions[1] > 0.99
+
+
+def exchange_frames(monkeypatch, projector: str) -> None:
+    """Let two bits of one projector change places in every camera's images."""
+    render = check_module.render_pair
+
+    def render_exchanged(seen, shining, design, *rest):
+        frames = render(seen, shining, design, *rest)
+        order = np.arange(len(frames.stack))
+        if design.id == projector:
+            order[[6, 7, 8, 9]] = 8, 9, 6, 7
+        return Frames(frames.stack[order], frames.corner)
+
+    monkeypatch.setattr(check_module, "render_pair", render_exchanged)
+
+
+def test_frames_out_of_order_are_named(rigs, one_light, samples, monkeypatch):
+    exchange_frames(monkeypatch, "P1")
+    predicted = rigs.predict_on_sphere(one_light, samples)
+    result = reconstruct_plan(one_light, seed=0, samples=samples, predicted=predicted)
+    assert not np.any(result.everything.projector == 0)
+    assert not result.passed
+    cause = r"P1 with C1, P1 with C2.*left out as `labels`.*frames out of order"
+    assert all(re.search(cause, text) for text in result.failures), result.failures
+
+
+def test_a_cloud_that_is_empty_for_its_labels_says_so(rigs, ball, monkeypatch):
+    exchange_frames(monkeypatch, "P1")
+    alone = rigs.small_rig(ball, "diverging")
+    alone = changed(alone, lambda document: document["projectors"].pop())
+    result = reconstruct_plan(alone, seed=0)
+    assert len(result.failures) == 1
+    assert "no point was measured" in result.failures[0]
+    assert "`labels`" in result.failures[0]
 
 
 def test_nothing_to_see_is_a_failure_in_words(one_light):

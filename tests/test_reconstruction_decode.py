@@ -250,6 +250,40 @@ def test_frames_in_the_wrong_order_give_no_cloud(rigs):
         assert shuffled.rejected["labels"] == shuffled.n_edges
 
 
+@pytest.mark.parametrize("light", ["diverging", "parallel"])
+def test_no_exchange_of_two_bits_gives_a_wrong_point(rigs, light):
+    frames, patterns, calibration = shot(rigs, light, 3478.0, Photometry())
+    n_refused = 0
+    exchanges = [(a, b) for b in range(patterns.n_bits) for a in range(b)]
+    for one, other in exchanges:
+        order = np.arange(len(frames.stack)).reshape(-1, 2)
+        order[[1 + one, 1 + other]] = order[[1 + other, 1 + one]]
+        stack = frames.stack[order.ravel()]
+        decoded = decode(Frames(stack, frames.corner), patterns, calibration)
+        n_refused += decoded.rejected.get("labels") == decoded.n_edges
+        assert np.all(np.abs(decoded.cloud.points[:, 1]) < 6e-4), (one, other)
+    assert n_refused >= len(exchanges) - 1
+
+
+def test_surface_too_dim_to_read_costs_no_point_elsewhere(rigs):
+    """Half the plate flickers about the least contrast; the other half is measured."""
+    frames, patterns, calibration = shot(rigs, "diverging", 3478.0, Photometry())
+    good = decode(frames, patterns, calibration)
+    stack = frames.stack.astype(np.float64)
+    middle = stack.shape[2] // 2
+    black, contrast = stack[1], stack[0] - stack[1]
+    share = (stack - black) / np.maximum(contrast, 1.0)
+    noise = np.random.default_rng(2).normal(0.0, 1.0, stack.shape)
+    dim = np.where(contrast > 10.0, black + 9.0 * share + noise, stack)
+    stack[:, :, :middle] = np.rint(dim)[:, :, :middle].clip(0, 255)
+    mixed = Frames(stack.astype(np.uint8), frames.corner)
+    half = decode(mixed, patterns, calibration)
+    right = good.cloud.pixels[:, 0] - frames.corner[0] > middle + 4
+    kept = half.cloud.pixels[:, 0] - frames.corner[0] > middle + 4
+    assert "labels" not in half.rejected
+    assert kept.sum() > 0.98 * right.sum() > 1000
+
+
 def test_black_and_saturated_images_give_nothing(rigs):
     _, patterns, calibration = shot(rigs, "diverging", 1400.0, CLEAN)
     for level in (0, 128, 255):
