@@ -91,6 +91,10 @@ def select_fewest(
         by_count[count] = warm = best.selected
         bounds[count] = best.upper_bound
         rows[count] = int(covers[:, best.selected].any(axis=1).sum())
+    one_fewer = int(np.floor(bounds[allowed - 1] + 1e-6)) if allowed > 1 else 0
+    if lower_bound >= allowed:
+        # Where fewer are proved too few, they fall short of what is required.
+        one_fewer = min(one_fewer, required - 1)
     met = needed <= allowed and rows[allowed] >= required
     status = SolveStatus.OPTIMAL if lower_bound >= needed else SolveStatus.FEASIBLE
     return Selection(
@@ -102,7 +106,7 @@ def select_fewest(
         required,
         rows[allowed],
         int(np.floor(bounds[allowed] + 1e-6)),
-        int(np.floor(bounds[allowed - 1] + 1e-6)) if allowed > 1 else 0,
+        one_fewer,
         by_count,
         _greedy_count(covers[reachable], required),
     )
