@@ -136,7 +136,7 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
         field = principal_curvatures(mesh)
         regions = dominant_regions(mesh, field)
         target = order.asked["target"]
-        if not len(regions):
+        if target == "dominant" and not len(regions):
             raise InputError(
                 "no dominant region: the surface is flat where its curvature can be "
                 "trusted; use --target surface"

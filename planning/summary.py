@@ -102,6 +102,11 @@ def _devices(plan: RigPlan) -> str:
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {azimuth:12.1f} "
             f"{elevation:10.1f}   {roll:12.1f}   {distance:10.1f}"
         )
+    k = int(np.argmax(np.abs(up)))
+    lines.append(
+        f"     azimuth counts about {_axis(tuple(up))} from +{_AXES[(k + 1) % 3]}; the "
+        f"axes are those of the mesh file"
+    )
     return "\n".join(lines)
 
 

@@ -177,6 +177,12 @@ def test_a_plate_without_curvature_has_no_dominant_region():
     plate = box((2.0, 2.0, 0.001), divisions=8)
     with pytest.raises(InputError, match="--target surface"):
         plan_rig(plate, load_rig("default"), max_projectors=3)
+    wall = box((0.3, 0.3, 0.01), divisions=6)
+    with pytest.raises(RequirementError) as caught:
+        plan_rig(
+            wall, load_rig("default"), max_projectors=1, target="surface", check=False
+        )
+    assert caught.value.plan.coverage["target"]["lit_m2"] > 0.08
 
 
 def test_impossible_accuracy_is_named_as_the_limit_that_forbids(head):
