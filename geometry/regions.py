@@ -1,6 +1,6 @@
 """Dominant regions: the most curved surface, in pieces that one projector can serve."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,6 +115,20 @@ def dominant_regions(
     least = min_region_share * mesh.area
     dominant = _without_specks(mesh, dominant, judged, pairs, least)
     pieces = cone_pieces(mesh, dominant, pairs, least, cone_half_angle)
+    return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
+
+
+def regions_of_pieces(
+    mesh: TriangleMesh,
+    pieces: Sequence[NDArray[np.int64]],
+    curvedness: NDArray[np.float64],
+    steep: NDArray[np.float64],
+    trusted: NDArray[np.bool_],
+) -> DominantRegions:
+    """Return pieces (each the ascending indices of its faces) as numbered regions.
+
+    The other arrays are those of `face_curvature`.
+    """
     regions = tuple(
         _region(i, mesh, faces, curvedness) for i, faces in enumerate(pieces)
     )
