@@ -1,6 +1,7 @@
 """Cut polygons into triangles: fans where convex, ear clipping where not."""
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,41 +10,59 @@ from numpy.typing import NDArray
 def triangulate(
     points: NDArray[np.float64], polygons: Sequence[Sequence[int]]
 ) -> NDArray[np.int64]:
+    """Return the triangles (m, 3) of polygons given as a list of corners each."""
+    return cut_polygons(points, *end_to_end(polygons))[0]
+
+
+def end_to_end(
+    polygons: Sequence[Sequence[int]],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the number of corners of each polygon, and all corners in one array."""
+    sizes = np.fromiter(map(len, polygons), np.int64, len(polygons))
+    corners = chain.from_iterable(polygons)
+    return sizes, np.fromiter(corners, np.int64, int(sizes.sum()))
+
+
+def cut_polygons(
+    points: NDArray[np.float64], sizes: NDArray[np.int64], corners: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the triangles of polygons, in their order and with their winding.
 
     A fan about the first corner of a concave polygon would leave its outline, so
-    concave ones are cut ear by ear in the plane of their vector area. Polygons of one
-    or two corners (points and lines in some formats) give none.
+    concave ones are cut ear by ear in the plane of their vector area. Polygons of less
+    than three corners (points and lines in some formats) give none.
 
     Args:
         points: Positions, shape (n, 3).
-        polygons: Vertex indices of each polygon, all in range.
+        sizes: Number of corners of each polygon, shape (n_p,).
+        corners: Vertex indices of all polygons, end to end, all in range.
 
     Returns:
-        Shape (m, 3).
+        Vertex indices, shape (m, 3), and the polygon each was cut from, shape (m,).
     """
-    sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    starts = np.cumsum(sizes) - sizes
     cut: list[NDArray[np.int64]] = []
     owner: list[NDArray[np.int64]] = []
     for size in np.unique(sizes[sizes >= 3]).tolist():
         which = np.flatnonzero(sizes == size)
-        corners = np.array([polygons[i] for i in which.tolist()], dtype=np.int64)
+        outline = corners[starts[which, None] + np.arange(size)]
         fans = np.stack(
             [
-                np.stack([corners[:, 0], corners[:, k], corners[:, k + 1]], axis=1)
+                np.stack([outline[:, 0], outline[:, k], outline[:, k + 1]], axis=1)
                 for k in range(1, size - 1)
             ],
             axis=1,
         )
         if size > 3:
             for i in np.flatnonzero(_concave(points, fans)):
-                fans[i] = _ears(points, corners[i])
+                fans[i] = _ears(points, outline[i])
         cut.append(fans.reshape(-1, 3))
         owner.append(np.repeat(which, size - 2))
     if not cut:
-        return np.empty((0, 3), dtype=np.int64)
-    order = np.argsort(np.concatenate(owner), kind="stable")
-    return np.concatenate(cut)[order]
+        return np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64)
+    owners = np.concatenate(owner)
+    order = np.argsort(owners, kind="stable")
+    return np.concatenate(cut)[order], owners[order]
 
 
 def _concave(points: NDArray[np.float64], fans: NDArray[np.int64]) -> NDArray[np.bool_]:
