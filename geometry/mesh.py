@@ -2,9 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .extent import enclosing_ball, main_bodies
+from .file_origin import FileOrigin
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 class MeshError(ValueError):
@@ -50,6 +56,7 @@ class TriangleMesh:
         vertices: Positions in the world frame, in [m], shape (n_v, 3).
         faces: Vertex indices, shape (n_f, 3).
         source: Where it came from; None for meshes made in memory.
+        origin: The faces' numbers in the file that it was read from; else None.
 
     Raises:
         MeshError: If an array has the wrong shape, a coordinate isn't finite, an index
@@ -59,6 +66,7 @@ class TriangleMesh:
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     source: MeshSource | None = None
+    origin: FileOrigin | None = None
 
     def __post_init__(self) -> None:
         vertices = np.array(self.vertices, dtype=np.float64, order="C")
@@ -74,6 +82,11 @@ class TriangleMesh:
             raise MeshError(
                 f"face indices span {faces.min()}..{faces.max()}, "
                 f"must lie in 0..{len(vertices) - 1}"
+            )
+        if self.origin is not None and len(self.origin.face) != len(faces):
+            raise MeshError(
+                f"the origin tells of {len(self.origin.face)} faces, the mesh has "
+                f"{len(faces)}"
             )
         for name, values in (("vertices", vertices), ("faces", faces)):
             values.setflags(write=False)
@@ -121,13 +134,34 @@ class TriangleMesh:
         return _read_only(np.stack([used.min(axis=0), used.max(axis=0)]))
 
     @cached_property
+    def main(self) -> NDArray[np.bool_]:
+        """Whether each face belongs to a main body; small fragments don't, (n_f,)."""
+        return _read_only(main_bodies(self.faces, self.face_areas))
+
+    @cached_property
+    def _ball(self) -> tuple[NDArray[np.float64], float]:
+        used = np.unique(self.faces[self.main])
+        centre, radius = enclosing_ball(self.vertices[used])
+        return _read_only(centre), radius
+
+    @cached_property
     def centre(self) -> NDArray[np.float64]:
-        """Centre of the bounding box in [m], shape (3,)."""
-        return _read_only(self.bounds.mean(axis=0))
+        """Centre of the smallest ball that holds the main bodies in [m], shape (3,)."""
+        return self._ball[0]
 
     @cached_property
     def radius(self) -> float:
-        """Radius in [m] of the smallest sphere about `centre` that holds every face."""
+        """Radius in [m] of the smallest ball that holds the main bodies."""
+        return self._ball[1]
+
+    @property
+    def size(self) -> float:
+        """Diameter in [m] of that ball; unlike a box's diagonal it turns with it."""
+        return 2.0 * self.radius
+
+    @cached_property
+    def reach(self) -> float:
+        """Largest distance in [m] of any face, fragments too, from `centre`."""
         return float(np.linalg.norm(self.corners - self.centre, axis=2).max())
 
     @cached_property
@@ -137,6 +171,6 @@ class TriangleMesh:
         return float(np.linalg.norm(edges, axis=2).mean())
 
 
-def _read_only(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _read_only(values: NDArray[_Scalar]) -> NDArray[_Scalar]:
     values.setflags(write=False)
     return values

@@ -78,7 +78,11 @@ def transform(
 
 
 def fibonacci_cap(
-    n: int, axis: NDArray[np.float64], half_angle: float
+    n: int,
+    axis: NDArray[np.float64],
+    half_angle: float,
+    *,
+    start: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Return n unit vectors spread evenly over a spherical cap.
 
@@ -86,13 +90,15 @@ def fibonacci_cap(
         n: Number of directions, at least 1.
         axis: Centre of the cap, shape (3,).
         half_angle: Opening of the cap in [rad]; pi is the whole sphere.
+        start: Unit direction across the axis from which azimuth counts, shape (3,);
+            default one that a world axis gives.
 
     Returns:
         Shape (n, 3), from the axis outwards.
     """
     axis = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    e1 = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    e1 /= np.linalg.norm(e1)
+    e1 = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]) if start is None else start
+    e1 = e1 / np.linalg.norm(e1)
     e2 = np.cross(axis, e1)
     i = np.arange(n)
     height = 1.0 - (1.0 - np.cos(half_angle)) * (i + 0.5) / n

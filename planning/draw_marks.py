@@ -199,7 +199,7 @@ def _hidden(
     if caster is None:
         return np.zeros(len(points), dtype=bool)
     mesh: TriangleMesh = caster.mesh
-    away = np.linalg.norm(points - mesh.centre, axis=1).max() + 2.0 * mesh.radius
+    away = np.linalg.norm(points - mesh.centre, axis=1).max() + 2.0 * mesh.reach
     rays = np.broadcast_to(view.to_viewer, points.shape)
     slack = 1e-4 * mesh.radius
     return caster.occluded(points + slack * rays, rays, np.full(len(points), away))

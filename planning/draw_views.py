@@ -144,7 +144,7 @@ class Shader:
         across = (columns + 0.5 - centre[0]) * view.m_per_px
         down = (rows + 0.5 - centre[1]) * view.m_per_px
         origins = view.focus + across[:, None] * view.right - down[:, None] * view.up
-        start = (mesh.centre - view.focus) @ back + 2.0 * mesh.radius
+        start = (mesh.centre - view.focus) @ back + 2.0 * mesh.reach
         origins += start * back
         faces, distances = self.caster.first_hits(
             origins, np.broadcast_to(-back, origins.shape)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from geometry.bearing import bearing
 from geometry.curvature import principal_curvatures
 from geometry.mesh import TriangleMesh
 from geometry.regions import DominantRegions, dominant_regions
@@ -278,8 +279,17 @@ def _resolve(order: Order) -> tuple[Requirements, Any, float]:
         rig.outer_ring_radius(),
     )
     radii = uniform_radii(outer, gap if parallel else gap / rig.standoff_m)
-    workspace = replace(workspace, reference_ring_radius=float(radii[-1]))
+    workspace = replace(
+        workspace,
+        reference_ring_radius=float(radii[-1]),
+        bearing=_direction(bearing(mesh, np.array(workspace.axis))),
+    )
     return replace(requirements, workspace=workspace), radii, tilt
+
+
+def _direction(vector: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:

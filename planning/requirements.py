@@ -92,8 +92,9 @@ class Workspace:
     (Q - centre) . up >= floor_m where a floor is given.
 
     Attributes:
-        centre: Centre of the object's bounding box in the world [m].
-        object_radius_m: Radius of the sphere about `centre` that holds the object [m].
+        centre: Centre of the smallest ball that holds the object's main bodies, in the
+            world [m].
+        object_radius_m: Radius of that ball [m].
         up: Unit vector that points up.
         axis: Unit vector, axis of the cone.
         half_angle: Half opening of the cone [rad]; pi is the whole shell.
@@ -104,6 +105,8 @@ class Workspace:
         n_reference_cameras: Poses in the cameras' reference set.
         reference_ring_radius: Outermost ring of the reference projectors: its tangent
             R (diverging) or its radius in [m] (parallel).
+        bearing: Unit vector across `axis`, turning with the object, from which the
+            lattice of offered poses starts; None: a world axis decides.
     """
 
     centre: tuple[float, float, float]
@@ -117,6 +120,7 @@ class Workspace:
     n_reference_projectors: int
     n_reference_cameras: int
     reference_ring_radius: float
+    bearing: tuple[float, float, float] | None = None
 
     def inset(self, by_m: float) -> "Workspace":
         """Return the workspace shrunk on all sides.

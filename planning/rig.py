@@ -220,8 +220,8 @@ class Rig:
         """Return what a plan of this rig must reach for one object.
 
         Args:
-            mesh_centre: Centre of the object's bounding box in [m], shape (3,).
-            object_radius_m: Radius of the ball about it that holds the object in [m].
+            mesh_centre: Centre of the smallest ball that holds the object in [m], (3,).
+            object_radius_m: Radius of that ball in [m].
             max_projectors: Projectors at most.
             tau_m: Distance within which a sample must have a measured point in [m].
             max_cameras: Cameras at most; None: as many as needed.

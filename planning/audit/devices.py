@@ -56,7 +56,7 @@ def audit_workspace(plan: RigPlan, ledger: Ledger) -> None:
         list(space.centre),
         surface.mesh.centre,
         slack,
-        "the centre of the surface's bounding box",
+        "the centre of the smallest ball that holds the surface",
     )
     ledger.number(
         f"{key}.object_radius_m", space.object_radius_m, surface.mesh.radius, slack, "m"

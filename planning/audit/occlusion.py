@@ -27,7 +27,7 @@ class Shadow:
     def __init__(self, mesh: TriangleMesh, *, threads: int) -> None:
         self._caster = RayCaster(mesh, threads=threads)
         self._centre = mesh.centre
-        self._radius = 1.05 * mesh.radius
+        self._radius = 1.05 * mesh.reach
         self._slack = _SLACK * mesh.radius
 
     def free(
