@@ -11,10 +11,20 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .polygons import triangulate
+from .polygons import end_to_end
 
 # Free-form geometry that has no triangles to give.
 _FREE_FORM = frozenset({"cstype", "curv", "curv2", "surf", "bmat", "bzp", "bsp", "cdc"})
+# An unknown word may be a damaged v or f, and leaving out one shifts all that follow.
+_NO_GEOMETRY = frozenset(
+    "vt vn vp vc p l g o s mg usemtl mtllib usemap maplib lod bevel c_interp d_interp "
+    "shadow_obj trace_obj ctech stech deg step parm trim hole scrv sp end con call "
+    "csh".split()
+)
+# "v" and x y z, with a weight, a colour, or both.
+_VERTEX_COLUMNS = (4, 5, 7, 8)
+# Up to here every whole number has a float64 of its own.
+_LARGEST = 2.0**53
 _OFF_HEADER = re.compile(r"(ST|C|N|4|n)*OFF", re.ASCII)
 
 
@@ -29,8 +39,55 @@ def decode(data: bytes) -> str:
     return data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
 
 
-def read_obj(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices (n, 3) in file units and triangles (m, 3) of a Wavefront OBJ.
+def numbers(words: Sequence[str]) -> NDArray[np.float64]:
+    """Return words as numbers, shape (n,).
+
+    Python also takes digit groups (1_000) and digits of other scripts; no mesh format
+    does, so there they are damage.
+
+    Raises:
+        FormatError: If a word isn't a decimal number, "nan" or "inf".
+    """
+    try:
+        values = np.array(words, dtype=np.float64).reshape(-1)
+    except ValueError as error:
+        raise FormatError(f"a number can't be read ({error})") from None
+    text = "".join(words)
+    if not text.isascii() or "_" in text:
+        raise FormatError("a number is written with other signs than digits")
+    return values
+
+
+def whole(values: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return vertex numbers as integers.
+
+    Raises:
+        FormatError: If one isn't whole, or too large to count anything.
+    """
+    if not np.all((values == np.floor(values)) & (np.abs(values) < _LARGEST)):
+        raise FormatError("a face names a vertex by a number that isn't whole")
+    return values.astype(np.int64)
+
+
+def _whole(word: str) -> int:
+    """Return a whole number; ValueError if it isn't written in plain digits."""
+    if not (word.isascii() and word.lstrip("+-").isdecimal()):
+        raise ValueError(word)
+    return int(word)
+
+
+def _lines(text: str) -> list[str]:
+    # str.splitlines also breaks at bytes that are part of a UTF-8 letter.
+    return re.split(r"\r\n|\r|\n", text)
+
+
+_PointsAndPolygons = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]
+
+
+def read_obj(data: bytes) -> _PointsAndPolygons:
+    """Return the vertices in file units and the polygons of a Wavefront OBJ.
+
+    Shapes (n, 3); (n_p,), the number of corners of each; and all corners end to end.
 
     Raises:
         FormatError: At the first line that can't be understood.
@@ -41,6 +98,11 @@ def read_obj(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         if words[0] == "v":
             if len(words) < 4:
                 raise FormatError(f"line {number}: a vertex needs three numbers")
+            if len(words) not in _VERTEX_COLUMNS:
+                raise FormatError(
+                    f"line {number}: a vertex has {len(words) - 1} numbers"
+                )
+            numbers(words[4:])
             vertices.append(words[1:4])
         elif words[0] == "f":
             polygons.append(_obj_polygon(number, words[1:], len(vertices)))
@@ -48,14 +110,18 @@ def read_obj(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
             raise FormatError(
                 f"line {number}: free-form geometry ('{words[0]}') isn't triangles"
             )
-    points = _numbers(vertices)
-    return points, triangulate(points, _in_range(polygons, len(points)))
+        elif words[0] not in _NO_GEOMETRY:
+            raise FormatError(
+                f"line {number}: '{ascii(words[0][:20])[1:-1]}' isn't known in OBJ"
+            )
+    points = _points(vertices)
+    return points, *end_to_end(_in_range(polygons, len(points)))
 
 
 def _obj_lines(text: str) -> Iterator[tuple[int, list[str]]]:
     """Yield line numbers and words, backslash continuations joined."""
     held = ""
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(_lines(text), 1):
         line = held + line.split("#", 1)[0].rstrip()
         if line.endswith("\\"):
             held = line[:-1] + " "
@@ -72,7 +138,7 @@ def _obj_polygon(number: int, words: Sequence[str], n_vertices: int) -> list[int
             f"line {number}: a face needs three corners, has {len(words)}"
         )
     try:
-        corners = [int(word.split("/", 1)[0]) for word in words]
+        corners = [_whole(word.split("/", 1)[0]) for word in words]
     except ValueError:
         raise FormatError(f"line {number}: a face's corner isn't a number") from None
     if 0 in corners:
@@ -80,8 +146,8 @@ def _obj_polygon(number: int, words: Sequence[str], n_vertices: int) -> list[int
     return [c - 1 if c > 0 else n_vertices + c for c in corners]
 
 
-def read_off(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices (n, 3) in file units and triangles (m, 3) of an OFF file.
+def read_off(data: bytes) -> _PointsAndPolygons:
+    """Return the vertices and polygons of an OFF file, as `read_obj` does.
 
     Lines may be wrapped anywhere if neither vertices nor faces carry extra columns.
 
@@ -97,9 +163,9 @@ def read_off(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     text = text[header.end() :]
     if re.match(r"\s*BINARY", text):
         raise FormatError("binary OFF isn't supported")
-    lines = [words for line in text.splitlines() if (words := line.split())]
+    lines = [words for line in _lines(text) if (words := line.split())]
     try:
-        n_vertices, n_faces = (int(word) for word in lines[0][:2])
+        n_vertices, n_faces = (_whole(word) for word in lines[0][:2])
         if not (n_vertices >= 0 and n_faces >= 0):
             raise ValueError
     except (IndexError, ValueError):
@@ -114,8 +180,8 @@ def read_off(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
             f"the header promises {n_vertices} vertices and {n_faces} faces, "
             "the content holds something else"
         )
-    points = _numbers(found[0])
-    return points, triangulate(points, _in_range(found[1], len(points)))
+    points = _points(found[0])
+    return points, *end_to_end(_in_range(found[1], len(points)))
 
 
 _Parts = tuple[list[list[str]], list[list[int]]]
@@ -125,19 +191,20 @@ def _off_by_line(
     lines: list[list[str]], n_vertices: int, n_faces: int
 ) -> _Parts | None:
     """One vertex or face a line, extra columns ignored; None if the lines don't fit."""
-    if len(lines) < n_vertices + n_faces:
+    if len(lines) != n_vertices + n_faces:
         return None
     rows = lines[:n_vertices]
-    if any(len(row) < 3 for row in rows):
+    # Colours and normals stand behind every vertex or behind none.
+    if len({len(row) for row in rows}) > 1 or any(len(row) < 3 for row in rows):
         return None
     polygons: list[list[int]] = []
     for words in lines[n_vertices : n_vertices + n_faces]:
         try:
-            count = int(words[0])
-            corners = [int(word) for word in words[1 : count + 1]]
+            count = _whole(words[0])
+            corners = [_whole(word) for word in words[1 : count + 1]]
         except ValueError:
             return None
-        if not (count >= 1 and len(corners) == count):
+        if not (count >= 3 and len(corners) == count):
             return None
         polygons.append(corners)
     return [row[:3] for row in rows], polygons
@@ -145,14 +212,16 @@ def _off_by_line(
 
 def _off_by_word(words: list[str], n_vertices: int, n_faces: int) -> _Parts | None:
     """Read as one stream of words that must be used up exactly; else None."""
+    if 3 * n_vertices + 4 * n_faces > len(words):
+        return None
     rows = [words[i : i + 3] for i in range(0, 3 * n_vertices, 3)]
     at = 3 * n_vertices
     polygons: list[list[int]] = []
     try:
         for _ in range(n_faces):
-            count = int(words[at])
-            corners = [int(word) for word in words[at + 1 : at + 1 + count]]
-            if not (count >= 1 and len(corners) == count):
+            count = _whole(words[at])
+            corners = [_whole(word) for word in words[at + 1 : at + 1 + count]]
+            if not (count >= 3 and len(corners) == count):
                 return None
             polygons.append(corners)
             at += 1 + count
@@ -161,11 +230,8 @@ def _off_by_word(words: list[str], n_vertices: int, n_faces: int) -> _Parts | No
     return (rows, polygons) if at == len(words) else None
 
 
-def _numbers(rows: list[list[str]]) -> NDArray[np.float64]:
-    try:
-        return np.array(rows, dtype=np.float64).reshape(-1, 3)
-    except ValueError as error:
-        raise FormatError(f"a vertex isn't three numbers ({error})") from None
+def _points(rows: list[list[str]]) -> NDArray[np.float64]:
+    return numbers([word for row in rows for word in row]).reshape(-1, 3)
 
 
 def _in_range(polygons: list[list[int]], n_vertices: int) -> list[list[int]]:

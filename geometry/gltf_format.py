@@ -1,0 +1,305 @@
+"""Strict reader of the triangles of glTF 2.0, GLB and .gltf with its buffers."""
+
+import base64
+import binascii
+import json
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene_parts import Part, joined
+from .text_formats import FormatError
+
+Fetch = Callable[[str], bytes]
+_Tree = Mapping[str, Any]
+
+_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}
+_COMPONENTS[5125] = "<u4"
+_INDICES = (5121, 5123, 5125)
+_FLOAT = 5126
+_WIDTH = {"SCALAR": 1, "VEC3": 3}
+# Required extensions that leave the triangles as the core format stores them.
+_HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
+_QUANTIZED = "KHR_mesh_quantization"
+_PACKED = (
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+)
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+
+
+def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices (n, 3) in metres and triangles (m, 3) of a GLB file.
+
+    Raises:
+        FormatError: If it isn't whole, or holds what can't be read as triangles.
+    """
+    if len(data) < 20 or not data.startswith(b"glTF"):
+        raise FormatError("it has no GLB header")
+    version, length = struct.unpack("<2I", data[4:12])
+    if version != 2:
+        raise FormatError(f"it is GLB version {version}, only 2 is read")
+    if length != len(data):
+        what = "cut short" if length > len(data) else "longer than it says"
+        raise FormatError(f"it is {what}: {len(data)} of {length} bytes")
+    chunks: list[tuple[bytes, bytes]] = []
+    at = 12
+    while at < length:
+        size = int.from_bytes(data[at : at + 4], "little")
+        if at + 8 + size > length:
+            raise FormatError(f"its part {len(chunks) + 1} is longer than the file")
+        chunks.append((data[at + 4 : at + 8], data[at + 8 : at + 8 + size]))
+        at += 8 + size
+    if chunks[0][0] != b"JSON":
+        raise FormatError("its first part isn't JSON")
+    stored = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == b"BIN\0" else None
+    return read_gltf(chunks[0][1], None, stored)
+
+
+def read_gltf(
+    text: bytes, fetch: Fetch | None, stored: bytes | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices (n, 3) in metres and triangles (m, 3) of the default scene.
+
+    Args:
+        text: The JSON.
+        fetch: Returns a file beside it.
+        stored: The binary part of a GLB, which is its first buffer.
+
+    Raises:
+        FormatError: If something that it names isn't there, or it holds deformed,
+            compressed or sparse meshes.
+    """
+    try:
+        tree = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(f"its JSON can't be read ({error})") from None
+    if not isinstance(tree, dict):
+        raise FormatError("its JSON isn't an object")
+    _check_extensions(tree)
+    buffers = _Buffers(tree, fetch, stored)
+    meshes: dict[int, list[tuple[NDArray[np.float64], NDArray[np.int64]]]] = {}
+    parts: list[Part] = []
+    for node, world_from_node in _placed(tree):
+        if "mesh" not in node:
+            continue
+        index = node["mesh"]
+        mesh = _item(tree, "meshes", index)
+        _check_rigid(node, mesh)
+        if index not in meshes:
+            shapes = [_primitive(tree, buffers, p) for p in mesh["primitives"]]
+            meshes[index] = [shape for shape in shapes if shape is not None]
+        parts += [Part(v, f, world_from_node) for v, f in meshes[index]]
+    if not parts and tree.get("meshes"):
+        raise FormatError("its default scene shows no triangle mesh")
+    return joined(parts)
+
+
+def _check_extensions(tree: _Tree) -> None:
+    version = str(tree.get("asset", {}).get("version", ""))
+    if not version.startswith("2."):
+        raise FormatError(f"it is glTF version '{version[:20]}', only 2 is read")
+    for name in tree.get("extensionsRequired", ()):
+        if name in _PACKED:
+            raise FormatError(f"it is compressed with {name}; export it uncompressed")
+        if name != _QUANTIZED and not str(name).startswith(_HARMLESS):
+            raise FormatError(f"it requires the extension {name}, which isn't read")
+
+
+def _item(tree: _Tree, kind: str, index: object) -> Any:  # noqa: ANN401
+    held = tree.get(kind, ())
+    if type(index) is not int or not 0 <= index < len(held):
+        raise FormatError(f"it names entry {index} of {len(held)} {kind}")
+    return held[index]
+
+
+def _placed(tree: _Tree) -> list[tuple[_Tree, NDArray[np.float64]]]:
+    """Return every node of the default scene with its transform to the world."""
+    nodes = tree.get("nodes", ())
+    if tree.get("scenes"):
+        roots = _item(tree, "scenes", tree.get("scene", 0)).get("nodes", ())
+    else:
+        children = {c for node in nodes for c in node.get("children", ())}
+        roots = [i for i in range(len(nodes)) if i not in children]
+    found: list[tuple[_Tree, NDArray[np.float64]]] = []
+    seen: set[int] = set()
+    waiting = [(root, np.eye(4)) for root in reversed(roots)]
+    while waiting:
+        index, world_from_parent = waiting.pop()
+        node = _item(tree, "nodes", index)
+        if index in seen:
+            raise FormatError(f"its node {index} hangs in two places")
+        seen.add(index)
+        with np.errstate(over="ignore", invalid="ignore"):
+            world_from_node = world_from_parent @ _transform(index, node)
+        found.append((node, world_from_node))
+        waiting += [(c, world_from_node) for c in reversed(node.get("children", ()))]
+    return found
+
+
+def _transform(index: int, node: _Tree) -> NDArray[np.float64]:
+    matrix = np.array(node.get("matrix", np.eye(4).ravel()), dtype=np.float64)
+    if matrix.shape != (16,):
+        raise FormatError(f"its node {index} has a matrix of {matrix.size} numbers")
+    # Stored column by column.
+    matrix = matrix.reshape(4, 4).T
+    shift = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64)
+    scale = np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
+    turn = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)
+    sizes = (shift.shape, scale.shape, turn.shape) == ((3,), (3,), (4,))
+    whole = sizes and all(np.all(np.isfinite(v)) for v in (matrix, shift, scale, turn))
+    if not (whole and np.any(turn) and np.all(matrix[3] == (0, 0, 0, 1))):
+        raise FormatError(f"its node {index} has no usable transform")
+    local = np.eye(4)
+    local[:3, :3] = _rotation(turn) * scale
+    local[:3, 3] = shift
+    return matrix @ local
+
+
+def _rotation(xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
+    x, y, z, w = xyzw / np.linalg.norm(xyzw)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _check_rigid(node: _Tree, mesh: _Tree) -> None:
+    """Refuse what is shown in another shape than it is stored in."""
+    if "skin" in node:
+        raise FormatError("a skeleton poses its mesh, which isn't read; apply the pose")
+    if np.any(node.get("weights", mesh.get("weights", ()))):
+        raise FormatError("morph targets deform its mesh, which isn't read; apply them")
+    if "EXT_mesh_gpu_instancing" in node.get("extensions", {}):
+        raise FormatError("EXT_mesh_gpu_instancing repeats its mesh, which isn't read")
+
+
+def _primitive(
+    tree: _Tree, buffers: "_Buffers", primitive: _Tree
+) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    mode = primitive.get("mode", _TRIANGLES)
+    if mode in (0, 1, 2, 3):
+        return None
+    points = buffers.values(primitive["attributes"].get("POSITION"), "VEC3")
+    if "indices" in primitive:
+        order = buffers.values(primitive["indices"], "SCALAR").reshape(-1)
+    else:
+        order = np.arange(len(points))
+    order = order.astype(np.int64)
+    if mode == _TRIANGLES and len(order) % 3 == 0:
+        return points.astype(np.float64), order.reshape(-1, 3)
+    if mode == _STRIP and len(order) >= 3:
+        faces = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
+        faces[1::2, :2] = faces[1::2, 1::-1]
+    elif mode == _FAN and len(order) >= 3:
+        hub = np.full(len(order) - 2, order[0])
+        faces = np.stack([hub, order[1:-1], order[2:]], axis=1)
+    else:
+        raise FormatError(f"{len(order)} corners make no triangles in mode {mode}")
+    # Triangles of no area join strips to one another.
+    a, b, c = faces.T
+    return points.astype(np.float64), faces[(a != b) & (b != c) & (c != a)]
+
+
+class _Buffers:
+    """The numbers that accessors name, with every offset held to what is there."""
+
+    def __init__(self, tree: _Tree, fetch: Fetch | None, stored: bytes | None) -> None:
+        self._tree = tree
+        self._fetch = fetch
+        self._stored = stored
+        self._read: dict[int, bytes] = {}
+
+    def values(self, index: object, kind: str) -> NDArray[np.generic]:
+        """Return the rows of an accessor, (count, 1) or (count, 3)."""
+        accessor = _item(self._tree, "accessors", index)
+        if "sparse" in accessor:
+            raise FormatError("it stores sparse accessors, which aren't read")
+        if "bufferView" not in accessor:
+            raise FormatError(
+                "an accessor stores no data: its compression isn't supported"
+            )
+        component = accessor.get("componentType")
+        if accessor.get("type") != kind or component not in self._allowed(kind):
+            raise FormatError(
+                f"accessor {index} holds {accessor.get('type')} of {component}, "
+                f"where {kind} is needed"
+            )
+        view = _item(self._tree, "bufferViews", accessor["bufferView"])
+        if set(_PACKED) & set(view.get("extensions", ())):
+            raise FormatError("its buffers are compressed; export it uncompressed")
+        dtype = np.dtype(_COMPONENTS[component])
+        rows = self._rows(accessor, view, dtype.itemsize * _WIDTH[kind])
+        values = rows.view(dtype)
+        if accessor.get("normalized") and component != _FLOAT:
+            return np.maximum(values / np.iinfo(dtype).max, -1.0)
+        return values
+
+    def _allowed(self, kind: str) -> Sequence[int]:
+        if kind == "SCALAR":
+            return _INDICES
+        quantized = _QUANTIZED in self._tree.get("extensionsUsed", ())
+        return tuple(c for c in _COMPONENTS if c != 5125) if quantized else (_FLOAT,)
+
+    def _rows(self, accessor: _Tree, view: _Tree, width: int) -> NDArray[np.uint8]:
+        """Return the bytes of each row, shape (count, width)."""
+        data = self._buffer(view.get("buffer"))
+        count = _natural(accessor, "count")
+        stride = _natural(view, "byteStride", width)
+        begin, size = _natural(view, "byteOffset", 0), _natural(view, "byteLength")
+        offset = _natural(accessor, "byteOffset", 0)
+        if begin + size > len(data):
+            raise FormatError(
+                f"it names {begin + size} bytes of a {len(data)} byte buffer"
+            )
+        if count == 0:
+            return np.empty((0, width), np.uint8)
+        span = (count - 1) * stride + width
+        if stride < width or offset + span > size:
+            raise FormatError(f"{count} rows don't fit into a view of {size} bytes")
+        flat = np.frombuffer(data, np.uint8, span, begin + offset)
+        rows = np.lib.stride_tricks.as_strided(flat, (count, width), (stride, 1))
+        return np.ascontiguousarray(rows)
+
+    def _buffer(self, index: object) -> bytes:
+        entry = _item(self._tree, "buffers", index)
+        assert isinstance(index, int)
+        if index not in self._read:
+            data = self._bytes(entry, index)
+            if len(data) < _natural(entry, "byteLength"):
+                raise FormatError(
+                    f"its buffer {index} is cut short: {len(data)} of "
+                    f"{entry['byteLength']} bytes"
+                )
+            self._read[index] = data
+        return self._read[index]
+
+    def _bytes(self, entry: _Tree, index: int) -> bytes:
+        if "uri" not in entry:
+            if index or self._stored is None:
+                raise FormatError(f"its buffer {index} isn't there")
+            return self._stored
+        uri = str(entry["uri"])
+        if uri.startswith("data:"):
+            try:
+                return base64.b64decode(uri.partition(",")[2], validate=True)
+            except binascii.Error as error:
+                raise FormatError(f"its buffer {index}: {error}") from None
+        if self._fetch is None:
+            raise FormatError(f"it needs the file '{uri[:60]}', which isn't beside it")
+        return self._fetch(unquote(uri))
+
+
+def _natural(entry: _Tree, key: str, default: int | None = None) -> int:
+    value = entry.get(key, default)
+    if type(value) is not int or value < 0:
+        raise FormatError(f"its {key} is {value}, must be a whole number from 0 on")
+    return value

@@ -1,0 +1,88 @@
+"""Strict reader of STL, ASCII and binary."""
+
+import re
+import struct
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .text_formats import FormatError, decode, numbers
+
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+# A facet in words; None stands for a number.
+_FACET = (
+    *("facet", "normal", None, None, None, "outer", "loop"),
+    *(3 * ("vertex", None, None, None)),
+    *("endloop", "endfacet"),
+)
+_SOLID = re.compile(r"\s*solid\b[^\r\n]*([\r\n].*?)\bendsolid\b[^\r\n]*", re.I | re.S)
+
+
+def read_stl(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices (3m, 3) in file units and triangles (m, 3), every corner apart.
+
+    A file whose length is the one that its counter states is binary, even if it begins
+    with "solid"; colours in the attribute bytes are passed over.
+
+    Raises:
+        FormatError: If a facet isn't one, or the file ends early.
+    """
+    counted = struct.unpack("<I", data[80:84])[0] if len(data) >= 84 else -1
+    if len(data) == 84 + 50 * counted:
+        corners = np.frombuffer(data, _RECORD, offset=84)["corners"].astype(np.float64)
+    else:
+        text = decode(data)
+        if re.match(r"\s*solid\b", text, re.I) is None or "\0" in text:
+            raise FormatError(
+                "it is neither ASCII STL nor binary STL of the stated length"
+                + (f" ({counted} facets in {len(data)} bytes)" if counted >= 0 else "")
+            )
+        corners = _ascii(text)
+    corners = corners.reshape(-1, 3)
+    return corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3)
+
+
+def _ascii(text: str) -> NDArray[np.float64]:
+    at = 0
+    parts: list[NDArray[np.float64]] = []
+    while text[at:].strip():
+        found = _SOLID.match(text, at)
+        if found is None:
+            read = sum(len(part) for part in parts)
+            facets = len(re.findall(r"^\s*facet\b", text, re.M | re.I))
+            raise FormatError(
+                f"{read} of {facets} facets could be read; a 'solid' without its "
+                "'endsolid' may be cut short"
+            )
+        parts.append(_facets(found[1].split()))
+        at = found.end()
+    return np.concatenate(parts)
+
+
+def _facets(words: list[str]) -> NDArray[np.float64]:
+    """Return the corners (m, 3, 3) of the facets of one solid."""
+    if len(words) % len(_FACET):
+        raise FormatError(_fault(words))
+    size = len(_FACET)
+    for column, word in enumerate(_FACET):
+        if word is not None and {w.lower() for w in words[column::size]} - {word}:
+            raise FormatError(_fault(words))
+    places = [k for k, word in enumerate(_FACET) if word is None][3:]
+    columns = [numbers(words[k::size]) for k in places]
+    return np.stack(columns, axis=1).reshape(-1, 3, 3)
+
+
+def _fault(words: list[str]) -> str:
+    """Say which facet is the first that isn't one."""
+    size = len(_FACET)
+    for number, begin in enumerate(range(0, len(words), size), 1):
+        row = words[begin : begin + size]
+        if len(row) < size or any(
+            word is not None and found.lower() != word
+            for found, word in zip(row, _FACET, strict=True)
+        ):
+            return (
+                f"facet {number} isn't 'facet normal x y z', 'outer loop', three "
+                "'vertex x y z', 'endloop', 'endfacet'"
+            )
+    return "a facet can't be understood"
