@@ -1,7 +1,7 @@
 """Which polygon of its file each face of a mesh came from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Properties = Mapping[str, NDArray[Any]]
-_NONE: Properties = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +33,11 @@ class FileOrigin:
     """
 
     face: NDArray[np.int64]
-    corners: NDArray[np.int32]
+    corners: NDArray[np.integer]
     n_faces: int
     n_vertices: int
-    face_properties: Properties = field(default=_NONE)
-    vertex_properties: Properties = field(default=_NONE)
+    face_properties: Properties = field(default_factory=dict[str, NDArray[Any]])
+    vertex_properties: Properties = field(default_factory=dict[str, NDArray[Any]])
 
     def __post_init__(self) -> None:
         face = np.array(self.face, dtype=np.int64)
@@ -57,7 +56,7 @@ class FileOrigin:
             ("face_properties", self.n_faces),
             ("vertex_properties", self.n_vertices),
         ):
-            held = {key: np.array(v) for key, v in getattr(self, name).items()}
+            held = {key: values.view() for key, values in getattr(self, name).items()}
             for key, values in held.items():
                 if values.shape != (count,):
                     raise ValueError(
@@ -65,6 +64,10 @@ class FileOrigin:
                     )
                 values.setflags(write=False)
             object.__setattr__(self, name, MappingProxyType(held))
+
+    def of_faces(self, kept: NDArray[np.int64]) -> "FileOrigin":
+        """Return the origin of a mesh that keeps these of the faces."""
+        return replace(self, face=self.face[kept], corners=self.corners[kept])
 
 
 def _check_range(name: str, indices: NDArray[Any], count: int) -> None:

@@ -1,58 +1,48 @@
 """From a file's bytes to raw vertices and triangles, whole or not at all.
 
-PLY, STL, glTF and 3MF go through trimesh, which reads some broken files in part and
-others as something else, without an error. What a file declares is therefore compared
-with what came out.
+Each format has a strict reader of its own. The general mesh libraries read some broken
+files in part and others as something else, without an error: strips as points,
+compressed or sparse data as zeros, mixed lists by the length of the first.
 """
 
-import io
-import json
-import logging
-import re
-import struct
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import PurePath
-from typing import Any
+from pathlib import PurePosixPath, PureWindowsPath
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
-from trimesh.resolvers import Resolver
 
-from .text_formats import FormatError, decode, read_obj, read_off
+from .file_origin import FileOrigin, Properties
+from .gltf_format import read_glb, read_gltf
+from .ply_format import ply_surface, read_ply
+from .polygons import cut_polygons
+from .stl_format import read_stl
+from .text_formats import FormatError, read_obj, read_off
+from .three_mf_format import read_three_mf
 
 SUPPORTED = ("obj", "ply", "stl", "off", "glb", "gltf", "3mf")
 
-# Without a handler of its own, Python prints the library's log records on stderr.
-logging.getLogger("trimesh").addHandler(logging.NullHandler())
-
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
-_UNITS = {
+_UNITS_3MF = {
     "micron": "um",
-    "micrometer": "um",
-    "micrometers": "um",
     "millimeter": "mm",
-    "millimeters": "mm",
     "centimeter": "cm",
-    "centimeters": "cm",
     "meter": "m",
-    "meters": "m",
     "inch": "in",
-    "inches": "in",
     "foot": "ft",
-    "feet": "ft",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """What a file holds: positions in its own unit, triangles, and the stated unit."""
+    """What a file holds: positions in its own unit, triangles, and the stated unit.
+
+    ``origin`` is None where each triangle is a polygon of the file, in its order.
+    """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     unit: str | None
+    origin: FileOrigin | None = None
 
 
 def read_format(
@@ -68,17 +58,7 @@ def read_format(
     Raises:
         FormatError: If it isn't whole, or holds no triangles.
     """
-    if kind == "obj":
-        raw = RawMesh(*read_obj(data), None)
-    elif kind == "off":
-        raw = RawMesh(*read_off(data), None)
-    else:
-        if kind == "stl" and not _is_binary_stl(data):
-            # For other encodings the library wants a package that guesses them.
-            data = decode(data).encode()
-        _CHECKS[kind](data)
-        raw = _through_library(kind, data, fetch)
-        _compare(kind, data, raw)
+    raw = _READERS[kind](data, fetch)
     if len(raw.vertices) == 0:
         raise FormatError("it is empty: no vertices")
     if len(raw.faces) == 0:
@@ -93,155 +73,93 @@ def read_format(
     return raw
 
 
-class _Fetch(Resolver):
-    """Hands the library the files named by a .gltf, and nothing else."""
-
-    def __init__(self, fetch: Callable[[str], bytes] | None) -> None:
-        self._fetch = fetch
-
-    def get(self, key: str) -> bytes:
-        if self._fetch is None or PurePath(key).is_absolute() or ".." in key:
-            raise FormatError(f"it needs the file '{key}', which isn't beside it")
-        return self._fetch(key)
-
-    def write(self, name: str, data: bytes) -> None:
-        raise NotImplementedError
-
-    def namespaced(self, namespace: str) -> "_Fetch":
-        raise NotImplementedError
-
-    def keys(self) -> list[str]:
-        return []
+_Fetch = Callable[[str], bytes] | None
 
 
-def _through_library(
-    kind: str, data: bytes, fetch: Callable[[str], bytes] | None
+def _obj(data: bytes, fetch: _Fetch) -> RawMesh:
+    return _of_polygons(*read_obj(data))
+
+
+def _off(data: bytes, fetch: _Fetch) -> RawMesh:
+    return _of_polygons(*read_off(data))
+
+
+def _stl(data: bytes, fetch: _Fetch) -> RawMesh:
+    return RawMesh(*read_stl(data), None)
+
+
+def _ply(data: bytes, fetch: _Fetch) -> RawMesh:
+    elements = read_ply(data)
+    points, polygons = ply_surface(elements)
+    corners = np.asarray(polygons.values, np.int64)
+    _check_range(corners, len(points))
+    face = elements.get("face")
+    return _of_polygons(
+        points,
+        polygons.lengths,
+        corners,
+        vertex_properties={
+            name: values
+            for name, values in elements["vertex"].scalars.items()
+            if name not in ("x", "y", "z")
+        },
+        face_properties={} if face is None else face.scalars,
+    )
+
+
+def _of_polygons(
+    points: NDArray[np.float64],
+    sizes: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    *,
+    vertex_properties: Properties | None = None,
+    face_properties: Properties | None = None,
 ) -> RawMesh:
-    options: dict[str, Any] = {"process": False}
-    if kind in ("glb", "gltf", "ply"):
-        options["skip_materials"] = True
-    if kind == "ply":
-        options["fix_texture"] = False
-    with warnings.catch_warnings():
-        # numpy warns where text numbers break off, and the library goes on with less.
-        warnings.simplefilter("error")
-        scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind, resolver=_Fetch(fetch), **options
+    faces, polygon = cut_polygons(points, sizes, corners)
+    origin = FileOrigin(
+        polygon,
+        faces,
+        len(sizes),
+        len(points),
+        face_properties or {},
+        vertex_properties or {},
+    )
+    return RawMesh(points, faces, None, origin)
+
+
+def _glb(data: bytes, fetch: _Fetch) -> RawMesh:
+    return RawMesh(*read_glb(data), "m")
+
+
+def _gltf(data: bytes, fetch: _Fetch) -> RawMesh:
+    def beside(name: str) -> bytes:
+        rooted = PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive
+        if fetch is None or rooted or ".." in name:
+            raise FormatError(f"it needs the file '{name}', which isn't beside it")
+        return fetch(name)
+
+    return RawMesh(*read_gltf(data, beside), "m")
+
+
+def _three_mf(data: bytes, fetch: _Fetch) -> RawMesh:
+    vertices, faces, unit = read_three_mf(data)
+    return RawMesh(vertices, faces, _UNITS_3MF.get(unit, unit))
+
+
+def _check_range(corners: NDArray[np.int64], n_vertices: int) -> None:
+    if len(corners) and not (corners.min() >= 0 and corners.max() < n_vertices):
+        raise FormatError(
+            f"faces name vertices {corners.min()}..{corners.max()}, "
+            f"there are {n_vertices}"
         )
-    vertices, faces = _joined(scene)
-    stated = None if kind in ("ply", "stl") else scene.units
-    unit = _UNITS.get(str(stated).lower(), stated) if stated else None
-    return RawMesh(vertices, faces, unit)
 
 
-def _joined(scene: trimesh.Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return every body of a scene, placed by its transforms, as one mesh."""
-    vertices, faces, n = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
-    for node in sorted(scene.graph.nodes_geometry):
-        world_from_part, name = scene.graph[node]
-        part = scene.geometry[name]
-        at = np.asarray(part.vertices, dtype=np.float64)
-        if at.ndim != 2 or at.shape[1] != 3:
-            continue
-        # Infinite coordinates are counted and removed later; here they may become NaN.
-        with np.errstate(invalid="ignore", over="ignore"):
-            at = at @ world_from_part[:3, :3].T + world_from_part[:3, 3]
-        corners = np.asarray(getattr(part, "faces", ()), dtype=np.int64).reshape(-1, 3)
-        if len(corners) and not (corners.min() >= 0 and corners.max() < len(at)):
-            raise FormatError(f"a face names a vertex that isn't there, of {len(at)}")
-        if np.linalg.det(world_from_part[:3, :3]) < 0:
-            corners = corners[:, ::-1]
-        vertices.append(at)
-        faces.append(corners + n)
-        n += len(at)
-    return np.concatenate(vertices), np.concatenate(faces)
-
-
-def _check_ply(data: bytes) -> None:
-    header = _ply_header(data)
-    if "tristrips" in header:
-        raise FormatError("it stores triangle strips, which aren't read; store faces")
-    if "vertex" not in header:
-        raise FormatError("its header declares no vertices")
-
-
-def _ply_header(data: bytes) -> dict[str, int]:
-    """Return how many of each element a PLY header declares."""
-    end = data.find(b"end_header")
-    if not data.startswith(b"ply") or end < 0:
-        raise FormatError("it has no PLY header")
-    found = re.findall(
-        r"^\s*element\s+(\w+)\s+(\d+)", data[:end].decode("latin-1"), re.M
-    )
-    return {name: int(count) for name, count in found}
-
-
-def _check_gltf_json(text: bytes) -> None:
-    try:
-        tree = json.loads(text)
-    except ValueError as error:
-        raise FormatError(f"its JSON can't be read ({error})") from None
-    if not isinstance(tree, dict):
-        raise FormatError("its JSON isn't an object")
-    for name in _COMPRESSED:
-        if name in tree.get("extensionsRequired", ()):
-            raise FormatError(f"it is compressed with {name}; export it uncompressed")
-    for mesh in tree.get("meshes", ()):
-        for part in mesh.get("primitives", ()):
-            if part.get("mode", 4) == 6:
-                raise FormatError("it stores triangle fans, which aren't read")
-            used = [part.get("indices"), part.get("attributes", {}).get("POSITION")]
-            stored = [tree["accessors"][i] for i in used if i is not None]
-            if any("sparse" in accessor for accessor in stored):
-                raise FormatError("it stores sparse accessors, which aren't read")
-
-
-def _check_glb(data: bytes) -> None:
-    if len(data) < 20 or not data.startswith(b"glTF"):
-        raise FormatError("it has no GLB header")
-    _, length, size, _ = struct.unpack("<4I", data[4:20])
-    if length > len(data):
-        raise FormatError(f"it is cut short: {len(data)} of {length} bytes")
-    _check_gltf_json(data[20 : 20 + size])
-
-
-def _accept(data: bytes) -> None:
-    """Nothing to look for before reading."""
-
-
-_CHECKS: dict[str, Callable[[bytes], None]] = {
-    "ply": _check_ply,
-    "glb": _check_glb,
-    "gltf": _check_gltf_json,
-    "stl": _accept,
-    "3mf": _accept,
+_READERS: dict[str, Callable[[bytes, _Fetch], RawMesh]] = {
+    "obj": _obj,
+    "off": _off,
+    "stl": _stl,
+    "ply": _ply,
+    "glb": _glb,
+    "gltf": _gltf,
+    "3mf": _three_mf,
 }
-
-
-def _compare(kind: str, data: bytes, raw: RawMesh) -> None:
-    """Refuse a file of which the library returned less than it declares."""
-    n_vertices, n_faces = len(raw.vertices), len(raw.faces)
-    if kind == "ply":
-        header = _ply_header(data)
-        declared = header["vertex"], header.get("face", 0)
-        if n_vertices < declared[0] or n_faces < declared[1]:
-            raise FormatError(
-                f"its header promises {declared[0]} vertices and {declared[1]} faces, "
-                f"{n_vertices} and {n_faces} could be read"
-            )
-    if kind == "stl" and not _is_binary_stl(data):
-        declared_faces = len(re.findall(rb"^\s*facet\b", data, re.M | re.I))
-        if n_faces != declared_faces:
-            raise FormatError(f"{n_faces} of {declared_faces} facets could be read")
-        if n_faces == 0 and not re.match(rb"\s*solid\b", data, re.I):
-            raise FormatError(
-                "it is neither ASCII STL nor binary STL of the stated length"
-            )
-    if n_faces and not np.any(raw.vertices):
-        raise FormatError("every coordinate is zero: its compression isn't supported")
-
-
-def _is_binary_stl(data: bytes) -> bool:
-    return (
-        len(data) >= 84 and len(data) == 84 + 50 * struct.unpack("<I", data[80:84])[0]
-    )

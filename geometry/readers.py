@@ -14,6 +14,7 @@ from typing import IO
 
 import numpy as np
 
+from .file_origin import FileOrigin
 from .formats import SUPPORTED, RawMesh, read_format
 from .mesh import MeshError, MeshSource, TriangleMesh
 from .orientation import orient
@@ -59,7 +60,7 @@ def load_mesh(
     data = _bytes_of(path)
     raw = _read(path, data)
     try:
-        vertices, faces, repairs = clean(raw.vertices, raw.faces)
+        vertices, faces, kept, repairs = clean(raw.vertices, raw.faces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     longest = float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max())
@@ -74,10 +75,21 @@ def load_mesh(
         n_faces=len(raw.faces),
         repairs=repairs,
     )
+    # Orientation turns faces and keeps their order, so that the origin stays theirs.
     faces, turned = orient(TriangleMesh(vertices * scale, faces))
     return TriangleMesh(
-        vertices * scale, faces, replace(source, repairs=repairs + turned)
+        vertices * scale,
+        faces,
+        replace(source, repairs=repairs + turned),
+        _origin(raw).of_faces(kept),
     )
+
+
+def _origin(raw: RawMesh) -> FileOrigin:
+    if raw.origin is not None:
+        return raw.origin
+    n = len(raw.faces)
+    return FileOrigin(np.arange(n), raw.faces, n, len(raw.vertices))
 
 
 def _scale(

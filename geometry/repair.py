@@ -10,10 +10,15 @@ _FLAT = 1e-10
 # More broken faces than this share, and the rest can't be taken for the object.
 _MAX_BROKEN = 0.1
 
-_Arrays = tuple[NDArray[np.float64], NDArray[np.int64], tuple[Repair, ...]]
+_Vertices = NDArray[np.float64]
+_Faces = NDArray[np.int64]
+# Vertices, faces, which of the faces handed in stayed (None: all), what was done.
+_Step = tuple[_Vertices, _Faces, NDArray[np.bool_] | None, tuple[Repair, ...]]
 
 
-def clean(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
+def clean(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[_Vertices, _Faces, NDArray[np.int64], tuple[Repair, ...]]:
     """Return a mesh that every later stage can take, and what was changed.
 
     In this order: faces with a corner that isn't finite, and such vertices, are
@@ -25,33 +30,38 @@ def clean(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
         vertices: In any unit, shape (n_v, 3).
         faces: Indices in range, shape (n_f, 3).
 
+    Returns:
+        Vertices (n, 3), faces (m, 3), the index that each of these had among the faces
+        handed in (m,), ascending, and the repairs.
+
     Raises:
         MeshError: If no face stays, or more than a tenth of them isn't finite.
     """
     n_faces = len(faces)
     steps = (_drop_non_finite, _weld, _drop_flat, _drop_doubled, _drop_unused)
     repairs: list[Repair] = []
+    origin = np.arange(n_faces)
     for step in steps:
-        vertices, faces, made = step(vertices, faces)
+        vertices, faces, kept, made = step(vertices, faces)
+        if kept is not None:
+            origin = origin[kept]
         repairs += [repair for repair in made if repair.count]
         if len(faces) == 0:
             raise MeshError(
                 f"none of its {n_faces} faces is usable ({_worded(repairs)}); "
                 "export the mesh again"
             )
-    return vertices, faces, tuple(repairs)
+    return vertices, faces, origin, tuple(repairs)
 
 
 def _worded(repairs: list[Repair]) -> str:
     return ", ".join(f"{r.kind}: {r.count}" for r in repairs)
 
 
-def _drop_non_finite(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> _Arrays:
+def _drop_non_finite(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
     finite: NDArray[np.bool_] = np.all(np.isfinite(vertices), axis=1)
     if finite.all():
-        return vertices, faces, ()
+        return vertices, faces, None, ()
     keep = np.all(finite[faces], axis=1)
     broken = len(faces) - int(keep.sum())
     if 0 < keep.sum() and not broken <= _MAX_BROKEN * len(faces):
@@ -64,13 +74,13 @@ def _drop_non_finite(
         Repair("non-finite vertices removed", int((~finite).sum())),
         Repair("non-finite faces removed", broken),
     )
-    return vertices[finite], faces, repairs
+    return vertices[finite], faces, keep, repairs
 
 
-def _weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
+def _weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
     first, where = _identical(vertices)
     repair = Repair("vertices welded", len(vertices) - len(first))
-    return vertices[first], where[faces], (repair,)
+    return vertices[first], where[faces], None, (repair,)
 
 
 def _identical(
@@ -95,17 +105,17 @@ def _identical(
     return first[order], rank[where.reshape(-1)]
 
 
-def _drop_flat(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
+def _drop_flat(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     double_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     sides = np.stack([b - a, c - b, a - c])
     longest = np.einsum("kij,kij->ki", sides, sides).max(axis=0)
     keep = double_area > _FLAT * longest
     repair = Repair("zero-area faces removed", len(faces) - int(keep.sum()))
-    return vertices, faces[keep], (repair,)
+    return vertices, faces[keep], keep, (repair,)
 
 
-def _drop_doubled(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
+def _drop_doubled(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
     low, middle, high = np.sort(faces, axis=1).T
     n = len(vertices)
     # The pair key fits 64 bits up to three thousand million vertices.
@@ -117,11 +127,11 @@ def _drop_doubled(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _A
     # lexsort is stable, so the first of equal faces is the one that was stored first.
     keep[order[same]] = False
     repair = Repair("duplicate faces removed", int(same.sum()))
-    return vertices, faces[keep], (repair,)
+    return vertices, faces[keep], keep, (repair,)
 
 
-def _drop_unused(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Arrays:
+def _drop_unused(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     repair = Repair("unreferenced vertices removed", int((~used).sum()))
-    return vertices[used], (np.cumsum(used) - 1)[faces], (repair,)
+    return vertices[used], (np.cumsum(used) - 1)[faces], None, (repair,)

@@ -56,7 +56,7 @@ def as_sets(faces: np.ndarray) -> set[tuple[int, ...]]:
 def test_a_soup_is_welded_back_into_the_mesh_it_came_from() -> None:
     ball = sphere(0.1, subdivisions=3)
     soup = ball.corners.reshape(-1, 3)
-    vertices, faces, repairs = clean(soup, np.arange(len(soup)).reshape(-1, 3))
+    vertices, faces, _, repairs = clean(soup, np.arange(len(soup)).reshape(-1, 3))
     assert len(vertices) == len(ball.vertices)
     np.testing.assert_array_equal(vertices[faces], ball.corners)
     assert [(r.kind, r.count) for r in repairs] == [
@@ -68,7 +68,7 @@ def test_positive_and_negative_zero_are_one_place() -> None:
     vertices = np.array(
         [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0], [0, -1, 0]]
     )
-    welded, faces, _ = clean(vertices, np.array([[0, 1, 2], [3, 4, 1]]))
+    welded, faces, _, _ = clean(vertices, np.array([[0, 1, 2], [3, 4, 1]]))
     assert len(welded) == 4
     assert faces[0, 0] == faces[1, 0]
 
@@ -86,7 +86,7 @@ def test_welding_survives_places_that_share_a_hash(
     monkeypatch.setattr("geometry.repair.np.bitwise_xor", Colliding)
     ball = sphere(0.1, subdivisions=2)
     soup = ball.corners.reshape(-1, 3)
-    vertices, faces, _ = clean(soup, np.arange(len(soup)).reshape(-1, 3))
+    vertices, faces, _, _ = clean(soup, np.arange(len(soup)).reshape(-1, 3))
     assert len(vertices) == len(ball.vertices)
     np.testing.assert_array_equal(vertices[faces], ball.corners)
 
@@ -105,8 +105,9 @@ def test_every_planted_fault_is_removed_and_counted() -> None:
         [0, 1, n + 3],
     ]
     faces = np.vstack([ball.faces, planted])
-    cleaned, kept, repairs = clean(vertices, faces)
+    cleaned, kept, origin, repairs = clean(vertices, faces)
     np.testing.assert_array_equal(cleaned[kept], ball.corners)
+    np.testing.assert_array_equal(origin, np.arange(len(ball.faces)))
     assert {r.kind: r.count for r in repairs} == {
         "non-finite vertices removed": 2,
         "non-finite faces removed": 1,
@@ -260,7 +261,7 @@ def test_two_boxes_that_share_an_edge_are_both_turned_outwards() -> None:
     a = box((1.0, 1.0, 1.0))
     b = moved(a, 1.0, 1.0, 0.0)
     both = joined(a, flipped(b))
-    vertices, faces, _ = clean(both.vertices, both.faces)
+    vertices, faces, _, _ = clean(both.vertices, both.faces)
     shared = TriangleMesh(vertices, faces)
     assert (mesh_edges(faces).n_faces == 4).sum() == 1
     mesh, _ = oriented(shared)
