@@ -22,14 +22,20 @@ from .three_mf_format import read_three_mf
 
 SUPPORTED = ("obj", "ply", "stl", "off", "glb", "gltf", "3mf")
 
-_UNITS_3MF = {
-    "micron": "um",
-    "millimeter": "mm",
-    "centimeter": "cm",
-    "meter": "m",
-    "inch": "in",
-    "foot": "ft",
-}
+# As 3MF names them, and in the plural, as glTF files of mesh libraries do.
+_UNIT_NAMES = {
+    name + plural: unit
+    for name, unit in (
+        ("micron", "um"),
+        ("micrometer", "um"),
+        ("millimeter", "mm"),
+        ("centimeter", "cm"),
+        ("meter", "m"),
+        ("inch", "in"),
+        ("foot", "ft"),
+    )
+    for plural in ("", "s")
+} | {"inches": "in", "feet": "ft"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +134,7 @@ def _of_polygons(
 
 
 def _glb(data: bytes, fetch: _Fetch) -> RawMesh:
-    return RawMesh(*read_glb(data), "m")
+    return _in_stated_unit(*read_glb(data))
 
 
 def _gltf(data: bytes, fetch: _Fetch) -> RawMesh:
@@ -138,12 +144,17 @@ def _gltf(data: bytes, fetch: _Fetch) -> RawMesh:
             raise FormatError(f"it needs the file '{name}', which isn't beside it")
         return fetch(name)
 
-    return RawMesh(*read_gltf(data, beside), "m")
+    return _in_stated_unit(*read_gltf(data, beside))
 
 
 def _three_mf(data: bytes, fetch: _Fetch) -> RawMesh:
-    vertices, faces, unit = read_three_mf(data)
-    return RawMesh(vertices, faces, _UNITS_3MF.get(unit, unit))
+    return _in_stated_unit(*read_three_mf(data))
+
+
+def _in_stated_unit(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], unit: str
+) -> RawMesh:
+    return RawMesh(vertices, faces, _UNIT_NAMES.get(unit.lower(), unit))
 
 
 def _check_range(corners: NDArray[np.int64], n_vertices: int) -> None:

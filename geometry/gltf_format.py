@@ -33,8 +33,8 @@ _PACKED = (
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
-def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices (n, 3) in metres and triangles (m, 3) of a GLB file.
+def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
+    """Return vertices (n, 3), triangles (m, 3) and the unit of a GLB file.
 
     Raises:
         FormatError: If it isn't whole, or holds what can't be read as triangles.
@@ -63,8 +63,11 @@ def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 def read_gltf(
     text: bytes, fetch: Fetch | None, stored: bytes | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices (n, 3) in metres and triangles (m, 3) of the default scene.
+) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
+    """Return vertices (n, 3), triangles (m, 3) and the unit of the default scene.
+
+    The unit is the metre, unless all meshes state the same other one under
+    ``extras.units``, as mesh libraries write it.
 
     Args:
         text: The JSON.
@@ -85,6 +88,7 @@ def read_gltf(
     buffers = _Buffers(tree, fetch, stored)
     meshes: dict[int, list[tuple[NDArray[np.float64], NDArray[np.int64]]]] = {}
     parts: list[Part] = []
+    units: set[str] = set()
     for node, world_from_node in _placed(tree):
         if "mesh" not in node:
             continue
@@ -94,10 +98,19 @@ def read_gltf(
         if index not in meshes:
             shapes = [_primitive(tree, buffers, p) for p in mesh["primitives"]]
             meshes[index] = [shape for shape in shapes if shape is not None]
+        units.add(_unit(mesh))
         parts += [Part(v, f, world_from_node) for v, f in meshes[index]]
     if not parts and tree.get("meshes"):
         raise FormatError("its default scene shows no triangle mesh")
-    return joined(parts)
+    if len(units) > 1:
+        raise FormatError(f"its meshes state different units: {sorted(units)}")
+    return *joined(parts), "".join(units)
+
+
+def _unit(mesh: _Tree) -> str:
+    extras = mesh.get("extras")
+    stated = extras.get("units") if isinstance(extras, dict) else None
+    return str(stated)[:20] if stated else "m"
 
 
 def _check_extensions(tree: _Tree) -> None:
