@@ -114,6 +114,9 @@ def _document(
             "sha256": surface.sha256(),
             "curvature_radius_m": draft.curvature_radius_m,
             "dominant_share": draft.regions.dominant_share,
+            "selection": entries.selection_entry(
+                draft.scene.mesh, draft.scene.region, draft.order.interest
+            ),
         },
         "rig": draft.order.rig.to_document(),
         "requirements": requirements.to_document(),

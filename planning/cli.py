@@ -165,6 +165,16 @@ def commands() -> None:
     help="What must be covered.",
 )
 @click.option(
+    "--select",
+    metavar="FILE|ply:NAME",
+    help="Cover these faces instead: indices from 0, or a PLY property that isn't 0.",
+)
+@click.option(
+    "--weight",
+    metavar="FILE|ply:NAME",
+    help="Cover the fifth of the area of highest weight: a number for each vertex.",
+)
+@click.option(
     "--dominant-coverage",
     type=_Positive(1.0),
     metavar="F",
@@ -226,6 +236,7 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
 
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
+    _check_target(options)
     if options["prove"]:
         raise click.UsageError(
             "--prove isn't built yet: bounds over all poses come later"
@@ -241,6 +252,16 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
             "several meshes on one rig aren't built yet: give one file"
         )
     _run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
+
+
+def _check_target(options: dict[str, Any]) -> None:
+    own = [name for name in ("select", "weight") if options[name] is not None]
+    if len(own) == 2:
+        raise click.UsageError("give --select or --weight, not both")
+    if own and options["target"] == "surface":
+        raise click.UsageError(f"give --target surface or --{own[0]}, not both")
+    if own and not options[own[0]]:
+        raise click.UsageError(f"--{own[0]} '' names no file")
 
 
 @commands.command()

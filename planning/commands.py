@@ -22,6 +22,7 @@ from .errors import (
     RequirementError,
 )
 from .face_status import face_status
+from .interest import Interest, read_selection, read_weight
 from .pipeline import plan_rig
 from .plan import RigPlan
 from .progress import Report
@@ -43,6 +44,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
             report(f"reading {path}")
         mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
         _say_size(report, mesh)
+        selection, weight = _interest(options, mesh, report)
         missed: tuple[str, ...] = ()
         code = 0
         try:
@@ -52,6 +54,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 max_projectors=options["max_projectors"],
                 max_cameras=options["max_cameras"],
                 target=options["target"],
+                select=selection,
+                weight=weight,
                 dominant_coverage=options["dominant_coverage"],
                 coverage=options["coverage"],
                 min_reachable=options["min_reachable"],
@@ -76,6 +80,27 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     else:
         click.echo(summary(plan, files, missed))
     return code
+
+
+def _interest(
+    options: Mapping[str, Any], mesh: TriangleMesh, report: Report | None
+) -> tuple[Interest | None, Interest | None]:
+    """Read the user's own target, by faces or by weight, and say what it holds."""
+    selection = weight = None
+    if options["select"] is not None:
+        selection = read_selection(options["select"], mesh)
+    if options["weight"] is not None:
+        weight = read_weight(options["weight"], mesh)
+    interest = selection or weight
+    if interest is not None and report is not None:
+        share = mesh.face_areas[interest.chosen].sum() / mesh.area
+        report(
+            f"{interest.source}: {interest.chosen.sum()} of {len(mesh.faces)} "
+            f"triangles are the target, {share:.1%} of the area"
+        )
+        if interest.n_removed:
+            report(f"  {interest.n_removed} chosen faces were removed by repair")
+    return selection, weight
 
 
 def _left(limit: float | None, begin: float) -> float | None:

@@ -11,6 +11,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh import TriangleMesh
 
 from .claims import Claims
+from .interest import Interest
 from .plan import PlannedCamera, PlannedProjector
 
 _POSITION_DECIMALS = 5
@@ -105,6 +106,21 @@ def mesh_entry(mesh: TriangleMesh) -> dict[str, Any]:
         "n_faces": source.n_faces,
         "area_m2": mesh.area,
         "repairs": [{"kind": r.kind, "count": r.count} for r in source.repairs],
+    }
+
+
+def selection_entry(
+    mesh: TriangleMesh, region: NDArray[np.int64], interest: Interest | None
+) -> dict[str, Any]:
+    """Return `surface.selection`: what the faces with a region were chosen by."""
+    chosen = region >= 0
+    return {
+        "kind": "curvature" if interest is None else interest.kind,
+        "source": None if interest is None else interest.source,
+        "sha256": None if interest is None else interest.sha256,
+        "n_faces": int(chosen.sum()),
+        "area_m2": float(mesh.face_areas[chosen].sum()),
+        "n_removed_by_repair": 0 if interest is None else interest.n_removed,
     }
 
 

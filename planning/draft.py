@@ -7,6 +7,7 @@ from geometry.mesh import TriangleMesh
 from geometry.regions import DominantRegions
 
 from .cameras import CameraStage
+from .interest import Interest
 from .plan import PlannedCamera, PlannedProjector
 from .projectors import ProjectorStage
 from .rig import Rig
@@ -24,6 +25,7 @@ class Order:
         seed: Of every random draw.
         threads: Worker threads.
         command: Words of the command line, for the record.
+        interest: The user's own target; None: the dominant regions by curvature.
     """
 
     mesh: TriangleMesh
@@ -32,6 +34,7 @@ class Order:
     seed: int
     threads: int
     command: tuple[str, ...]
+    interest: Interest | None = None
 
 
 @dataclass(frozen=True, eq=False)

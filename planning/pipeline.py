@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from geometry.bearing import bearing
-from geometry.curvature import principal_curvatures
+from geometry.curvature import CurvatureField, principal_curvatures
 from geometry.mesh import TriangleMesh
 from geometry.regions import DominantRegions, dominant_regions
+from geometry.selected_regions import regions_of_faces
 
 from .assemble import falls_short, write_plan
 from .camera_stage import place_cameras, spread
@@ -24,6 +25,7 @@ from .errors import (
     RequirementError,
     TimeLimitError,
 )
+from .interest import Select, Weight, interest_of
 from .plan import PlannedCamera, PlannedProjector, RigPlan
 from .progress import Report, Stopwatch
 from .projector_poses import widen_margins
@@ -47,6 +49,8 @@ def plan_rig(
     max_projectors: int,
     max_cameras: int | None = None,
     target: Literal["dominant", "surface"] = "dominant",
+    select: Select | None = None,
+    weight: Weight | None = None,
     dominant_coverage: float | None = None,
     coverage: float | None = None,
     min_reachable: float | None = None,
@@ -67,6 +71,10 @@ def plan_rig(
         max_projectors: Projectors at most.
         max_cameras: Cameras at most; None: as many as the coverage needs.
         target: The `dominant` regions, or the whole `surface`.
+        select: Faces that are the target instead of the dominant regions: one bool a
+            face of the mesh, or face indices, or from `read_selection`.
+        weight: Of each vertex of the mesh, at least 0, or from `read_weight`: takes the
+            place of curvedness in choosing the target.
         dominant_coverage: Lit / reachable by projectors; None: the rig's.
         coverage: Measured / reachable by cameras; None: the rig's.
         min_reachable: Reachable by projectors / target; None: the rig's.
@@ -88,8 +96,11 @@ def plan_rig(
         RequirementError: If a requirement is missed; it carries the best plan.
         TimeLimitError: If the time limit came before any plan.
     """
+    surface = _single(mesh)
+    if target == "surface" and not (select is None and weight is None):
+        raise InputError("the whole surface and a selection both are targets: give one")
     order = Order(
-        _single(mesh),
+        surface,
         rig,
         {
             "max_projectors": max_projectors,
@@ -104,6 +115,7 @@ def plan_rig(
         seed,
         threads,
         tuple(command),
+        interest_of(surface, select, weight),
     )
     clock = Stopwatch(progress, time_limit=time_limit)
     # BLAS must not split sums differently with another number of threads.
@@ -135,19 +147,13 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
     mesh, rig = order.mesh, order.rig
     with clock.stage("regions", "curvature and dominant regions"):
         field = principal_curvatures(mesh)
-        regions = dominant_regions(mesh, field)
-        target = order.asked["target"]
-        if target == "dominant" and not len(regions):
-            raise InputError(
-                "no dominant region: the surface is flat where its curvature can be "
-                "trusted; use --target surface"
-            )
+        regions = _regions(order, field)
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
     requirements, radii, tilt = _resolve(order)
     scene = Scene(
         mesh,
         regions.face_region,
-        _steep(regions, target),
+        _steep(regions, order.asked["target"]),
         requirements,
         order.seed,
         order.threads,
@@ -179,6 +185,19 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
         cameras,
         cameras.cameras,
     )
+
+
+def _regions(order: Order, field: CurvatureField) -> DominantRegions:
+    """The user's selection, or else the most curved surface."""
+    if order.interest is not None:
+        return regions_of_faces(order.mesh, field, order.interest.chosen)
+    regions = dominant_regions(order.mesh, field)
+    if order.asked["target"] == "dominant" and not len(regions):
+        raise InputError(
+            "no dominant region: the surface is flat where its curvature can be "
+            "trusted; use --target surface, or choose faces with --select"
+        )
+    return regions
 
 
 def _placed(

@@ -157,7 +157,7 @@ def _proofs(plan: RigPlan) -> str:
         _proof("projector", proofs["projectors"], asked.dominant_coverage, "light"),
         _proof("camera", proofs["cameras"], asked.coverage, "measure")
         + " (given these projectors)",
-        f"         {len(plan.document['regions'])} dominant regions; nothing is proved "
+        f"         {_regions(plan)}; nothing is proved "
         f"over poses beside the candidates",
     ]
     return "\n" + "\n".join(lines)
@@ -194,7 +194,7 @@ def _coverage(plan: RigPlan) -> str:
         ("reachable by cameras", "reachable_by_cameras_m2"),
         ("measured", "measured_m2"),
     ]
-    name = plan.requirements.target
+    name = _target_name(plan)
     lines = [
         f"\n{'':<9}{'':<25}{'target (' + name + ')':>24}{'whole surface':>24}",
         *(
@@ -219,6 +219,30 @@ def _coverage(plan: RigPlan) -> str:
             f"calibrated poses, not by the surface"
         )
     return "\n".join(lines)
+
+
+def _target_name(plan: RigPlan) -> str:
+    return "your selection" if _own(plan) else plan.requirements.target
+
+
+def _regions(plan: RigPlan) -> str:
+    """Return how many regions there are, and what chose their faces."""
+    regions = plan.document["regions"]
+    many = f"region{'s' * (len(regions) != 1)}"
+    own = _own(plan)
+    if own is None:
+        return f"{len(regions)} dominant {many}"
+    by = "highest weight" if own["kind"] == "vertex_weight" else "selection"
+    source = f" by {own['source']}" if own["source"] else ""
+    removed = own["n_removed_by_repair"]
+    gone = f" ({removed} chosen ones removed by repair)" if removed else ""
+    return f"{len(regions)} {many} of your {by}{source}: {own['n_faces']} faces{gone}"
+
+
+def _own(plan: RigPlan) -> dict[str, Any] | None:
+    """Return `surface.selection` if the user made it; older plans have none."""
+    found = plan.document["surface"].get("selection")
+    return None if found is None or found["kind"] == "curvature" else found
 
 
 def _cell(areas: dict[str, float], key: str) -> str:
