@@ -30,6 +30,7 @@ _DEFAULT_UNIT = "mm"
 _LIKELY_SIZE_M = 0.2
 # A small archive can unpack to more than any machine holds.
 _MAX_BYTES = 1 << 32
+_PIECE = 1 << 24
 
 
 def load_mesh(
@@ -221,7 +222,12 @@ def _from_zip(data: bytes) -> _Unpacked:
 
 
 def _at_most(stream: IO[bytes] | gzip.GzipFile | bz2.BZ2File) -> bytes:
-    content = stream.read(_MAX_BYTES + 1)
-    if len(content) > _MAX_BYTES:
-        raise OSError(f"it unpacks to more than {_MAX_BYTES >> 30} GiB")
-    return content
+    # Asked for everything at once, gzip and bz2 set the largest size aside first.
+    pieces: list[bytes] = []
+    total = 0
+    while piece := stream.read(_PIECE):
+        pieces.append(piece)
+        total += len(piece)
+        if total > _MAX_BYTES:
+            raise OSError(f"it unpacks to more than {_MAX_BYTES >> 30} GiB")
+    return b"".join(pieces)

@@ -7,6 +7,8 @@ from .mesh import MeshError, Repair
 
 # A triangle whose height is below this share of its longest side has no normal.
 _FLAT = 1e-10
+# Numbers from here on overflow where areas are squared: as good as infinite.
+_HUGE = 1e60
 # More broken faces than this share, and the rest can't be taken for the object.
 _MAX_BROKEN = 0.1
 
@@ -59,7 +61,7 @@ def _worded(repairs: list[Repair]) -> str:
 
 
 def _drop_non_finite(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
-    finite: NDArray[np.bool_] = np.all(np.isfinite(vertices), axis=1)
+    finite: NDArray[np.bool_] = np.all(np.abs(vertices) < _HUGE, axis=1)
     if finite.all():
         return vertices, faces, None, ()
     keep = np.all(finite[faces], axis=1)
