@@ -20,6 +20,7 @@ from .serving import MARGIN_SLACK
 
 # Room for the rounding of a written direction or angle [rad].
 _ANGLE = 1e-4
+_SELECTIONS = ("curvature", "faces", "vertex_weight")
 
 
 def audit_regions(
@@ -35,6 +36,7 @@ def audit_regions(
         "regions",
         f"ids {sorted(listed)}, but surface.npz has {sorted(numbers)}",
     )
+    _audit_selection(plan, ledger)
     for number in sorted(set(listed) & numbers):
         key, claims = f"regions.{number}", listed[number]
         inside = own.samples.region == number
@@ -44,6 +46,25 @@ def audit_regions(
         _audit_lit_by(
             plan, key, claims.get("lit_by"), could, own.server[inside], ledger
         )
+
+
+def _audit_selection(plan: RigPlan, ledger: Ledger) -> None:
+    """Check what is said of the faces that were chosen; who chose them is no claim."""
+    claims = ledger.read("surface", "selection")
+    if claims is None:
+        return
+    key, chosen = "surface.selection", plan.surface.region >= 0
+    area = float(plan.surface.mesh.face_areas[chosen].sum())
+    for name, own, slack, unit in (
+        ("n_faces", float(chosen.sum()), 0.0, ""),
+        ("area_m2", area, ROUNDING * area, "m²"),
+    ):
+        claimed = ledger.read("surface", "selection", name)
+        ledger.number(f"{key}.{name}", claimed, own, slack, unit)
+    kind = ledger.read("surface", "selection", "kind")
+    ledger.holds(
+        kind in _SELECTIONS, f"{key}.kind", f"is {kind!r}, must be one of {_SELECTIONS}"
+    )
 
 
 def _listed(regions: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
