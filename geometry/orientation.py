@@ -2,7 +2,8 @@
 
 A *patch* is connected across edges of exactly two faces: the largest piece whose
 winding can be made consistent without a choice. Each patch is then decided on its own,
-so that a floating fragment never decides for the rest.
+so that a floating fragment never decides for the rest. `docs/orientation.md` has the
+rules.
 """
 
 import igl
@@ -10,56 +11,72 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .mesh import Repair, TriangleMesh
-from .poses import fibonacci_cap
+from .nesting import containers
+from .openness import look_out, spots_on
 from .rays import RayCaster
 from .topology import mesh_edges
 
-_VIEWS = 48
-_ROWS = 120
-# Fewer hits, or a front share this near a half, say nothing about a patch.
-_MIN_HITS = 24
-_CLEAR = 0.05
+# Rays of one spot, spots in all, and what even a single triangle gets.
+_RAYS = 16
+_SPOTS = 6000
+_LEAST = 2
+# Sides that are seen this much alike, relative to both, don't tell which is outside.
+_CLEAR = 0.02
+# A fragment, smaller than this share of the area, must show one side four times as
+# much as the other; else it keeps its side relative to the rest.
+_FRAGMENT = 0.01
+_CLEAR_FRAGMENT = 0.6
+_SIGMAS = 3.0
 # Below this |volume| / area^1.5 a closed patch encloses nothing (a folded sheet).
-_HOLLOW = 1e-6
-_MAX_LAYERS = 400
+_EMPTY = 1e-6
+# A body that fills this share of the one around it is the inner wall of a shell.
+_LINING = 0.5
 
 
 def orient(mesh: TriangleMesh) -> tuple[NDArray[np.int64], tuple[Repair, ...]]:
     """Return the faces wound consistently and outwards, and what was changed.
 
-    Winding is made consistent inside each patch, after its majority. A closed patch is
-    turned if its signed volume is negative, unless it lies inside another closed one:
-    then it may be the inner wall of a hollow shell, and is turned only together with
-    the one that holds it. An open patch is turned if rays from all around hit more of
-    its back than of its front. Patches that neither decides (flat, or never seen) are
-    turned if most of the decided area was.
+    Winding is made consistent inside each patch, after its majority. Then:
+
+    1. A closed patch is turned if its signed volume is negative.
+    2. A closed patch wholly inside another may be the inner wall of a hollow shell.
+       If it fills at least half of the one around it, it is one, and is turned to face
+       the other way than that. If not, it is turned together with the outermost one.
+    3. An open patch is turned if its back is seen from outside more than its front.
+    4. A patch that nothing decides (flat, or never seen) is turned with the closed one
+       that holds it, else if most of the decided area was.
 
     Args:
         mesh: Welded, without duplicate or zero-area faces.
 
     Returns:
-        Faces (n_f, 3), and the repairs: rewound and turned faces.
+        Faces (n_f, 3), and the repairs: rewound faces, turned faces and pieces, those
+        of them that followed others, and seams of one-sided surfaces.
     """
     wound, patch = _consistent(mesh)
-    closed = _closed_patches(wound, patch)
+    closed, one_sided = _closed_patches(wound, patch)
     straight = TriangleMesh(mesh.vertices, wound)
-    verdict = np.zeros(len(closed), dtype=np.int64)
-    caster = None
-    if closed.sum() > 1 or not closed.all():
+    area = np.asarray(np.bincount(patch, straight.face_areas), dtype=np.float64)
+    volume = _volumes(straight, patch, area)
+    closed &= np.abs(volume) > _EMPTY * area**1.5
+    verdict = np.where(closed, np.sign(volume), 0.0).astype(np.int64)
+    if len(closed) > 1 or not closed.all():
         caster = RayCaster(straight)
-    if closed.any():
-        verdict[closed] = _by_volume(straight, patch, closed, caster)[closed]
-    if caster is not None and not closed.all():
-        verdict[~closed] = _by_visibility(straight, patch, caster)[~closed]
-    area = np.bincount(patch, straight.face_areas)
+        if not closed.all():
+            verdict = _by_visibility(caster, patch, closed, verdict)
+        verdict = _by_holder(caster, patch, closed, volume, verdict)
+    follows = verdict == 0
     undecided = -1 if float(verdict @ area) < 0 else 1
-    turned = (np.where(verdict == 0, undecided, verdict) < 0)[patch]
-    faces = np.where(turned[:, None], wound[:, ::-1], wound)
-    rewound = np.any(wound != mesh.faces, axis=1)
-    repairs = (
-        Repair("faces rewound like their neighbours", int(rewound.sum())),
-        Repair("faces turned outwards", int(turned.sum())),
-    )
+    turned = np.where(follows, undecided, verdict) < 0
+    faces = np.where(turned[patch, None], wound[:, ::-1], wound)
+    counts = {
+        "faces rewound like their neighbours": np.any(wound != mesh.faces, axis=1),
+        "faces turned outwards": turned[patch],
+        "pieces turned outwards": turned,
+        "of these turned like the rest, being too small or hidden": turned & follows,
+        "edges where a one-sided surface can't be wound alike": one_sided,
+    }
+    repairs = (Repair(kind, int(np.sum(what))) for kind, what in counts.items())
     return faces, tuple(repair for repair in repairs if repair.count)
 
 
@@ -79,126 +96,88 @@ def _consistent(
 
 def _closed_patches(
     faces: NDArray[np.int64], patch: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """Whether each patch meets every one of its edges an even number of times."""
-    of_face = mesh_edges(faces).of_face
-    n = int(patch.max()) + 1
-    _, first, counts = np.unique(
-        (of_face * n + patch[:, None]).ravel(), return_index=True, return_counts=True
-    )
-    odd = patch[first[counts % 2 == 1] // 3]
-    closed = np.ones(n, dtype=bool)
-    closed[odd] = False
-    return closed
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether each patch bounds a volume, and which edges two faces run alike.
 
-
-def _by_volume(
-    mesh: TriangleMesh,
-    patch: NDArray[np.int64],
-    closed: NDArray[np.bool_],
-    caster: RayCaster | None,
-) -> NDArray[np.int64]:
-    """1 outwards, -1 inwards, 0 undecided, for each patch."""
-    area = np.bincount(patch, mesh.face_areas)
-    middle = (
-        np.stack(
-            [
-                np.bincount(patch, mesh.face_areas * mesh.face_centroids[:, k])
-                for k in range(3)
-            ],
-            axis=1,
-        )
-        / np.maximum(area, 1e-300)[:, None]
-    )
-    a, b, c = (mesh.corners[:, k] - middle[patch] for k in range(3))
-    volume = np.bincount(patch, np.einsum("ij,ij->i", a, np.cross(b, c))) / 6.0
-    sign = np.where(np.abs(volume) > _HOLLOW * area**1.5, np.sign(volume), 0.0)
-    holder = np.arange(len(closed))
-    if caster is not None and closed.sum() > 1:
-        holder = _outermost(mesh, patch, closed, caster)
-    return sign[holder].astype(np.int64)
-
-
-def _outermost(
-    mesh: TriangleMesh,
-    patch: NDArray[np.int64],
-    closed: NDArray[np.bool_],
-    caster: RayCaster,
-) -> NDArray[np.int64]:
-    """For each patch the closed one that holds it and is held by none, else itself.
-
-    A point lies inside a closed patch if a ray from it crosses the patch an odd number
-    of times; three rays vote, since one may pass through an edge.
+    A patch does if it meets each of its edges an even number of times, as often
+    one way as the other. Where no winding is consistent (Moebius, Klein), some edge
+    between two faces is run twice the same way.
     """
-    n = len(closed)
-    largest = np.lexsort((mesh.face_areas, patch))
-    largest = largest[np.append(patch[largest][1:] != patch[largest][:-1], True)]
-    seeds = mesh.face_centroids[largest[closed]]
-    inner = np.flatnonzero(closed)
-    votes = np.zeros((len(inner), n), dtype=np.int8)
-    for direction in fibonacci_cap(3, np.array([0.31, 0.52, 0.8]), 1.2):
-        votes += _crossed(mesh, patch, seeds, direction, caster) % 2
-    inside = votes >= 2
-    inside[:, ~closed] = False
-    inside[np.arange(len(inner)), inner] = False
-    depth = np.zeros(n, dtype=np.int64)
-    depth[inner] = inside.sum(axis=1)
-    holder = np.arange(n)
-    for row in np.flatnonzero(inside.any(axis=1)):
-        held_by = np.flatnonzero(inside[row])
-        holder[inner[row]] = held_by[np.argmin(depth[held_by])]
-    return holder
+    edges = mesh_edges(faces)
+    forward = faces[:, [0, 1, 2]] < faces[:, [1, 2, 0]]
+    way = np.where(forward, 1, -1).ravel()
+    balance = np.bincount(edges.of_face.ravel(), way, len(edges.n_faces))
+    alike = (edges.n_faces == 2) & (balance != 0)
+    n = int(patch.max()) + 1
+    closed = np.ones(n, dtype=bool)
+    # Only edges of other than two faces can be met an odd number of times.
+    other = np.flatnonzero((edges.n_faces != 2)[edges.of_face].ravel())
+    key = edges.of_face.ravel()[other] * n + patch[other // 3]
+    key, counts = np.unique(key, return_counts=True)
+    closed[key[counts % 2 == 1] % n] = False
+    closed[patch[alike[edges.of_face].any(axis=1)]] = False
+    return closed, alike
 
 
-def _crossed(
-    mesh: TriangleMesh,
-    patch: NDArray[np.int64],
-    seeds: NDArray[np.float64],
-    direction: NDArray[np.float64],
-    caster: RayCaster,
-) -> NDArray[np.int64]:
-    """How often a ray from each seed crosses each patch, shape (seeds, patches)."""
-    crossed = np.zeros((len(seeds), int(patch.max()) + 1), dtype=np.int64)
-    step = 1e-6 * mesh.radius
-    alive = np.arange(len(seeds))
-    at = seeds + step * direction
-    for _ in range(_MAX_LAYERS):
-        along = np.broadcast_to(direction, at.shape)
-        faces, distances = caster.first_hits(at, along)
-        hit = faces >= 0
-        alive, at = alive[hit], at[hit]
-        if len(alive) == 0:
-            break
-        crossed[alive, patch[faces[hit]]] += 1
-        forward = np.maximum(distances[hit], 0.0) + step
-        at = at + forward[:, None] * direction
-    return crossed
+def _volumes(
+    mesh: TriangleMesh, patch: NDArray[np.int64], area: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Signed volume of each patch in [m³]; it means something for closed ones."""
+    weight = mesh.face_areas
+    middle = np.stack(
+        [np.bincount(patch, weight * mesh.face_centroids[:, k]) for k in range(3)],
+        axis=1,
+    )
+    middle /= np.maximum(area, 1e-300)[:, None]
+    # A face, its centroid and its area normal make the volume to the middle.
+    arm = mesh.face_centroids - middle[patch]
+    height = np.einsum("ij,ij->i", arm, mesh.face_normals)
+    return np.bincount(patch, weight * height) / 3.0
 
 
 def _by_visibility(
-    mesh: TriangleMesh, patch: NDArray[np.int64], caster: RayCaster
+    caster: RayCaster,
+    patch: NDArray[np.int64],
+    closed: NDArray[np.bool_],
+    verdict: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """1 front, -1 back, 0 undecided, by what parallel beams from all around hit first.
+    """Decide open patches by which of their sides is seen more: 1 front, -1 back."""
+    n = len(closed)
+    spots = spots_on(
+        caster.mesh, _SPOTS, group=patch, least=_LEAST, within=~closed[patch]
+    )
+    owner = patch[spots.faces]
+    front, back = (
+        np.bincount(owner, look_out(caster, spots, _RAYS, behind=side).escaped, n)
+        for side in (False, True)
+    )
+    lead, total = front - back, front + back
+    area = np.bincount(patch, caster.mesh.face_areas)
+    needed = np.where(area < _FRAGMENT * area.sum(), _CLEAR_FRAGMENT, _CLEAR)
+    clear = np.abs(lead) > np.maximum(needed * total, _SIGMAS * np.sqrt(total))
+    return np.where(closed, verdict, np.where(clear, np.sign(lead), 0)).astype(np.int64)
 
-    Every ray stands for the same projected area, so the votes are area-weighted.
-    """
-    n = int(patch.max()) + 1
-    front, back = np.zeros(n), np.zeros(n)
-    ticks = (np.arange(_ROWS) + 0.5) / _ROWS * 2.0 - 1.0
-    u, v = (k.ravel() for k in np.meshgrid(ticks, ticks))
-    keep = u * u + v * v <= 1.0
-    u, v = u[keep, None] * mesh.radius, v[keep, None] * mesh.radius
-    for view in fibonacci_cap(_VIEWS, np.array([0.0, 0.0, 1.0]), np.pi):
-        side = np.cross(view, np.eye(3)[np.argmin(np.abs(view))])
-        side /= np.linalg.norm(side)
-        origins = mesh.centre + 1.5 * mesh.radius * view + u * side
-        origins = origins + v * np.cross(view, side)
-        faces, _ = caster.first_hits(origins, np.broadcast_to(-view, origins.shape))
-        faces = faces[faces >= 0]
-        facing = mesh.face_normals[faces] @ view > 0
-        front += np.bincount(patch[faces], facing, n)
-        back += np.bincount(patch[faces], ~facing, n)
-    total = front + back
-    lean = (front - back) / np.maximum(total, 1.0)
-    clear = (total >= _MIN_HITS) & (np.abs(lean) > 2.0 * _CLEAR)
-    return np.where(clear, np.sign(lean), 0.0).astype(np.int64)
+
+def _by_holder(
+    caster: RayCaster,
+    patch: NDArray[np.int64],
+    closed: NDArray[np.bool_],
+    volume: NDArray[np.float64],
+    verdict: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Decide what lies inside a closed patch after those that hold it."""
+    asked = closed | (verdict == 0)
+    held = containers(caster.mesh, patch, closed, asked, caster)
+    result = verdict.copy()
+    for row in sorted(
+        (row for row in range(len(held)) if len(held[row])),
+        key=lambda row: len(held[row]),
+    ):
+        outermost, around = held[row][0], held[row][-1]
+        result[row] = verdict[outermost]
+        if closed[row] and abs(volume[row]) >= _LINING * abs(volume[around]):
+            # The normal of the stored winding points outwards where the volume is
+            # positive; that of the wall around it does so after `result`.
+            outwards = result[around] * np.sign(volume[around])
+            result[row] = int(-outwards * np.sign(volume[row]))
+    return result

@@ -40,7 +40,8 @@ def dome(radius: float = 0.1) -> TriangleMesh:
 
 def oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, int]]:
     faces, repairs = orient(mesh)
-    return TriangleMesh(mesh.vertices, faces), {r.kind: r.count for r in repairs}
+    of_faces = {r.kind: r.count for r in repairs if r.kind.startswith("faces")}
+    return TriangleMesh(mesh.vertices, faces), of_faces
 
 
 def as_sets(faces: np.ndarray) -> set[tuple[int, ...]]:
