@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .readers import load_mesh as load_mesh
     from .regions import Region as Region
     from .regions import dominant_regions as dominant_regions
+    from .selected_regions import regions_of_faces as regions_of_faces
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
@@ -23,6 +24,7 @@ _EXPORTS = {
     "dominant_regions": "regions",
     "load_mesh": "readers",
     "principal_curvatures": "curvature",
+    "regions_of_faces": "selected_regions",
 }
 __all__ = [
     "CurvatureField",
@@ -32,6 +34,7 @@ __all__ = [
     "dominant_regions",
     "load_mesh",
     "principal_curvatures",
+    "regions_of_faces",
 ]
 
 

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from .errors import InputError as InputError
     from .errors import PlanningError as PlanningError
     from .errors import RequirementError as RequirementError
+    from .interest import read_selection as read_selection
+    from .interest import read_weight as read_weight
     from .pipeline import plan_rig as plan_rig
     from .plan import RigPlan as RigPlan
     from .rig import Rig as Rig
@@ -29,6 +31,8 @@ _EXPORTS = {
     "load_mesh": "geometry.readers",
     "load_rig": "planning.rig",
     "plan_rig": "planning.pipeline",
+    "read_selection": "planning.interest",
+    "read_weight": "planning.interest",
     "verify_plan": "planning.verification",
 }
 __all__ = [
@@ -41,6 +45,8 @@ __all__ = [
     "load_mesh",
     "load_rig",
     "plan_rig",
+    "read_selection",
+    "read_weight",
     "verify_plan",
 ]
 
