@@ -5,8 +5,10 @@ reach and what slack they are given is the caller's business. The planner's visi
 and the checkers each bring a policy of their own.
 """
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh as _EmbreeMesh
@@ -15,20 +17,29 @@ from numpy.typing import NDArray
 
 from .mesh import TriangleMesh
 
-_CHUNK = 1 << 18
+# Rays in one call of embree: their arrays stay in the second-level cache.
+CHUNK = 1 << 14
 
 
 class RayCaster:
     """Casts rays against one mesh.
 
-    Coordinates are centred on the mesh in float64 before embree rounds them to float32,
-    so that a mesh far from the origin is hit as precisely as one at it. Rays are traced
-    in chunks, so memory stays bounded, and each ray's answer is independent of the
-    number of threads.
+    Embree computes in float32. Coordinates are therefore taken relative to the middle
+    of the mesh, in float64, and scaled by a power of two (so exactly) to a mesh of
+    about unit size before they are rounded: a mesh far from the origin, or a tiny one,
+    is hit as precisely as any. Rays are traced in chunks, so memory stays bounded, and
+    each ray's answer is independent of the number of threads.
 
     Args:
         mesh: The occluder.
         threads: Worker threads; embree releases the interpreter lock.
+
+    Attributes:
+        middle: Of the bounding box in [m]; the origin of the caster's own frame. (Not
+            `mesh.centre`, which may leave small fragments out of account.)
+        scale: Metres to the caster's own unit.
+        reach: Half the diagonal of the bounding box in the caster's own unit: every
+            vertex of a face lies within it, and it is in [1, 2).
     """
 
     def __init__(self, mesh: TriangleMesh, *, threads: int = 2) -> None:
@@ -36,13 +47,24 @@ class RayCaster:
             raise ValueError(f"threads must be at least 1, got {threads}")
         self.mesh = mesh
         self.threads = threads
-        self._centre = mesh.centre
+        low, high = mesh.bounds
+        self.middle = 0.5 * (low + high)
+        half = 0.5 * float(np.linalg.norm(high - low))
+        self.scale = float(np.exp2(-np.floor(np.log2(half)))) if half > 0 else 1.0
+        self.reach = half * self.scale
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
         self._scene = EmbreeScene(robust=True)
-        vertices = np.ascontiguousarray(mesh.vertices - self._centre, dtype=np.float32)
-        faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+        # Vertices that no face uses may lie anywhere, also beyond float32.
+        used, faces = np.unique(mesh.faces, return_inverse=True)
+        vertices = self.local(mesh.vertices[used])
+        faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int32)
         _EmbreeMesh(self._scene, vertices, faces)
         # The first call commits the scene; do it here, where no thread races.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+
+    def local(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return points in the caster's own frame, shape (n, 3)."""
+        return np.ascontiguousarray((points - self.middle) * self.scale, np.float32)
 
     def occluded(
         self,
@@ -71,14 +93,32 @@ class RayCaster:
         blocked = np.empty(len(directions), dtype=bool)
 
         def trace(part: slice) -> None:
-            start, along = self._local(origins, directions, part)
-            reach = np.ascontiguousarray(distances[part], dtype=np.float32)
-            # embree answers 0 for blocked and -1 for clear.
-            answer = self._scene.run(start, along, reach, query="OCCLUDED")
-            blocked[part] = np.asarray(answer) == 0
+            start, along = self._rays(origins, directions, part)
+            reach = (distances[part] * self.scale).astype(np.float32)
+            blocked[part] = self.blocked_local(start, along, reach)
 
-        self._spread(trace, len(directions))
+        self.share(trace, self.chunks(len(directions)))
         return blocked
+
+    def blocked_local(
+        self,
+        start: NDArray[np.float32],
+        along: NDArray[np.float32],
+        reach: NDArray[np.float32],
+    ) -> NDArray[np.bool_]:
+        """Return whether rays in the caster's own frame are blocked; checks nothing.
+
+        For engines that prepare float32 rays themselves, in their own threads: one call
+        of embree on at most `CHUNK` rays.
+
+        Args:
+            start: Origins, shape (n, 3), any strides.
+            along: Directions of any length, same shape.
+            reach: How far each ray goes in units of its direction, shape (n,).
+        """
+        # embree answers 0 for blocked and -1 for clear.
+        answer = self._scene.run(start, along, reach, query="OCCLUDED")
+        return np.equal(answer, 0)
 
     def first_hits(
         self, origins: NDArray[np.float64], directions: NDArray[np.float64]
@@ -103,7 +143,7 @@ class RayCaster:
         normals, anchors = self.mesh.face_normals, self.mesh.corners[:, 0]
 
         def trace(part: slice) -> None:
-            start, along = self._local(origins, directions, part)
+            start, along = self._rays(origins, directions, part)
             hit = np.asarray(self._scene.run(start, along), dtype=np.int64)
             faces[part] = hit
             on = np.flatnonzero(hit >= 0)
@@ -115,28 +155,51 @@ class RayCaster:
             slope = np.where(np.abs(slope) < 1e-12, np.copysign(1e-12, slope), slope)
             distances[part.start + on] = towards / slope
 
-        self._spread(trace, len(directions))
+        self.share(trace, self.chunks(len(directions)))
         return faces, distances
 
-    def _local(
+    def chunks(self, n: int) -> list[slice]:
+        """Return n rays in equal parts of at most `CHUNK`, the threads evenly loaded.
+
+        The parts bound memory and spread work; no answer depends on them.
+        """
+        parts = -(-n // CHUNK)
+        if n >= 1024 * self.threads:
+            parts = -(-parts // self.threads) * self.threads
+        ends = [n * k // parts for k in range(parts + 1)] if parts else [0]
+        return [slice(a, b) for a, b in pairwise(ends)]
+
+    def share(
+        self, work: Callable[[slice], None], parts: Iterable[slice], *, least: int = 2
+    ) -> None:
+        """Do work on every part, shared among the threads; the first failure is raised.
+
+        Args:
+            work: What to do with a part; writes to places of its own.
+            parts: The parts.
+            least: Parts below which no thread is worth its while.
+        """
+        parts = list(parts)
+        if self.threads == 1 or len(parts) < least:
+            for part in parts:
+                work(part)
+            return
+        for done in [self._workers().submit(work, part) for part in parts]:
+            done.result()
+
+    def _workers(self) -> ThreadPoolExecutor:
+        # A forked child has the pool but not its threads.
+        if self._pool is None or self._pool[0] != os.getpid():
+            self._pool = (os.getpid(), ThreadPoolExecutor(self.threads))
+        return self._pool[1]
+
+    def _rays(
         self, origins: NDArray[np.float64], directions: NDArray[np.float64], part: slice
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         along = np.ascontiguousarray(directions[part], dtype=np.float32)
-        begin = origins if origins.ndim == 1 else origins[part]
-        start = np.empty_like(along)
-        start[:] = begin - self._centre
-        return start, along
-
-    def _spread(self, trace: Callable[[slice], None], n: int) -> None:
-        size = min(_CHUNK, max(1024, -(-n // self.threads)))
-        parts = [slice(i, min(i + size, n)) for i in range(0, n, size)]
-        if self.threads == 1 or len(parts) < 2:
-            for part in parts:
-                trace(part)
-            return
-        with ThreadPoolExecutor(self.threads) as pool:
-            for done in [pool.submit(trace, part) for part in parts]:
-                done.result()
+        if origins.ndim == 1:
+            return np.broadcast_to(self.local(origins), along.shape), along
+        return self.local(origins[part]), along
 
 
 def _checked(

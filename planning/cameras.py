@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.visibility_matrix import visibility_matrix
+
 from . import lighting, measurability
 from .candidates import camera_candidates
 from .errors import InfeasibleLimitsError
@@ -78,7 +80,15 @@ def measured_by(
     scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
 ) -> NDArray[np.bool_]:
     """Return which camera measures which sample with any projector, (n, n_cameras)."""
-    return np.stack([_measured(scene, camera, rows) for camera in cameras], axis=1)
+    samples = rows.target.samples
+    pairs = [_measurable(scene, camera, rows) for camera in cameras]
+    return visibility_matrix(
+        scene.visibility,
+        np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
+        samples.points,
+        samples.normals,
+        candidates=np.stack(pairs),
+    ).dense_transposed()
 
 
 def plan_cameras(
@@ -135,10 +145,10 @@ def plan_cameras(
     )
 
 
-def _measured(
+def _measurable(
     scene: Scene, camera: PlannedCamera, rows: LitSamples
 ) -> NDArray[np.bool_]:
-    """Whether a camera measures each sample; rays come last, as they cost most."""
+    """Whether a camera measures each sample, were there nothing in between."""
     scene.pulse()
     required = scene.requirements
     seen = measurability.view(camera, rows.target, required.camera, None)
@@ -157,10 +167,6 @@ def _measured(
         )
         stage = measurability.first_pair_failure(quality, required.triangulation)
         wanted[open_pairs[stage == measurability.MEASURED]] = True
-    tested = np.flatnonzero(wanted)
-    points = rows.target.samples.points[tested]
-    blocked = scene.visibility.blocked(camera.world_from_device[:3, 3], points)
-    wanted[tested[blocked]] = False
     return wanted
 
 

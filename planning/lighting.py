@@ -139,21 +139,15 @@ def first_failure(
     for index in range(len(tests) - 1, -1, -1):
         stage[~tests[index]] = index
     clear = np.flatnonzero(stage == LIT)
-    points = target.samples.points[clear]
-    blocked = visibility.blocked(light_sources(projector, points), points)
+    samples, pose = target.samples, projector.world_from_device
+    blocked = visibility.blocked(
+        pose[:3, 3],
+        samples.points[clear],
+        samples.normals[clear],
+        along=pose[:3, 2] if projector.light == "parallel" else None,
+    )
     stage[clear[blocked]] = LIT - 1
     return stage
-
-
-def light_sources(
-    projector: PlannedProjector, points: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return where each point's light leaves the device: its plane or centre."""
-    pose = projector.world_from_device
-    if projector.light == "diverging":
-        return pose[:3, 3]
-    depth = (points - pose[:3, 3]) @ pose[:3, 2]
-    return points - depth[:, None] * pose[:3, 2]
 
 
 def margins(light: Light, limits: ProjectorLimits) -> NDArray[np.float64]:

@@ -95,7 +95,7 @@ def view(
     passed = np.logical_and.reduce(tests)
     if visibility is not None:
         clear = np.flatnonzero(passed)
-        blocked = visibility.blocked(pose[:3, 3], points[clear])
+        blocked = visibility.blocked(pose[:3, 3], points[clear], normals[clear])
         stage[clear[blocked]] = 3
     for index in range(len(tests) - 1, -1, -1):
         stage[~tests[index]] = index

@@ -87,12 +87,12 @@ def test_a_sign_flipped_in_the_projection_is_seen(scene, rig, monkeypatch):
 
 def test_a_sign_flipped_in_the_visibility_is_seen(scene, rig, monkeypatch):
     """Rays leave the device the wrong way, so nothing is ever in their way."""
-    right = visibility.RayCaster.occluded
+    right = visibility.RayCaster.blocked_local
 
-    def flipped(self, origins, directions, distances):
-        return right(self, origins, -directions, distances)
+    def flipped(self, start, along, reach):
+        return right(self, start, -along, reach)
 
-    monkeypatch.setattr(visibility.RayCaster, "occluded", flipped)
+    monkeypatch.setattr(visibility.RayCaster, "blocked_local", flipped)
     plan = planned(scene, rig)
     monkeypatch.undo()
     failures = audited(plan).failures

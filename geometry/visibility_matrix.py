@@ -1,0 +1,214 @@
+"""Which device sees which sample: a matrix of bits, made in bounded memory."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from .visibility import SampleSet, Source, Visibility
+
+# Samples of one device that a thread handles at a time; a half of them faces it.
+_SAMPLES = 1 << 15
+# Rows that are unpacked at a time where a result is narrower than the matrix.
+_BLOCK_BYTES = 1 << 22
+
+
+@dataclass(frozen=True, eq=False)
+class BitMatrix:
+    """A matrix of booleans, eight to a byte along each row.
+
+    Attributes:
+        packed: Rows as `numpy.packbits` leaves them, shape (n_rows, ceil(n / 8)),
+            uint8, read-only; the bits beyond the last column are zero.
+        n_columns: Number of columns n.
+
+    Raises:
+        ValueError: If shape or type is wrong, or a bit beyond the last column is set.
+    """
+
+    packed: NDArray[np.uint8]
+    n_columns: int
+
+    def __post_init__(self) -> None:
+        packed, n = self.packed, self.n_columns
+        if packed.dtype != np.uint8 or packed.ndim != 2:
+            raise ValueError(f"packed must be a 2-D uint8 array, got {packed.dtype}")
+        if n < 0 or packed.shape[1] != -(-n // 8):
+            raise ValueError(
+                f"{n} columns take {-(-n // 8)} bytes a row, got {packed.shape[1]}"
+            )
+        if n % 8 and np.any(packed[:, -1] & np.uint8(0xFF >> (n % 8))):
+            raise ValueError(f"bits beyond column {n - 1} must be zero")
+        packed.setflags(write=False)
+
+    @classmethod
+    def pack(cls, dense: NDArray[np.bool_]) -> "BitMatrix":
+        """Return a boolean matrix packed, shape (n_rows, n)."""
+        return cls(np.packbits(dense, axis=1), dense.shape[1])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return len(self.packed), self.n_columns
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the bits take."""
+        return self.packed.nbytes
+
+    def row(self, index: int) -> NDArray[np.bool_]:
+        """Return one row, shape (n_columns,)."""
+        return self.rows(np.array([index]))[0]
+
+    def rows(self, chosen: NDArray[np.int64] | slice) -> NDArray[np.bool_]:
+        """Return some rows, shape (k, n_columns)."""
+        bits = np.unpackbits(self.packed[chosen], axis=1, count=self.n_columns)
+        return bits.view(np.bool_)
+
+    def column(self, index: int) -> NDArray[np.bool_]:
+        """Return one column, shape (n_rows,)."""
+        if not -self.n_columns <= index < self.n_columns:
+            raise IndexError(f"column {index} of {self.n_columns}")
+        index %= self.n_columns
+        return (self.packed[:, index // 8] >> np.uint8(7 - index % 8) & 1).astype(bool)
+
+    def columns(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return some columns, shape (n_rows, k)."""
+        wanted = np.arange(self.n_columns)[chosen]
+        shift = (7 - wanted % 8).astype(np.uint8)
+        return (self.packed[:, wanted // 8] >> shift & 1).astype(bool)
+
+    def count(self) -> int:
+        """Return how many bits are set."""
+        return int(self.row_counts().sum())
+
+    def row_counts(self) -> NDArray[np.int64]:
+        """Return how many bits are set in each row, shape (n_rows,)."""
+        return np.bitwise_count(self.packed).sum(axis=1, dtype=np.int64)
+
+    def column_counts(self) -> NDArray[np.int64]:
+        """Return how many bits are set in each column, shape (n_columns,)."""
+        total = np.zeros(self.n_columns, dtype=np.int64)
+        for block in self._blocks():
+            total += self.rows(block).sum(axis=0)
+        return total
+
+    def any_row(self, chosen: NDArray[np.int64] | slice) -> NDArray[np.bool_]:
+        """Return which columns some of the rows set, shape (n_columns,)."""
+        joined = np.bitwise_or.reduce(self.packed[chosen], axis=0)
+        return np.unpackbits(joined, count=self.n_columns).view(np.bool_)
+
+    def dense(self) -> NDArray[np.bool_]:
+        """Return the matrix as booleans, a byte each."""
+        return self.rows(slice(None))
+
+    def dense_transposed(self) -> NDArray[np.bool_]:
+        """Return the transposed matrix as booleans, a byte each, in C order."""
+        return np.ascontiguousarray(self.dense().T)
+
+    def sparse(self) -> csr_array:
+        """Return the matrix as sparse booleans, made in blocks of rows."""
+        found = [np.nonzero(self.rows(block))[1] for block in self._blocks()]
+        columns = np.concatenate([np.empty(0, dtype=np.int64), *found])
+        ends = np.concatenate([[0], np.cumsum(self.row_counts())])
+        data = np.ones(len(columns), dtype=bool)
+        return csr_array((data, columns, ends), shape=self.shape)
+
+    def _blocks(self) -> Iterator[slice]:
+        step = max(1, _BLOCK_BYTES // max(1, self.n_columns))
+        for begin in range(0, len(self.packed), step):
+            yield slice(begin, begin + step)
+
+
+def visibility_matrix(
+    visibility: Visibility,
+    origins: NDArray[np.float64],
+    points: NDArray[np.float64] | SampleSet,
+    normals: NDArray[np.float64] | None = None,
+    *,
+    along: NDArray[np.float64] | None = None,
+    candidates: NDArray[np.bool_] | BitMatrix | None = None,
+) -> BitMatrix:
+    """Return which device (row) sees which sample (column).
+
+    A bit is set where the pair is a candidate and the segment between them is free. A
+    sample that faces away is no candidate: it has ``N . (P - O) >= 0``, or ``N . L >=
+    0`` in parallel light. Limits beyond that are the caller's, through `candidates`.
+
+    Devices are shared among the threads. Beside the answer (n_devices * n / 8 bytes)
+    and the prepared samples (32 n bytes), a thread holds one row (3 n bytes) and one
+    chunk of rays (under 2 MB), however many devices there are.
+
+    Args:
+        visibility: The occluder.
+        origins: Optical centres in [m], shape (m, 3); in parallel light, a point of the
+            plane that each beam leaves.
+        points: Samples on the mesh in [m], shape (n, 3), or a prepared set.
+        normals: Unit normals of the samples' faces, (n, 3); None with a set.
+        along: Unit directions of parallel light, shape (m, 3); None for centres.
+        candidates: Pairs worth a ray, shape (m, n); default all.
+
+    Raises:
+        ValueError: If shapes disagree or a number isn't finite.
+    """
+    if isinstance(points, SampleSet):
+        samples = points
+    elif normals is None:
+        raise ValueError("points need the normals of their faces")
+    else:
+        samples = visibility.samples(points, normals)
+    origins = np.asarray(origins, dtype=np.float64)
+    shape = (len(origins), len(samples))
+    if origins.ndim != 2 or (along is not None and np.shape(along) != origins.shape):
+        raise ValueError(f"origins and along must be (m, 3), got {origins.shape}")
+    if candidates is not None and candidates.shape != shape:
+        raise ValueError(f"candidates must be {shape}, got {candidates.shape}")
+    sources = [
+        visibility.source(origin, None if along is None else along[index])
+        for index, origin in enumerate(origins)
+    ]
+    packed = np.empty((len(origins), -(-len(samples) // 8)), dtype=np.uint8)
+
+    def trace(rows: slice) -> None:
+        for index in range(rows.start, rows.stop):
+            wanted = None
+            if isinstance(candidates, BitMatrix):
+                wanted = candidates.row(index)
+            elif candidates is not None:
+                wanted = candidates[index]
+            seen = _row(visibility, samples, sources[index], wanted)
+            packed[index] = np.packbits(seen)
+
+    visibility.caster.share(trace, [slice(i, i + 1) for i in range(len(origins))])
+    return BitMatrix(packed, len(samples))
+
+
+def _row(
+    visibility: Visibility,
+    samples: SampleSet,
+    source: Source,
+    wanted: NDArray[np.bool_] | None,
+) -> NDArray[np.bool_]:
+    """Return which samples one device sees, in the caller's order, shape (n,)."""
+    seen = np.zeros(len(samples), dtype=bool)
+    if wanted is not None and samples.order is not None:
+        wanted = wanted.take(samples.order)
+    for begin in range(0, len(samples), _SAMPLES):
+        part = slice(begin, begin + _SAMPLES)
+        climb = samples.climb(part, source)
+        worth = climb < 0
+        if wanted is not None:
+            worth &= wanted[part]
+        rays = np.flatnonzero(worth)
+        # `take` is several times faster than indexing by an array.
+        blocked = visibility.trace(
+            samples.points[:, part].take(rays, axis=1),
+            climb.take(rays),
+            source,
+            samples.back,
+        )
+        worth[rays] = ~blocked
+        seen[part] = worth
+    return seen if samples.place is None else seen.take(samples.place)
