@@ -20,6 +20,18 @@ def rigs() -> ModuleType:
     return _load("reconstruction_rigs")
 
 
+@pytest.fixture(scope="session")
+def fuzzing() -> ModuleType:
+    """Whole mesh files of every format, and how they are damaged."""
+    return _load("fuzzing")
+
+
+@pytest.fixture(scope="session")
+def shared_meshes() -> ModuleType:
+    """The table of the meshes that lie beside the repository."""
+    return _load("shared_meshes")
+
+
 def _load(name: str) -> ModuleType:
     path = Path(__file__).with_name(f"{name}.py")
     spec = importlib.util.spec_from_file_location(f"ringrig_tests_{name}", path)
