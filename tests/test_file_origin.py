@@ -106,6 +106,16 @@ def cells_of(mesh: TriangleMesh) -> np.ndarray:
     return np.floor(mesh.face_centroids[:, 0] / (1e-3 * CELL_MM)).astype(int)
 
 
+def assert_corners_are_the_files_own(mesh: TriangleMesh, row: Row) -> None:
+    stored = 1e-3 * np.array(row.vertices)[origin_of(mesh).corners]
+    for axis in range(3):
+        np.testing.assert_allclose(
+            np.sort(stored[..., axis], axis=1),
+            np.sort(mesh.corners[..., axis], axis=1),
+            rtol=1e-12,
+        )
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(3))
 def test_every_triangle_knows_its_polygon_in_mixed_files(
@@ -117,15 +127,10 @@ def test_every_triangle_knows_its_polygon_in_mixed_files(
     np.testing.assert_array_equal(row.cells[origin.face], cells_of(mesh))
     assert origin.n_faces == 40
     assert origin.n_vertices == len(row.vertices)
+    assert np.all(np.diff(origin.face) >= 0), "triangles stand in the file's order"
     # Touching corners are welded, yet every triangle keeps the file's own vertices.
     assert len(mesh.vertices) < len(row.vertices)
-    stored = 1e-3 * np.array(row.vertices)[origin.corners]
-    for axis in range(3):
-        np.testing.assert_allclose(
-            np.sort(stored[..., axis], axis=1),
-            np.sort(mesh.corners[..., axis], axis=1),
-            rtol=1e-12,
-        )
+    assert_corners_are_the_files_own(mesh, row)
     # All of each polygon came through, and nothing beside its outline.
     areas = np.bincount(origin.face, mesh.face_areas, origin.n_faces)
     truth = [outline_area(SHAPES[row.shape_of_cell[c]]) for c in row.cells]
@@ -168,6 +173,7 @@ def test_numbers_survive_every_repair(kind: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(row.cells[origin.face], cells_of(mesh))
     assert origin.n_faces == 33
     assert sorted(set(range(33)) - set(origin.face.tolist())) == sorted(planted)
+    assert_corners_are_the_files_own(mesh, row)
 
 
 def quad_box(folder: Path, *, flipped: np.ndarray) -> Path:

@@ -170,9 +170,10 @@ def test_chosen_faces_that_repair_removed_are_counted(tmp_path: Path) -> None:
     block = QuadBox()
     n = len(block.quads)
     first = int(block.indices()[0])
-    # A copy of a chosen quad, and one without area; both are chosen as well.
-    block.quads += [list(block.quads[first]), [0, 1, 1, 0]]
-    block.side = np.append(block.side, [TOP, TOP])
+    # A copy of a chosen quad, and one without area; both are chosen as well. Another
+    # without area isn't, and doesn't count.
+    block.quads += [list(block.quads[first]), [0, 1, 1, 0], [2, 3, 3, 2]]
+    block.side = np.append(block.side, [TOP, TOP, 0])
     mesh = load_mesh(block.write(tmp_path), unit="mm")
     found = read_selection("ply:painted", mesh)
     np.testing.assert_array_equal(found.chosen, top_of(mesh))
