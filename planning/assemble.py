@@ -108,7 +108,7 @@ def _document(
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": list(draft.order.command),
         "truncated": draft.truncated,
-        "meshes": [entries.mesh_entry(draft.scene.mesh)],
+        "meshes": [entries.mesh_entry(draft.scene.mesh, draft.scene.shell)],
         "surface": {
             "path": "surface.npz",
             "sha256": surface.sha256(),

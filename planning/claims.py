@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.hollow import lies_inside
+
 from . import lighting, measurability
 from .cameras import LitSamples, furthest_failure, lit_samples, measured_by
 from .lighting import Target
@@ -53,6 +55,7 @@ class Claims:
         target: Areas of the target.
         uncovered_by_cause: Target area that isn't measured, by cause [m²].
         unreachable_by_cause: Target area that no reference projector lights [m²].
+        unreachable_inside_m2: The part of it that lies inside the body.
         lit_area_m2: Target area that each projector lights.
         min_margin_rad: Least margin over what each projector serves.
         seen_area_m2: Target area that each camera measures.
@@ -66,6 +69,7 @@ class Claims:
     target: Areas
     uncovered_by_cause: dict[str, float]
     unreachable_by_cause: dict[str, float]
+    unreachable_inside_m2: float
     lit_area_m2: tuple[float, ...]
     min_margin_rad: tuple[float, ...]
     seen_area_m2: tuple[float, ...]
@@ -91,6 +95,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
         areas,
         _by_cause(_uncovered(scene, devices, target, stages, measured), weight),
         _by_cause([lighting.CAUSES[stage] for stage in furthest[~reachable]], weight),
+        weight * _n_inside(scene, target.take(~reachable)),
         tuple(weight * lit.sum(axis=0)),
         _least_margins(scene, devices, target, served),
         tuple(weight * seen.sum(axis=0)),
@@ -236,6 +241,15 @@ def _uncovered(
     rows = _lit_rows(devices.projectors, target.take(left), lit[left])
     furthest = furthest_failure(scene, devices.cameras, rows)
     return causes + [measurability.CAUSES[stage] for stage in furthest]
+
+
+def _n_inside(scene: Scene, target: Target) -> int:
+    """How many samples lie inside the body, where no pose can be expected to reach."""
+    if not len(target):
+        return 0
+    samples = target.samples
+    caster = scene.visibility.caster
+    return int(lies_inside(caster, samples.faces, samples.points).sum())
 
 
 def _any(table: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -1,13 +1,14 @@
 """Writes the plan's JSON document; every number a claim rests on is rounded here."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
+from geometry.hollow import Shell
 from geometry.mesh import TriangleMesh
 
 from .claims import Claims
@@ -83,7 +84,7 @@ def camera_entries(
     ]
 
 
-def mesh_entry(mesh: TriangleMesh) -> dict[str, Any]:
+def mesh_entry(mesh: TriangleMesh, shell: Shell) -> dict[str, Any]:
     """Return one entry of the plan's `meshes`."""
     source = mesh.source
     if source is None:
@@ -96,6 +97,7 @@ def mesh_entry(mesh: TriangleMesh) -> dict[str, Any]:
             "n_faces": len(mesh.faces),
             "area_m2": mesh.area,
             "repairs": [],
+            "shell": asdict(shell),
         }
     return {
         "path": source.path,
@@ -106,6 +108,7 @@ def mesh_entry(mesh: TriangleMesh) -> dict[str, Any]:
         "n_faces": source.n_faces,
         "area_m2": mesh.area,
         "repairs": [{"kind": r.kind, "count": r.count} for r in source.repairs],
+        "shell": asdict(shell),
     }
 
 
@@ -132,6 +135,7 @@ def coverage_entry(claims: Claims) -> dict[str, Any]:
         "target": claims.target.to_document(),
         "uncovered_by_cause": claims.uncovered_by_cause,
         "unreachable_by_cause": claims.unreachable_by_cause,
+        "unreachable_inside_m2": claims.unreachable_inside_m2,
     }
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.hollow import Shell, measure_shell
 from geometry.mesh import TriangleMesh
 from geometry.sampling import sample_surface
 from geometry.visibility import Visibility
@@ -49,6 +50,11 @@ class Scene:
     def visibility(self) -> Visibility:
         """Occlusion by the mesh."""
         return Visibility(self.mesh, threads=self.threads)
+
+    @cached_property
+    def shell(self) -> Shell:
+        """Whether the mesh is hollow, and what of it lies inside."""
+        return measure_shell(self.visibility.caster)
 
     @cached_property
     def target_faces(self) -> NDArray[np.bool_]:

@@ -62,7 +62,7 @@ def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]
         f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
         f"{_cm2(areas['area_m2'] - areas['reachable_by_projectors_m2'])} of "
         f"{_cm2(areas['area_m2'])} can't be reached: "
-        f"{causes_line(causes, areas['area_m2'])}"
+        f"{causes_line(causes, areas['area_m2'])}{_inside(document)}"
     )
     steps = [
         f"{step['change']} would reach {_percent(step['reachable_share'])}"
@@ -70,6 +70,17 @@ def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]
     ]
     steps.append(f"--min-reachable {_down(share)} accepts what there is")
     return (f"{line}. What would help: {'; '.join(steps)}",)
+
+
+def _inside(document: dict[str, Any]) -> str:
+    """How much of what can't be reached lies inside the body."""
+    inside = document["coverage"].get("unreachable_inside_m2", 0.0)
+    if not inside > 0.0:
+        return ""
+    shell = document["meshes"][0].get("shell", {})
+    hollow = shell.get("kind") == "hollow shell"
+    where = "lies inside the hollow body" if hollow else "lies in cavities"
+    return f"; {_cm2(inside)} of it {where}"
 
 
 def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:

@@ -50,7 +50,24 @@ def _head(plan: RigPlan) -> str:
         f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
         f"{_unit(mesh)}, up {_axis(workspace.up)}; rig {document['rig']['name']}, "
         f"{document['rig']['light']} light\n"
+        f"{shell_line(mesh)}"
         f"         devices may stand in {where}"
+    )
+
+
+def shell_line(mesh: dict[str, Any]) -> str:
+    """Return what kind of body a mesh of the plan is, as a line; none for a solid."""
+    shell = mesh.get("shell", {"kind": "solid"})
+    if shell["kind"] == "solid":
+        return ""
+    if shell["wall_m"] is None:
+        return f"         {shell['kind']}\n"
+    share = 100.0 * shell["inside_m2"] / mesh["area_m2"]
+    sealed = 100.0 * shell["sealed_m2"] / mesh["area_m2"]
+    closed = f", {sealed:.1f} % in sealed cavities" if sealed > 0.05 else ""
+    return (
+        f"         {shell['kind']}, wall about {1e3 * shell['wall_m']:.2g} mm; "
+        f"{share:.1f} % of the surface lies inside{closed}\n"
     )
 
 

@@ -16,6 +16,7 @@ from .consistency import audit_consistency
 from .devices import audit_devices, audit_workspace
 from .estimates import Estimator
 from .groups import audit_groups
+from .inside import audit_inside
 from .ledger import Ledger, as_number
 from .occlusion import Shadow
 from .recompute import Reach, Recomputed, reach_of, recompute
@@ -95,6 +96,7 @@ def audit_plan(
     audit_workspace(plan, ledger)
     audit_areas(own, reach, estimator, ledger)
     audit_causes(own, reach, estimator, ledger)
+    audit_inside(plan, own, reach, shadow, ledger, seed=seed)
     audit_contributions(plan, own, estimator, ledger)
     audit_margins(plan, own, shadow, ledger)
     audit_regions(plan, own, estimator, shadow, ledger)

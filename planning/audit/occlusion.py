@@ -30,6 +30,11 @@ class Shadow:
         self._radius = 1.05 * mesh.reach
         self._slack = _SLACK * mesh.radius
 
+    @property
+    def caster(self) -> RayCaster:
+        """The bare ray caster, for other questions about the same mesh."""
+        return self._caster
+
     def free(
         self,
         points: NDArray[np.float64],

@@ -1,0 +1,118 @@
+"""What a plan says about the inside of a body: claimed, told, and audited."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from geometry.hollow import measure_shell
+from geometry.mesh import TriangleMesh
+from geometry.primitives import sphere
+from geometry.rays import RayCaster
+from planning.audit.inside import audit_inside
+from planning.audit.ledger import Ledger
+from planning.audit.occlusion import Shadow
+from planning.audit.samples import draw_samples
+from planning.document import mesh_entry
+from planning.shortfall import shortfalls
+from planning.summary import shell_line
+from planning.surface import Surface
+
+OUTER, INNER = sphere(0.1, subdivisions=3), sphere(0.096, subdivisions=3)
+HOLLOW = TriangleMesh(
+    np.concatenate([OUTER.vertices, INNER.vertices]),
+    np.concatenate([OUTER.faces, INNER.faces[:, ::-1] + len(OUTER.vertices)]),
+)
+
+
+def surface(mesh: TriangleMesh) -> Surface:
+    n = len(mesh.faces)
+    none = np.zeros((0, 4, 4))
+    # The target is the half of both walls above the middle.
+    region = np.where(mesh.face_centroids[:, 2] > 0, 0, -1)
+    zero = np.zeros(n, dtype=np.int64)
+    return Surface(mesh, zero, region, np.zeros((n, 3)), none, none, none)
+
+
+def found(mesh: TriangleMesh, document: dict[str, Any]) -> tuple[str, ...]:
+    plan: Any = SimpleNamespace(
+        document=document,
+        surface=surface(mesh),
+        requirements=SimpleNamespace(target="dominant"),
+    )
+    samples = draw_samples(plan.surface, "dominant", 20_000, 0)
+    # Projectors reach the outer wall alone.
+    reached = np.linalg.norm(samples.points, axis=1) > 0.0975
+    own: Any = SimpleNamespace(samples=samples)
+    reach: Any = SimpleNamespace(projectors=reached)
+    ledger = Ledger(document)
+    audit_inside(plan, own, reach, Shadow(mesh, threads=2), ledger, seed=0)
+    return ledger.failures
+
+
+def claims(mesh: TriangleMesh, inside_m2: float, dark_m2: float) -> dict[str, Any]:
+    entry = mesh_entry(mesh, measure_shell(RayCaster(mesh)))
+    entry["shell"]["inside_m2"] = inside_m2
+    return {"meshes": [entry], "coverage": {"unreachable_inside_m2": dark_m2}}
+
+
+def dark_area() -> float:
+    return float(INNER.face_areas[INNER.face_centroids[:, 2] > 0].sum())
+
+
+def test_the_audit_finds_the_inside_of_a_hollow_ball_by_itself() -> None:
+    assert found(HOLLOW, claims(HOLLOW, INNER.area, dark_area())) == ()
+    assert found(OUTER, claims(OUTER, 0.0, 0.0)) == ()
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.2])
+def test_a_fifth_more_or_less_inside_is_a_false_claim(factor: float) -> None:
+    (one,) = found(HOLLOW, claims(HOLLOW, factor * INNER.area, dark_area()))
+    assert one.startswith("meshes.0.shell.inside_m2: claimed")
+    (one,) = found(HOLLOW, claims(HOLLOW, INNER.area, factor * dark_area()))
+    assert one.startswith("coverage.unreachable_inside_m2: claimed")
+
+
+def test_an_inside_that_a_solid_has_not_is_a_false_claim() -> None:
+    (one,) = found(OUTER, claims(OUTER, 0.2 * OUTER.area, 0.0))
+    assert one.startswith("meshes.0.shell.inside_m2: claimed")
+
+
+def test_one_claim_alone_is_not_enough() -> None:
+    document = claims(HOLLOW, INNER.area, dark_area())
+    del document["meshes"][0]["shell"]
+    (one,) = found(HOLLOW, document)
+    assert one.startswith("meshes.0.shell.inside_m2: None is claimed")
+
+
+def test_the_shell_is_told_with_wall_and_share() -> None:
+    line = shell_line(mesh_entry(HOLLOW, measure_shell(RayCaster(HOLLOW))))
+    share = 100.0 * INNER.area / HOLLOW.area
+    assert "hollow shell, wall about 4 mm" in line
+    assert f"{share:.1f} % of the surface lies inside" in line
+    assert f"{share:.1f} % in sealed cavities" in line
+    assert shell_line(mesh_entry(OUTER, measure_shell(RayCaster(OUTER)))) == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("hollow shell", "12.5 cm² of it lies inside the hollow body"),
+        ("solid with cavities", "12.5 cm² of it lies in cavities"),
+    ],
+)
+def test_target_out_of_reach_is_said_to_lie_inside(
+    handmade: Any, kind: str, words: str
+) -> None:
+    plan = handmade.build_plan()
+    document = dict(plan.document)
+    target = document["coverage"]["target"] | {"reachable_by_projectors_m2": 1e-4}
+    coverage = {"target": target, "unreachable_inside_m2": 12.5e-4}
+    document["coverage"] = document["coverage"] | coverage
+    document["meshes"] = [document["meshes"][0] | {"shell": {"kind": kind}}]
+    document["reconstruction"] = None
+    assert words in shortfalls(document, plan.requirements)[0]
+    coverage["unreachable_inside_m2"] = 0.0
+    document["coverage"] |= coverage
+    assert "lies in" not in shortfalls(document, plan.requirements)[0]
