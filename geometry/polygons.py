@@ -6,6 +6,9 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+# Corners closer than this share of the outline's width are one place.
+_SAME = 1e-12
+
 
 def triangulate(
     points: NDArray[np.float64], polygons: Sequence[Sequence[int]]
@@ -105,7 +108,9 @@ def _is_ear(flat: NDArray[np.float64], left: list[int], at: int) -> bool:
     if not _turn(flat[a], flat[b], flat[c]) > 0:
         return False
     others = flat[[i for i in left if i not in (a, b, c)]]
-    inside = np.ones(len(others), dtype=bool)
+    # A hole is tied to the outline by an edge there and back, whose ends come twice.
+    apart = np.abs(others[:, None] - flat[[a, b, c]]).max(axis=2).min(axis=1)
+    inside = apart > _SAME * np.ptp(flat)
     for p, q in ((a, b), (b, c), (c, a)):
         inside &= _turn(flat[p], flat[q], others) >= 0
     return not inside.any()

@@ -32,6 +32,12 @@ def shared_meshes() -> ModuleType:
     return _load("shared_meshes")
 
 
+@pytest.fixture(scope="session")
+def small_job() -> ModuleType:
+    """The main job in this process, with few candidates."""
+    return _load("small_job")
+
+
 def _load(name: str) -> ModuleType:
     path = Path(__file__).with_name(f"{name}.py")
     spec = importlib.util.spec_from_file_location(f"ringrig_tests_{name}", path)

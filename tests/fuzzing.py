@@ -214,7 +214,8 @@ def _three_mf(v: np.ndarray, f: np.ndarray) -> bytes:
         '.com/3dmanufacturing/core/2015/02"><resources>\n<object id="1"><mesh>'
         f"<vertices>\n{vertices}</vertices><triangles>\n{faces}</triangles></mesh>"
         '</object>\n<object id="2"><components><component objectid="1" '
-        'transform="1 0 0 0 1 0 0 0 1 90 0 0"/></components></object></resources>\n<build><item '
+        'transform="1 0 0 0 1 0 0 0 1 90 0 0"/></components></object></resources>\n'
+        "<build><item "
         'objectid="1"/>\n<item objectid="2"/></build></model>\n'
     )
     return _zipped("3D/3dmodel.model", model.encode())

@@ -1,0 +1,60 @@
+"""The main job in this process with few candidates: exit code, messages, plan."""
+
+import json
+import signal
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from click.testing import CliRunner
+
+from planning.cli import commands
+
+RIG = """
+base = "default"
+name = "few candidates"
+[placement]
+n_candidate_projectors = 40
+n_candidate_cameras = 40
+n_reference_projectors = 600
+n_reference_cameras = 400
+"""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a run ended.
+
+    Attributes:
+        code: Exit code.
+        message: Standard error, in one line.
+        lines: Lines of it.
+        plan: Parsed plan.json; None if none was written.
+    """
+
+    code: int
+    message: str
+    lines: int
+    plan: dict | None
+
+
+def run(mesh: Path, folder: Path, words: Sequence[str] = ()) -> Ended:
+    """Plan a mesh without the check from pixels; write into a folder."""
+    rig = folder / "few.toml"
+    rig.write_text(RIG)
+    out = folder / "plan"
+    command = ["--mesh", str(mesh), "--max-projectors", "3", "--rig", str(rig)]
+    command += ["--no-check", "--quiet", "--threads", "1", "-o", str(out), *words]
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        # A bug would be reported as one line and 70: with --debug it is raised.
+        result = CliRunner().invoke(commands, command)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    written = out / "plan.json"
+    plan = json.loads(written.read_text()) if written.exists() else None
+    said = result.stderr.strip()
+    lines = len(said.splitlines())
+    return Ended(result.exit_code, " ".join(said.split()), lines, plan)
