@@ -138,7 +138,7 @@ def visibility_matrix(
     0`` in parallel light. Limits beyond that are the caller's, through `candidates`.
 
     Devices are shared among the threads. Beside the answer (n_devices * n / 8 bytes)
-    and the prepared samples (32 n bytes), a thread holds one row (3 n bytes) and one
+    and the prepared samples (44 n bytes), a thread holds one row (3 n bytes) and one
     chunk of rays (under 2 MB), however many devices there are.
 
     Args:
