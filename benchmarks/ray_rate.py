@@ -6,7 +6,8 @@ Raw: two threads, each one embree call on half of float32 arrays that were prepa
 beforehand, not counted; facing pairs of 40 devices and 20,000 samples, once in the
 caller's order and once sorted as the engine sorts its samples. Engine: everything that
 it does per query in its own API, from the float64 pose to booleans or packed bits.
-Rounds are interleaved; a ratio is the median of the ratios of each round.
+Rounds are interleaved; a ratio of rates is the median over rounds, of wall times and in
+brackets of processor times, which other work on the machine disturbs less.
 """
 
 import os
@@ -38,7 +39,10 @@ def main() -> int:
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} cores"
     )
-    print(f"python {platform.python_version()}, numpy {np.__version__}\n")
+    print(
+        f"python {platform.python_version()}, numpy {np.__version__}, "
+        f"load before the run {os.getloadavg()[0]:.1f}\n"
+    )
     print(
         "| mesh, faces | raw [Mray/s] | raw, sorted [Mray/s] "
         "| matrix / raw | matrix / raw sorted | prepared set / raw "
@@ -94,17 +98,23 @@ def _row(mesh: TriangleMesh, rounds: int) -> str:
         arrays,
     ]
     seconds = np.array([[_seconds(job) for job in jobs] for _ in range(rounds + 1)])[1:]
+    # Ratio of times: axes are job, wall or processor.
     against_plain = np.median(seconds[:, :1] / seconds, axis=0)
     against_sorted = np.median(seconds[:, 1:2] / seconds, axis=0)
     rate = n / np.median(seconds, axis=0) / 1e6
+    cells = [f"{rate[0, 0]:.2f}", f"{rate[1, 0]:.2f}"]
+    for ratio, job in (
+        (against_plain, 2),
+        (against_sorted, 2),
+        (against_plain, 3),
+        (against_sorted, 3),
+        (against_plain, 4),
+    ):
+        cells.append(f"{ratio[job, 0]:.2f} ({ratio[job, 1]:.2f})")
     many = middle + 3.0 * radius * fibonacci_cap(1000, np.eye(3)[2], np.pi)
     whole = _seconds(lambda: visibility_matrix(visibility, many, points, normals))
     pool.shutdown()
-    return (
-        f"| {rate[0]:.2f} | {rate[1]:.2f} | {against_plain[2]:.2f} "
-        f"| {against_sorted[2]:.2f} | {against_plain[3]:.2f} | {against_sorted[3]:.2f} "
-        f"| {against_plain[4]:.2f} | {whole:.2f} |"
-    )
+    return f"| {' | '.join(cells)} | {whole[0]:.2f} |"
 
 
 def _raw(
@@ -136,10 +146,11 @@ def _raw(
     return run
 
 
-def _seconds(job: Callable[[], object]) -> float:
-    begin = time.perf_counter()
+def _seconds(job: Callable[[], object]) -> tuple[float, float]:
+    """Wall and processor seconds of all threads."""
+    wall, cpu = time.perf_counter(), time.process_time()
     job()
-    return time.perf_counter() - begin
+    return time.perf_counter() - wall, time.process_time() - cpu
 
 
 if __name__ == "__main__":
