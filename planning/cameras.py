@@ -204,6 +204,11 @@ def _nothing_measured(
     scene: Scene, candidates: Sequence[PlannedCamera], rows: LitSamples
 ) -> str:
     causes = furthest_failure(scene, candidates, rows)
+    if len(causes) == 0:
+        return (
+            "the projectors that were chosen light none of the target's fresh samples, "
+            "so no camera measures any; the object may be too small for this rig"
+        )
     counts = np.bincount(causes, minlength=measurability.MEASURED)
     order = np.argsort(-counts, kind="stable")
     named = ", ".join(
