@@ -30,7 +30,7 @@ def joined(*meshes: TriangleMesh) -> TriangleMesh:
 
 
 def welded(mesh: TriangleMesh) -> TriangleMesh:
-    vertices, faces, _ = clean(mesh.vertices, mesh.faces)
+    vertices, faces, *_ = clean(mesh.vertices, mesh.faces)
     return TriangleMesh(vertices, faces)
 
 
