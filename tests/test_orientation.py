@@ -358,3 +358,25 @@ def test_what_holds_what_is_found_layer_by_layer() -> None:
     assert [row.tolist() for row in held] == [[], [0], [0, 1], [0, 1, 2], [], []]
     held = containers(mesh, patch, np.arange(6) != 1, every, RayCaster(mesh))
     assert held[3].tolist() == [0, 2]
+
+
+def test_what_lies_in_the_box_of_a_body_need_not_lie_in_it() -> None:
+    """A ball in the hole of a ring, and one that sticks out of its tube."""
+    parts = [
+        torus(0.1, 0.03, around=48, about_tube=24),
+        sphere(0.02, subdivisions=2),
+        moved(sphere(0.02, subdivisions=2), 0.0, 0.075, 0.0),
+        moved(sphere(0.02, subdivisions=2), -0.1, 0.0, 0.0),
+    ]
+    mesh = joined(*parts)
+    patch = np.repeat(np.arange(4), [len(part.faces) for part in parts])
+    every = np.ones(4, dtype=bool)
+    held = containers(mesh, patch, every, every, RayCaster(mesh))
+    assert [row.tolist() for row in held] == [[], [], [], [0]]
+
+
+def test_a_speck_needs_more_than_a_slight_advantage() -> None:
+    """A plate above a ball shows the upper side a little more; it keeps its side."""
+    speck = moved(grid(1e-3, 1e-3, divisions=(1, 1)), 0.0, 0.0, 0.2)
+    for plate in (speck, flipped(speck)):
+        assert result(joined(BALL, plate))[1] == {}
