@@ -1,14 +1,16 @@
 """Time the main job as a whole process, and hold its claims against the audit.
 
-Usage: python benchmarks/main_job.py [DATA]   (ringrig installed)
+Usage: python benchmarks/main_job.py [NAME ...]   (ringrig installed, from a checkout)
 
-DATA is the folder with the shared meshes, `../shared/data` by default; without it only
-the sample is run. Prints a table: exit code, wall time, counts with their bounds, the
-coverage, and the largest difference between a claimed area and the one that the audit
-recomputes, in points of the target's or surface's area.
+Plans the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
+each in the unit or size that `tests/shared_meshes.py` states; without that folder only
+the sample. The sample, the face scan and the bust are planned in both lights. Prints
+exit code, what was read, counts with their bounds, the coverage, the check, the largest
+difference between a claimed area and the one that the audit recomputes (in points of
+the target's or surface's area), and the seconds of every stage.
 """
 
-import json
+import importlib.util
 import os
 import platform
 import statistics
@@ -17,6 +19,9 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from types import ModuleType
+
+import numpy as np
 
 from planning import RigPlan
 from planning.audit import audit_plan
@@ -26,29 +31,54 @@ RUN = [sys.executable, "-c", "from planning.cli import main; main()"]
 
 
 def main() -> int:
-    """Print the tables; return 0."""
-    data = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT.parent / "shared" / "data"
+    """Print the tables; return 1 if a run ended without a documented exit code."""
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} cores"
+        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
+        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
     )
-    print(f"python {platform.python_version()}\n")
     print("`plan --help`, median of 5:", f"{_help_seconds():.2f} s\n")
     print(
-        "| mesh | light | exit | wall [s] | projectors (bound) | cameras (bound) "
-        "| lit | measured | rms [mm] | largest difference to the audit |"
+        "| mesh | light | exit | faces | longest side [mm] | regions | wall [s] "
+        "| projectors (bound) | cameras (bound) | lit | measured | rms [mm] | missing "
+        "| difference to the audit |"
     )
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    meshes = data / "meshes"
-    jobs = [(ROOT / "face.obj", [])]
-    if meshes.is_dir():
-        jobs += [
-            (meshes / "face_scan_james.obj", []),
-            (meshes / "snowden_bust_lo.obj", ["--unit", "in"]),
-        ]
-    for mesh, words in jobs:
-        for light in ("diverging", "parallel"):
-            print(_row(mesh, words, light), flush=True)
-    return 0
+    print("|" + 14 * "---|")
+    stages: list[str] = []
+    codes: list[int] = []
+    for mesh, words, lights in _jobs(sys.argv[1:]):
+        for light in lights:
+            code, row, timings = _run(mesh, words, light)
+            codes.append(code)
+            stages.append(f"| {mesh.name} | {light} | {timings} |")
+            print(row, flush=True)
+    print("\nSeconds of each stage:\n\n| mesh | light | stages |\n|---|---|---|")
+    print("\n".join(stages))
+    return int(any(code not in (0, 1, 4) for code in codes))
+
+
+def _jobs(names: list[str]) -> list[tuple[Path, tuple[str, ...], tuple[str, ...]]]:
+    table = _load("shared_meshes")
+    jobs = [(ROOT / "face.obj", ())]
+    if table.FOLDER.is_dir():
+        jobs += [(mesh.path, mesh.words) for mesh in table.MESHES]
+    both = ("face.obj", "face_scan_james.obj", "snowden_bust_lo.obj")
+    lights = ("diverging", "parallel")
+    return [
+        (path, words, lights if path.name in both else lights[:1])
+        for path, words in jobs
+        if not names or path.name in names
+    ]
+
+
+def _load(name: str) -> ModuleType:
+    path = ROOT / "tests" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 def _help_seconds() -> float:
@@ -60,14 +90,27 @@ def _help_seconds() -> float:
     return statistics.median(seconds)
 
 
-def _row(mesh: Path, words: list[str], light: str) -> str:
+def _run(mesh: Path, words: tuple[str, ...], light: str) -> tuple[int, str, str]:
+    """Return the exit code, the row of the table, and the seconds of the stages."""
     with tempfile.TemporaryDirectory() as folder:
         command = [*RUN, "--mesh", str(mesh), "--max-projectors", "3", "--quiet"]
         command += ["--light", light, "-o", folder, *words]
         begin = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         wall = time.perf_counter() - begin
-        plan = RigPlan.load(Path(folder) / "plan.json")
+        written = Path(folder) / "plan.json"
+        plan = RigPlan.load(written) if written.exists() else None
+    code = done.returncode
+    start = f"| {mesh.name} | {light} | {code} |"
+    if plan is None:
+        said = " ".join(done.stderr.replace(str(mesh), "FILE").split())[:160]
+        return code, f"{start} | | | {wall:.1f} | {said} | | | | | | |", "no plan"
+    times = plan.document["timings_s"].items()
+    timings = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in times)
+    return code, f"{start} {_row(plan, wall)} |", timings
+
+
+def _row(plan: RigPlan, wall: float) -> str:
     document, areas = plan.document, plan.coverage["target"]
     counts = [
         f"{proof['count']} of {proof['needed']['count']} needed "
@@ -76,12 +119,27 @@ def _row(mesh: Path, words: list[str], light: str) -> str:
     ]
     lit = areas["lit_m2"] / areas["reachable_by_projectors_m2"]
     measured = areas["measured_m2"] / areas["reachable_by_cameras_m2"]
-    check = json.loads(json.dumps(document["reconstruction"]))
-    return (
-        f"| {mesh.name} | {light} | {done.returncode} | {wall:.1f} | {counts[0]} "
-        f"| {counts[1]} | {lit:.1%} | {measured:.1%} "
-        f"| {1e3 * check['accuracy_rms_m']:.3f} | {_difference(plan):.2f} points |"
-    )
+    check = document["reconstruction"]
+    seen = ("not checked", "")
+    if check is not None:
+        rms = check["accuracy_rms_m"]
+        seen = (
+            "none" if rms is None else f"{1e3 * rms:.3f}",
+            f"{check['predicted_missing']:.2%}",
+        )
+    size = 1e3 * np.ptp(plan.surface.mesh.bounds, axis=0).max()
+    cells = [
+        str(document["meshes"][0]["n_faces"]),
+        f"{size:.1f}",
+        str(len(document["regions"])),
+        f"{wall:.1f}",
+        *counts,
+        f"{lit:.1%}",
+        f"{measured:.1%}",
+        *seen,
+        f"{_difference(plan):.2f} points",
+    ]
+    return " | ".join(cells)
 
 
 def _difference(plan: RigPlan) -> float:
