@@ -2,13 +2,19 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, diags_array
 
+from .diffusion import diffused
 from .mesh import TriangleMesh
 from .topology import components
 
 # Share of a piece's area whose normals must lie in its cone.
 _CONE_SHARE = 0.98
 _MAX_SPLITS = 12
+# Normals are averaged over this share of the mesh's size before they are judged.
+_AVERAGED_SHARE = 0.01
+# Of the length of an edge over the distance across it.
+_LARGEST_WEIGHT = 3.0
 
 
 def cone_pieces(
@@ -18,30 +24,60 @@ def cone_pieces(
     least: float,
     half_angle: float,
 ) -> list[NDArray[np.int64]]:
-    """Connected pieces that fit the cone, largest area first."""
+    """Connected pieces that fit the cone, largest area first.
+
+    The normals that are judged are averaged (`averaged_normals`): a face that noise has
+    turned is no feature. Adjacent pieces stay apart only if their union fits no cone.
+    """
+    normals = averaged_normals(mesh, pairs)
     inside = pairs[dominant[pairs].all(axis=1)]
     waiting = [(part, 0) for part in _connected(np.flatnonzero(dominant), inside)]
     done: list[NDArray[np.int64]] = []
     while waiting:
         (faces, links), depth = waiting.pop()
-        fits = normal_cone(mesh, faces)[1] <= half_angle
+        fits = _cone(mesh, normals, faces)[1] <= half_angle
         if fits or len(faces) == 1 or depth == _MAX_SPLITS:
             done.append(faces)
             continue
-        side = _halves(mesh, faces, links, least)
+        side = _halves(mesh, normals, faces, links, least)
         if side.all() or not side.any():
             done.append(faces)
             continue
         for half in (faces[side], faces[~side]):
             waiting += [(part, depth + 1) for part in _connected(half, links)]
-    done = _merged(mesh, done, pairs, least, half_angle)
+    done = _merged(mesh, normals, done, pairs, least, half_angle)
+    done = _merged(mesh, normals, done, pairs, np.inf, half_angle)
     areas = [float(mesh.face_areas[faces].sum()) for faces in done]
     order = sorted(range(len(done)), key=lambda i: (-areas[i], int(done[i][0])))
     return [done[i] for i in order]
 
 
+def averaged_normals(
+    mesh: TriangleMesh, pairs: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return unit normals of the faces averaged over 1 % of the mesh's size, (n_f, 3).
+
+    One implicit step of diffusion between adjacent faces (m, 2), weighted by the
+    square root of their areas over the distance of their centroids, so that faces
+    larger than that length keep their own.
+    """
+    n, (a, b) = len(mesh.faces), pairs.T
+    away = np.linalg.norm(mesh.face_centroids[a] - mesh.face_centroids[b], axis=1)
+    shared = np.sqrt(np.sqrt(mesh.face_areas[a] * mesh.face_areas[b]))
+    weight = np.clip(shared / np.maximum(away, 1e-300), 0.0, _LARGEST_WEIGHT)
+    links = coo_array((weight, (a, b)), (n, n)).tocsr()
+    links = links + links.T
+    laplacian = (diags_array(links.sum(axis=1)) - links).tocsr()
+    unit = mesh.mean_edge
+    length = _AVERAGED_SHARE * mesh.size / unit
+    areas = mesh.face_areas / (unit * unit)
+    normals = diffused(np.array(mesh.face_normals), areas, laplacian, length)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+
+
 def _merged(
     mesh: TriangleMesh,
+    normals: NDArray[np.float64],
     pieces: list[NDArray[np.int64]],
     pairs: NDArray[np.int64],
     least: float,
@@ -66,7 +102,7 @@ def _merged(
                 for j in neighbours[i]
             }
             angle, j = min(
-                (normal_cone(mesh, faces)[1], j) for j, faces in unions.items()
+                (_cone(mesh, normals, faces)[1], j) for j, faces in unions.items()
             )
             if angle > half_angle:
                 continue
@@ -124,12 +160,13 @@ def _connected(faces: NDArray[np.int64], pairs: NDArray[np.int64]) -> list[_Part
 
 def _halves(
     mesh: TriangleMesh,
+    all_normals: NDArray[np.float64],
     faces: NDArray[np.int64],
     links: NDArray[np.int64],
     least: float,
 ) -> NDArray[np.bool_]:
     """Two clusters of normals by Lloyd's steps from the axis they vary along most."""
-    normals, areas = mesh.face_normals[faces], mesh.face_areas[faces]
+    normals, areas = all_normals[faces], mesh.face_areas[faces]
     centred = normals - np.average(normals, axis=0, weights=areas)
     axis = np.linalg.eigh((centred * areas[:, None]).T @ centred)[1][:, -1]
     # An eigenvector has no sign of its own: fix one, so that every run cuts alike.
@@ -160,7 +197,13 @@ def normal_cone(
     mesh: TriangleMesh, faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], float]:
     """Mean normal, and the half angle about it that holds most of the area."""
-    normals, areas = mesh.face_normals[faces], mesh.face_areas[faces]
+    return _cone(mesh, mesh.face_normals, faces)
+
+
+def _cone(
+    mesh: TriangleMesh, all_normals: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], float]:
+    normals, areas = all_normals[faces], mesh.face_areas[faces]
     axis = areas @ normals
     axis = axis / max(float(np.linalg.norm(axis)), 1e-300)
     angle = np.arccos(np.clip(normals @ axis, -1.0, 1.0))

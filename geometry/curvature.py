@@ -9,13 +9,29 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from .diffusion import diffused, surface_laplacian, vertex_areas
 from .mesh import TriangleMesh
-from .topology import Edges, components, mesh_edges
+from .refinement import refined
+from .topology import Edges, components, face_pairs, mesh_edges
 
 DEFAULT_RADIUS_SHARE = 0.02
-# A quadric needs two rings; the cost of a ring grows with its square, so a mesh that
-# would need more than the last is fitted at a smaller radius, which the field states.
-_MIN_RINGS, _MAX_RINGS = 2, 10
+# A quadric has six coefficients: one ring is too few. More rings would reach farther on
+# coarse meshes than on fine ones; the radius is kept by diffusion instead.
+_RINGS = 2
+# Positions are averaged over this share of the scale before the fit.
+_SMOOTHING_SHARE = 0.5
+# Edges longer than this share of the scale are cut. Where facets are far larger than
+# the radius, only edges that are long beside them: a cut facet of a smooth surface is a
+# flat with creases about it.
+_LONGEST_SHARE = 1.25
+_COARSE, _LONGEST_COARSE_SHARE = 1.5, 2.0
+# Turns sharper than this between two faces are creases of the object, not facets.
+_SHARPEST_FACET = np.deg2rad(40.0)
+_LEAST_TURN = 1e-6
+# The cut surface has so many faces at most, or four times those of the mesh.
+_MAX_FACES = 100_000
+# A vertex normal shorter than this share of its faces' area is none.
+_CANCELLED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,24 +39,27 @@ class CurvatureField:
     """Principal curvatures per vertex; an outward-oriented sphere has positive ones.
 
     Attributes:
-        radius: Radius of the fitted neighbourhood that was asked for, in [m].
-        rings: Rings of edges that stand for it.
+        radius: Radius of the neighbourhood that was asked for, in [m].
+        scale: The one that holds: `radius`, or the size of the facets where those of a
+            coarse mesh are larger, in [m].
         k_max: Larger principal curvature in [1/m], shape (n_v,); 0 where not valid.
         k_min: Smaller one, signed, k_min <= k_max.
         direction_max: Unit direction of k_max, shape (n_v, 3).
         direction_min: Unit direction of k_min.
         valid: Whether the vertex could be fitted, isn't on an edge of more than two
-            faces, and lies farther than ``radius`` and ``rings`` from an open border,
+            faces, and lies farther than ``radius`` and two rings from an open border,
             shape (n_v,).
+        fine: The same on the surface with its long edges cut; None where none is long.
     """
 
     radius: float
-    rings: int
+    scale: float
     k_max: NDArray[np.float64]
     k_min: NDArray[np.float64]
     direction_max: NDArray[np.float64]
     direction_min: NDArray[np.float64]
     valid: NDArray[np.bool_]
+    fine: "FineField | None" = None
 
     @cached_property
     def steep(self) -> NDArray[np.float64]:
@@ -63,30 +82,93 @@ class CurvatureField:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class FineField:
+    """Curvature on a mesh whose long edges were cut.
+
+    Attributes:
+        mesh: The cut mesh; its first vertices are those of the original.
+        field: Its curvatures.
+        parent: Face of the original that each of its faces is a part of, (n_f,).
+    """
+
+    mesh: TriangleMesh
+    field: CurvatureField
+    parent: NDArray[np.int64]
+
+
 def principal_curvatures(
     mesh: TriangleMesh, radius: float | None = None
 ) -> CurvatureField:
-    """Return principal curvatures and directions from a quadric fitted at each vertex.
+    """Return principal curvatures and directions at a physical scale.
 
-    The neighbourhood has a physical radius, so that a finer mesh of the same object
-    gives the same curvatures; it is turned into rings of the mean edge, since libigl's
-    neighbourhoods in rings never crash while its balls do. Source: Panozzo, Puppo and
-    Rocca, "Efficient multi-scale curvature and crease estimation", 2010.
+    Edges longer than 1.25 times the scale are cut in half (2 times where it is more
+    than 1.5 radii), positions are averaged by diffusion over half the scale, and a
+    quadric is fitted to two rings about each vertex. So other triangles on the same
+    object give the same curvatures, and noise shorter than the scale is averaged out.
+    The scale is the radius; where the facets of a coarse mesh are larger, it is theirs
+    (`facet_size`), since the mesh knows nothing smaller of the shape. Source of the
+    fit: Panozzo, Puppo and Rocca, "Efficient multi-scale curvature and crease
+    estimation", 2010.
 
     Args:
         mesh: Repaired and oriented outwards.
-        radius: Of the neighbourhood in [m]; default 2 % of the bounding box's diagonal.
+        radius: Of the neighbourhood in [m]; default 2 % of the mesh's size.
 
     Raises:
         ValueError: If the radius isn't positive.
     """
     if radius is None:
-        diagonal = np.linalg.norm(mesh.bounds[1] - mesh.bounds[0])
-        radius = DEFAULT_RADIUS_SHARE * float(diagonal)
+        radius = DEFAULT_RADIUS_SHARE * mesh.size
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
+    facet = facet_size(mesh)
+    scale = max(radius, facet)
+    vertices, faces, parent = refined(
+        mesh.vertices,
+        mesh.faces,
+        scale * (_LONGEST_SHARE if facet < _COARSE * radius else _LONGEST_COARSE_SHARE),
+        max_faces=max(_MAX_FACES, 4 * len(mesh.faces)),
+    )
+    if len(faces) == len(mesh.faces):
+        return _curvatures(mesh, radius, scale)
+    fine = TriangleMesh(vertices, faces)
+    field = _curvatures(fine, radius, scale)
     n = len(mesh.vertices)
-    rings = _MIN_RINGS
+    return CurvatureField(
+        radius,
+        scale,
+        field.k_max[:n],
+        field.k_min[:n],
+        field.direction_max[:n],
+        field.direction_min[:n],
+        field.valid[:n],
+        FineField(fine, field, parent),
+    )
+
+
+def facet_size(mesh: TriangleMesh) -> float:
+    """Return the length in [m] over which the mesh turns from face to face.
+
+    sum(turn (A1 + A2)) / sum(turn edge) over the edges of two faces with areas A1, A2
+    that turn by less than 40 degrees; sharper ones are creases of the object, and flat
+    surface counts nothing, however large its triangles. 0 without such an edge.
+    """
+    edges = mesh_edges(mesh.faces)
+    pairs, edge = face_pairs(edges)
+    normals = mesh.face_normals[pairs]
+    sine = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1)
+    turn = np.arctan2(sine, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
+    # Below, it is the rounding of flat surface.
+    turn[(turn > _SHARPEST_FACET) | (turn < _LEAST_TURN)] = 0.0
+    ends = mesh.vertices[edges.ends[edge]]
+    length = turn @ np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    area = turn @ mesh.face_areas[pairs].sum(axis=1)
+    return float(area / length) if length > 0 else 0.0
+
+
+def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureField:
+    n = len(mesh.vertices)
     valid = np.zeros(n, dtype=bool)
     k, directions = np.zeros((2, n)), np.zeros((2, n, 3))
     directions[0], directions[1] = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
@@ -95,12 +177,17 @@ def principal_curvatures(
     if len(solid):
         # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
         edge = mesh.mean_edge
-        rings = int(np.clip(round(radius / edge), _MIN_RINGS, _MAX_RINGS))
         used, local_faces = np.unique(solid, return_inverse=True)
         vertices = np.ascontiguousarray((mesh.vertices[used] - mesh.centre) / edge)
         faces = np.ascontiguousarray(local_faces.reshape(-1, 3), dtype=np.int64)
-        found, ways, fitted = _fit(vertices, faces, rings)
-        fitted &= ~_near_border(vertices, mesh_edges(faces), radius / edge, rings)
+        smooth = diffused(
+            vertices,
+            vertex_areas(vertices, faces),
+            surface_laplacian(vertices, faces),
+            _SMOOTHING_SHARE * scale / edge,
+        )
+        found, ways, fitted = _fit(smooth, faces, _RINGS)
+        fitted &= ~_near_border(vertices, mesh_edges(faces), radius / edge, _RINGS)
         valid[used] = fitted
         k[:, valid] = found[:, fitted] / edge
         # An exactly flat neighbourhood has no direction of its own.
@@ -109,7 +196,7 @@ def principal_curvatures(
     for values in (k, directions, valid):
         values.setflags(write=False)
     return CurvatureField(
-        radius, rings, k[0], k[1], directions[0], directions[1], valid
+        radius, scale, k[0], k[1], directions[0], directions[1], valid
     )
 
 
@@ -117,13 +204,48 @@ def _fit(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], rings: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,)."""
+    n = len(vertices)
+    k, ways, fitted = np.zeros((2, n)), np.zeros((2, n, 3)), np.zeros(n, dtype=bool)
+    faces = _with_normals(vertices, faces)
+    if len(faces) == 0:
+        return k, ways, fitted
+    used, local = np.unique(faces, return_inverse=True)
     first, second, k_first, k_second, bad = igl.principal_curvature(
-        vertices, faces, radius=rings, useKring=True
+        np.ascontiguousarray(vertices[used]),
+        np.ascontiguousarray(local.reshape(-1, 3)),
+        radius=rings,
+        useKring=True,
     )
-    k, ways = np.stack([k_first, k_second]), np.stack([first, second])
-    fitted = np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
-    fitted[list(bad)] = False
+    k[:, used] = np.stack([k_first, k_second])
+    ways[:, used] = np.stack([first, second])
+    fitted[used] = True
+    fitted &= np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
+    fitted[used[list(bad)]] = False
     return k, ways, fitted
+
+
+def _with_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Leave out faces at vertices whose normals cancel: libigl crashes there.
+
+    Two faces on the same three corners, turned against each other, do that.
+    """
+    while len(faces):
+        corners = vertices[faces]
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(cross, axis=1)
+        sums = [
+            np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
+            for part in (*cross.T, size)
+        ]
+        length = np.linalg.norm(sums[:3], axis=0)
+        lost = ~(length > _CANCELLED * sums[3])
+        kept = (size > 0) & ~lost[faces].any(axis=1)
+        if kept.all():
+            break
+        faces = faces[kept]
+    return faces
 
 
 def _near_border(

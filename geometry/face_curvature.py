@@ -2,15 +2,13 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, diags_array
 
 from .curvature import CurvatureField
+from .diffusion import diffused, surface_laplacian, vertex_areas
 from .mesh import TriangleMesh
-from .topology import mesh_edges
 
-# Curvature is averaged over a length that is this share of its radius.
-_SMOOTHING_SHARE = 1.0
-_MAX_SMOOTHING_STEPS = 60
+# Curvature is averaged over a length that is this share of its scale.
+_SMOOTHING_SHARE = 1.5
 # |k1 - k2| up to this share of the larger magnitude leaves the direction arbitrary.
 _ISOTROPIC = 0.3
 # Curvedness times the diagonal below this is flat: its order means nothing.
@@ -44,8 +42,7 @@ def face_curvature(
         raise ValueError(
             f"the field has {len(field.valid)} vertices, the mesh {len(mesh.vertices)}"
         )
-    trusted: NDArray[np.bool_] = np.all(field.valid[mesh.faces], axis=1)
-    tensors = _smoothed(mesh, field)[mesh.faces].mean(axis=1)
+    tensors, trusted = _face_tensors(mesh, field)
     first = mesh.corners[:, 1] - mesh.corners[:, 0]
     first = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
     plane = np.stack([first, np.cross(mesh.face_normals, first)], axis=2)
@@ -59,34 +56,55 @@ def face_curvature(
     # Angle of the eigenvector of half_sum + spread; the other one is across.
     angle = 0.5 * np.arctan2(twist, half_gap) + np.where(half_sum < 0, 0.5 * np.pi, 0.0)
     steep = plane @ np.stack([np.cos(angle), np.sin(angle)], axis=1)[..., None]
-    diagonal = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
-    curvedness = np.where(trusted & (curvedness * diagonal > _FLAT), curvedness, 0.0)
+    curvedness = np.where(trusted & (curvedness * mesh.size > _FLAT), curvedness, 0.0)
     directed = (2.0 * spread > _ISOTROPIC * largest) & (curvedness > 0)
     return curvedness, np.where(directed[:, None], steep[..., 0], 0.0), trusted
 
 
-def _smoothed(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.float64]:
-    """Curvature tensors averaged along edges over a physical length, (n_v, 3, 3).
+def _face_tensors(
+    mesh: TriangleMesh, field: CurvatureField
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Averaged tensors (n_f, 3, 3), and the faces whose corners are valid, (n_f,).
 
-    One step averages a vertex with its neighbours, weighted by area; n steps reach
-    about sqrt(n) mean edges. Vertices that aren't valid give nothing.
+    A face that was cut has the average of its valid parts, and is trusted if they are
+    half of it.
     """
-    length = _SMOOTHING_SHARE * field.radius / mesh.mean_edge
-    steps = int(np.clip(round(length**2), 1, _MAX_SMOOTHING_STEPS))
-    n = len(mesh.vertices)
-    a, b = mesh_edges(mesh.faces).ends.T
-    links = coo_array((np.ones(len(a)), (a, b)), (n, n)).tocsr()
-    links = links + links.T + diags_array(np.ones(n))
-    weight = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
-    weight = np.where(field.valid, weight, 0.0)
-    total = links @ weight
+    if field.fine is None:
+        trusted: NDArray[np.bool_] = np.all(field.valid[mesh.faces], axis=1)
+        return _smoothed(mesh, field)[mesh.faces].mean(axis=1), trusted
+    parts, parent, n = field.fine.mesh, field.fine.parent, len(mesh.faces)
+    tensors, trusted = _face_tensors(parts, field.fine.field)
+    weight = np.where(trusted, parts.face_areas, 0.0)
+    total = np.bincount(parent, weight, n)
+    sums = np.stack(
+        [np.bincount(parent, weight * t, n) for t in tensors.reshape(-1, 9).T],
+        axis=1,
+        dtype=np.float64,
+    )
     scale = np.divide(1.0, total, out=np.zeros(n), where=total > 0)
-    average = (diags_array(scale) @ links @ diags_array(weight)).tocsr()
+    return (sums * scale[:, None]).reshape(-1, 3, 3), total > 0.5 * mesh.face_areas
+
+
+def _smoothed(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.float64]:
+    """Curvature tensors averaged over the field's scale, (n_v, 3, 3).
+
+    Vertices that aren't valid give nothing.
+    """
+    edge = mesh.mean_edge
+    vertices = (mesh.vertices - mesh.centre) / edge
+    mass = np.where(field.valid, vertex_areas(vertices, mesh.faces), 0.0)
     upper = np.triu_indices(3)
-    values = field.tensors[:, upper[0], upper[1]]
-    for _ in range(steps):
-        values = average @ values
-    tensors = np.empty((n, 3, 3))
+    # Entries beside the diagonal stand for two: with the root of two, the sum of
+    # squares is the tensor's own, which no turn changes.
+    doubled = np.where(upper[0] == upper[1], 1.0, np.sqrt(2.0))
+    values = diffused(
+        field.tensors[:, upper[0], upper[1]] * doubled,
+        mass,
+        surface_laplacian(vertices, mesh.faces),
+        _SMOOTHING_SHARE * field.scale / edge,
+    )
+    values = values / doubled
+    tensors = np.empty((len(vertices), 3, 3))
     tensors[:, upper[0], upper[1]] = values
     tensors[:, upper[1], upper[0]] = values
     return tensors

@@ -79,8 +79,9 @@ def dominant_regions(
     """Return the share of the trusted area with the highest curvedness, in regions.
 
     Trusted faces have three valid vertices, so the rim of an open border is left out;
-    where nothing is trusted, the surface counts as uniform. Curvature tensors are
-    averaged over the radius they were fitted at. If the cut at ``area_share``
+    where nothing is trusted, the surface counts as uniform. Bodies too small for a
+    region are left out too. Curvature tensors are
+    averaged over 1.5 times the scale they hold at. If the cut at ``area_share``
     would run through a plateau of equal curvedness, the plateau is taken whole: a
     sphere, a cylinder or a plate is dominant as a whole. If less than the share is
     curved at all, that is all. Islands and holes below
@@ -106,13 +107,14 @@ def dominant_regions(
     if not 0 < cone_half_angle < np.pi:
         raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
     curvedness, steep, trusted = face_curvature(mesh, field)
-    judged = trusted if trusted.any() else np.ones(len(mesh.faces), dtype=bool)
+    least = min_region_share * mesh.area
+    judged = trusted & _on_main_bodies(mesh, least)
+    judged = judged if judged.any() else np.ones(len(mesh.faces), dtype=bool)
     dominant = judged & (curvedness >= _cut(mesh, curvedness, judged, area_share))
     if dominant[judged].all():
         # Uniform: the rim, whose curvature isn't known, is no less dominant.
         dominant = judged = np.ones(len(mesh.faces), dtype=bool)
     pairs = adjacent_faces(mesh_edges(mesh.faces), manifold_only=False)
-    least = min_region_share * mesh.area
     dominant = _without_specks(mesh, dominant, judged, pairs, least)
     pieces = cone_pieces(mesh, dominant, pairs, least, cone_half_angle)
     return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
@@ -139,6 +141,16 @@ def regions_of_pieces(
     for values in (face_region, steep, trusted):
         values.setflags(write=False)
     return DominantRegions(regions, face_region, steep, share, trusted)
+
+
+def _on_main_bodies(mesh: TriangleMesh, least: float) -> NDArray[np.bool_]:
+    """Faces of bodies that are large enough to hold a region, shape (n_f,).
+
+    A fragment is curved more than anything, and would take up the share.
+    """
+    count, label = components(mesh_edges(mesh.faces).ends, len(mesh.vertices))
+    body = label[mesh.faces[:, 0]]
+    return np.bincount(body, mesh.face_areas, count)[body] >= least
 
 
 def _cut(

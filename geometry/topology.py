@@ -49,12 +49,20 @@ def adjacent_faces(edges: Edges, *, manifold_only: bool = True) -> NDArray[np.in
     Around an edge of more than two faces, consecutive faces are paired, unless
     ``manifold_only`` leaves such edges out.
     """
+    return face_pairs(edges, manifold_only=manifold_only)[0]
+
+
+def face_pairs(
+    edges: Edges, *, manifold_only: bool = True
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return `adjacent_faces`, shape (m, 2), and the edge that each pair shares."""
     flat = edges.of_face.ravel()
     order = np.argsort(flat, kind="stable")
     same = flat[order][1:] == flat[order][:-1]
     if manifold_only:
         same &= edges.n_faces[flat[order][1:]] == 2
-    return np.stack([order[:-1][same] // 3, order[1:][same] // 3], axis=1)
+    pairs = np.stack([order[:-1][same] // 3, order[1:][same] // 3], axis=1)
+    return pairs, flat[order][1:][same]
 
 
 def components(pairs: NDArray[np.int64], n: int) -> tuple[int, NDArray[np.int64]]:

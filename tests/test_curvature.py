@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.curvature import CurvatureField, principal_curvatures
+from geometry.curvature import CurvatureField, facet_size, principal_curvatures
 from geometry.mesh import TriangleMesh
 from geometry.primitives import box, cylinder, grid, sphere, torus
 
@@ -35,11 +35,12 @@ def test_a_sphere_is_positive_and_exact_at_two_scales() -> None:
 
 
 def test_turning_a_mesh_inside_out_swaps_and_negates() -> None:
-    mesh = torus(R, TUBE)
+    mesh = torus(R, TUBE, around=140, about_tube=70)
     out = principal_curvatures(mesh)
     back = principal_curvatures(TriangleMesh(mesh.vertices, mesh.faces[:, ::-1]))
-    np.testing.assert_allclose(back.k_max, -out.k_min, atol=0.05)
-    np.testing.assert_allclose(back.k_min, -out.k_max, atol=0.05)
+    # Long edges are cut from another corner, which changes what is fitted a little.
+    np.testing.assert_allclose(back.k_max, -out.k_min, atol=0.01 / TUBE)
+    np.testing.assert_allclose(back.k_min, -out.k_max, atol=0.01 / TUBE)
 
 
 def test_a_tube_bends_across_its_axis_only() -> None:
@@ -61,7 +62,7 @@ def test_a_torus_has_its_curvatures_and_directions_and_they_converge() -> None:
     errors = []
     for around in (70, 140, 280):
         mesh = torus(R, TUBE, around=around, about_tube=around // 2)
-        field = principal_curvatures(mesh, radius=2 * mesh.mean_edge)
+        field = principal_curvatures(mesh, radius=0.5 * mesh.mean_edge)
         about_axis, tube_way, axis_way = torus_truth(mesh)
         errors.append(
             (rms(field.k_max - 1 / TUBE) * TUBE, rms(field.k_min - about_axis) * TUBE)
@@ -107,16 +108,16 @@ def test_a_plane_is_flat_up_to_its_border_strip() -> None:
     # Distances run along edges, so they may exceed the straight ones, never fall short.
     assert field.valid[inset > radius + 1e-12].all()
     assert not field.valid[inset < 0.7 * radius].any()
-    # A neighbourhood of two rings reaches the border from the second row.
-    assert not principal_curvatures(mesh, 1e-6).valid[inset < 0.0101].any()
+    assert not principal_curvatures(mesh, 1e-3).valid[inset < 1e-9].any()
 
 
-def test_a_radius_beyond_the_rings_still_keeps_its_distance_from_the_border() -> None:
+def test_a_wide_radius_keeps_its_distance_from_the_border() -> None:
     mesh = grid(0.2, 0.2, divisions=(100, 100))
     field = principal_curvatures(mesh, radius=0.04)
-    assert field.rings == 10
     inset = 0.1 - np.abs(mesh.vertices[:, :2]).max(axis=1)
-    np.testing.assert_array_equal(field.valid, inset > 0.04 + 1e-9)
+    # Rows at that distance exactly are rounding's to decide.
+    assert field.valid[inset > 0.04 + 1e-6].all()
+    assert not field.valid[inset < 0.04 - 1e-6].any()
 
 
 def test_an_open_border_never_looks_curved() -> None:
@@ -129,7 +130,7 @@ def test_an_open_border_never_looks_curved() -> None:
     field = principal_curvatures(TriangleMesh(vertices, mesh.faces))
     assert field.valid.any()
     assert not field.valid[rim].any()
-    assert field.curvedness.max() < 1.0
+    assert field.curvedness.max() < 0.05 / field.scale
 
 
 def test_a_pinhole_spoils_its_rim_only() -> None:
@@ -140,16 +141,49 @@ def test_a_pinhole_spoils_its_rim_only() -> None:
     assert np.abs(field.k_max[field.valid] * 0.1 - 1).max() < 0.1
 
 
-def test_a_radius_is_physical_a_finer_mesh_uses_more_rings() -> None:
-    coarse, fine = sphere(0.1, subdivisions=4), sphere(0.1, subdivisions=6)
-    radius = 0.015
-    fields = [principal_curvatures(mesh, radius) for mesh in (coarse, fine)]
-    rings = [field.rings for field in fields]
-    for mesh, n in zip((coarse, fine), rings, strict=True):
-        assert n == round(radius / mesh.mean_edge)
-    assert all(field.radius == radius for field in fields)
-    default = principal_curvatures(coarse)
-    assert default.radius == pytest.approx(0.02 * 0.2 * np.sqrt(3), rel=1e-2)
+def test_a_radius_is_physical_however_fine_the_mesh() -> None:
+    # A dimple narrower than the radius: what is left of it depends on the radius alone.
+    found = []
+    for cells in (60, 120, 240):
+        flat = grid(0.2, 0.2, divisions=(cells, cells))
+        away = (flat.vertices[:, :2] ** 2).sum(axis=1)
+        dimple = 0.002 * np.exp(-away / (2 * 0.008**2))
+        mesh = TriangleMesh(flat.vertices - dimple[:, None] * [0, 0, 1], flat.faces)
+        field = principal_curvatures(mesh, 0.012)
+        assert field.radius == field.scale == 0.012
+        found.append(field.k_min[np.argmin(away)])
+    true = -0.002 / 0.008**2
+    assert found[2] > 0.8 * true
+    np.testing.assert_allclose(found[1], found[2], rtol=0.03)
+    np.testing.assert_allclose(found[0], found[2], rtol=0.1)
+
+
+def test_the_default_radius_is_2_percent_of_the_size() -> None:
+    mesh = sphere(0.1, subdivisions=4)
+    assert principal_curvatures(mesh).radius == pytest.approx(0.004, rel=1e-9)
+
+
+def test_a_coarse_mesh_states_the_scale_of_its_facets() -> None:
+    mesh = sphere(0.1, subdivisions=2)
+    field = principal_curvatures(mesh)
+    assert field.scale > 2 * field.radius
+    assert field.scale == facet_size(mesh)
+    assert rms(field.k_max * 0.1 - 1) < 0.15
+
+
+@pytest.mark.parametrize("cells", [1, 4])
+def test_flat_faces_and_sharp_creases_have_no_facets(cells: int) -> None:
+    mesh = box((0.1, 0.1, 0.1), divisions=cells)
+    assert facet_size(mesh) == 0.0
+    field = principal_curvatures(mesh)
+    assert field.scale == field.radius
+
+
+def test_facets_of_a_cylinder_are_as_wide_as_they_are() -> None:
+    mesh = cylinder(0.05, 0.3, around=40, along=1, capped=False)
+    # The turn is across; the diagonals of flat cells don't turn.
+    width = 2 * 0.05 * np.sin(np.pi / 40)
+    assert facet_size(mesh) == pytest.approx(width, rel=1e-6)
 
 
 def test_a_wider_radius_resists_noise() -> None:
@@ -160,14 +194,8 @@ def test_a_wider_radius_resists_noise() -> None:
         rms(principal_curvatures(noisy, n * ball.mean_edge).k_max * 0.1 - 1)
         for n in (2, 4, 8)
     ]
-    assert errors[0] > 2 * errors[1] > 4 * errors[2]
+    assert errors[0] > 2 * errors[1] > 3 * errors[2]
     assert errors[2] < 0.04
-
-
-def test_the_number_of_rings_is_bounded() -> None:
-    ball = sphere(0.1, subdivisions=4)
-    assert principal_curvatures(ball, radius=1.0).rings == 10
-    assert principal_curvatures(ball, radius=1e-6).rings == 2
 
 
 def test_curvature_moves_with_the_mesh_and_scales_inversely() -> None:
@@ -239,7 +267,17 @@ def test_creases_of_a_box_are_its_curved_places() -> None:
     on_edge = (np.abs(mesh.vertices) > 0.0499).sum(axis=1) >= 2
     middle = (np.abs(mesh.vertices) < 0.035).sum(axis=1) >= 2
     assert field.curvedness[on_edge].min() > 50
-    np.testing.assert_allclose(field.curvedness[middle], 0.0, atol=1e-9)
+    np.testing.assert_allclose(field.curvedness[middle], 0.0, atol=0.05)
+
+
+def test_faces_on_the_same_corners_turned_apart_dont_crash() -> None:
+    mesh = sphere(0.1, subdivisions=3)
+    around = mesh.faces[(mesh.faces == 0).any(axis=1)]
+    doubled = np.concatenate([mesh.faces, around[:, ::-1]])
+    field = principal_curvatures(TriangleMesh(mesh.vertices, doubled))
+    assert not field.valid[0]
+    assert np.isfinite(field.k_max).all()
+    assert field.valid.mean() > 0.8
 
 
 @pytest.mark.parametrize("radius", [0.0, -1.0, float("nan"), float("inf")])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.cones import normal_cone
+from geometry.cones import averaged_normals, normal_cone
 from geometry.curvature import CurvatureField, principal_curvatures
 from geometry.face_curvature import face_curvature, steep_directions
 from geometry.mesh import TriangleMesh
@@ -97,7 +97,7 @@ def test_a_plateau_is_never_cut_through() -> None:
 
 def test_where_nothing_is_trusted_everything_counts_as_uniform() -> None:
     triangle = TriangleMesh(0.1 * np.eye(3), np.array([[0, 1, 2]]))
-    found = regions_of(triangle)
+    found = dominant_regions(triangle, principal_curvatures(triangle, radius=0.1))
     assert not found.trusted.any()
     assert [list(region.faces) for region in found] == [[0]]
     np.testing.assert_array_equal(found.steep, np.zeros((1, 3)))
@@ -122,6 +122,7 @@ def test_regions_are_connected_disjoint_and_fit_the_cone(
     found = regions_of(mesh, cone_half_angle=np.deg2rad(limit))
     assert len(found) >= 2
     pairs = adjacent_faces(mesh_edges(mesh.faces))
+    averaged = averaged_normals(mesh, pairs)
     for number, region in enumerate(found):
         assert region.id == number
         np.testing.assert_array_equal(
@@ -135,7 +136,14 @@ def test_regions_are_connected_disjoint_and_fit_the_cone(
             region.mean_normal, mean / np.linalg.norm(mean), atol=1e-12
         )
         angle = np.arccos(np.clip(normals @ region.mean_normal, -1, 1))
-        assert region.cone_angle <= np.deg2rad(limit)
+        # Noise turns faces by more; what is judged are normals averaged over 1 %.
+        turned = np.einsum("ij,ij->i", averaged, mesh.face_normals).min()
+        if turned > np.cos(np.deg2rad(15.0)):
+            assert region.cone_angle <= np.deg2rad(limit + 5.0)
+        mean = areas @ averaged[region.faces]
+        lean = averaged[region.faces] @ (mean / np.linalg.norm(mean))
+        held = areas[lean >= np.cos(np.deg2rad(limit)) - 1e-12].sum()
+        assert held >= 0.98 * areas.sum()
         assert areas[angle <= region.cone_angle + 1e-12].sum() >= 0.98 * areas.sum()
         inner = np.isin(pairs, region.faces).all(axis=1)
         local = np.searchsorted(region.faces, pairs[inner])
@@ -218,7 +226,7 @@ def synthetic(mesh: TriangleMesh, k1: float, k2: float) -> CurvatureField:
     ks = (np.full(n, k1), np.full(n, k2))
     valid = np.ones(n, dtype=bool)
     return CurvatureField(
-        0.01, 2, ks[order[0]], ks[order[1]], ways[order[0]], ways[order[1]], valid
+        0.01, 0.01, ks[order[0]], ks[order[1]], ways[order[0]], ways[order[1]], valid
     )
 
 
@@ -263,11 +271,9 @@ def test_regions_move_and_scale_with_the_mesh_and_repeat_exactly() -> None:
     np.testing.assert_array_equal(first.steep, again.steep)
     turn = Rotation.from_rotvec([0.4, 0.2, -0.9]).as_matrix()
     changed = TriangleMesh(1000 * mesh.vertices @ turn.T + 1e5, mesh.faces)
-    # The default radius follows the bounding box, which a turn changes: state it.
-    radius = principal_curvatures(mesh).radius
-    other = dominant_regions(changed, principal_curvatures(changed, 1000 * radius))
-    same = (first.face_region >= 0) == (other.face_region >= 0)
-    assert mesh.face_areas[same].sum() > 0.999 * mesh.area
+    other = regions_of(changed)
+    same = first.face_region == other.face_region
+    assert mesh.face_areas[same].sum() > 0.9999 * mesh.area
     assert len(other) == len(first)
     for a, b in zip(first, other, strict=True):
         assert b.area_m2 == pytest.approx(1e6 * a.area_m2, rel=1e-2)
@@ -299,6 +305,53 @@ def test_a_cut_off_box_edge_is_found_on_both_sides() -> None:
     distance = np.sort(0.05 - np.abs(mesh.face_centroids), axis=1)[:, 1]
     assert inside[distance < 0.002].all()
     assert not inside[distance > 0.02].any()
+
+
+def test_fragments_take_no_share_of_what_is_dominant() -> None:
+    mesh = bumpy()
+    rng = np.random.default_rng(0)
+    dust = sphere(0.0015, subdivisions=2)
+    places = rng.uniform(-0.1, 0.1, (60, 3)) + [0.0, 0.0, 0.3]
+    dirty = TriangleMesh(
+        np.concatenate([mesh.vertices, *(dust.vertices + at for at in places)]),
+        np.concatenate(
+            [mesh.faces]
+            + [
+                dust.faces + len(mesh.vertices) + k * len(dust.vertices)
+                for k in range(len(places))
+            ]
+        ),
+    )
+    radius = 0.007
+    clean = dominant_regions(mesh, principal_curvatures(mesh, radius))
+    found = dominant_regions(dirty, principal_curvatures(dirty, radius))
+    n = len(mesh.faces)
+    assert np.all(found.face_region[n:] == -1)
+    kept = overlap(found.face_region[:n] >= 0, clean.face_region >= 0, mesh.face_areas)
+    assert kept > 0.99
+
+
+def test_averaged_normals_lose_noise_and_keep_large_faces() -> None:
+    ball = sphere(0.1, subdivisions=6)
+    noise = np.random.default_rng(0).normal(size=ball.vertices.shape)
+    rough = TriangleMesh(ball.vertices + 0.2 * ball.mean_edge * noise, ball.faces)
+    true = ball.face_centroids / np.linalg.norm(
+        ball.face_centroids, axis=1, keepdims=True
+    )
+    pairs = adjacent_faces(mesh_edges(ball.faces))
+    errors = [
+        overlap_angle(normals, true)
+        for normals in (rough.face_normals, averaged_normals(rough, pairs))
+    ]
+    assert errors[1] < 0.5 * errors[0]
+    cube = box((0.1, 0.1, 0.1))
+    pairs = adjacent_faces(mesh_edges(cube.faces))
+    kept = np.einsum("ij,ij->i", averaged_normals(cube, pairs), cube.face_normals)
+    assert kept.min() > 0.999
+
+
+def overlap_angle(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.arccos(np.clip((a * b).sum(axis=1), -1, 1)) ** 2)))
 
 
 @pytest.mark.parametrize(
