@@ -429,8 +429,9 @@ def test_the_real_face_scan_is_welded_and_kept_as_it_is() -> None:
     assert sides_mm(mesh).max() == pytest.approx(321.2, abs=0.1)
     assert mesh.source is not None
     made = {repair.kind: repair.count for repair in mesh.source.repairs}
-    # One of its six bodies is a loose triangle whose sides are lit by chance.
-    assert made in ({}, {"faces turned outwards": 1, "bodies turned outwards": 1})
+    # A loose triangle's sides are lit by chance; nothing else may be touched.
+    assert made.keys() <= {"faces turned outwards", "pieces turned outwards"}
+    assert made.get("faces turned outwards", 0) <= 1
 
 
 @needs_shared
