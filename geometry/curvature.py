@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import dijkstra
 
 from .diffusion import diffused, surface_laplacian, vertex_areas
 from .mesh import TriangleMesh
-from .refinement import refined
 from .topology import Edges, components, face_pairs, mesh_edges
 
 DEFAULT_RADIUS_SHARE = 0.02
@@ -20,16 +19,9 @@ DEFAULT_RADIUS_SHARE = 0.02
 _RINGS = 2
 # Positions are averaged over this share of the scale before the fit.
 _SMOOTHING_SHARE = 0.5
-# Edges longer than this share of the scale are cut. Where facets are far larger than
-# the radius, only edges that are long beside them: a cut facet of a smooth surface is a
-# flat with creases about it.
-_LONGEST_SHARE = 1.25
-_COARSE, _LONGEST_COARSE_SHARE = 1.5, 2.0
 # Turns sharper than this between two faces are creases of the object, not facets.
 _SHARPEST_FACET = np.deg2rad(40.0)
 _LEAST_TURN = 1e-6
-# The cut surface has so many faces at most, or four times those of the mesh.
-_MAX_FACES = 100_000
 # A vertex normal shorter than this share of its faces' area is none.
 _CANCELLED = 1e-6
 
@@ -49,7 +41,6 @@ class CurvatureField:
         valid: Whether the vertex could be fitted, isn't on an edge of more than two
             faces, and lies farther than ``radius`` and two rings from an open border,
             shape (n_v,).
-        fine: The same on the surface with its long edges cut; None where none is long.
     """
 
     radius: float
@@ -59,7 +50,6 @@ class CurvatureField:
     direction_max: NDArray[np.float64]
     direction_min: NDArray[np.float64]
     valid: NDArray[np.bool_]
-    fine: "FineField | None" = None
 
     @cached_property
     def steep(self) -> NDArray[np.float64]:
@@ -82,30 +72,15 @@ class CurvatureField:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class FineField:
-    """Curvature on a mesh whose long edges were cut.
-
-    Attributes:
-        mesh: The cut mesh; its first vertices are those of the original.
-        field: Its curvatures.
-        parent: Face of the original that each of its faces is a part of, (n_f,).
-    """
-
-    mesh: TriangleMesh
-    field: CurvatureField
-    parent: NDArray[np.int64]
-
-
 def principal_curvatures(
     mesh: TriangleMesh, radius: float | None = None
 ) -> CurvatureField:
     """Return principal curvatures and directions at a physical scale.
 
-    Edges longer than 1.25 times the scale are cut in half (2 times where it is more
-    than 1.5 radii), positions are averaged by diffusion over half the scale, and a
-    quadric is fitted to two rings about each vertex. So other triangles on the same
-    object give the same curvatures, and noise shorter than the scale is averaged out.
+    Positions are averaged by diffusion over half the scale, and a quadric is fitted to
+    two rings about each vertex. So other triangles on the same object give the same
+    curvatures, and noise shorter than the scale is averaged out. Edges should not be
+    longer than the scale (`refinement.refined` cuts them).
     The scale is the radius; where the facets of a coarse mesh are larger, it is theirs
     (`facet_size`), since the mesh knows nothing smaller of the shape. Source of the
     fit: Panozzo, Puppo and Rocca, "Efficient multi-scale curvature and crease
@@ -122,29 +97,7 @@ def principal_curvatures(
         radius = DEFAULT_RADIUS_SHARE * mesh.size
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
-    facet = facet_size(mesh)
-    scale = max(radius, facet)
-    vertices, faces, parent = refined(
-        mesh.vertices,
-        mesh.faces,
-        scale * (_LONGEST_SHARE if facet < _COARSE * radius else _LONGEST_COARSE_SHARE),
-        max_faces=max(_MAX_FACES, 4 * len(mesh.faces)),
-    )
-    if len(faces) == len(mesh.faces):
-        return _curvatures(mesh, radius, scale)
-    fine = TriangleMesh(vertices, faces)
-    field = _curvatures(fine, radius, scale)
-    n = len(mesh.vertices)
-    return CurvatureField(
-        radius,
-        scale,
-        field.k_max[:n],
-        field.k_min[:n],
-        field.direction_max[:n],
-        field.direction_min[:n],
-        field.valid[:n],
-        FineField(fine, field, parent),
-    )
+    return _curvatures(mesh, radius, max(radius, facet_size(mesh)))
 
 
 def facet_size(mesh: TriangleMesh) -> float:

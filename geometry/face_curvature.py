@@ -64,25 +64,9 @@ def face_curvature(
 def _face_tensors(
     mesh: TriangleMesh, field: CurvatureField
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Averaged tensors (n_f, 3, 3), and the faces whose corners are valid, (n_f,).
-
-    A face that was cut has the average of its valid parts, and is trusted if they are
-    half of it.
-    """
-    if field.fine is None:
-        trusted: NDArray[np.bool_] = np.all(field.valid[mesh.faces], axis=1)
-        return _smoothed(mesh, field)[mesh.faces].mean(axis=1), trusted
-    parts, parent, n = field.fine.mesh, field.fine.parent, len(mesh.faces)
-    tensors, trusted = _face_tensors(parts, field.fine.field)
-    weight = np.where(trusted, parts.face_areas, 0.0)
-    total = np.bincount(parent, weight, n)
-    sums = np.stack(
-        [np.bincount(parent, weight * t, n) for t in tensors.reshape(-1, 9).T],
-        axis=1,
-        dtype=np.float64,
-    )
-    scale = np.divide(1.0, total, out=np.zeros(n), where=total > 0)
-    return (sums * scale[:, None]).reshape(-1, 3, 3), total > 0.5 * mesh.face_areas
+    """Averaged tensors (n_f, 3, 3), and the faces whose corners are valid, (n_f,)."""
+    trusted: NDArray[np.bool_] = np.all(field.valid[mesh.faces], axis=1)
+    return _smoothed(mesh, field)[mesh.faces].mean(axis=1), trusted
 
 
 def _smoothed(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.float64]:
