@@ -35,15 +35,16 @@ def bearing(mesh: TriangleMesh, axis: NDArray[np.float64]) -> NDArray[np.float64
     e2 = np.cross(axis, e1)
     used = mesh.main
     offsets = mesh.face_centroids[used] - mesh.centre
-    plane = offsets @ e1 + 1j * (offsets @ e2)
-    rho = np.abs(plane)
+    x, y = offsets @ e1, offsets @ e2
+    rho = np.hypot(x, y)
     weight = mesh.face_areas[used] * rho**2
     total = float(weight.sum())
     if not total > 0.0:
         return e1
-    turn = np.divide(plane, rho, out=np.ones_like(plane), where=rho > 0)
+    theta = np.arctan2(y, x)
     harmonics = [
-        complex((weight * turn**m).sum()) / total for m in range(1, _HARMONICS + 1)
+        complex(weight @ np.cos(m * theta), weight @ np.sin(m * theta)) / total
+        for m in range(1, _HARMONICS + 1)
     ]
     azimuth = _azimuth(harmonics)
     return np.cos(azimuth) * e1 + np.sin(azimuth) * e2

@@ -16,7 +16,7 @@ import numpy as np
 
 from .file_origin import FileOrigin
 from .formats import SUPPORTED, RawMesh, read_format
-from .mesh import MeshError, MeshSource, TriangleMesh
+from .mesh import MeshError, MeshSource, Repair, TriangleMesh
 from .orientation import orient
 from .repair import clean
 from .text_formats import FormatError
@@ -44,7 +44,8 @@ def load_mesh(
     Args:
         path: OBJ, PLY, STL, OFF, GLB, glTF or 3MF, also inside .gz, .bz2 or .zip.
         unit: mm, cm, m, in or um.
-        size_mm: Instead of a unit: the longest side of the bounding box in [mm].
+        size_mm: Instead of a unit: the longest side of the bounding box in [mm]. Small
+            floating fragments don't count for it.
 
     Raises:
         MeshError: If the file can't be read whole, holds no surface, or has a longest
@@ -59,17 +60,39 @@ def load_mesh(
     if size_mm is not None and not (size_mm > 0 and np.isfinite(size_mm)):
         raise MeshError(f"size must be a positive number of millimetres, got {size_mm}")
     data = _bytes_of(path)
-    raw = _read(path, data)
+    digest = hashlib.sha256(data).hexdigest()
+    return usable_mesh(_read(path, data), str(path), digest, unit, size_mm)
+
+
+def usable_mesh(
+    raw: RawMesh,
+    path: str,
+    sha256: str,
+    unit: str | None = None,
+    size_mm: float | None = None,
+) -> TriangleMesh:
+    """Return raw triangles in metres, repaired and oriented outwards.
+
+    Args:
+        raw: What a file holds.
+        path: Its name, for messages and the record.
+        sha256: Digest of its bytes.
+        unit: Of its numbers; else the stated one, else mm.
+        size_mm: Instead of a unit.
+
+    Raises:
+        MeshError: As `load_mesh`.
+    """
     try:
         vertices, faces, kept, repairs = clean(raw.vertices, raw.faces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    longest = float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max())
+    longest, stray = _longest_side(TriangleMesh(vertices, faces))
     name, scale = _scale(raw, longest, unit, size_mm)
     _check_size(path, longest, name, scale)
     source = MeshSource(
-        path=str(path),
-        sha256=hashlib.sha256(data).hexdigest(),
+        path=path,
+        sha256=sha256,
         unit=name,
         scale_to_m=scale,
         n_vertices=len(raw.vertices),
@@ -81,9 +104,20 @@ def load_mesh(
     return TriangleMesh(
         vertices * scale,
         faces,
-        replace(source, repairs=repairs + turned),
+        replace(source, repairs=repairs + turned + stray),
         _origin(raw).of_faces(kept),
     )
+
+
+def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
+    """Longest side of the box of the main bodies, and what lies outside of that box."""
+    corners = mesh.corners[mesh.main].reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    outside = np.any((mesh.corners < low) | (mesh.corners > high), axis=(1, 2))
+    kind = "faces of fragments outside the rest, kept but left out of its size"
+    count = int(outside.sum())
+    found = (Repair(kind, count),) if count else ()
+    return float((high - low).max()), found
 
 
 def _origin(raw: RawMesh) -> FileOrigin:

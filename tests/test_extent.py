@@ -7,6 +7,7 @@ from geometry.bearing import bearing
 from geometry.extent import enclosing_ball, main_bodies
 from geometry.mesh import TriangleMesh
 from geometry.primitives import box, sphere, torus
+from geometry.readers import load_mesh
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -130,3 +131,25 @@ def test_rounding_does_not_choose_between_equal_bearings() -> None:
     for shift in (1e2, -3e3, 7.7):
         other = moved(square, np.eye(3), np.full(3, shift))
         np.testing.assert_allclose(bearing(other, Z), first, atol=1e-7)
+
+
+def test_a_fragment_does_not_decide_the_scale_of_a_file(tmp_path) -> None:
+    ball = sphere(0.1, subdivisions=3)
+    speck = moved(sphere(0.002, subdivisions=1), np.eye(3), np.array([0.0, 0.0, 3.0]))
+    both = joined(ball, speck)
+    path = tmp_path / "ball.off"
+    rows = [" ".join(map(repr, row)) for row in both.vertices.tolist()]
+    rows += ["3 {} {} {}".format(*face) for face in both.faces.tolist()]
+    head = f"OFF\n{len(both.vertices)} {len(both.faces)} 0\n"
+    path.write_text(head + "\n".join(rows) + "\n")
+    mesh = load_mesh(path, size_mm=200.0)
+    assert mesh.size == pytest.approx(0.2, rel=1e-2)
+    assert mesh.bounds[1, 2] == pytest.approx(
+        3.002 / np.ptp(ball.bounds[:, 2]) * 0.2, rel=1e-2
+    )
+    assert [(r.kind, r.count) for r in mesh.source.repairs] == [
+        (
+            "faces of fragments outside the rest, kept but left out of its size",
+            len(speck.faces),
+        )
+    ]

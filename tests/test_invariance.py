@@ -1,0 +1,78 @@
+"""A rigid motion of the mesh moves the plan; another unit changes nothing."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from planning import load_mesh, load_rig, plan_rig
+from planning.sample_head import sample_head
+
+# Up z becomes up -y, with a turn about it: not a symmetry of any world lattice.
+TURN = (
+    Rotation.from_rotvec([np.pi / 2, 0, 0]) * Rotation.from_rotvec([0, 0, 0.7])
+).as_matrix()
+SHIFT_M = np.array([100.0, -100.0, 100.0])
+
+
+def planned(path, unit, up):
+    mesh = load_mesh(path, unit=unit)
+    return plan_rig(mesh, load_rig("default"), max_projectors=3, up=up, check=False)
+
+
+@pytest.fixture(scope="module")
+def head():
+    return sample_head(n_faces=5000)
+
+
+@pytest.fixture(scope="module")
+def plans(head, tmp_path_factory):
+    """The plan of a file in mm, and of one in um, turned and 10^5 mm away."""
+    folder = tmp_path_factory.mktemp("meshes")
+    moved = head.vertices @ TURN.T + SHIFT_M
+    found = []
+    for name, vertices, unit, up in (
+        ("still.off", head.vertices * 1e3, "mm", "z"),
+        ("moved.off", moved * 1e6, "um", "-y"),
+    ):
+        path = folder / name
+        rows = [" ".join(map(repr, row)) for row in vertices.tolist()]
+        rows += [f"3 {a} {b} {c}" for a, b, c in head.faces.tolist()]
+        head_line = f"OFF\n{len(vertices)} {len(head.faces)} 0"
+        path.write_text("\n".join([head_line, *rows]) + "\n")
+        found.append(planned(path, unit, up))
+    return found
+
+
+def test_counts_bounds_and_regions_stay(plans):
+    still, moved = (p.document for p in plans)
+    for kind in ("projectors", "cameras"):
+        a, b = still["certificates"][kind], moved["certificates"][kind]
+        assert (a["count"], a["status"], a["candidates"]) == (
+            b["count"],
+            b["status"],
+            b["candidates"],
+        )
+        assert a["required_m2"] == pytest.approx(b["required_m2"], rel=1e-6)
+    np.testing.assert_array_equal(plans[0].surface.region, plans[1].surface.region)
+
+
+def test_every_area_stays(plans):
+    for part in ("target", "surface"):
+        still, moved = (p.coverage[part] for p in plans)
+        for key, area in still.items():
+            assert moved[key] == pytest.approx(area, abs=2e-3 * still["area_m2"]), key
+
+
+def test_every_device_moves_along(plans):
+    still, moved = plans
+    for before, after in (
+        *zip(still.projectors, moved.projectors, strict=True),
+        *zip(still.cameras, moved.cameras, strict=True),
+    ):
+        a, b = before.world_from_device, after.world_from_device
+        np.testing.assert_allclose(
+            b[:3, 3], TURN @ a[:3, 3] + SHIFT_M, atol=1e-3, err_msg=before.id
+        )
+        np.testing.assert_allclose(
+            b[:3, :3], TURN @ a[:3, :3], atol=2e-3, err_msg=before.id
+        )
