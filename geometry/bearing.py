@@ -30,8 +30,9 @@ def bearing(mesh: TriangleMesh, axis: NDArray[np.float64]) -> NDArray[np.float64
     Returns:
         Shape (3,).
     """
-    e1 = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    e1 /= np.linalg.norm(e1)
+    spare: NDArray[np.float64] = np.eye(3)[np.argmin(np.abs(axis))]
+    e1 = np.asarray(np.cross(axis, spare), dtype=np.float64)
+    e1 = e1 / np.linalg.norm(e1)
     e2 = np.cross(axis, e1)
     used = mesh.main
     offsets = mesh.face_centroids[used] - mesh.centre
