@@ -8,6 +8,8 @@ from ._siblings import check_siblings
 if TYPE_CHECKING:
     from .curvature import CurvatureField as CurvatureField
     from .curvature import principal_curvatures as principal_curvatures
+    from .interchange import from_trimesh as from_trimesh
+    from .interchange import to_trimesh as to_trimesh
     from .mesh import TriangleMesh as TriangleMesh
     from .rays import RayCaster as RayCaster
     from .readers import load_mesh as load_mesh
@@ -22,9 +24,11 @@ _EXPORTS = {
     "Region": "regions",
     "TriangleMesh": "mesh",
     "dominant_regions": "regions",
+    "from_trimesh": "interchange",
     "load_mesh": "readers",
     "principal_curvatures": "curvature",
     "regions_of_faces": "selected_regions",
+    "to_trimesh": "interchange",
 }
 __all__ = [
     "CurvatureField",
@@ -32,9 +36,11 @@ __all__ = [
     "Region",
     "TriangleMesh",
     "dominant_regions",
+    "from_trimesh",
     "load_mesh",
     "principal_curvatures",
     "regions_of_faces",
+    "to_trimesh",
 ]
 
 
