@@ -8,7 +8,7 @@ import hashlib
 import io
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,10 @@ class Interest:
     source: str | None = None
     sha256: str | None = None
     n_removed: int = 0
+
+    def on_parts(self, parent: NDArray[np.int64]) -> "Interest":
+        """Return the same choice on a mesh whose faces are parts of the chosen."""
+        return replace(self, chosen=self.chosen[parent])
 
 
 Select = Interest | NDArray[Any] | Sequence[int]

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from geometry.bearing import bearing
 from geometry.curvature import CurvatureField, principal_curvatures
 from geometry.mesh import TriangleMesh
+from geometry.refinement import cut_for_curvature
 from geometry.regions import DominantRegions, dominant_regions
 from geometry.selected_regions import regions_of_faces
 
@@ -99,8 +100,11 @@ def plan_rig(
     surface = _single(mesh)
     if target == "surface" and not (select is None and weight is None):
         raise InputError("the whole surface and a selection both are targets: give one")
+    interest = interest_of(surface, select, weight)
+    # Planned and judged on places, not on whatever triangles a flat face came in.
+    cut, parent = cut_for_curvature(surface)
     order = Order(
-        surface,
+        cut,
         rig,
         {
             "max_projectors": max_projectors,
@@ -115,9 +119,14 @@ def plan_rig(
         seed,
         threads,
         tuple(command),
-        interest_of(surface, select, weight),
+        None if interest is None else interest.on_parts(parent),
     )
     clock = Stopwatch(progress, time_limit=time_limit)
+    if len(cut.faces) > len(surface.faces):
+        clock.say(
+            f"  long edges cut: {len(surface.faces):,} triangles become "
+            f"{len(cut.faces):,}, the surface stays"
+        )
     # BLAS must not split sums differently with another number of threads.
     with threadpool_limits(1):
         plan = _plan(order, clock, check=check)
