@@ -11,14 +11,19 @@ from scipy.sparse.csgraph import dijkstra
 
 from .diffusion import diffused, surface_laplacian, vertex_areas
 from .mesh import TriangleMesh
+from .tensors import packed, principal, tangent_planes, unpacked
 from .topology import Edges, components, face_pairs, mesh_edges
 
 DEFAULT_RADIUS_SHARE = 0.02
 # A quadric has six coefficients: one ring is too few. More rings would reach farther on
 # coarse meshes than on fine ones; the radius is kept by diffusion instead.
 _RINGS = 2
-# Positions are averaged over this share of the scale before the fit.
-_SMOOTHING_SHARE = 0.5
+# Tensors are averaged over this share of the scale, but no less than some neighbours:
+# a quadric leaves out what is cubic, which on irregular triangles is as good as noise.
+_AVERAGED_SHARE, _LEAST_EDGES = 0.5, 0.6
+# Positions are averaged over the same before, less the edge that a fit reaches over
+# anyway: where triangles are that large, moving vertices costs more than it wins.
+_FITTED_EDGES = 1.0
 # Turns sharper than this between two faces are creases of the object, not facets.
 _SHARPEST_FACET = np.deg2rad(40.0)
 _LEAST_TURN = 1e-6
@@ -32,8 +37,8 @@ class CurvatureField:
 
     Attributes:
         radius: Radius of the neighbourhood that was asked for, in [m].
-        scale: The one that holds: `radius`, or the size of the facets where those of a
-            coarse mesh are larger, in [m].
+        scale: The one that holds: `radius`, or the size of the facets where none was
+            asked for and those of a coarse mesh are larger, in [m].
         k_max: Larger principal curvature in [1/m], shape (n_v,); 0 where not valid.
         k_min: Smaller one, signed, k_min <= k_max.
         direction_max: Unit direction of k_max, shape (n_v, 3).
@@ -77,14 +82,18 @@ def principal_curvatures(
 ) -> CurvatureField:
     """Return principal curvatures and directions at a physical scale.
 
-    Positions are averaged by diffusion over half the scale, and a quadric is fitted to
-    two rings about each vertex. So other triangles on the same object give the same
-    curvatures, and noise shorter than the scale is averaged out. Edges should not be
-    longer than the scale (`refinement.refined` cuts them).
-    The scale is the radius; where the facets of a coarse mesh are larger, it is theirs
-    (`facet_size`), since the mesh knows nothing smaller of the shape. Source of the
-    fit: Panozzo, Puppo and Rocca, "Efficient multi-scale curvature and crease
-    estimation", 2010.
+    A quadric is fitted to two rings about each vertex, and the curvature tensors are
+    averaged by diffusion over half the scale. On meshes finer than that, positions are
+    averaged over it before, since noise is large beside short edges. So other triangles
+    on the same object give the same curvatures, and noise shorter than the scale is
+    averaged out. Both averages vanish with the radius, down to 0.6 edges for tensors
+    and none for positions: a radius below an edge is the route for clean meshes.
+
+    The scale is a radius that is given; else it is 2 % of the mesh's size, or the size
+    of the facets (`facet_size`) of a coarse mesh where those are larger, since the mesh
+    knows nothing smaller of the shape. Edges should not be longer than it
+    (`refinement.refined` cuts them). Source of the fit: Panozzo, Puppo and Rocca,
+    "Efficient multi-scale curvature and crease estimation", 2010.
 
     Args:
         mesh: Repaired and oriented outwards.
@@ -95,9 +104,10 @@ def principal_curvatures(
     """
     if radius is None:
         radius = DEFAULT_RADIUS_SHARE * mesh.size
+        return _curvatures(mesh, radius, max(radius, facet_size(mesh)))
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
-    return _curvatures(mesh, radius, max(radius, facet_size(mesh)))
+    return _curvatures(mesh, radius, radius)
 
 
 def facet_size(mesh: TriangleMesh) -> float:
@@ -130,22 +140,13 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
     if len(solid):
         # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
         edge = mesh.mean_edge
-        used, local_faces = np.unique(solid, return_inverse=True)
-        vertices = np.ascontiguousarray((mesh.vertices[used] - mesh.centre) / edge)
-        faces = np.ascontiguousarray(local_faces.reshape(-1, 3), dtype=np.int64)
-        smooth = diffused(
-            vertices,
-            vertex_areas(vertices, faces),
-            surface_laplacian(vertices, faces),
-            _SMOOTHING_SHARE * scale / edge,
-        )
-        found, ways, fitted = _fit(smooth, faces, _RINGS)
+        used, faces = _numbered(solid, n)
+        vertices = (mesh.vertices[used] - mesh.centre) / edge
+        found, ways, fitted = _averaged_fit(vertices, faces, scale / edge)
         fitted &= ~_near_border(vertices, mesh_edges(faces), radius / edge, _RINGS)
         valid[used] = fitted
         k[:, valid] = found[:, fitted] / edge
-        # An exactly flat neighbourhood has no direction of its own.
-        directed = fitted & np.all(np.linalg.norm(ways, axis=2) > 0.5, axis=0)
-        directions[:, used[directed]] = _unit(ways[:, directed])
+        directions[:, valid] = ways[:, fitted]
     for values in (k, directions, valid):
         values.setflags(write=False)
     return CurvatureField(
@@ -153,28 +154,76 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
     )
 
 
+def _averaged_fit(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], scale: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Fit, averaged over a scale in mean edges; the results are those of `_fit`."""
+    mass, laplacian = vertex_areas(vertices, faces), surface_laplacian(vertices, faces)
+    beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
+    if beyond > 0:
+        vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))
+    k, ways, fitted = _fit(vertices, faces, _RINGS)
+    # An exactly flat neighbourhood has no direction of its own, hence no normal.
+    normals = np.cross(ways[0], ways[1])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(length > 0.5, normals, _vertex_normals(vertices, faces))
+    length = np.where(length > 0.5, length, 1.0)
+    tensors = diffused(
+        packed((k[0], k[1]), (ways[0], ways[1])),
+        np.where(fitted, mass, 0.0),
+        laplacian,
+        max(_AVERAGED_SHARE * scale, _LEAST_EDGES),
+    )
+    return *principal(unpacked(tensors), tangent_planes(normals / length)), fitted
+
+
 def _fit(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], rings: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,)."""
+    """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,).
+
+    Where there is no success, all are zero.
+    """
     n = len(vertices)
     k, ways, fitted = np.zeros((2, n)), np.zeros((2, n, 3)), np.zeros(n, dtype=bool)
     faces = _with_normals(vertices, faces)
     if len(faces) == 0:
         return k, ways, fitted
-    used, local = np.unique(faces, return_inverse=True)
+    used, local = _numbered(faces, n)
     first, second, k_first, k_second, bad = igl.principal_curvature(
-        np.ascontiguousarray(vertices[used]),
-        np.ascontiguousarray(local.reshape(-1, 3)),
-        radius=rings,
-        useKring=True,
+        np.ascontiguousarray(vertices[used]), local, radius=rings, useKring=True
     )
     k[:, used] = np.stack([k_first, k_second])
     ways[:, used] = np.stack([first, second])
     fitted[used] = True
     fitted &= np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
     fitted[used[list(bad)]] = False
+    k[:, ~fitted], ways[:, ~fitted] = 0.0, 0.0
     return k, ways, fitted
+
+
+def _numbered(
+    faces: NDArray[np.int64], n: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices of n that faces use, ascending, and the faces in their numbers."""
+    taken = np.zeros(n, dtype=bool)
+    taken[faces] = True
+    return np.flatnonzero(taken), (np.cumsum(taken) - 1)[faces]
+
+
+def _vertex_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Unit normals averaged over the area of each vertex's faces, (n, 3)."""
+    corners = vertices[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = [
+        np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
+        for part in cross.T
+    ]
+    normals = np.stack(sums, axis=1)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.where(length > 0, normals / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
 
 
 def _with_normals(
@@ -234,7 +283,3 @@ def _near_border(
     for _ in range(rings):
         touched[edges.ends[touched[edges.ends].any(axis=1)]] = True
     return near | touched | np.isfinite(distance)
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -38,9 +38,8 @@ def test_turning_a_mesh_inside_out_swaps_and_negates() -> None:
     mesh = torus(R, TUBE, around=140, about_tube=70)
     out = principal_curvatures(mesh)
     back = principal_curvatures(TriangleMesh(mesh.vertices, mesh.faces[:, ::-1]))
-    # Long edges are cut from another corner, which changes what is fitted a little.
-    np.testing.assert_allclose(back.k_max, -out.k_min, atol=0.01 / TUBE)
-    np.testing.assert_allclose(back.k_min, -out.k_max, atol=0.01 / TUBE)
+    np.testing.assert_allclose(back.k_max, -out.k_min, atol=1e-6 / TUBE)
+    np.testing.assert_allclose(back.k_min, -out.k_max, atol=1e-6 / TUBE)
 
 
 def test_a_tube_bends_across_its_axis_only() -> None:
@@ -155,7 +154,7 @@ def test_a_radius_is_physical_however_fine_the_mesh() -> None:
     true = -0.002 / 0.008**2
     assert found[2] > 0.8 * true
     np.testing.assert_allclose(found[1], found[2], rtol=0.03)
-    np.testing.assert_allclose(found[0], found[2], rtol=0.1)
+    np.testing.assert_allclose(found[0], found[2], rtol=0.2)
 
 
 def test_the_default_radius_is_2_percent_of_the_size() -> None:

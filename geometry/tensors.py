@@ -1,0 +1,65 @@
+"""Symmetric tensors on a surface: their average, and their values in a plane."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+_UPPER = np.triu_indices(3)
+# Entries beside the diagonal stand for two: with the root of two, the sum of squares is
+# the tensor's own, which no turn changes.
+_DOUBLED = np.where(_UPPER[0] == _UPPER[1], 1.0, np.sqrt(2.0))
+_PACKED_AT = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+
+
+def packed(
+    values: tuple[NDArray[np.float64], NDArray[np.float64]],
+    ways: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    """Return k1 d1 d1^T + k2 d2 d2^T as six numbers each, (n, 6), of the same norm.
+
+    Args:
+        values: k1 and k2, each (n,).
+        ways: d1 and d2, each (n, 3).
+    """
+    i, j = _UPPER
+    first, second = (
+        k[:, None] * d[:, i] * d[:, j] for k, d in zip(values, ways, strict=True)
+    )
+    return np.asarray((first + second) * _DOUBLED, dtype=np.float64)
+
+
+def unpacked(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what `packed` packed, (n, 3, 3)."""
+    plain = np.asarray(tensors / _DOUBLED, dtype=np.float64)
+    return plain[:, _PACKED_AT]
+
+
+def tangent_planes(normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return two unit vectors across each unit normal, as columns, shape (n, 3, 2)."""
+    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    first = np.cross(normals, least)
+    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
+    return np.stack([first, np.cross(normals, first)], axis=2)
+
+
+def principal(
+    tensors: NDArray[np.float64], planes: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return eigenvalues, larger first, and unit eigenvectors of tensors in planes.
+
+    Args:
+        tensors: Symmetric, shape (n, 3, 3).
+        planes: Two orthonormal vectors that span each plane, as columns, (n, 3, 2).
+
+    Returns:
+        Shapes (2, n) and (2, n, 3).
+    """
+    form = np.swapaxes(planes, 1, 2) @ tensors @ planes
+    half_sum = 0.5 * (form[:, 0, 0] + form[:, 1, 1])
+    half_gap = 0.5 * (form[:, 0, 0] - form[:, 1, 1])
+    twist = 0.5 * (form[:, 0, 1] + form[:, 1, 0])
+    spread = np.hypot(half_gap, twist)
+    angle = 0.5 * np.arctan2(twist, half_gap)
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    a, b = planes[:, :, 0], planes[:, :, 1]
+    ways = np.stack([cosine * a + sine * b, cosine * b - sine * a])
+    return np.stack([half_sum + spread, half_sum - spread]), ways
