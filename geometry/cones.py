@@ -4,52 +4,70 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array
 
+from .cone_crumbs import join_crumbs
+from .cone_sums import CONE_SHARE, Patch, merged
 from .diffusion import diffused
 from .mesh import TriangleMesh
 from .topology import components
 
-# Share of a piece's area whose normals must lie in its cone.
-_CONE_SHARE = 0.98
-_MAX_SPLITS = 12
+_MAX_ROUNDS = 60
+_SHIFTS = 5
+# Length of the mean of unit normals below which it has no direction to speak of.
+_AIMLESS = 0.25
 # Normals are averaged over this share of the mesh's size before they are judged.
 _AVERAGED_SHARE = 0.01
 # Of the length of an edge over the distance across it.
 _LARGEST_WEIGHT = 3.0
+_AREA_DIGITS = 1e-9
 
 
 def cone_pieces(
     mesh: TriangleMesh,
-    dominant: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
     pairs: NDArray[np.int64],
     least: float,
     half_angle: float,
+    *,
+    keep_all: bool = False,
 ) -> list[NDArray[np.int64]]:
     """Connected pieces that fit the cone, largest area first.
 
-    The normals that are judged are averaged (`averaged_normals`): a face that noise has
-    turned is no feature. Adjacent pieces stay apart only if their union fits no cone.
+    At least 95 % of a piece's area has its averaged normal (`averaged_normals`: a face
+    that noise has turned is no feature) within the half angle of their mean. Of what
+    doesn't fit, the part about its mean is taken as seen from its own front, then what
+    is left on its sides. Parts below the least area join the adjacent piece that they
+    fit best; what fits none is dropped, or with `keep_all` a piece of its own. Adjacent
+    pieces stay apart only if their union fits no cone.
+
+    Args:
+        mesh: The surface.
+        chosen: Which faces, shape (n_f,).
+        pairs: Adjacent faces, (m, 2).
+        least: Area in [m²].
+        half_angle: In [rad].
+        keep_all: Whether every chosen face must be in a piece.
     """
-    normals = averaged_normals(mesh, pairs)
-    inside = pairs[dominant[pairs].all(axis=1)]
-    waiting = [(part, 0) for part in _connected(np.flatnonzero(dominant), inside)]
-    done: list[NDArray[np.int64]] = []
-    while waiting:
-        (faces, links), depth = waiting.pop()
-        fits = _cone(mesh, normals, faces)[1] <= half_angle
-        if fits or len(faces) == 1 or depth == _MAX_SPLITS:
-            done.append(faces)
-            continue
-        side = _halves(mesh, normals, faces, links, least)
-        if side.all() or not side.any():
-            done.append(faces)
-            continue
-        for half in (faces[side], faces[~side]):
-            waiting += [(part, depth + 1) for part in _connected(half, links)]
-    done = _merged(mesh, normals, done, pairs, least, half_angle)
-    done = _merged(mesh, normals, done, pairs, np.inf, half_angle)
-    areas = [float(mesh.face_areas[faces].sum()) for faces in done]
-    order = sorted(range(len(done)), key=lambda i: (-areas[i], int(done[i][0])))
-    return [done[i] for i in order]
+    faces = np.flatnonzero(chosen)
+    if not len(faces):
+        return []
+    local = np.full(len(mesh.faces), -1, dtype=np.int64)
+    local[faces] = np.arange(len(faces))
+    links = local[pairs]
+    links = links[links.min(axis=1, initial=0) >= 0]
+    patch = Patch(
+        averaged_normals(mesh, pairs)[faces],
+        mesh.face_areas[faces],
+        links,
+        float(np.cos(half_angle)),
+    )
+    piece = _split(patch, np.ones(len(faces), dtype=bool), least)
+    piece = merged(patch, piece, CONE_SHARE[0])
+    piece = join_crumbs(patch, piece)
+    if keep_all and np.any(piece < 0):
+        rest = _split(patch, piece < 0, 0.0)
+        piece = np.where(piece < 0, rest + piece.max(initial=-1) + 1, piece)
+    piece = merged(patch, piece, CONE_SHARE[1])
+    return _by_area(faces, piece, patch.areas, mesh.area)
 
 
 def averaged_normals(
@@ -75,138 +93,88 @@ def averaged_normals(
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 
 
-def _merged(
-    mesh: TriangleMesh,
-    normals: NDArray[np.float64],
-    pieces: list[NDArray[np.int64]],
-    pairs: NDArray[np.int64],
-    least: float,
-    half_angle: float,
-) -> list[NDArray[np.int64]]:
-    """Give pieces below the least area to the neighbour with which they fit best.
-
-    Passes over the small ones, smallest first, until none fits any neighbour.
-    """
-    neighbours = _neighbours(pieces, pairs, len(mesh.faces))
-    pieces = list(pieces)
-    areas = [float(mesh.face_areas[faces].sum()) for faces in pieces]
-    waiting = True
-    while waiting:
-        waiting = False
-        small = [i for i in range(len(pieces)) if neighbours[i] and areas[i] < least]
-        for i in sorted(small, key=lambda i: (areas[i], i)):
-            if not neighbours[i] or areas[i] >= least:
-                continue
-            unions = {
-                j: np.sort(np.concatenate([pieces[i], pieces[j]]))
-                for j in neighbours[i]
-            }
-            angle, j = min(
-                (_cone(mesh, normals, faces)[1], j) for j, faces in unions.items()
-            )
-            if angle > half_angle:
-                continue
-            pieces[j], areas[j] = unions[j], areas[j] + areas[i]
-            pieces[i] = pieces[i][:0]
-            for k in neighbours[i]:
-                neighbours[k].discard(i)
-                if k != j:
-                    neighbours[k].add(j)
-                    neighbours[j].add(k)
-            neighbours[i] = set()
-            waiting = True
-    return [faces for faces in pieces if len(faces)]
-
-
-def _neighbours(
-    pieces: list[NDArray[np.int64]], pairs: NDArray[np.int64], n_faces: int
-) -> list[set[int]]:
-    """For each piece, the pieces that it shares an edge with."""
-    owner = np.full(n_faces, -1, dtype=np.int64)
-    for i, faces in enumerate(pieces):
-        owner[faces] = i
-    met = owner[pairs]
-    met = np.unique(met[(met.min(axis=1) >= 0) & (met[:, 0] != met[:, 1])], axis=0)
-    neighbours: list[set[int]] = [set() for _ in pieces]
-    for a, b in met.tolist():
-        neighbours[a].add(b)
-        neighbours[b].add(a)
-    return neighbours
-
-
-_Part = tuple[NDArray[np.int64], NDArray[np.int64]]
-
-
-def _connected(faces: NDArray[np.int64], pairs: NDArray[np.int64]) -> list[_Part]:
-    """Split faces (ascending) into connected parts, each with its own pairs."""
-    if len(faces) == 0:
-        return []
-    where = np.searchsorted(faces, pairs)
-    known = np.minimum(where, len(faces) - 1)
-    held = np.all(faces[known] == pairs, axis=1)
-    pairs, where = pairs[held], known[held]
-    count, label = components(where, len(faces))
-    by_face = np.split(
-        faces[np.argsort(label, kind="stable")],
-        np.cumsum(np.bincount(label, minlength=count))[:-1],
-    )
-    of_pair = label[where[:, 0]] if len(where) else np.empty(0, dtype=np.int64)
-    by_pair = np.split(
-        pairs[np.argsort(of_pair, kind="stable")],
-        np.cumsum(np.bincount(of_pair, minlength=count))[:-1],
-    )
-    return list(zip(by_face, by_pair, strict=True))
-
-
-def _halves(
-    mesh: TriangleMesh,
-    all_normals: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    links: NDArray[np.int64],
-    least: float,
-) -> NDArray[np.bool_]:
-    """Two clusters of normals by Lloyd's steps from the axis they vary along most."""
-    normals, areas = all_normals[faces], mesh.face_areas[faces]
-    centred = normals - np.average(normals, axis=0, weights=areas)
-    axis = np.linalg.eigh((centred * areas[:, None]).T @ centred)[1][:, -1]
-    # An eigenvector has no sign of its own: fix one, so that every run cuts alike.
-    axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-    side = centred @ axis > 0
-    for _ in range(20):
-        if side.all() or not side.any():
-            return side
-        poles = [areas[s] @ normals[s] for s in (side, ~side)]
-        poles = [pole / max(float(np.linalg.norm(pole)), 1e-300) for pole in poles]
-        moved = normals @ poles[0] > normals @ poles[1]
-        if np.array_equal(moved, side):
-            break
-        side = moved
-    for _ in range(2):
-        where = np.searchsorted(faces, links)
-        same = where[side[where[:, 0]] == side[where[:, 1]]]
-        count, label = components(same, len(faces))
-        small = np.bincount(label, areas, count) < 0.5 * least
-        flipped = side ^ small[label]
-        if flipped.all() or not flipped.any():
-            break
-        side = flipped
-    return side
-
-
 def normal_cone(
     mesh: TriangleMesh, faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], float]:
-    """Mean normal, and the half angle about it that holds most of the area."""
-    return _cone(mesh, mesh.face_normals, faces)
-
-
-def _cone(
-    mesh: TriangleMesh, all_normals: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], float]:
-    normals, areas = all_normals[faces], mesh.face_areas[faces]
+    """Mean normal, and the half angle about it that holds 98 % of the area."""
+    normals, areas = mesh.face_normals[faces], mesh.face_areas[faces]
     axis = areas @ normals
     axis = axis / max(float(np.linalg.norm(axis)), 1e-300)
     angle = np.arccos(np.clip(normals @ axis, -1.0, 1.0))
     order = np.argsort(angle, kind="stable")
     held = np.cumsum(areas[order])
-    return axis, float(angle[order[np.searchsorted(held, _CONE_SHARE * held[-1])]])
+    at = np.searchsorted(held, CONE_SHARE[0] * held[-1])
+    return axis, float(angle[order[at]])
+
+
+def _split(patch: Patch, active: NDArray[np.bool_], least: float) -> NDArray[np.int64]:
+    """Connected pieces that fit, of the active faces; -1: too small to be cut on."""
+    piece = np.full(patch.n, -1, dtype=np.int64)
+    part = np.where(active, 0, -1)
+    n_done = 0
+    for _ in range(_MAX_ROUNDS):
+        if not np.any(part >= 0):
+            break
+        part = _connected(patch, part)
+        # What is too small to be a piece waits for a neighbour.
+        small = (part >= 0) & (patch.sums(part)[1][part] < least)
+        part[small] = -1
+        if not np.any(part >= 0):
+            break
+        _, part[part >= 0] = np.unique(part[part >= 0], return_inverse=True)
+        fits = patch.shares(part) >= CONE_SHARE[0]
+        core = _core(patch, part)
+        inside = patch.sums(np.where(core, part, -1), len(fits))[1]
+        fits |= (inside <= 0) | (inside >= patch.sums(part)[1])
+        done = (part >= 0) & fits[part]
+        piece[done] = part[done] + n_done
+        n_done += len(fits)
+        part = np.where(done | (part < 0), -1, 2 * part + core)
+    return piece
+
+
+def _core(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Faces in the cone about the mean of their part's normals, moved to its middle."""
+    sums, areas = patch.sums(part)
+    axis = sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-300)
+    members = np.flatnonzero(part >= 0)
+    first = np.full(len(areas), patch.n, dtype=np.int64)
+    np.minimum.at(first, part[members], members)
+    aimless = np.linalg.norm(sums, axis=1) < _AIMLESS * areas
+    axis[aimless] = patch.normals[first[aimless]]
+    core = part >= 0
+    for _ in range(_SHIFTS):
+        core = (part >= 0) & (patch.cosines(part, axis) >= patch.cos_half)
+        sums, _ = patch.sums(np.where(core, part, -1), len(areas))
+        length = np.linalg.norm(sums, axis=1, keepdims=True)
+        axis = np.where(length > 0, sums / np.maximum(length, 1e-300), axis)
+    return core
+
+
+def _connected(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Number the connected parts; -1 stays."""
+    a, b = part[patch.links].T
+    same = patch.links[(a == b) & (a >= 0)]
+    label = components(same, patch.n)[1]
+    label[part < 0] = -1
+    _, label[part >= 0] = np.unique(label[part >= 0], return_inverse=True)
+    return label
+
+
+def _by_area(
+    faces: NDArray[np.int64],
+    piece: NDArray[np.int64],
+    areas: NDArray[np.float64],
+    total: float,
+) -> list[NDArray[np.int64]]:
+    """Faces of each piece, largest first; equal up to rounding, lowest face first."""
+    held = np.flatnonzero(piece >= 0)
+    if not len(held):
+        return []
+    _, first, number = np.unique(piece[held], return_index=True, return_inverse=True)
+    area = np.bincount(number, areas[held])
+    rank = np.lexsort((first, -np.round(area / (_AREA_DIGITS * total))))
+    order = np.argsort(number, kind="stable")
+    ends = np.cumsum(np.bincount(number))[:-1]
+    parts = np.split(faces[held[order]], ends)
+    return [parts[i] for i in rank]

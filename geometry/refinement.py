@@ -8,12 +8,13 @@ from .mesh import TriangleMesh
 from .topology import Edges, mesh_edges
 
 _MAX_ROUNDS = 24
-# A mesh is cut if faces with edges longer than _LONG scales hold this share of its
-# area, and then into edges of _LONGEST scales. Where facets are far larger than the
-# radius, only what is long beside them: a cut facet of a smooth surface is a flat with
-# creases about it.
-_CUT_SHARE, _LONG, _LONGEST = 0.2, 2.0, 1.25
-_COARSE = 1.5
+# Edges longer than this share of the scale are long. Where facets are far larger than
+# the radius, only those are that are long beside them: a cut facet of a smooth surface
+# is a flat with creases about it.
+_LONGEST_SHARE = 1.25
+_COARSE, _LONGEST_COARSE_SHARE = 1.5, 2.0
+# Faces with a long edge must hold this share of the area before a mesh is touched.
+_CUT_SHARE = 0.2
 _MAX_FACES, _MAX_GROWTH = 100_000, 2
 _LESS_FINE = 2.0**0.25
 
@@ -39,9 +40,8 @@ def cut_for_curvature(
     Curvature lives at vertices: on triangles far larger than its scale (the radius, or
     the size of the facets of a coarse smooth mesh) it depends on the triangulation
     alone, and a face of which a part is curved could only be chosen as a whole. Edges
-    are cut to 1.25 times the scale, or twice where it is more than 1.5 radii. Meshes
-    with less than a fifth of their area in faces with an edge of more than two scales
-    come back as they are.
+    are cut to 1.25 times the scale, or twice where it is more than 1.5 radii. A mesh
+    with less than a fifth of its area in faces with a longer edge comes back as it is.
 
     Args:
         mesh: The surface.
@@ -53,12 +53,13 @@ def cut_for_curvature(
     radius = DEFAULT_RADIUS_SHARE * mesh.size if radius is None else radius
     facet = facet_size(mesh)
     scale = max(radius, facet)
+    coarse = facet >= _COARSE * radius
+    longest = scale * (_LONGEST_COARSE_SHARE if coarse else _LONGEST_SHARE)
     edges = np.linalg.norm(mesh.corners - np.roll(mesh.corners, 1, axis=1), axis=2)
-    long = edges.max(axis=1) > _LONG * scale
+    long = edges.max(axis=1) > longest
     if mesh.face_areas[long].sum() < _CUT_SHARE * mesh.area:
         return mesh, np.arange(len(mesh.faces))
-    share = _LONGEST if facet < _COARSE * radius else _LONG
-    return cut_long_edges(mesh, share * scale)
+    return cut_long_edges(mesh, longest)
 
 
 def cut_long_edges(
@@ -142,4 +143,4 @@ def _to_cut(
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Which edges are long, and for each face the key of its pattern."""
     long = lengths > longest
-    return long, long[edges.of_face] @ np.array([1, 2, 4])
+    return long, np.where(long[edges.of_face], [1, 2, 4], 0).sum(axis=1)

@@ -8,14 +8,10 @@ from numpy.typing import NDArray
 
 from .cones import cone_pieces, normal_cone
 from .curvature import CurvatureField
-from .face_curvature import face_curvature
+from .dominance import dominant_faces, face_curvedness
+from .face_curvature import steep_directions
 from .mesh import TriangleMesh
-from .topology import adjacent_faces, components, mesh_edges
-
-# The cut must not run through equal curvedness: faces this little below it are taken
-# too, and more of them where this share of the area lies in a wider band about it.
-_TIE_BAND = 0.02
-_PLATEAU_BAND, _PLATEAU_SHARE = 0.1, 0.25
+from .topology import adjacent_faces, mesh_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,17 +102,13 @@ def dominant_regions(
         raise ValueError(f"min_region_share must lie in [0, 1), got {min_region_share}")
     if not 0 < cone_half_angle < np.pi:
         raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
-    curvedness, steep, trusted = face_curvature(mesh, field)
-    least = min_region_share * mesh.area
-    judged = trusted & _on_main_bodies(mesh, least)
-    judged = judged if judged.any() else np.ones(len(mesh.faces), dtype=bool)
-    dominant = judged & (curvedness >= _cut(mesh, curvedness, judged, area_share))
-    if dominant[judged].all():
-        # Uniform: the rim, whose curvature isn't known, is no less dominant.
-        dominant = judged = np.ones(len(mesh.faces), dtype=bool)
+    curvedness, trusted = face_curvedness(mesh, field)
     pairs = adjacent_faces(mesh_edges(mesh.faces), manifold_only=False)
-    dominant = _without_specks(mesh, dominant, judged, pairs, least)
-    pieces = cone_pieces(mesh, dominant, pairs, least, cone_half_angle)
+    least = min_region_share * mesh.area
+    dominant = dominant_faces(mesh, curvedness, trusted, pairs, area_share, least)
+    whole = bool(dominant.all())
+    pieces = cone_pieces(mesh, dominant, pairs, least, cone_half_angle, keep_all=whole)
+    steep = steep_directions(mesh, field)
     return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
 
 
@@ -129,7 +121,7 @@ def regions_of_pieces(
 ) -> DominantRegions:
     """Return pieces (each the ascending indices of its faces) as numbered regions.
 
-    The other arrays are those of `face_curvature`.
+    The other arrays are those of `face_curvedness` and `steep_directions`.
     """
     regions = tuple(
         _region(i, mesh, faces, curvedness) for i, faces in enumerate(pieces)
@@ -141,63 +133,6 @@ def regions_of_pieces(
     for values in (face_region, steep, trusted):
         values.setflags(write=False)
     return DominantRegions(regions, face_region, steep, share, trusted)
-
-
-def _on_main_bodies(mesh: TriangleMesh, least: float) -> NDArray[np.bool_]:
-    """Faces of bodies that are large enough to hold a region, shape (n_f,).
-
-    A fragment is curved more than anything, and would take up the share.
-    """
-    count, label = components(mesh_edges(mesh.faces).ends, len(mesh.vertices))
-    body = label[mesh.faces[:, 0]]
-    return np.bincount(body, mesh.face_areas, count)[body] >= least
-
-
-def _cut(
-    mesh: TriangleMesh,
-    curvedness: NDArray[np.float64],
-    judged: NDArray[np.bool_],
-    area_share: float,
-) -> float:
-    """Curvedness from which a face is dominant; below a plateau, never through it."""
-    faces = np.flatnonzero(judged)
-    order = faces[np.argsort(-curvedness[faces], kind="stable")]
-    area = np.cumsum(mesh.face_areas[order])
-    cut = float(curvedness[order[np.searchsorted(area, area_share * area[-1])]])
-    curved = curvedness[judged & (curvedness > 0.0)]
-    if not cut > 0.0 and len(curved):
-        # Less than the share is curved at all: flat surface doesn't fill it up.
-        return float(curved.min())
-    near = judged & (np.abs(curvedness - cut) <= _PLATEAU_BAND * cut)
-    plateau = mesh.face_areas[near].sum() >= _PLATEAU_SHARE * area[-1]
-    return cut * (1.0 - (_PLATEAU_BAND if plateau else _TIE_BAND))
-
-
-def _without_specks(
-    mesh: TriangleMesh,
-    dominant: NDArray[np.bool_],
-    judged: NDArray[np.bool_],
-    pairs: NDArray[np.int64],
-    least: float,
-) -> NDArray[np.bool_]:
-    """Fill small holes of trusted surface, then drop small islands."""
-    for state in (False, True):
-        same = pairs[
-            (dominant[pairs[:, 0]] == state) & (dominant[pairs[:, 1]] == state)
-        ]
-        count, label = components(same, len(dominant))
-        area = np.bincount(label, mesh.face_areas, count)
-        small = (dominant == state) & judged & (area[label] < least)
-        if not state:
-            # A hole has a dominant rim; a whole small body hasn't.
-            mixed = pairs[dominant[pairs[:, 0]] != dominant[pairs[:, 1]]]
-            rimmed = np.zeros(count, dtype=bool)
-            rimmed[label[mixed.ravel()]] = True
-            open_ended = np.zeros(count, dtype=bool)
-            open_ended[label[~judged]] = True
-            small &= rimmed[label] & ~open_ended[label]
-        dominant = dominant ^ small
-    return dominant
 
 
 def _region(

@@ -5,7 +5,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .cones import cone_pieces
 from .curvature import CurvatureField
-from .face_curvature import face_curvature
+from .dominance import face_curvedness
+from .face_curvature import steep_directions
 from .mesh import TriangleMesh
 from .regions import DominantRegions, regions_of_pieces
 from .topology import adjacent_faces, mesh_edges
@@ -49,10 +50,11 @@ def regions_of_faces(
         raise ValueError(f"min_region_share must lie in [0, 1), got {min_region_share}")
     if not 0 < cone_half_angle < np.pi:
         raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
-    curvedness, steep, trusted = face_curvature(mesh, field)
+    curvedness, trusted = face_curvedness(mesh, field)
     pairs = adjacent_faces(mesh_edges(mesh.faces), manifold_only=False)
     least = min_region_share * float(mesh.face_areas[faces].sum())
-    pieces = cone_pieces(mesh, faces, pairs, least, cone_half_angle)
+    pieces = cone_pieces(mesh, faces, pairs, least, cone_half_angle, keep_all=True)
+    steep = steep_directions(mesh, field)
     return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
 
 

@@ -51,7 +51,10 @@ def test_the_number_of_faces_is_bounded_and_the_longest_edges_go_first() -> None
 
 
 def test_a_fine_mesh_comes_through_as_it_is() -> None:
-    for mesh in (sphere(0.1, subdivisions=4), torus(0.1, 0.04)):
+    for mesh in (
+        sphere(0.1, subdivisions=4),
+        torus(0.1, 0.04, around=160, about_tube=80),
+    ):
         cut, parent = cut_for_curvature(mesh)
         assert cut is mesh
         np.testing.assert_array_equal(parent, np.arange(len(mesh.faces)))

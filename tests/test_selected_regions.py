@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.cones import normal_cone
+from geometry.cones import averaged_normals
 from geometry.curvature import principal_curvatures
 from geometry.mesh import TriangleMesh
 from geometry.primitives import box, cylinder, grid, sphere
@@ -42,20 +42,25 @@ def test_exactly_the_chosen_faces_are_the_target(share: float) -> None:
     found = regions_of(ball, chosen)
     np.testing.assert_array_equal(found.face_region >= 0, chosen)
     areas = [region.area_m2 for region in found]
-    assert areas == sorted(areas, reverse=True)
+    assert np.all(np.diff(areas) <= 1e-9 * ball.area)
+    normals = averaged_normals(ball, adjacent_faces(mesh_edges(ball.faces)))
     for region in found:
         np.testing.assert_array_equal(
             np.flatnonzero(found.face_region == region.id), region.faces
         )
         assert is_connected(ball, region.faces)
-        assert normal_cone(ball, region.faces)[1] <= np.deg2rad(50.0)
+        areas = ball.face_areas[region.faces]
+        mean = areas @ normals[region.faces]
+        lean = normals[region.faces] @ (mean / np.linalg.norm(mean))
+        inside = lean >= np.cos(np.deg2rad(50.0)) - 1e-12
+        assert areas[inside].sum() >= 0.95 * areas.sum()
 
 
 def test_a_whole_ball_needs_at_least_as_many_cones_as_its_area_says() -> None:
     ball = sphere(0.1, subdivisions=4)
     found = regions_of(ball, np.ones(len(ball.faces), dtype=bool))
-    # A cone of 50 degrees that may miss 2 % holds (1 - cos 50) / 2 / 0.98 of a ball.
-    assert len(found) >= 0.98 * 2 / (1 - np.cos(np.deg2rad(50.0)))
+    # A cone of 50 degrees that may miss 5 % holds (1 - cos 50) / 2 / 0.95 of a ball.
+    assert len(found) >= 0.95 * 2 / (1 - np.cos(np.deg2rad(50.0)))
     wide = regions_of(
         ball, np.ones(len(ball.faces), dtype=bool), cone_half_angle=np.deg2rad(80.0)
     )

@@ -1,0 +1,111 @@
+"""Crumbs that splitting leaves join the piece beside them that they fit best."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cone_sums import CONE_SHARE, Patch, unit
+from .topology import components
+
+_MAX_ROUNDS = 60
+_ROOM = 0.7
+
+
+def join_crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give connected faces without a piece to adjacent ones; -1 where they fit none.
+
+    No piece takes more area outside its cone than leaves the last of `CONE_SHARE` in.
+    """
+    if not np.any(piece < 0) or not np.any(piece >= 0):
+        return piece
+    before = piece
+    locked = np.zeros(int(piece.max()) + 1, dtype=bool)
+    while True:
+        joined = _join(patch, before, locked)
+        # The axis moved with what joined: whose share is lost goes back.
+        lost = (patch.shares(joined) < CONE_SHARE[1]) & ~locked
+        if not lost.any():
+            return joined
+        locked |= lost
+
+
+def _join(
+    patch: Patch, piece: NDArray[np.int64], locked: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    piece = piece.copy()
+    sums, areas = patch.sums(piece)
+    axis = unit(sums)
+    inside = patch.shares(piece)
+    # Not all that is free, since the mean moves.
+    room = np.where(locked, -1.0, areas * _ROOM * (inside - CONE_SHARE[1]))
+    whole = True
+    for _ in range(_MAX_ROUNDS):
+        crumb = _crumbs(patch, piece) if whole else _single(piece)
+        owner = _best(patch, crumb, piece, axis, locked)
+        to = np.where(crumb >= 0, owner[crumb], -1) if len(owner) else piece * 0 - 1
+        outside = (to >= 0) & (patch.cosines(to, axis) < patch.cos_half)
+        out = patch.sums(np.where(outside, crumb, -1), len(owner))[1]
+        taken = _within(owner, out, room)
+        if not taken.any():
+            if not whole:
+                break
+            # What fits nowhere as one may fit its neighbours face by face.
+            whole = False
+            continue
+        gained = (crumb >= 0) & taken[crumb]
+        piece[gained] = to[gained]
+        room -= np.bincount(owner[taken], out[taken], len(room))
+    return piece
+
+
+def _crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Number connected faces without a piece, -1 for the others."""
+    free = piece < 0
+    links = patch.links[free[patch.links].all(axis=1)]
+    label = components(links, patch.n)[1]
+    label[~free] = -1
+    if free.any():
+        _, label[free] = np.unique(label[free], return_inverse=True)
+    return label
+
+
+def _single(piece: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Number the faces without a piece, -1 for the others."""
+    free = piece < 0
+    return np.where(free, np.cumsum(free) - 1, -1)
+
+
+def _best(
+    patch: Patch,
+    crumb: NDArray[np.int64],
+    piece: NDArray[np.int64],
+    axis: NDArray[np.float64],
+    locked: NDArray[np.bool_],
+) -> NDArray[np.int64]:
+    """The adjacent piece whose axis is nearest to each crumb's mean, -1 without one."""
+    sums, _ = patch.sums(crumb)
+    owner = np.full(len(sums), -1, dtype=np.int64)
+    both = np.concatenate([patch.links, patch.links[:, ::-1]])
+    both = both[(crumb[both[:, 0]] >= 0) & (piece[both[:, 1]] >= 0)]
+    met = np.stack([crumb[both[:, 0]], piece[both[:, 1]]], axis=1)
+    met = np.unique(met[~locked[met[:, 1]]], axis=0)
+    if len(met):
+        fit = np.einsum("ij,ij->i", unit(sums)[met[:, 0]], axis[met[:, 1]])
+        order = np.lexsort((met[:, 1], -np.round(fit, 9), met[:, 0]))
+        crumbs, first = np.unique(met[order, 0], return_index=True)
+        owner[crumbs] = met[order[first], 1]
+    return owner
+
+
+def _within(
+    owner: NDArray[np.int64], out: NDArray[np.float64], room: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which crumbs their pieces have room for, the best fitting first."""
+    taken = np.zeros(len(owner), dtype=bool)
+    waiting = np.flatnonzero(owner >= 0)
+    order = waiting[np.lexsort((waiting, out[waiting], owner[waiting]))]
+    total = np.cumsum(out[order])
+    start = np.searchsorted(owner[order], owner[order])
+    before = np.where(start > 0, total[start - 1], 0.0) if len(order) else total
+    used = total - before
+    taken[order] = (out[order] <= 0) | (used <= room[owner[order]])
+    return taken

@@ -1,0 +1,172 @@
+"""Sums over the pieces of a patch of faces, and the merging of pieces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Share of a piece's area whose normals must lie in its cone: while it is cut and
+# merged, and after crumbs have joined it.
+CONE_SHARE = (0.98, 0.95)
+_SLACK = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Faces that are to be cut into pieces.
+
+    Attributes:
+        normals: Unit normals, shape (n, 3).
+        areas: Shape (n,).
+        links: Adjacent faces, (m, 2).
+        cos_half: Cosine of the half angle of the cone.
+    """
+
+    normals: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    links: NDArray[np.int64]
+    cos_half: float
+
+    @property
+    def n(self) -> int:
+        """Number of faces."""
+        return len(self.areas)
+
+    def sums(
+        self, piece: NDArray[np.int64], count: int = 0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return area-weighted sums of normals (k, 3) and areas (k,) of pieces."""
+        count = max(count, int(piece.max(initial=-1)) + 1)
+        held = np.flatnonzero(piece >= 0)
+        of, areas = piece[held], self.areas[held]
+        weighted = self.normals[held] * areas[:, None]
+        sums = [
+            np.bincount(of, values, count).astype(np.float64)
+            for values in (*weighted.T, areas)
+        ]
+        return np.stack(sums[:3], axis=1), sums[3]
+
+    def cosines(
+        self, piece: NDArray[np.int64], axis: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return each face's normal times the axis (k, 3) of its piece, (n,)."""
+        if not len(axis):
+            return np.zeros(self.n)
+        return np.einsum("ij,ij->i", self.normals, axis[np.maximum(piece, 0)])
+
+    def shares(self, piece: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the share of each piece's area in the cone about its mean, (k,)."""
+        sums, areas = self.sums(piece)
+        axis = unit(sums)
+        inside = (piece >= 0) & (self.cosines(piece, axis) >= self.cos_half - _SLACK)
+        held = self.sums(np.where(inside, piece, -1), len(areas))[1]
+        return np.divide(held, areas, out=np.ones_like(areas), where=areas > 0)
+
+
+def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return vectors (k, 3) of length one; zero stays."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.maximum(length, 1e-300)
+
+
+def merged(patch: Patch, piece: NDArray[np.int64], share: float) -> NDArray[np.int64]:
+    """Join adjacent pieces as long as some union has the share of its area in a cone.
+
+    The smallest goes first, and to the neighbour with which its mean normal is longest.
+    """
+    met = piece[patch.links]
+    met = met[(met.min(axis=1, initial=0) >= 0) & (met[:, 0] != met[:, 1])]
+    met = np.unique(np.sort(met, axis=1), axis=0)
+    if not len(met):
+        return piece
+    sums, areas = patch.sums(piece)
+    work = _Merging(patch, share, sums, areas, _members(piece, len(areas)))
+    for a, b in met.tolist():
+        work.near.setdefault(a, set()).add(b)
+        work.near.setdefault(b, set()).add(a)
+    waiting = set(work.near)
+    while waiting:
+        i = min(waiting, key=lambda i: (work.rank(i), i))
+        waiting.discard(i)
+        j = work.partner(i)
+        if j is not None:
+            work.join(i, j)
+            waiting.discard(i)
+            waiting |= {j} | work.near[j]
+    result = np.full_like(piece, -1)
+    for i, faces in enumerate(work.faces):
+        result[faces] = i
+    return result
+
+
+class _Merging:
+    """Pieces while they are merged: sums, faces and neighbours of each."""
+
+    def __init__(
+        self,
+        patch: Patch,
+        share: float,
+        sums: NDArray[np.float64],
+        areas: NDArray[np.float64],
+        faces: list[NDArray[np.int64]],
+    ) -> None:
+        self._patch, self._share = patch, share
+        self._sums, self._areas, self.faces = sums, areas, faces
+        self._total = float(areas.sum())
+        self._refused: dict[int, set[int]] = {}
+        self.near: dict[int, set[int]] = {}
+
+    def rank(self, i: int) -> float:
+        return round(float(self._areas[i]) / self._total, 9)
+
+    def partner(self, i: int) -> int | None:
+        """The neighbour that fits best with it in one cone; None: none does."""
+        near = np.array(sorted(self.near[i]), dtype=np.int64)
+        if not len(near):
+            return None
+        sums = self._sums[near] + self._sums[i]
+        areas = self._areas[near] + self._areas[i]
+        mean = np.linalg.norm(sums, axis=1) / areas
+        # With this share within the angle the mean of the cosines can't be less.
+        possible = mean >= self._share * (1.0 + self._patch.cos_half) - 1.0
+        order = np.argsort(-np.round(mean, 9), kind="stable")
+        for k in order[possible[order]]:
+            j = int(near[k])
+            if j in self._refused.get(i, ()):
+                continue
+            if self._fits(i, j):
+                return j
+            self._refused.setdefault(i, set()).add(j)
+            self._refused.setdefault(j, set()).add(i)
+        return None
+
+    def join(self, i: int, j: int) -> None:
+        """Make one piece, j, of two."""
+        self.faces[j] = np.concatenate([self.faces[i], self.faces[j]])
+        self.faces[i] = self.faces[i][:0]
+        self._sums[j] += self._sums[i]
+        self._areas[j] += self._areas[i]
+        for k in self.near.pop(i):
+            self.near[k].discard(i)
+            if k != j:
+                self.near[k].add(j)
+                self.near[j].add(k)
+        for k in (i, j):
+            for other in self._refused.pop(k, set()):
+                self._refused[other].discard(k)
+
+    def _fits(self, i: int, j: int) -> bool:
+        axis = self._sums[i] + self._sums[j]
+        axis = axis / max(float(np.linalg.norm(axis)), 1e-300)
+        held = 0.0
+        for k in (i, j):
+            inside = self._patch.normals[self.faces[k]] @ axis >= self._patch.cos_half
+            held += float(self._patch.areas[self.faces[k]] @ inside)
+        return held >= self._share * float(self._areas[i] + self._areas[j])
+
+
+def _members(piece: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
+    held = np.flatnonzero(piece >= 0)
+    order = held[np.argsort(piece[held], kind="stable")]
+    ends = np.cumsum(np.bincount(piece[held], minlength=count))[:-1]
+    return list(np.split(order, ends))
