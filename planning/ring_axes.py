@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from . import measurability
 from .cameras import LitSamples, lit_samples, rings_of
-from .lighting import Target
+from .lighting import Target, ring_coordinate
 from .measurability import Rings, View
 from .plan import PlannedCamera, PlannedProjector
 from .rings import ring_frame
@@ -29,7 +29,8 @@ def turn_ring_axes(
 
     Each projector in turn tries a number of azimuths of its tilted (or shifted) axis;
     among equals the one with the largest mean |r.m| of each sample's best pair wins.
-    The ring surfaces move, the light doesn't: what is lit stays lit.
+    An axis that leaves a lit sample outside the last ring isn't offered, so what is
+    lit stays lit.
 
     Args:
         scene: Surface and requirements.
@@ -53,6 +54,8 @@ def turn_ring_axes(
             best = _value(scores)
             for azimuth in np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS):
                 offered = _with_axis(turned[p], tilt, float(azimuth))
+                if not _inside_rings(offered, points[rows.lit[:, p]]):
+                    continue
                 trial = scores.copy()
                 rings = measurability.rings_at(offered, points)
                 trial[p] = _scores(scene, rows, p, views, rings)
@@ -89,6 +92,11 @@ def _with_axis(
 ) -> PlannedProjector:
     frame = ring_frame(projector.world_from_device, projector.device, tilt, azimuth)
     return replace(projector, world_from_ring=frame)
+
+
+def _inside_rings(projector: PlannedProjector, points: NDArray[np.float64]) -> bool:
+    coordinate = ring_coordinate(projector, points)
+    return bool(np.all(coordinate <= projector.ring_radii[-1]))
 
 
 def _scores(

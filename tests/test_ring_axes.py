@@ -1,7 +1,10 @@
 """Ring axes turn where the blind curves do least harm; claims and reach follow."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from geometry.primitives import sphere
 from planning.cameras import lit_samples, measured_by, plan_cameras
@@ -11,7 +14,7 @@ from planning.projectors import lit_stages, margins_of, merged, plan_projectors
 from planning.relaxations import reachability_relaxations
 from planning.rig import load_rig
 from planning.ring_axes import turn_ring_axes, widest_gap
-from planning.rings import uniform_radii
+from planning.rings import ring_frame, uniform_radii
 from planning.scene import Scene
 
 RADIUS = 0.1
@@ -62,6 +65,41 @@ def test_turned_axes_measure_no_less_and_light_the_same(stages):
     assert counts[1] >= 0.995 * counts[0]
     for old, new in zip(before, after, strict=True):
         assert np.array_equal(old.world_from_device, new.world_from_device)
+
+
+def test_no_axis_is_offered_that_leaves_lit_samples_outside_the_last_ring(stages):
+    """Rings about the ball, no wider than it: about any other axis they miss it."""
+    made, projectors, cameras, tilt = stages
+    target = made.target_samples(500, 9)
+    tight = [_rings_about_the_ball(p, tilt) for p in projectors.projectors]
+    rows = lit_samples(made, tight, target)
+    assert len(rows.target) > 100
+    after = turn_ring_axes(made, tight, cameras.cameras, rows, tilt)
+    assert np.array_equal(lit_samples(made, after, rows.target).lit, rows.lit)
+    assert all(old is new for old, new in zip(tight, after, strict=True))
+
+
+def _rings_about_the_ball(projector, tilt):
+    """Turned (parallel: shifted) until the ring axis meets the ball's centre."""
+    pose = projector.world_from_device
+    frame = ring_frame(pose, projector.device, tilt, -np.pi / 2)
+    moved = np.eye(4)
+    if projector.light == "parallel":
+        aside = -frame[:3, 3]
+        moved[:3, 3] = aside - (aside @ frame[:3, 2]) * frame[:3, 2]
+        outer = RADIUS
+    else:
+        towards = -frame[:3, 3] / np.linalg.norm(frame[:3, 3])
+        turn = Rotation.align_vectors(towards[None], frame[None, :3, 2])[0].as_matrix()
+        moved[:3, :3] = turn
+        moved[:3, 3] = frame[:3, 3] - turn @ frame[:3, 3]
+        outer = np.tan(np.arcsin(RADIUS / np.linalg.norm(frame[:3, 3])))
+    return replace(
+        projector,
+        world_from_device=moved @ pose,
+        world_from_ring=moved @ frame,
+        ring_radii=uniform_radii(1.001 * outer, projector.ring_radii[0]),
+    )
 
 
 def test_widest_gap_is_that_of_the_farthest_lit_sample(stages):
