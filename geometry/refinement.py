@@ -51,13 +51,21 @@ def cut_for_curvature(
         The mesh, and of which face each of its faces is a part, as `cut_long_edges`.
     """
     radius = DEFAULT_RADIUS_SHARE * mesh.size if radius is None else radius
-    facet = facet_size(mesh)
-    scale = max(radius, facet)
-    coarse = facet >= _COARSE * radius
-    longest = scale * (_LONGEST_COARSE_SHARE if coarse else _LONGEST_SHARE)
     edges = np.linalg.norm(mesh.corners - np.roll(mesh.corners, 1, axis=1), axis=2)
-    long = edges.max(axis=1) > longest
-    if mesh.face_areas[long].sum() < _CUT_SHARE * mesh.area:
+    largest = edges.max(axis=1)
+
+    def fine(longest: float) -> bool:
+        area = mesh.face_areas[largest > longest].sum()
+        return bool(area < _CUT_SHARE * mesh.area)
+
+    # The scale is no less than the radius: most meshes needn't be looked at closer.
+    if fine(_LONGEST_SHARE * radius):
+        return mesh, np.arange(len(mesh.faces))
+    facet = facet_size(mesh)
+    coarse = facet >= _COARSE * radius
+    share = _LONGEST_COARSE_SHARE if coarse else _LONGEST_SHARE
+    longest = share * max(radius, facet)
+    if fine(longest):
         return mesh, np.arange(len(mesh.faces))
     return cut_long_edges(mesh, longest)
 
