@@ -163,11 +163,7 @@ class RayCaster:
 
         The parts bound memory and spread work; no answer depends on them.
         """
-        parts = -(-n // CHUNK)
-        if n >= 1024 * self.threads:
-            parts = -(-parts // self.threads) * self.threads
-        ends = [n * k // parts for k in range(parts + 1)] if parts else [0]
-        return [slice(a, b) for a, b in pairwise(ends)]
+        return equal_parts(n, CHUNK, self.threads if n >= 1024 * self.threads else 1)
 
     def share(
         self, work: Callable[[slice], None], parts: Iterable[slice], *, least: int = 2
@@ -180,17 +176,25 @@ class RayCaster:
             least: Parts below which no thread is worth its while.
         """
         parts = list(parts)
-        if self.threads == 1 or len(parts) < least:
-            for part in parts:
+        queue = iter(parts)
+
+        def drain() -> None:
+            for part in queue:
                 work(part)
-            return
-        for done in [self._workers().submit(work, part) for part in parts]:
-            done.result()
+
+        helpers = min(self.threads, len(parts)) - 1 if len(parts) >= least else 0
+        others = [self._workers().submit(drain) for _ in range(helpers)]
+        # The caller works too: no thread has to be woken for the last part.
+        try:
+            drain()
+        finally:
+            for other in others:
+                other.result()
 
     def _workers(self) -> ThreadPoolExecutor:
         # A forked child has the pool but not its threads.
         if self._pool is None or self._pool[0] != os.getpid():
-            self._pool = (os.getpid(), ThreadPoolExecutor(self.threads))
+            self._pool = (os.getpid(), ThreadPoolExecutor(self.threads - 1))
         return self._pool[1]
 
     def _rays(
@@ -200,6 +204,13 @@ class RayCaster:
         if origins.ndim == 1:
             return np.broadcast_to(self.local(origins), along.shape), along
         return self.local(origins[part]), along
+
+
+def equal_parts(n: int, most: int, multiple: int = 1) -> list[slice]:
+    """Return n things in equal parts of at most `most`, their number a multiple."""
+    parts = min(-(-n // (most * multiple)) * multiple, n)
+    ends = [n * k // parts for k in range(parts + 1)] if parts else [0]
+    return [slice(a, b) for a, b in pairwise(ends)]
 
 
 def _checked(

@@ -18,72 +18,25 @@ for falsely clear ones. Three things make it hold at any scale.
 `docs/rays.md` has the measurements behind it.
 """
 
-from dataclasses import dataclass
+import threading
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .mesh import TriangleMesh
+from .ray_batch import RayBatch, SampleSet, Source
 from .rays import RayCaster
 
 # Height above a sample's face at which rays end, in units of the half diagonal.
 _SLACK = 2e-6
 # Roundings of the float64 coordinates in the file, for meshes very far from its origin.
 _SLACK_ULPS = 8.0
-# A ray gives up at most `_SLACK` over this of its length, however flatly it meets.
-_LEAST_RISE = 1e-4
+# Rays that go to embree in one call.
+_BATCH = 1 << 16
+# Samples whose facing test is done at a time: its numbers stay in the cache.
+BLOCK = 1 << 14
 # In half diagonals: beyond, squares overflow float32.
 _FARTHEST = 1e15
-
-
-@dataclass(frozen=True, eq=False)
-class Source:
-    """Where the light or view comes from, in the caster's own frame.
-
-    Attributes:
-        origin: Optical centre, or where a parallel beam's plane meets `along`, (3, 1).
-        along: Unit direction of parallel light, shape (3, 1); None for a centre.
-        distance: Of the origin from the middle of the mesh.
-    """
-
-    origin: NDArray[np.float32]
-    along: NDArray[np.float32] | None
-    distance: float
-
-
-@dataclass(frozen=True, eq=False)
-class SampleSet:
-    """Samples made ready for many queries: checked, sorted in space, in float32.
-
-    Attributes:
-        order: Place of each sorted sample in the caller's order, shape (n,); None if
-            the caller's order is kept.
-        place: Where in that order each of the caller's samples went; None likewise.
-        points: Positions in the caster's own frame, shape (3, n).
-        normals: Unit normals, shape (3, n).
-        heights: N . P, shape (n,).
-        back: Diameter of a ball about the middle that holds the mesh and all samples.
-    """
-
-    order: NDArray[np.int64] | None
-    place: NDArray[np.int64] | None
-    points: NDArray[np.float32]
-    normals: NDArray[np.float32]
-    heights: NDArray[np.float32]
-    back: float
-
-    def __len__(self) -> int:
-        return self.points.shape[1]
-
-    def climb(self, part: slice, source: Source) -> NDArray[np.float32]:
-        """Return N . (P - O) of some samples in the set's own order; N . L if parallel.
-
-        Negative where a sample faces the device.
-        """
-        normals = self.normals[:, part]
-        if source.along is not None:
-            return _dot(normals, source.along)
-        return self.heights[part] - _dot(normals, source.origin)
 
 
 class Visibility:
@@ -104,7 +57,8 @@ class Visibility:
             _SLACK * self.caster.reach, _SLACK_ULPS * float(np.finfo(float).eps) * away
         )
         self.slack = local / self.caster.scale
-        self._slack = np.float32(local)
+        self._slack = local
+        self._own = threading.local()
 
     def samples(
         self,
@@ -132,23 +86,16 @@ class Visibility:
                 f"{points.shape} and {normals.shape}"
             )
         local = self.caster.local(points)
-        order = place = None
+        order = None
         if sort:
             order = morton_order(local)
-            place = np.empty_like(order)
-            place[order] = np.arange(len(order))
-            local, normals = local[order], normals[order]
-        farthest = float(np.sqrt(np.einsum("ij,ij->i", local, local).max(initial=0.0)))
-        across = np.ascontiguousarray(local.T)
-        facing = np.ascontiguousarray(normals.T, dtype=np.float32)
-        return SampleSet(
-            order,
-            place,
-            across,
-            facing,
-            _dot(facing, across),
-            1.001 * 2.0 * max(self.caster.reach, farthest),
-        )
+            local, normals = local.take(order, axis=0), normals.take(order, axis=0)
+        across, facing = _columns(local), _columns(normals)
+        farthest = float(np.sqrt(_dot(across, across).max(initial=0.0)))
+        padded = np.zeros((len(local), 4), dtype=np.float32)
+        padded[:, :3] = local
+        back = 1.001 * 2.0 * max(self.caster.reach, farthest)
+        return SampleSet(order, padded, facing, _dot(facing, across), back)
 
     def blocked(
         self,
@@ -183,14 +130,24 @@ class Visibility:
         blocked = np.empty(len(samples), dtype=bool)
 
         def trace(part: slice) -> None:
-            place = part if samples.order is None else samples.order[part]
-            climb = samples.climb(part, source)
-            blocked[place] = self.trace(
-                samples.points[:, part], climb, source, samples.back
-            )
+            batch = self.batch()
+            batch.add_all(samples, part, source)
+            blocked[part] = ~batch.clear()
 
         self.caster.share(trace, self.caster.chunks(len(samples)))
-        return blocked
+        if samples.order is None:
+            return blocked
+        unsorted = np.empty_like(blocked)
+        unsorted[samples.order] = blocked
+        return unsorted
+
+    def batch(self) -> RayBatch:
+        """Return the calling thread's own buffers, empty."""
+        own = self._own
+        if not hasattr(own, "batch"):
+            own.batch = RayBatch(self.caster, self._slack, _BATCH, BLOCK)
+        own.batch.filled = 0
+        return own.batch
 
     def source(
         self, origin: NDArray[np.float64], along: NDArray[np.float64] | None = None
@@ -208,52 +165,17 @@ class Visibility:
                 f"at most {_FARTHEST:g} times the mesh away"
             )
         if along is None:
-            return Source(_column(local), None, float(np.linalg.norm(local)))
+            return Source(local.astype(np.float32), None, float(np.linalg.norm(local)))
         along = np.asarray(along, dtype=np.float64)
         if along.shape != (3,) or not abs(np.linalg.norm(along) - 1.0) < 1e-6:
             raise ValueError(f"along must be a unit vector, got {along.tolist()}")
         # The plane's own point nearest to the mesh keeps float32 from losing digits.
         local = (local @ along) * along
-        return Source(_column(local), _column(along), float(np.linalg.norm(local)))
-
-    def trace(
-        self,
-        points: NDArray[np.float32],
-        climb: NDArray[np.float32],
-        source: Source,
-        back: float,
-    ) -> NDArray[np.bool_]:
-        """Return whether samples are blocked, shape (n,).
-
-        Every step is elementwise, so an answer depends on its sample and device only.
-
-        Args:
-            points: Of the samples, shape (3, n).
-            climb: What `SampleSet.climb` returned for them, shape (n,).
-            source: The device.
-            back: Of the set.
-        """
-        if source.along is None:
-            # All rays shrink towards their samples by one factor. Starts then lie in a
-            # ball about the shrunk origin, which the ball of the mesh can't reach.
-            away = source.distance + 0.5 * back
-            kept = np.float32(min(1.0, back / away))
-            ray: NDArray[np.float32] = points - source.origin
-            ray *= kept
-            rise = np.abs(climb) * kept
-            longest = away * kept
-        else:
-            depth = _dot(points - source.origin, source.along)
-            np.minimum(depth, np.float32(back), out=depth)
-            ray = depth * source.along
-            rise = np.abs(climb * depth)
-            longest = back
-        # `rise` is cos t times the ray's length, so this is the slack's share of it.
-        np.maximum(rise, np.float32(_LEAST_RISE * longest), out=rise)
-        np.divide(-self._slack, rise, out=rise)
-        rise += np.float32(1.0)
-        start: NDArray[np.float32] = points - ray
-        return self.caster.blocked_local(start.T, ray.T, rise)
+        return Source(
+            local.astype(np.float32),
+            along.astype(np.float32),
+            float(np.linalg.norm(local)),
+        )
 
 
 def morton_order(points: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -282,8 +204,8 @@ def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
     return total
 
 
-def _column(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    return values[:, None].astype(np.float32)
+def _columns(rows: NDArray[np.floating]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(rows.T, dtype=np.float32)
 
 
 def _finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from .visibility import SampleSet, Source, Visibility
+from .ray_batch import SampleSet, Source
+from .rays import equal_parts
+from .visibility import BLOCK, Visibility
 
-# Samples of one device that a thread handles at a time; a half of them faces it.
-_SAMPLES = 1 << 15
+# Pairs of device and sample that a thread takes on at a time, a byte each.
+_GROUP = 1 << 19
 # Rows that are unpacked at a time where a result is narrower than the matrix.
 _BLOCK_BYTES = 1 << 22
 
@@ -172,43 +174,62 @@ def visibility_matrix(
     packed = np.empty((len(origins), -(-len(samples) // 8)), dtype=np.uint8)
 
     def trace(rows: slice) -> None:
-        for index in range(rows.start, rows.stop):
-            wanted = None
-            if isinstance(candidates, BitMatrix):
-                wanted = candidates.row(index)
-            elif candidates is not None:
-                wanted = candidates[index]
-            seen = _row(visibility, samples, sources[index], wanted)
-            packed[index] = np.packbits(seen)
+        seen = np.zeros((rows.stop - rows.start, len(samples)), dtype=bool)
+        own = None if candidates is None else _Candidates(candidates, rows, samples)
+        _trace(visibility, samples, sources[rows], own, seen)
+        packed[rows] = np.packbits(seen, axis=1)
 
-    visibility.caster.share(trace, [slice(i, i + 1) for i in range(len(origins))])
+    most = max(1, _GROUP // max(1, len(samples)))
+    caster = visibility.caster
+    caster.share(trace, equal_parts(len(origins), most, caster.threads))
     return BitMatrix(packed, len(samples))
 
 
-def _row(
+class _Candidates:
+    """Rows of the candidates, in the order of the samples."""
+
+    def __init__(
+        self,
+        every: NDArray[np.bool_] | BitMatrix,
+        rows: slice,
+        samples: SampleSet,
+    ) -> None:
+        self._rows = every.rows(rows) if isinstance(every, BitMatrix) else every[rows]
+        self._order = samples.order
+
+    def of(self, row: int, part: slice) -> NDArray[np.bool_]:
+        """Return whether each sample of a part is worth a ray."""
+        row_of = self._rows[row]
+        return row_of[part] if self._order is None else row_of.take(self._order[part])
+
+
+def _trace(
     visibility: Visibility,
     samples: SampleSet,
-    source: Source,
-    wanted: NDArray[np.bool_] | None,
-) -> NDArray[np.bool_]:
-    """Return which samples one device sees, in the caller's order, shape (n,)."""
-    seen = np.zeros(len(samples), dtype=bool)
-    if wanted is not None and samples.order is not None:
-        wanted = wanted.take(samples.order)
-    for begin in range(0, len(samples), _SAMPLES):
-        part = slice(begin, begin + _SAMPLES)
-        climb = samples.climb(part, source)
-        worth = climb < 0
-        if wanted is not None:
-            worth &= wanted[part]
-        rays = np.flatnonzero(worth)
-        # `take` is several times faster than indexing by an array.
-        blocked = visibility.trace(
-            samples.points[:, part].take(rays, axis=1),
-            climb.take(rays),
-            source,
-            samples.back,
-        )
-        worth[rays] = ~blocked
-        seen[part] = worth
-    return seen if samples.place is None else seen.take(samples.place)
+    sources: list[Source],
+    candidates: _Candidates | None,
+    seen: NDArray[np.bool_],
+) -> None:
+    """Set what some devices see, in the caller's order; `seen` is all false before."""
+    batch = visibility.batch()
+    waiting: list[tuple[int, NDArray[np.int64]]] = []
+
+    def settle() -> None:
+        clear, begin = batch.clear(), 0
+        for row, places in waiting:
+            # One index of one dimension: numpy's quick way to scatter.
+            seen[row][places] = clear[begin : begin + len(places)]
+            begin += len(places)
+        waiting.clear()
+
+    order = samples.order
+    parts = equal_parts(len(samples), BLOCK)
+    for row, source in enumerate(sources):
+        for part in parts:
+            if batch.room < part.stop - part.start:
+                settle()
+            wanted = None if candidates is None else candidates.of(row, part)
+            rays = batch.add_facing(samples, part, source, wanted)
+            places = rays + part.start if order is None else order[part].take(rays)
+            waiting.append((row, places))
+    settle()

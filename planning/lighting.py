@@ -21,6 +21,7 @@ CAUSES = (
     "projector_occlusion",
 )
 LIT = len(CAUSES)
+OCCLUDED = LIT - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +128,27 @@ def first_failure(
     Returns:
         Shape (n,).
     """
+    stage = first_failure_in_the_open(projector, target, limits, light=light)
+    clear = np.flatnonzero(stage == LIT)
+    samples, pose = target.samples, projector.world_from_device
+    blocked = visibility.blocked(
+        pose[:3, 3],
+        samples.points[clear],
+        samples.normals[clear],
+        along=pose[:3, 2] if projector.light == "parallel" else None,
+    )
+    stage[clear[blocked]] = OCCLUDED
+    return stage
+
+
+def first_failure_in_the_open(
+    projector: PlannedProjector,
+    target: Target,
+    limits: ProjectorLimits,
+    *,
+    light: Light | None = None,
+) -> NDArray[np.int8]:
+    """Return what `first_failure` does, were there nothing in between."""
     light = light_on(projector, target) if light is None else light
     low, high = projector.device.range_m
     tests = (
@@ -138,15 +160,6 @@ def first_failure(
     stage = np.full(len(target), LIT, dtype=np.int8)
     for index in range(len(tests) - 1, -1, -1):
         stage[~tests[index]] = index
-    clear = np.flatnonzero(stage == LIT)
-    samples, pose = target.samples, projector.world_from_device
-    blocked = visibility.blocked(
-        pose[:3, 3],
-        samples.points[clear],
-        samples.normals[clear],
-        along=pose[:3, 2] if projector.light == "parallel" else None,
-    )
-    stage[clear[blocked]] = LIT - 1
     return stage
 
 

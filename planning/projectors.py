@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.visibility_matrix import visibility_matrix
+
 from . import lighting
 from .candidates import projector_candidates
 from .errors import InfeasibleLimitsError
@@ -96,13 +98,37 @@ def lit_stages(
 ) -> NDArray[np.int8]:
     """Return the first failing limit of each sample (row) and projector (column)."""
     stages = np.empty((len(target), len(projectors)), dtype=np.int8)
-    limits, visibility = scene.requirements.projector, scene.visibility
     for column, projector in enumerate(projectors):
         scene.pulse()
-        stages[:, column] = lighting.first_failure(
-            projector, target, limits, visibility
+        stages[:, column] = lighting.first_failure_in_the_open(
+            projector, target, scene.requirements.projector
         )
+    for light in ("diverging", "parallel"):
+        alike = [i for i, p in enumerate(projectors) if p.light == light]
+        if alike:
+            own = [projectors[i] for i in alike]
+            stages[:, alike] = _with_shadows(scene, own, target, stages[:, alike])
     return stages
+
+
+def _with_shadows(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    target: Target,
+    stages: NDArray[np.int8],
+) -> NDArray[np.int8]:
+    """Return the stages of projectors with one kind of light, occlusion included."""
+    poses = np.stack([projector.world_from_device for projector in projectors])
+    lit = stages == lighting.LIT
+    seen = visibility_matrix(
+        scene.visibility,
+        poses[:, :3, 3],
+        target.samples.points,
+        target.samples.normals,
+        along=poses[:, :3, 2] if projectors[0].light == "parallel" else None,
+        candidates=np.ascontiguousarray(lit.T),
+    ).dense_transposed()
+    return np.where(lit & ~seen, np.int8(lighting.OCCLUDED), stages)
 
 
 def margins_of(
