@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from .cone_sums import CONE_SHARE, Patch, unit
 from .topology import components
 
-_MAX_ROUNDS = 60
+_MAX_ROUNDS = 12
 _ROOM = 0.7
 
 
@@ -17,43 +17,35 @@ def join_crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     """
     if not np.any(piece < 0) or not np.any(piece >= 0):
         return piece
-    before = piece
-    locked = np.zeros(int(piece.max()) + 1, dtype=bool)
-    while True:
-        joined = _join(patch, before, locked)
-        # The axis moved with what joined: whose share is lost goes back.
-        lost = (patch.shares(joined) < CONE_SHARE[1]) & ~locked
-        if not lost.any():
-            return joined
-        locked |= lost
+    joined = _join(patch, piece)
+    # The axis moved with what joined: what a piece that lost its share took goes back.
+    lost = patch.shares(joined) < CONE_SHARE[1]
+    return np.where((joined >= 0) & lost[joined], piece, joined)
 
 
-def _join(
-    patch: Patch, piece: NDArray[np.int64], locked: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def _join(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     piece = piece.copy()
     sums, areas = patch.sums(piece)
     axis = unit(sums)
     inside = patch.shares(piece)
     # Not all that is free, since the mean moves.
-    room = np.where(locked, -1.0, areas * _ROOM * (inside - CONE_SHARE[1]))
-    whole = True
-    for _ in range(_MAX_ROUNDS):
-        crumb = _crumbs(patch, piece) if whole else _single(piece)
-        owner = _best(patch, crumb, piece, axis, locked)
-        to = np.where(crumb >= 0, owner[crumb], -1) if len(owner) else piece * 0 - 1
-        outside = (to >= 0) & (patch.cosines(to, axis) < patch.cos_half)
-        out = patch.sums(np.where(outside, crumb, -1), len(owner))[1]
-        taken = _within(owner, out, room)
-        if not taken.any():
-            if not whole:
+    room = areas * _ROOM * (inside - CONE_SHARE[1])
+    # What fits nowhere as one may fit its neighbours face by face.
+    for number in (_crumbs, _single):
+        for _ in range(_MAX_ROUNDS):
+            crumb = number(patch, piece)
+            owner = _best(patch, crumb, piece, axis)
+            if not len(owner):
+                return piece
+            to = np.where(crumb >= 0, owner[crumb], -1)
+            outside = (to >= 0) & (patch.cosines(to, axis) < patch.cos_half)
+            out = patch.sums(np.where(outside, crumb, -1), len(owner))[1]
+            taken = _within(owner, out, room)
+            if not taken.any():
                 break
-            # What fits nowhere as one may fit its neighbours face by face.
-            whole = False
-            continue
-        gained = (crumb >= 0) & taken[crumb]
-        piece[gained] = to[gained]
-        room -= np.bincount(owner[taken], out[taken], len(room))
+            gained = (crumb >= 0) & taken[crumb]
+            piece[gained] = to[gained]
+            room -= np.bincount(owner[taken], out[taken], len(room))
     return piece
 
 
@@ -68,9 +60,9 @@ def _crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     return label
 
 
-def _single(piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def _single(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     """Number the faces without a piece, -1 for the others."""
-    free = piece < 0
+    free = piece[: patch.n] < 0
     return np.where(free, np.cumsum(free) - 1, -1)
 
 
@@ -79,15 +71,14 @@ def _best(
     crumb: NDArray[np.int64],
     piece: NDArray[np.int64],
     axis: NDArray[np.float64],
-    locked: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
     """The adjacent piece whose axis is nearest to each crumb's mean, -1 without one."""
     sums, _ = patch.sums(crumb)
     owner = np.full(len(sums), -1, dtype=np.int64)
     both = np.concatenate([patch.links, patch.links[:, ::-1]])
     both = both[(crumb[both[:, 0]] >= 0) & (piece[both[:, 1]] >= 0)]
-    met = np.stack([crumb[both[:, 0]], piece[both[:, 1]]], axis=1)
-    met = np.unique(met[~locked[met[:, 1]]], axis=0)
+    key = np.unique(crumb[both[:, 0]] * len(axis) + piece[both[:, 1]])
+    met = np.stack(np.divmod(key, len(axis)), axis=1)
     if len(met):
         fit = np.einsum("ij,ij->i", unit(sums)[met[:, 0]], axis[met[:, 1]])
         order = np.lexsort((met[:, 1], -np.round(fit, 9), met[:, 0]))

@@ -76,9 +76,11 @@ def merged(patch: Patch, piece: NDArray[np.int64], share: float) -> NDArray[np.i
     """
     met = piece[patch.links]
     met = met[(met.min(axis=1, initial=0) >= 0) & (met[:, 0] != met[:, 1])]
-    met = np.unique(np.sort(met, axis=1), axis=0)
     if not len(met):
         return piece
+    count = int(piece.max()) + 1
+    key = np.unique(met.min(axis=1) * count + met.max(axis=1))
+    met = np.stack(np.divmod(key, count), axis=1)
     sums, areas = patch.sums(piece)
     work = _Merging(patch, share, sums, areas, _members(piece, len(areas)))
     for a, b in met.tolist():
