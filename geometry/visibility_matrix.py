@@ -140,8 +140,8 @@ def visibility_matrix(
     0`` in parallel light. Limits beyond that are the caller's, through `candidates`.
 
     Devices are shared among the threads. Beside the answer (n_devices * n / 8 bytes)
-    and the prepared samples (44 n bytes), a thread holds one row (3 n bytes) and one
-    chunk of rays (under 2 MB), however many devices there are.
+    and the prepared samples (40 n bytes), a thread holds 3 MB of rays and a byte for
+    each of half a million pairs, or of one row, however many devices there are.
 
     Args:
         visibility: The occluder.
