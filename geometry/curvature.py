@@ -142,8 +142,8 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
         edge = mesh.mean_edge
         used, faces = _numbered(solid, n)
         vertices = (mesh.vertices[used] - mesh.centre) / edge
-        found, ways, fitted = _averaged_fit(vertices, faces, scale / edge)
-        fitted &= ~_near_border(vertices, mesh_edges(faces), radius / edge, _RINGS)
+        whole = ~_near_border(vertices, mesh_edges(faces), radius / edge, _RINGS)
+        found, ways, fitted = _averaged_fit(vertices, faces, whole, scale / edge)
         valid[used] = fitted
         k[:, valid] = found[:, fitted] / edge
         directions[:, valid] = ways[:, fitted]
@@ -155,14 +155,21 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
 
 
 def _averaged_fit(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], scale: float
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    whole: NDArray[np.bool_],
+    scale: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Fit, averaged over a scale in mean edges; the results are those of `_fit`."""
+    """Fit, averaged over a scale in mean edges; the results are those of `_fit`.
+
+    Only vertices with a whole neighbourhood take part.
+    """
     mass, laplacian = vertex_areas(vertices, faces), surface_laplacian(vertices, faces)
     beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
     if beyond > 0:
         vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))
     k, ways, fitted = _fit(vertices, faces, _RINGS)
+    fitted &= whole
     # An exactly flat neighbourhood has no direction of its own, hence no normal.
     normals = np.cross(ways[0], ways[1])
     length = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -33,6 +33,12 @@ def shared_meshes() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def curved_shapes() -> ModuleType:
+    """Shapes with their exact curvatures."""
+    return _load("curved_shapes")
+
+
+@pytest.fixture(scope="session")
 def small_job() -> ModuleType:
     """The main job in this process, with few candidates."""
     return _load("small_job")
