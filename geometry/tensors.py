@@ -29,16 +29,16 @@ def packed(
 
 def unpacked(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return what `packed` packed, (n, 3, 3)."""
-    plain = np.asarray(tensors / _DOUBLED, dtype=np.float64)
-    return plain[:, _PACKED_AT]
+    return (tensors / _DOUBLED)[:, _PACKED_AT]
 
 
 def tangent_planes(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return two unit vectors across each unit normal, as columns, shape (n, 3, 2)."""
     least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    first = np.cross(normals, least)
+    first = np.cross(normals, least).astype(np.float64)
     first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
-    return np.stack([first, np.cross(normals, first)], axis=2)
+    second = np.cross(normals, first).astype(np.float64)
+    return np.stack([first, second], axis=2)
 
 
 def principal(
