@@ -12,6 +12,8 @@ by the cosine of incidence at which its ray meets the sample's face.
 import os
 import platform
 import sys
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import igl
@@ -53,7 +55,7 @@ def main() -> int:
     return 0
 
 
-def _cases(data: Path):
+def _cases(data: Path) -> Iterator[tuple[str, TriangleMesh, float]]:
     ball = _bumpy(6)
     for name, scale, centre, distance in (
         ("bumpy ball, 82k faces, radius 1 m", 1.0, 0.0, 3.0),
@@ -119,9 +121,8 @@ def _row(mesh: TriangleMesh, distance: float, n: int) -> str:
     tree, corners = igl.AABB(), np.ascontiguousarray(mesh.faces)
     tree.init(vertices, corners)
     found: list[np.ndarray] = []
-    for part, origin in zip(
-        np.array_split(np.arange(n), 8), middle + away, strict=True
-    ):
+    parts = np.array_split(np.arange(n), 8)
+    for part, origin in zip(parts, middle + away, strict=True):
         rays = points[part] - origin
         length = np.linalg.norm(rays, axis=1)
         rays /= length[:, None]
@@ -142,7 +143,7 @@ def _row(mesh: TriangleMesh, distance: float, n: int) -> str:
 def _counted(found: np.ndarray) -> str:
     cosine, truth, blocked = found[:, 0], found[:, 1] > 0, found[:, 2] > 0
     cells = []
-    for low, high in zip(BANDS[:-1], BANDS[1:], strict=True):
+    for low, high in pairwise(BANDS):
         band = (cosine > low) & (cosine <= high)
         false = (blocked & ~truth)[band].sum(), (truth & ~blocked)[band].sum()
         cells.append(f"{band.sum():,}, {false[0]} / {false[1]}")

@@ -1,6 +1,7 @@
 """The visibility engine against float64, and the matrix of bits against its meaning."""
 
 import tracemalloc
+from functools import lru_cache
 
 import igl
 import numpy as np
@@ -34,18 +35,22 @@ def devices(mesh: TriangleMesh, distance: float, n: int = 6) -> np.ndarray:
     return mesh.bounds.mean(axis=0) + distance * along
 
 
-def truly_blocked(mesh: TriangleMesh, samples: SurfaceSamples, sources) -> np.ndarray:
-    """Float64 first hits; a sample is free if its own face is the first.
-
-    libigl takes triangles whose determinant is under 1e-6 for edge-on, so the mesh is
-    scaled to a million units.
-    """
+@lru_cache(maxsize=1)
+def reference(mesh: TriangleMesh):
+    """The mesh for libigl, which takes triangles whose determinant is under 1e-6 for
+    edge-on: so a million units large."""
     middle = mesh.bounds.mean(axis=0)
     scale = 1e6 / np.linalg.norm(np.ptp(mesh.bounds, axis=0))
     vertices = np.ascontiguousarray((mesh.vertices - middle) * scale)
     faces = np.ascontiguousarray(mesh.faces)
     tree = igl.AABB()
     tree.init(vertices, faces)
+    return tree, vertices, faces, middle, scale
+
+
+def truly_blocked(mesh: TriangleMesh, samples: SurfaceSamples, sources) -> np.ndarray:
+    """Float64 first hits; a sample is free if its own face is the first."""
+    tree, vertices, faces, middle, scale = reference(mesh)
     points = (samples.points - middle) * scale
     rays = points - (sources - middle) * scale
     length = np.linalg.norm(rays, axis=1)
