@@ -8,6 +8,7 @@ from .topology import components
 
 _MAX_ROUNDS = 12
 _ROOM = 0.7
+_EQUAL = 1e-9
 
 
 def join_crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -93,7 +94,9 @@ def _within(
     """Which crumbs their pieces have room for, the best fitting first."""
     taken = np.zeros(len(owner), dtype=bool)
     waiting = np.flatnonzero(owner >= 0)
-    order = waiting[np.lexsort((waiting, out[waiting], owner[waiting]))]
+    # Equal up to rounding, as on two sides of a mirror: the lowest number goes first.
+    rank = np.round(out[waiting] / max(_EQUAL * float(room.max()), 1e-300))
+    order = waiting[np.lexsort((waiting, rank, owner[waiting]))]
     total = np.cumsum(out[order])
     start = np.searchsorted(owner[order], owner[order])
     before = np.where(start > 0, total[start - 1], 0.0) if len(order) else total
