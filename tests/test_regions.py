@@ -11,6 +11,7 @@ from geometry.face_curvature import face_curvature, steep_directions
 from geometry.mesh import TriangleMesh
 from geometry.primitives import box, cylinder, grid, sphere, torus
 from geometry.readers import load_mesh
+from geometry.refinement import cut_for_curvature
 from geometry.regions import DominantRegions, dominant_regions
 from geometry.topology import adjacent_faces, components, mesh_edges
 
@@ -403,3 +404,73 @@ def test_on_a_real_face_nose_lips_chin_and_brows_come_out() -> None:
     noise = np.random.default_rng(0).normal(size=mesh.vertices.shape)
     noisy = TriangleMesh(mesh.vertices + 1e-3 * size * noise / np.sqrt(3), mesh.faces)
     assert overlap(regions_of(noisy).face_region >= 0, inside, mesh.face_areas) > 0.8
+
+
+def test_the_regions_of_a_cube_lie_along_its_edges_whatever_its_triangles() -> None:
+    plain = box((0.1, 0.1, 0.1))
+    turned = TriangleMesh(
+        plain.vertices, np.concatenate([plain.faces[6:], plain.faces[:6, [1, 2, 0]]])
+    )
+    for mesh in (plain, turned):
+        assert len(mesh.faces) == 12
+        cut, _ = cut_for_curvature(mesh)
+        inside = regions_of(cut).face_region >= 0
+        off = np.sort(0.05 - np.abs(cut.face_centroids), axis=1)[:, 1]
+        assert inside[off < 0.003].all()
+        assert not inside[off > 0.02].any()
+
+
+def test_equal_areas_are_numbered_by_their_lowest_face() -> None:
+    one = bumpy(60)
+    other = TriangleMesh(one.vertices * [-1, 1, 1] + [0.5, 0, 0], one.faces[:, ::-1])
+    n = len(one.vertices)
+    pair = TriangleMesh(
+        np.concatenate([one.vertices, other.vertices]),
+        np.concatenate([one.faces, other.faces + n]),
+    )
+    found = regions_of(pair)
+    assert len(found) >= 2
+    for turn in range(4):
+        way = Rotation.from_rotvec([0.3 * turn, 0.7, 0.2 * turn]).as_matrix()
+        moved = TriangleMesh(3.7 * pair.vertices @ way.T + 100.0, pair.faces)
+        np.testing.assert_array_equal(regions_of(moved).face_region, found.face_region)
+    areas = np.array([region.area_m2 for region in found])
+    twins = np.flatnonzero(np.abs(np.diff(areas)) < 1e-9 * pair.area)
+    assert len(twins)
+    assert all(found[i].faces[0] < found[i + 1].faces[0] for i in twins)
+
+
+def test_an_eyeball_in_its_socket_stays_curved() -> None:
+    # Convex in concave: with sign, the two would cancel.
+    flat = grid(0.3, 0.3, divisions=(120, 120))
+    away = np.linalg.norm(flat.vertices[:, :2], axis=1)
+    ball = np.sqrt(np.maximum(0.02**2 - away**2, 0.0))
+    z = ball - 0.02 * np.exp(-((away / 0.03) ** 2))
+    mesh = TriangleMesh(np.column_stack([flat.vertices[:, :2], z]), flat.faces)
+    inside = regions_of(mesh, area_share=0.05).face_region >= 0
+    near = np.linalg.norm(mesh.face_centroids[:, :2], axis=1)
+    assert inside[near < 0.02].all()
+    assert not inside[near > 0.08].any()
+
+
+def test_on_the_sample_head_every_feature_is_in_a_region_on_both_sides() -> None:
+    mesh = load_mesh(Path(__file__).resolve().parents[1] / "face.obj", unit="mm")
+    found = regions_of(mesh)
+    assert len(found) <= 30
+    inside = found.face_region >= 0
+    at = mesh.face_centroids
+    share = mesh.face_areas[inside].sum() / mesh.area
+    assert 0.15 < share < 0.25
+    # The head looks along -y; its halves are mirror images about x = 0.
+    left, right = (mesh.face_areas[inside & (s * at[:, 0] > 0)].sum() for s in (1, -1))
+    assert left == pytest.approx(right, rel=0.02)
+    tip = at[np.argmin(at[:, 1])]
+    for across, up, reach in ((0.0, 0.0, 0.012), (0.035, 0.045, 0.01)):
+        for side in (-1, 1):
+            spot = np.hypot(at[:, 0] - side * across, at[:, 2] - tip[2] - up) < reach
+            spot &= mesh.face_normals[:, 1] < -0.3
+            assert mesh.face_areas[spot & inside].sum() > (
+                0.6 * mesh.face_areas[spot].sum()
+            )
+    ears = np.abs(at[:, 0]) > 0.97 * np.abs(at[:, 0]).max()
+    assert inside[ears].mean() > 0.9

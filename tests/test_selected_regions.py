@@ -173,3 +173,17 @@ def test_what_cannot_be_a_selection_or_a_weight_is_refused() -> None:
             lightest_corner([1.0, 1.0, value], np.array([[0, 1, 2]]))
     with pytest.raises(ValueError, match="no face has a weight above 0"):
         heaviest_faces(ball, np.zeros(n))
+
+
+def test_thousands_of_scattered_faces_are_as_many_regions() -> None:
+    ball = sphere(0.1, subdivisions=6)
+    pairs = adjacent_faces(mesh_edges(ball.faces))
+    order = np.random.default_rng(5).permutation(len(ball.faces))[:6000]
+    chosen = np.zeros(len(ball.faces), dtype=bool)
+    chosen[order] = True
+    found = regions_of(ball, chosen)
+    np.testing.assert_array_equal(found.face_region >= 0, chosen)
+    inner = pairs[chosen[pairs].all(axis=1)]
+    lonely = components(inner, len(ball.faces))[0] - int((~chosen).sum())
+    assert lonely > 4000
+    assert len(found) == lonely
