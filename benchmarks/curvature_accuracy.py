@@ -193,7 +193,7 @@ def _draw(panels: list[tuple[str, list[tuple[str, list[float], list[float]]]]]) 
             pen.line(dots, INKS[k], 3)
             for x, y in dots:
                 pen.ellipse([x - 4, y - 4, x + 4, y + 4], INKS[k])
-            pen.text((x0 + 285, y0 + 165 + 20 * k), name, INKS[k], font)
+            pen.text((x0 + 285, y0 + 216 + 20 * k), name, INKS[k], font)
     image.save(FIGURE, optimize=True)
 
 
