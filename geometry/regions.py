@@ -76,13 +76,12 @@ def dominant_regions(
 
     Trusted faces have three valid vertices, so the rim of an open border is left out;
     where nothing is trusted, the surface counts as uniform. Bodies too small for a
-    region are left out too. Curvature tensors are
-    averaged over 1.5 times the scale they hold at. If the cut at ``area_share``
-    would run through a plateau of equal curvedness, the plateau is taken whole: a
-    sphere, a cylinder or a plate is dominant as a whole. If less than the share is
-    curved at all, that is all. Islands and holes below
-    ``min_region_share`` of the area vanish; what stays is split by its normals until
-    each piece fits a cone.
+    region are left out too. Curvedness is that of `face_curvedness`. A plateau of equal
+    curvedness at the cut is taken whole: a sphere, a cylinder or a plate is dominant as
+    a whole. If less than the share is curved at all, that is all. Islands and holes
+    below ``min_region_share`` of the area vanish; what stays is cut into pieces that
+    fit a cone (`cone_pieces`). Pieces below a quarter of that share that fit no
+    neighbour are dropped, unless the whole surface is dominant.
 
     Args:
         mesh: The surface.
