@@ -19,8 +19,6 @@ _AVERAGED_SHARE = 0.01
 # Of the length of an edge over the distance across it.
 _LARGEST_WEIGHT = 3.0
 _AREA_DIGITS = 1e-9
-# Shares of the least area at which what fits no piece is cut once more.
-_FINER = (1.0, 0.25)
 
 
 def cone_pieces(
@@ -38,9 +36,8 @@ def cone_pieces(
     that noise has turned is no feature) within the half angle of their mean. Of what
     doesn't fit, the part about its mean is taken as seen from its own front, then what
     is left on its sides. Parts below the least area join the adjacent piece that they
-    fit best; what fits none is cut down to a quarter of it, and what still fits none is
-    dropped, or with `keep_all` a piece of its own. Adjacent pieces
-    stay apart only if their union fits no cone.
+    fit best; what fits none is dropped, or with `keep_all` a piece of its own.
+    Adjacent pieces stay apart only if their union fits no cone.
 
     Args:
         mesh: The surface.
@@ -63,13 +60,9 @@ def cone_pieces(
         links,
         float(np.cos(half_angle)),
     )
-    piece = np.full(len(faces), -1, dtype=np.int64)
-    for share in _FINER:
-        # What was too small to be cut on, and fitted nowhere, is cut finer.
-        found = _split(patch, piece < 0, share * least)
-        piece = np.where(found < 0, piece, found + piece.max(initial=-1) + 1)
-        piece = merged(patch, piece, CONE_SHARE[0])
-        piece = join_crumbs(patch, piece)
+    piece = _split(patch, np.ones(len(faces), dtype=bool), least)
+    piece = merged(patch, piece, CONE_SHARE[0])
+    piece = join_crumbs(patch, piece)
     if keep_all and np.any(piece < 0):
         rest = _split(patch, piece < 0, 0.0)
         piece = np.where(piece < 0, rest + piece.max(initial=-1) + 1, piece)

@@ -80,8 +80,8 @@ def dominant_regions(
     curvedness at the cut is taken whole: a sphere, a cylinder or a plate is dominant as
     a whole. If less than the share is curved at all, that is all. Islands and holes
     below ``min_region_share`` of the area vanish; what stays is cut into pieces that
-    fit a cone (`cone_pieces`). Pieces below a quarter of that share that fit no
-    neighbour are dropped, unless the whole surface is dominant.
+    fit a cone (`cone_pieces`). What is smaller and fits no neighbour is dropped, unless
+    the whole surface is dominant.
 
     Args:
         mesh: The surface.
