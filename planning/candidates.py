@@ -1,5 +1,6 @@
 """Poses offered to the cover programs, spread evenly over the workspace."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,10 @@ from .rings import ring_frame
 _QUARTER = float(np.pi / 2)
 # A floor may leave a sliver of the cone; finer lattices than this aren't tried for it.
 _MOST_OFFERED = 1000
+# Positions offered around a chosen one.
+_AROUND = 60
+# Sine of the angle to the vertical below which a direction has no level across it.
+_LEVEL = 1e-6
 
 
 def shell_positions(
@@ -104,6 +109,65 @@ def projector_candidates(
         ring_offset: Tilt and azimuth of the ring axis, as `ring_frame` takes them.
     """
     poses = _poses(template.device, workspace, workspace.projector_radius_m, n)
+    return _projectors(template, poses, ring_offset)
+
+
+def projectors_around(
+    chosen: Sequence[PlannedProjector],
+    workspace: Workspace,
+    n_lattice: int,
+    *,
+    ring_offset: tuple[float, float],
+) -> tuple[PlannedProjector, ...]:
+    """Return candidates between those of a lattice, close around chosen ones.
+
+    Each chosen pose gets positions out to the lattice's spacing, as seen from the
+    centre of the workspace, as far as they are admissible; laid out from the vertical
+    through it, so that they turn with the workspace.
+
+    Args:
+        chosen: Projectors of the lattice.
+        workspace: Where devices may stand.
+        n_lattice: Poses of the lattice.
+        ring_offset: As for `projector_candidates`.
+    """
+    if not chosen:
+        return ()
+    device, centre = chosen[0].device, np.array(workspace.centre)
+    near, far = workspace.projector_radius_m
+    radius = 0.5 * (near + far)
+    rolls = rolls_for(device, workspace.object_radius_m, radius)
+    n_positions = max(1, n_lattice // len(rolls))
+    # Each position of the lattice has this much of the solid angle.
+    spacing = np.sqrt(2 * np.pi * (1 - np.cos(workspace.half_angle)) / n_positions)
+    found: list[NDArray[np.float64]] = []
+    for projector in chosen:
+        outwards = projector.world_from_device[:3, 3] - centre
+        outwards = outwards / np.linalg.norm(outwards)
+        level = np.cross(np.array(workspace.up), outwards)
+        start = level if np.linalg.norm(level) > _LEVEL else None
+        cap = fibonacci_cap(_AROUND, outwards, float(spacing), start=start)
+        found.append(centre + radius * cap[_stands(cap, radius, workspace)])
+    positions = np.concatenate(found)
+    poses = _aimed(positions, device, workspace, rolls)
+    return _projectors(chosen[0], poses, ring_offset)
+
+
+def _stands(
+    directions: NDArray[np.float64], radius: float, workspace: Workspace
+) -> NDArray[np.bool_]:
+    """Whether places on a sphere about the centre are in the cone, over the floor."""
+    height = radius * (directions @ np.array(workspace.up))
+    floor = -np.inf if workspace.floor_m is None else workspace.floor_m
+    along = directions @ np.array(workspace.axis)
+    return (height >= floor) & (along >= np.cos(workspace.half_angle))
+
+
+def _projectors(
+    template: PlannedProjector,
+    poses: NDArray[np.float64],
+    ring_offset: tuple[float, float],
+) -> tuple[PlannedProjector, ...]:
     return tuple(
         replace(
             template,
@@ -131,12 +195,21 @@ def _poses(
     distance = 0.5 * (radius_m[0] + radius_m[1])
     rolls = rolls_for(device, workspace.object_radius_m, distance)
     positions = shell_positions(workspace, radius_m, -(-n // len(rolls)))
-    centre, up = np.array(workspace.centre), np.array(workspace.up)
     if not len(positions):
         raise InfeasibleLimitsError(
             "the workspace holds no position: its floor, cone and shell exclude each "
             "other; lower the floor or widen the cone"
         )
+    return _aimed(positions, device, workspace, rolls)
+
+
+def _aimed(
+    positions: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    workspace: Workspace,
+    rolls: Sequence[float],
+) -> NDArray[np.float64]:
+    centre, up = np.array(workspace.centre), np.array(workspace.up)
     return np.concatenate(
         [aimed_poses(positions, centre, up, device, roll=roll) for roll in rolls]
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from geometry.visibility_matrix import visibility_matrix
 
 from . import lighting
-from .candidates import projector_candidates
+from .candidates import projector_candidates, projectors_around
 from .errors import InfeasibleLimitsError
 from .lighting import Target
 from .plan import PlannedProjector
@@ -52,8 +52,10 @@ def plan_projectors(
 ) -> ProjectorStage:
     """Choose the fewest projectors that light the required share of the target.
 
-    A minimal cover overfits its samples; so it is tested on fresh ones, and where it
-    falls short there, they join the rows and the cover is solved again.
+    The best of a lattice of candidates get more candidates around them, and the cover
+    is solved again over all. A minimal cover overfits its samples; so it is tested on
+    fresh ones, and where it falls short there, they join the rows and the cover is
+    solved once more.
 
     Args:
         scene: Surface and requirements.
@@ -72,15 +74,20 @@ def plan_projectors(
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
         raise InfeasibleLimitsError(_nothing_lit(stages, len(candidates)))
+    selection = _fewest(scene, stages)
+    # The best of a lattice lies beside the best there is.
+    around = projectors_around(
+        [candidates[i] for i in selection.chosen],
+        required.workspace,
+        len(candidates),
+        ring_offset=ring_offset,
+    )
+    stages = np.concatenate([stages, lit_stages(scene, around, rows)], axis=1)
+    candidates += around
     attempt = 0
     while True:
         attempt += 1
-        selection = select_fewest(
-            stages == lighting.LIT,
-            required.dominant_coverage,
-            max_count=required.max_projectors,
-            seed=scene.seed,
-        )
+        selection = _fewest(scene, stages)
         fresh = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh_stages = lit_stages(scene, candidates, fresh)
         lit = fresh_stages == lighting.LIT
@@ -91,6 +98,16 @@ def plan_projectors(
         rows = merged(rows, fresh)
         stages = np.concatenate([stages, fresh_stages])
     return _stage(scene, candidates, rows, stages, selection)
+
+
+def _fewest(scene: Scene, stages: NDArray[np.int8]) -> Selection:
+    required = scene.requirements
+    return select_fewest(
+        stages == lighting.LIT,
+        required.dominant_coverage,
+        max_count=required.max_projectors,
+        seed=scene.seed,
+    )
 
 
 def lit_stages(

@@ -9,6 +9,7 @@ from planning.candidates import (
     aimed_poses,
     camera_candidates,
     projector_candidates,
+    projectors_around,
     rolls_for,
     shell_positions,
 )
@@ -174,3 +175,50 @@ def test_uniform_radii_end_at_the_outermost_in_equal_steps_no_wider_than_the_gap
     steps = np.diff(radii, prepend=0.0)
     assert np.allclose(steps, steps[0])
     assert 0.019 < steps[0] <= 0.02
+
+
+def _chosen(space, n=640):
+    template = PlannedProjector(
+        "", "diverging", np.eye(4), np.eye(4), SHIFTED, np.linspace(0.01, 0.4, 40)
+    )
+    return projector_candidates(template, space, n, ring_offset=(0.14, -np.pi / 2))
+
+
+def test_candidates_around_a_chosen_one_fill_the_gap_of_the_lattice():
+    space = workspace()
+    chosen = _chosen(space)[200]
+    found = projectors_around([chosen], space, 640, ring_offset=(0.14, -np.pi / 2))
+    before, *after = (p.world_from_device[:3, 3] - CENTRE for p in (chosen, *found))
+    angles = np.arccos(np.clip(np.array(after) @ before / 1.2**2, -1, 1))
+    # 640 on a sphere: 4 pi / 640 sr each.
+    assert np.degrees(angles.max()) == pytest.approx(8.0, abs=0.3)
+    assert np.allclose(np.linalg.norm(after, axis=1), 1.2)
+    probes = np.random.default_rng(1).normal(size=(20_000, 3))
+    probes /= np.linalg.norm(probes, axis=1, keepdims=True)
+    probes = probes[probes @ before > 1.2 * np.cos(np.radians(7.5))]
+    nearest = np.arccos(np.clip(probes @ np.array(after).T / 1.2, -1, 1)).min(axis=1)
+    assert np.degrees(nearest.max()) < 1.5
+    for projector in found[:5]:
+        local = transform(inverse(projector.world_from_device), np.array([CENTRE]))
+        middle = [[511.5, 383.5]]
+        assert SHIFTED.project(local) == pytest.approx(np.array(middle), abs=1e-6)
+        assert np.allclose(
+            projector.world_from_ring,
+            ring_frame(projector.world_from_device, SHIFTED, 0.14, -np.pi / 2),
+        )
+
+
+@pytest.mark.parametrize("floor", [None, 0.3])
+def test_candidates_around_stay_in_cone_and_over_the_floor(floor):
+    space = workspace(np.radians(40), floor)
+    chosen = _chosen(space, 60)
+    found = projectors_around(chosen, space, 60, ring_offset=(0.14, -np.pi / 2))
+    offset = np.array([p.world_from_device[:3, 3] for p in found]) - CENTRE
+    assert np.arccos(np.clip(-offset[:, 1] / 1.2, -1, 1)).max() <= np.radians(40) + 1e-9
+    if floor is not None:
+        assert offset[:, 2].min() >= floor
+    assert 60 * len(chosen) * 0.5 < len(found) < 60 * len(chosen)
+
+
+def test_nothing_chosen_offers_nothing_around():
+    assert projectors_around([], workspace(), 640, ring_offset=(0.0, 0.0)) == ()
