@@ -6,13 +6,13 @@ from functools import cached_property
 import igl
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from .diffusion import diffused, surface_laplacian, vertex_areas
+from .diffusion import diffused
 from .mesh import TriangleMesh
 from .tensors import packed, principal, tangent_planes, unpacked
-from .topology import Edges, components, face_pairs, mesh_edges
+from .topology import Edges, components, face_pairs
 
 DEFAULT_RADIUS_SHARE = 0.02
 # A quadric has six coefficients: one ring is too few. More rings would reach farther on
@@ -117,7 +117,7 @@ def facet_size(mesh: TriangleMesh) -> float:
     that turn by less than 40 degrees; sharper ones are creases of the object, and flat
     surface counts nothing, however large its triangles. 0 without such an edge.
     """
-    edges = mesh_edges(mesh.faces)
+    edges = mesh.edges
     pairs, edge = face_pairs(edges)
     normals = mesh.face_normals[pairs]
     sine = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1)
@@ -141,9 +141,15 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
         # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
         edge = mesh.mean_edge
         used, faces = _numbered(solid, n)
-        vertices = (mesh.vertices[used] - mesh.centre) / edge
-        whole = ~_near_border(vertices, mesh_edges(faces), radius / edge, _RINGS)
-        found, ways, fitted = _averaged_fit(vertices, faces, whole, scale / edge)
+        part = mesh
+        if len(used) < n or len(solid) < len(mesh.faces):
+            part = TriangleMesh(mesh.vertices[used], faces)
+        whole = ~_near_border(part.vertices, part.edges, radius, _RINGS)
+        vertices = (part.vertices - mesh.centre) / edge
+        mass = part.vertex_areas / (edge * edge)
+        found, ways, fitted = _averaged_fit(
+            vertices, faces, mass, part.laplacian, whole, scale / edge
+        )
         valid[used] = fitted
         k[:, valid] = found[:, fitted] / edge
         directions[:, valid] = ways[:, fitted]
@@ -157,6 +163,8 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
 def _averaged_fit(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
+    mass: NDArray[np.float64],
+    laplacian: csr_array,
     whole: NDArray[np.bool_],
     scale: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
@@ -164,7 +172,6 @@ def _averaged_fit(
 
     Only vertices with a whole neighbourhood take part.
     """
-    mass, laplacian = vertex_areas(vertices, faces), surface_laplacian(vertices, faces)
     beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
     if beyond > 0:
         vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))

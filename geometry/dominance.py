@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .curvature import CurvatureField
-from .diffusion import diffused, surface_laplacian, vertex_areas
+from .diffusion import diffused
 from .mesh import TriangleMesh
-from .topology import components, mesh_edges
+from .topology import components
 
 # Curvedness is averaged over a length that is this share of its scale.
 _AVERAGED_SHARE = 1.5
@@ -39,12 +39,11 @@ def face_curvedness(
             f"the field has {len(field.valid)} vertices, the mesh {len(mesh.vertices)}"
         )
     unit = mesh.mean_edge
-    vertices = (mesh.vertices - mesh.centre) / unit
-    mass = np.where(field.valid, vertex_areas(vertices, mesh.faces), 0.0)
+    mass = np.where(field.valid, mesh.vertex_areas / (unit * unit), 0.0)
     values = diffused(
         np.minimum(field.curvedness, _SHARPEST / field.scale)[:, None],
         mass,
-        surface_laplacian(vertices, mesh.faces),
+        mesh.laplacian,
         _AVERAGED_SHARE * field.scale / unit,
     )
     curvedness = values[:, 0][mesh.faces].mean(axis=1)
@@ -85,7 +84,7 @@ def _on_main_bodies(mesh: TriangleMesh, least: float) -> NDArray[np.bool_]:
 
     A fragment is curved more than anything, and would take up the share.
     """
-    count, label = components(mesh_edges(mesh.faces).ends, len(mesh.vertices))
+    count, label = components(mesh.edges.ends, len(mesh.vertices))
     body = label[mesh.faces[:, 0]]
     return np.bincount(body, mesh.face_areas, count)[body] >= least
 

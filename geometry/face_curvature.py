@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .curvature import CurvatureField
-from .diffusion import diffused, surface_laplacian, vertex_areas
+from .diffusion import diffused
 from .mesh import TriangleMesh
 from .tensors import packed, principal, tangent_planes, unpacked
 
@@ -62,12 +62,11 @@ def _face_tensors(
     Vertices that aren't valid give nothing.
     """
     edge = mesh.mean_edge
-    vertices = (mesh.vertices - mesh.centre) / edge
-    mass = np.where(field.valid, vertex_areas(vertices, mesh.faces), 0.0)
+    mass = np.where(field.valid, mesh.vertex_areas / (edge * edge), 0.0)
     tensors = diffused(
         packed((field.k_max, field.k_min), (field.direction_max, field.direction_min)),
         mass,
-        surface_laplacian(vertices, mesh.faces),
+        mesh.laplacian,
         _SMOOTHING_SHARE * field.scale / edge,
     )
     a, b, c = mesh.faces.T

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from .mesh import TriangleMesh
 from .openness import Spots, look_out, spots_at, spots_on
 from .rays import RayCaster
-from .topology import adjacent_faces, components, mesh_edges
+from .topology import adjacent_faces, components
 
 SOLID = "solid"
 CAVITIES = "solid with cavities"
@@ -175,7 +175,7 @@ def _sight(caster: RayCaster, spots: Spots) -> _Sight:
 
 def _bodies(mesh: TriangleMesh) -> NDArray[np.int64] | None:
     """The body of each face, connected over edges; None where there are too many."""
-    pairs = adjacent_faces(mesh_edges(mesh.faces), manifold_only=False)
+    pairs = adjacent_faces(mesh.edges, manifold_only=False)
     count, body = components(pairs, len(mesh.faces))
     return body if count <= _MAX_BODIES else None
 

@@ -6,9 +6,12 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
+from .diffusion import surface_laplacian, vertex_areas
 from .extent import enclosing_ball, main_bodies
 from .file_origin import FileOrigin
+from .topology import Edges, mesh_edges
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -123,6 +126,21 @@ class TriangleMesh:
         return _read_only(self.corners.mean(axis=1))
 
     @cached_property
+    def edges(self) -> Edges:
+        """Undirected edges of the faces."""
+        return mesh_edges(self.faces)
+
+    @cached_property
+    def vertex_areas(self) -> NDArray[np.float64]:
+        """A third of the area of each vertex's faces in [m²], shape (n_v,)."""
+        return _read_only(vertex_areas(self.vertices, self.faces))
+
+    @cached_property
+    def laplacian(self) -> csr_array:
+        """Stiffness of linear elements (`diffusion.surface_laplacian`), (n_v, n_v)."""
+        return surface_laplacian(self.vertices, self.faces)
+
+    @cached_property
     def area(self) -> float:
         """Total area in [m²]."""
         return float(self.face_areas.sum())
@@ -140,7 +158,8 @@ class TriangleMesh:
 
     @cached_property
     def _ball(self) -> tuple[NDArray[np.float64], float]:
-        used = np.unique(self.faces[self.main])
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.faces[self.main]] = True
         centre, radius = enclosing_ball(self.vertices[used])
         return _read_only(centre), radius
 

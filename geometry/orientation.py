@@ -14,7 +14,7 @@ from .mesh import Repair, TriangleMesh
 from .nesting import containers
 from .openness import look_out, spots_on
 from .rays import RayCaster
-from .topology import mesh_edges
+from .topology import Edges, adjacent_faces, components
 
 # Rays of one spot, spots in all, and what even a single triangle gets.
 _RAYS = 16
@@ -54,8 +54,8 @@ def orient(mesh: TriangleMesh) -> tuple[NDArray[np.int64], tuple[Repair, ...]]:
         of them that followed others, and seams of one-sided surfaces.
     """
     wound, patch = _consistent(mesh)
-    closed, one_sided = _closed_patches(wound, patch)
-    straight = TriangleMesh(mesh.vertices, wound)
+    straight = mesh if wound is mesh.faces else TriangleMesh(mesh.vertices, wound)
+    closed, one_sided = _closed_patches(straight, patch)
     area = np.asarray(np.bincount(patch, straight.face_areas), dtype=np.float64)
     volume = _volumes(straight, patch, area)
     closed &= np.abs(volume) > _EMPTY * area**1.5
@@ -84,6 +84,9 @@ def _consistent(
     mesh: TriangleMesh,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Faces wound alike within each patch, and the patch of each face."""
+    if not _alike(mesh.faces, mesh.edges).any():
+        pairs = adjacent_faces(mesh.edges)
+        return mesh.faces, components(pairs, len(mesh.faces))[1]
     wound, patch = igl.bfs_orient(mesh.faces)
     wound, patch = np.array(wound, np.int64), np.array(patch, np.int64)
     changed = np.any(wound != mesh.faces, axis=1)
@@ -95,7 +98,7 @@ def _consistent(
 
 
 def _closed_patches(
-    faces: NDArray[np.int64], patch: NDArray[np.int64]
+    mesh: TriangleMesh, patch: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Whether each patch bounds a volume, and which edges two faces run alike.
 
@@ -103,11 +106,8 @@ def _closed_patches(
     one way as the other. Where no winding is consistent (Moebius, Klein), some edge
     between two faces is run twice the same way.
     """
-    edges = mesh_edges(faces)
-    forward = faces[:, [0, 1, 2]] < faces[:, [1, 2, 0]]
-    way = np.where(forward, 1, -1).ravel()
-    balance = np.bincount(edges.of_face.ravel(), way, len(edges.n_faces))
-    alike = (edges.n_faces == 2) & (balance != 0)
+    edges = mesh.edges
+    alike = _alike(mesh.faces, edges)
     n = int(patch.max()) + 1
     closed = np.ones(n, dtype=bool)
     # Only edges of other than two faces can be met an odd number of times.
@@ -117,6 +117,14 @@ def _closed_patches(
     closed[key[counts % 2 == 1] % n] = False
     closed[patch[alike[edges.of_face].any(axis=1)]] = False
     return closed, alike
+
+
+def _alike(faces: NDArray[np.int64], edges: Edges) -> NDArray[np.bool_]:
+    """Whether the two faces at an edge run it the same way, shape (n_e,)."""
+    forward = faces < faces[:, [1, 2, 0]]
+    way = np.where(forward, 1, -1).ravel()
+    balance = np.bincount(edges.of_face.ravel(), way, len(edges.n_faces))
+    return (edges.n_faces == 2) & (balance != 0)
 
 
 def _volumes(

@@ -55,9 +55,11 @@ class RayCaster:
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
         self._scene = EmbreeScene(robust=True)
         # Vertices that no face uses may lie anywhere, also beyond float32.
-        used, faces = np.unique(mesh.faces, return_inverse=True)
+        used = np.zeros(len(mesh.vertices), dtype=bool)
+        used[mesh.faces] = True
         vertices = self.local(mesh.vertices[used])
-        faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int32)
+        number = np.cumsum(used, dtype=np.int32) - 1
+        faces = np.ascontiguousarray(number[mesh.faces], dtype=np.int32)
         _EmbreeMesh(self._scene, vertices, faces)
         # The first call commits the scene; do it here, where no thread races.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))

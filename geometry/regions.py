@@ -11,7 +11,7 @@ from .curvature import CurvatureField
 from .dominance import dominant_faces, face_curvedness
 from .face_curvature import steep_directions
 from .mesh import TriangleMesh
-from .topology import adjacent_faces, mesh_edges
+from .topology import adjacent_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ def dominant_regions(
     if not 0 < cone_half_angle < np.pi:
         raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
     curvedness, trusted = face_curvedness(mesh, field)
-    pairs = adjacent_faces(mesh_edges(mesh.faces), manifold_only=False)
+    pairs = adjacent_faces(mesh.edges, manifold_only=False)
     least = min_region_share * mesh.area
     dominant = dominant_faces(mesh, curvedness, trusted, pairs, area_share, least)
     whole = bool(dominant.all())

@@ -57,10 +57,16 @@ def face_pairs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return `adjacent_faces`, shape (m, 2), and the edge that each pair shares."""
     flat = edges.of_face.ravel()
+    if manifold_only or not np.any(edges.n_faces > 2):
+        # Two faces at most: the first and the last one at each edge, without sorting.
+        first = np.empty(len(edges.n_faces), dtype=np.int64)
+        last = np.empty_like(first)
+        last[flat] = at = np.arange(len(flat))
+        first[flat[::-1]] = at[::-1]
+        edge = np.flatnonzero(edges.n_faces == 2)
+        return np.stack([first[edge] // 3, last[edge] // 3], axis=1), edge
     order = np.argsort(flat, kind="stable")
     same = flat[order][1:] == flat[order][:-1]
-    if manifold_only:
-        same &= edges.n_faces[flat[order][1:]] == 2
     pairs = np.stack([order[:-1][same] // 3, order[1:][same] // 3], axis=1)
     return pairs, flat[order][1:][same]
 
@@ -74,7 +80,8 @@ def components(pairs: NDArray[np.int64], n: int) -> tuple[int, NDArray[np.int64]
         (np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), (n, n)
     )
     count, label = connected_components(links, directed=False)
-    _, first = np.unique(label, return_index=True)
+    first = np.empty(count, dtype=np.int64)
+    first[label[::-1]] = np.arange(n)[::-1]
     rank = np.empty(count, dtype=np.int64)
     rank[np.argsort(first)] = np.arange(count)
     return int(count), rank[label]
