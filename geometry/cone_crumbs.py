@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .cone_sums import CONE_SHARE, Patch, unit
+from .cone_sums import CONE_SHARE, Patch, renumbered, unit
 from .topology import components
 
 _MAX_ROUNDS = 12
@@ -56,9 +56,7 @@ def _crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     links = patch.links[free[patch.links].all(axis=1)]
     label = components(links, patch.n)[1]
     label[~free] = -1
-    if free.any():
-        _, label[free] = np.unique(label[free], return_inverse=True)
-    return label
+    return renumbered(label)
 
 
 def _single(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -69,6 +69,16 @@ def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     return vectors / np.maximum(length, 1e-300)
 
 
+def renumbered(piece: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return numbers without gaps in the same order; -1 stays."""
+    used = np.zeros(int(piece.max(initial=-1)) + 2, dtype=bool)
+    used[piece] = True
+    # The last entry is that of -1.
+    number = np.cumsum(used) - 1
+    number[-1] = -1
+    return number[piece]
+
+
 def merged(patch: Patch, piece: NDArray[np.int64], share: float) -> NDArray[np.int64]:
     """Join adjacent pieces as long as some union has the share of its area in a cone.
 

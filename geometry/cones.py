@@ -2,11 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, diags_array
 
 from .cone_crumbs import join_crumbs
-from .cone_sums import CONE_SHARE, Patch, merged
-from .diffusion import diffused
+from .cone_sums import CONE_SHARE, Patch, merged, renumbered
+from .diffusion import diffused, graph_laplacian
 from .mesh import TriangleMesh
 from .topology import components
 
@@ -79,13 +78,11 @@ def averaged_normals(
     square root of their areas over the distance of their centroids, so that faces
     larger than that length keep their own.
     """
-    n, (a, b) = len(mesh.faces), pairs.T
+    a, b = pairs.T
     away = np.linalg.norm(mesh.face_centroids[a] - mesh.face_centroids[b], axis=1)
     shared = np.sqrt(np.sqrt(mesh.face_areas[a] * mesh.face_areas[b]))
     weight = np.clip(shared / np.maximum(away, 1e-300), 0.0, _LARGEST_WEIGHT)
-    links = coo_array((weight, (a, b)), (n, n)).tocsr()
-    links = links + links.T
-    laplacian = (diags_array(links.sum(axis=1)) - links).tocsr()
+    laplacian = graph_laplacian(pairs, weight, len(mesh.faces))
     unit = mesh.mean_edge
     length = _AVERAGED_SHARE * mesh.size / unit
     areas = mesh.face_areas / (unit * unit)
@@ -121,7 +118,7 @@ def _split(patch: Patch, active: NDArray[np.bool_], least: float) -> NDArray[np.
         part[small] = -1
         if not np.any(part >= 0):
             break
-        _, part[part >= 0] = np.unique(part[part >= 0], return_inverse=True)
+        part = renumbered(part)
         fits = patch.shares(part) >= CONE_SHARE[0]
         core = _core(patch, part)
         inside = patch.sums(np.where(core, part, -1), len(fits))[1]
@@ -139,7 +136,7 @@ def _core(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.bool_]:
     axis = sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-300)
     members = np.flatnonzero(part >= 0)
     first = np.full(len(areas), patch.n, dtype=np.int64)
-    np.minimum.at(first, part[members], members)
+    first[part[members][::-1]] = members[::-1]
     aimless = np.linalg.norm(sums, axis=1) < _AIMLESS * areas
     axis[aimless] = patch.normals[first[aimless]]
     core = part >= 0
@@ -157,8 +154,7 @@ def _connected(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.int64]:
     same = patch.links[(a == b) & (a >= 0)]
     label = components(same, patch.n)[1]
     label[part < 0] = -1
-    _, label[part >= 0] = np.unique(label[part >= 0], return_inverse=True)
-    return label
+    return renumbered(label)
 
 
 def _by_area(

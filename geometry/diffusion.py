@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
+from .topology import Edges, mesh_edges
+
 # Share of the change that may be missing. A solve that has come this far moves nothing
 # that is larger than rounding in what is made of it, and takes tens of steps.
 _TOLERANCE = 1e-4
@@ -15,29 +17,54 @@ _LARGEST_WEIGHT = 3.0
 
 
 def surface_laplacian(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    edges: Edges | None = None,
 ) -> csr_array:
     """Return the stiffness L of linear elements, (n, n), positive semi-definite.
 
     w_ij = (cot a + cot b) / 2 over the angles opposite the edge, no less than zero (an
     average must not leave the range of its values); L_ij = -w_ij, and rows sum to zero.
     Source: Pinkall and Polthier, "Computing discrete minimal surfaces", 1993.
+
+    Args:
+        vertices: Shape (n, 3).
+        faces: Shape (n_f, 3).
+        edges: Those of the faces, if they are known.
     """
-    n = len(vertices)
+    edges = mesh_edges(faces) if edges is None else edges
     corners = vertices[faces]
     # The side opposite to corner k runs from corner k + 1 to k + 2.
     sides = [corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3] for k in range(3)]
     double_area = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
     double_area = np.maximum(double_area, 1e-300)
-    values = [
-        -0.5 * np.einsum("ij,ij->i", sides[k - 2], sides[k - 1]) / double_area
+    # Edge k of a face is opposite to corner k + 2.
+    weights = sum(
+        np.bincount(
+            edges.of_face[:, k],
+            -0.5 * np.einsum("ij,ij->i", sides[k], sides[k - 2]) / double_area,
+            len(edges.ends),
+        )
         for k in range(3)
-    ]
-    pair = (faces[:, [1, 2, 0]].T.ravel(), faces[:, [2, 0, 1]].T.ravel())
-    weights = coo_array((np.concatenate(values), pair), (n, n)).tocsr()
-    weights = (weights + weights.T).tocsr()
-    weights.data = np.clip(weights.data, 0.0, _LARGEST_WEIGHT)
-    return (diags_array(weights.sum(axis=1)) - weights).tocsr()
+    )
+    return graph_laplacian(
+        edges.ends, np.clip(weights, 0.0, _LARGEST_WEIGHT), len(vertices)
+    )
+
+
+def graph_laplacian(
+    ends: NDArray[np.int64], weights: NDArray[np.float64], n: int
+) -> csr_array:
+    """Return L of n nodes with links (m, 2) and their weights (m,), shape (n, n).
+
+    L_ij = -w_ij, and rows sum to zero.
+    """
+    a, b = ends.T
+    nodes = np.arange(n)
+    total = np.bincount(a, weights, n) + np.bincount(b, weights, n)
+    values = np.concatenate([-weights, -weights, total])
+    rows, columns = np.concatenate([a, b, nodes]), np.concatenate([b, a, nodes])
+    return coo_array((values, (rows, columns)), (n, n)).tocsr()
 
 
 def vertex_areas(

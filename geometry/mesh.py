@@ -138,7 +138,7 @@ class TriangleMesh:
     @cached_property
     def laplacian(self) -> csr_array:
         """Stiffness of linear elements (`diffusion.surface_laplacian`), (n_v, n_v)."""
-        return surface_laplacian(self.vertices, self.faces)
+        return surface_laplacian(self.vertices, self.faces, self.edges)
 
     @cached_property
     def area(self) -> float:
