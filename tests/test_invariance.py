@@ -16,7 +16,7 @@ SHIFT_M = np.array([100.0, -100.0, 100.0])
 
 def planned(path, unit, up):
     mesh = load_mesh(path, unit=unit)
-    return plan_rig(mesh, load_rig("default"), max_projectors=3, up=up, check=False)
+    return plan_rig(mesh, load_rig("default"), max_projectors=4, up=up, check=False)
 
 
 @pytest.fixture(scope="module")
