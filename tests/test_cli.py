@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -49,12 +50,12 @@ def face(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def runs(face):
-    """The same command twice, with 1 and with 2 threads."""
+    """The same command twice, with 1 and with 2 threads, then with --json."""
     folder = face.parent
     found = []
     for threads in (1, 2):
         words = ["--mesh", "face.obj", "--max-projectors", "3", "-o", f"plan{threads}"]
-        words += ["--threads", str(threads)]
+        words += ["--threads", str(threads), *["--json"] * (threads == 2)]
         found.append(run(*words, cwd=folder, threads=threads))
     return folder, found
 
@@ -64,14 +65,15 @@ def test_the_main_job_ends_with_0_and_says_what_a_designer_needs(runs):
     assert first.returncode == 0, first.stderr
     for words in (
         "3 projectors",
-        "640 candidate poses",
-        "480 candidate poses",
         "COVERAGE",
         "MARGINAL",
         "CHECK    passed",
         "plan.json",
     ):
         assert words in first.stdout
+    offered = re.findall(r"(\d+) candidate poses", first.stdout.replace(",", ""))
+    assert 640 <= int(offered[0]) <= 1000
+    assert int(offered[1]) == 480
     assert "plan: " not in first.stdout
     assert "cameras: candidates" in first.stderr
 
@@ -108,14 +110,15 @@ def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(runs, tmp_path):
     assert bad.stderr == ""
 
 
-def test_json_is_one_object_and_nothing_else(face, tmp_path):
-    words = ["--mesh", str(face), "--max-projectors", "3", "--no-check", "--json"]
-    done = run(*words, "-o", str(tmp_path / "out"), cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    document = json.loads(done.stdout)
+def test_json_is_one_object_and_nothing_else(runs):
+    folder, (_, second) = runs
+    assert second.returncode == 0, second.stderr
+    document = json.loads(second.stdout)
     assert document["format"] == "ringrig-plan"
-    assert document["reconstruction"] is None
-    assert document["missed"] == []
+    assert document["reconstruction"]["passed"] is True
+    assert document.pop("missed") == []
+    written = json.loads((folder / "plan2" / "plan.json").read_text())
+    assert written.items() <= document.items()
 
 
 def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path):
@@ -189,8 +192,6 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
 def test_errors_are_one_line_with_the_documented_code(
     words, code, message, face, tmp_path, monkeypatch, capsys
 ):
-    import re
-
     monkeypatch.chdir(tmp_path)
     words = [str(w).replace("FACE", str(face)) for w in words]
     if words[0] not in ("verify", "vrify", "export", "report", "reconstruct"):
@@ -249,12 +250,12 @@ def test_sample_writes_the_file_at_the_root(tmp_path, monkeypatch, capsys):
     assert path.read_text().startswith("# Sample head")
 
 
-@pytest.mark.parametrize("light", ["diverging", "parallel"])
-def test_the_real_face_scan_is_planned(light, tmp_path):
+def test_the_real_face_scan_is_planned(tmp_path):
+    """In parallel light too: benchmarks/main_job.py."""
     mesh = SHARED / "meshes" / "face_scan_james.obj"
     if not mesh.exists():
         pytest.skip("../shared/data isn't there")
-    words = ["--mesh", str(mesh), "--max-projectors", "3", "--light", light]
+    words = ["--mesh", str(mesh), "--max-projectors", "3"]
     done = run(*words, "-o", str(tmp_path), "--quiet", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "CHECK    passed" in done.stdout
