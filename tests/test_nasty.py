@@ -143,7 +143,9 @@ ENDS = {
     "tm_joined_tetrahedra.obj": (1, "no point was measured"),
     "tm_mirror.ply": (1, "no point was measured"),
     "tm_nancolor.obj": (1, "no point was measured"),
+    "tm_nested.glb": (1, "can be lit from anywhere in the workspace"),
     "tm_obj_with_no_face_in_chunk.obj": (1, "no point was measured"),
+    "tm_simple_pole.glb": (4, "lights any part of the target"),
     "tm_tet.ply": (1, "no point was measured"),
     "tm_whitespace.off": (1, "no point was measured"),
 }
