@@ -30,6 +30,8 @@ _DEFAULT_UNIT = "mm"
 _LIKELY_SIZE_M = 0.2
 # A small archive can unpack to more than any machine holds.
 _MAX_BYTES = 1 << 32
+# Fragments that stand out by this share of the longest side are reported.
+_STRAY = 0.01
 _PIECE = 1 << 24
 
 
@@ -110,14 +112,17 @@ def usable_mesh(
 
 
 def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
-    """Longest side of the box of the main bodies, and what lies outside of that box."""
+    """Longest side of the box of the main bodies, and what lies well outside of it."""
     corners = mesh.corners[mesh.main].reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
+    longest = float((high - low).max())
+    # What stands out by less changes no size that anyone reads.
+    low, high = low - _STRAY * longest, high + _STRAY * longest
     outside = np.any((mesh.corners < low) | (mesh.corners > high), axis=(1, 2))
     kind = "faces of fragments outside the rest, kept but left out of its size"
     count = int(outside.sum())
     found = (Repair(kind, count),) if count else ()
-    return float((high - low).max()), found
+    return longest, found
 
 
 def _origin(raw: RawMesh) -> FileOrigin:
