@@ -81,7 +81,7 @@ def dominant_regions(
     a whole. If less than the share is curved at all, that is all. Islands and holes
     below ``min_region_share`` of the area vanish; what stays is cut into pieces that
     fit a cone (`cone_pieces`). What is smaller and fits no neighbour is dropped, unless
-    the whole surface is dominant or nothing would be left.
+    the whole surface is dominant.
 
     Args:
         mesh: The surface.
@@ -107,11 +107,6 @@ def dominant_regions(
     dominant = dominant_faces(mesh, curvedness, trusted, pairs, area_share, least)
     whole = bool(dominant.all())
     pieces = cone_pieces(mesh, dominant, pairs, least, cone_half_angle, keep_all=whole)
-    if not pieces and dominant.any():
-        # A part so small in itself or so rough that all of it would be dropped.
-        pieces = cone_pieces(
-            mesh, dominant, pairs, least, cone_half_angle, keep_all=True
-        )
     steep = steep_directions(mesh, field)
     return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
 
