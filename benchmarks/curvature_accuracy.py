@@ -9,7 +9,6 @@ with vertex noise; and of the routes that weren't taken. Writes the figure
 docs/images/curvature_convergence.png.
 """
 
-import importlib.util
 import os
 import platform
 import sys
@@ -19,6 +18,7 @@ from types import ModuleType
 
 import igl
 import numpy as np
+from from_tests import load
 from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
 
@@ -41,7 +41,7 @@ Route = Callable[[TriangleMesh], Found]
 
 def main() -> int:
     """Print the tables and write the figure; return 0."""
-    shapes = _shapes()
+    shapes = load("curved_shapes")
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
         f"cores; python {platform.python_version()}, numpy {np.__version__}\n\n"
@@ -195,17 +195,6 @@ def _draw(panels: list[tuple[str, list[tuple[str, list[float], list[float]]]]]) 
                 pen.ellipse([x - 4, y - 4, x + 4, y + 4], INKS[k])
             pen.text((x0 + 285, y0 + 216 + 20 * k), name, INKS[k], font)
     image.save(FIGURE, optimize=True)
-
-
-def _shapes() -> ModuleType:
-    path = ROOT / "tests" / "curved_shapes.py"
-    spec = importlib.util.spec_from_file_location("curved_shapes", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["curved_shapes"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

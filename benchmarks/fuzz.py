@@ -9,16 +9,15 @@ it dies. A tenth of what is read goes through curvature and regions too. A failu
 made again with `python benchmarks/fuzz.py 1 SEED NUMBER`.
 """
 
-import importlib.util
 import os
 import platform
 import sys
 import time
 from collections import Counter
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
+from from_tests import load
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"
 SEED = 20_261_121
@@ -28,7 +27,7 @@ def main() -> int:
     """Print the table; return 1 if anything escaped."""
     words = [int(word) for word in sys.argv[1:]]
     count, seed, first = words + [2000, SEED, 0][len(words) :]
-    fuzzing = _load()
+    fuzzing = load("fuzzing")
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
         f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
@@ -55,16 +54,6 @@ def main() -> int:
         if "escaped" in answer:
             print(f"\n- {answer}")
     return int(totals[2] > 0)
-
-
-def _load() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("fuzzing", TESTS / "fuzzing.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["fuzzing"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

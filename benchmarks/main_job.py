@@ -10,7 +10,6 @@ difference between a claimed area and the one that the audit recomputes (in poin
 the target's or surface's area), and the seconds of every stage.
 """
 
-import importlib.util
 import os
 import platform
 import statistics
@@ -19,9 +18,9 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
+from from_tests import load
 
 from planning import RigPlan
 from planning.audit import audit_plan
@@ -57,7 +56,7 @@ def main() -> int:
 
 
 def _jobs(names: list[str]) -> list[tuple[Path, tuple[str, ...], tuple[str, ...]]]:
-    table = _load("shared_meshes")
+    table = load("shared_meshes")
     jobs = [(ROOT / "face.obj", ())]
     if table.FOLDER.is_dir():
         jobs += [(mesh.path, mesh.words) for mesh in table.MESHES]
@@ -68,17 +67,6 @@ def _jobs(names: list[str]) -> list[tuple[Path, tuple[str, ...], tuple[str, ...]
         for path, words in jobs
         if not names or path.name in names
     ]
-
-
-def _load(name: str) -> ModuleType:
-    path = ROOT / "tests" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def _help_seconds() -> float:

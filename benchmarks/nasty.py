@@ -11,7 +11,6 @@ threads, since wall time tells how busy the machine is; a run that hangs without
 working is cut after ten minutes.
 """
 
-import importlib.util
 import os
 import platform
 import resource
@@ -24,6 +23,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+from from_tests import load
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT.parent / "shared" / "data" / "nasty"
@@ -53,7 +53,7 @@ class Ended:
 
 def main() -> int:
     """Print the table; return 1 if a file ended otherwise than it must."""
-    table = _load("test_nasty")
+    table = load("test_nasty")
     names = sys.argv[1:] or sorted(path.name for path in FOLDER.iterdir())
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
@@ -125,17 +125,6 @@ def _job(path: Path) -> Ended:
 def _spent() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
-
-
-def _load(name: str) -> ModuleType:
-    path = ROOT / "tests" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from from_tests import load
 
 from geometry.mesh import MeshError
 from geometry.readers import load_mesh
@@ -45,7 +46,7 @@ def main() -> int:
         f"cores, python {platform.python_version()}, numpy {np.__version__}, "
         f"trimesh {version}\n"
     )
-    nasty = _load("test_nasty")
+    nasty = load("test_nasty")
     sets = {"traps": _traps(nasty)}
     if nasty.NASTY.is_dir():
         files = sorted(nasty.NASTY.iterdir())
@@ -142,17 +143,6 @@ def _measures(corners: np.ndarray) -> tuple[float, np.ndarray]:
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
     points = corners.reshape(-1, 3)
     return float(area), np.stack([points.min(axis=0), points.max(axis=0)])
-
-
-def _load(name: str) -> ModuleType:
-    path = TESTS / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .curvature import CurvatureField
-from .diffusion import diffused
+from .face_curvature import FLAT, averaged_on_faces
 from .mesh import TriangleMesh
 from .topology import components
 
@@ -12,8 +12,6 @@ from .topology import components
 _AVERAGED_SHARE = 1.5
 # Times the scale: what is sharper is an edge, and by how much is the triangles' choice.
 _SHARPEST = 0.5
-# Curvedness times the size of the mesh below this is flat: its order means nothing.
-_FLAT = 0.05
 # The cut must not run through equal curvedness: faces this little below it are taken
 # too, and so many more the more of the area lies in a band about it. Between the two
 # shares the step grows evenly, so that no small change of the mesh makes it jump.
@@ -34,21 +32,10 @@ def face_curvedness(
     Raises:
         ValueError: If the field is of another mesh.
     """
-    if len(field.valid) != len(mesh.vertices):
-        raise ValueError(
-            f"the field has {len(field.valid)} vertices, the mesh {len(mesh.vertices)}"
-        )
-    unit = mesh.mean_edge
-    mass = np.where(field.valid, mesh.vertex_areas / (unit * unit), 0.0)
-    values = diffused(
-        np.minimum(field.curvedness, _SHARPEST / field.scale)[:, None],
-        mass,
-        mesh.laplacian,
-        _AVERAGED_SHARE * field.scale / unit,
-    )
-    curvedness = values[:, 0][mesh.faces].mean(axis=1)
-    trusted: NDArray[np.bool_] = np.all(field.valid[mesh.faces], axis=1)
-    curved = trusted & (curvedness * mesh.size > _FLAT)
+    capped = np.minimum(field.curvedness, _SHARPEST / field.scale)[:, None]
+    averaged, trusted = averaged_on_faces(mesh, field, capped, _AVERAGED_SHARE)
+    curvedness = averaged[:, 0]
+    curved = trusted & (curvedness * mesh.size > FLAT)
     return np.where(curved, curvedness, 0.0), trusted
 
 

@@ -4,8 +4,8 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+
+from .topology import components
 
 # Bodies are small if each has less area than this share of the largest, and all of
 # them together less than this share of the whole.
@@ -30,10 +30,8 @@ def main_bodies(
     Returns:
         Shape (n_f,).
     """
-    n = int(faces.max()) + 1
-    a, b = faces[:, [0, 1]].T.ravel(), faces[:, [1, 2]].T.ravel()
-    links = coo_array((np.ones(len(a), np.int8), (a, b)), (n, n))
-    count, label = connected_components(links, directed=False)
+    links = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    count, label = components(links, int(faces.max()) + 1)
     body = label[faces[:, 0]]
     area = np.bincount(body, areas, count)
     order = np.argsort(area, kind="stable")

@@ -12,8 +12,8 @@ from .tensors import packed, principal, tangent_planes, unpacked
 _SMOOTHING_SHARE = 1.4
 # |k1 - k2| up to this share of the larger magnitude leaves the direction arbitrary.
 _ISOTROPIC = 0.3
-# Curvedness times the diagonal below this is flat: its order means nothing.
-_FLAT = 0.05
+# Curvedness times the size of the mesh below this is flat: its order means nothing.
+FLAT = 0.05
 
 
 def steep_directions(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.float64]:
@@ -39,36 +39,47 @@ def face_curvature(
     Raises:
         ValueError: If the field is of another mesh.
     """
-    if len(field.valid) != len(mesh.vertices):
-        raise ValueError(
-            f"the field has {len(field.valid)} vertices, the mesh {len(mesh.vertices)}"
-        )
-    tensors, trusted = _face_tensors(mesh, field)
-    k, ways = principal(tensors, tangent_planes(mesh.face_normals))
+    six = packed((field.k_max, field.k_min), (field.direction_max, field.direction_min))
+    tensors, trusted = averaged_on_faces(mesh, field, six, _SMOOTHING_SHARE)
+    k, ways = principal(unpacked(tensors), tangent_planes(mesh.face_normals))
     magnitude = np.abs(k)
     largest = magnitude.max(axis=0)
     curvedness = np.sqrt(0.5 * (k**2).sum(axis=0))
     steep = np.where((magnitude[0] >= magnitude[1])[:, None], ways[0], ways[1])
-    curvedness = np.where(trusted & (curvedness * mesh.size > _FLAT), curvedness, 0.0)
+    curvedness = np.where(trusted & (curvedness * mesh.size > FLAT), curvedness, 0.0)
     directed = (k[0] - k[1] > _ISOTROPIC * largest) & (curvedness > 0)
     return curvedness, np.where(directed[:, None], steep, 0.0), trusted
 
 
-def _face_tensors(
-    mesh: TriangleMesh, field: CurvatureField
+def averaged_on_faces(
+    mesh: TriangleMesh,
+    field: CurvatureField,
+    values: NDArray[np.float64],
+    share: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Averaged tensors (n_f, 3, 3), and the faces whose corners are valid, (n_f,).
+    """Return values averaged on the faces, and which faces have valid corners only.
 
     Vertices that aren't valid give nothing.
+
+    Args:
+        mesh: The surface.
+        field: Its curvatures.
+        values: Of each vertex, shape (n_v, m).
+        share: Of the field's scale, over which diffusion averages.
+
+    Returns:
+        Shapes (n_f, m) and (n_f,).
+
+    Raises:
+        ValueError: If the field is of another mesh.
     """
+    if len(field.valid) != len(mesh.vertices):
+        raise ValueError(
+            f"the field has {len(field.valid)} vertices, the mesh {len(mesh.vertices)}"
+        )
     edge = mesh.mean_edge
     mass = np.where(field.valid, mesh.vertex_areas / (edge * edge), 0.0)
-    tensors = diffused(
-        packed((field.k_max, field.k_min), (field.direction_max, field.direction_min)),
-        mass,
-        mesh.laplacian,
-        _SMOOTHING_SHARE * field.scale / edge,
-    )
+    smooth = diffused(values, mass, mesh.laplacian, share * field.scale / edge)
     a, b, c = mesh.faces.T
     trusted = field.valid[a] & field.valid[b] & field.valid[c]
-    return unpacked((tensors[a] + tensors[b] + tensors[c]) / 3.0), trusted
+    return (smooth[a] + smooth[b] + smooth[c]) / 3.0, trusted

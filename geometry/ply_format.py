@@ -5,7 +5,9 @@ where a file stores strips; a mesh whose rows don't fit its header is refused he
 """
 
 import re
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,33 +180,77 @@ def _short(text: str) -> str:
     return ascii(text.strip()[:60])[1:-1]
 
 
-class _BinaryRows:
-    """Takes the rows of one element after the other from binary data."""
+class _Rows(ABC):
+    """Takes the rows of one element after the other.
 
-    def __init__(self, body: bytes, order: str) -> None:
-        self._body = body
-        self._order = order
-        self._at = 0
+    Lists are tried at the lengths that those of the first row have, all rows at once;
+    where they differ, row by row.
+    """
+
+    _unit: str
 
     def fill(self, element: PlyElement) -> None:
         if element.count == 0:
             _store(element, {}, {})
             return
         lengths = self._first_lengths(element)
+        columns = self._alike(element, lengths)
+        if columns is not None:
+            _store(element, columns, lengths)
+        elif lengths:
+            self._row_by_row(element)
+        else:
+            raise self._short_of(element)
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Refuse what is left behind the last element."""
+
+    @abstractmethod
+    def _left(self) -> int:
+        """How much isn't taken yet."""
+
+    @abstractmethod
+    def _first_lengths(self, element: PlyElement) -> dict[str, int]:
+        """Lengths of the lists of the first row."""
+
+    @abstractmethod
+    def _alike(
+        self, element: PlyElement, lengths: dict[str, int]
+    ) -> dict[str, NDArray[Any]] | None:
+        """Take all rows as columns; None if lists differ or it is too short."""
+
+    @abstractmethod
+    def _row_by_row(self, element: PlyElement) -> None:
+        """Take rows whose lists differ in length."""
+
+    def _short_of(self, element: PlyElement) -> FormatError:
+        return FormatError(
+            f"it is cut short: {element.count} rows of '{_short(element.name)}' don't "
+            f"fit into the {self._left()} {self._unit} left"
+        )
+
+
+class _BinaryRows(_Rows):
+    """Rows of binary data."""
+
+    _unit = "bytes"
+
+    def __init__(self, body: bytes, order: str) -> None:
+        self._body = body
+        self._order = order
+        self._at = 0
+
+    def _alike(
+        self, element: PlyElement, lengths: dict[str, int]
+    ) -> dict[str, NDArray[Any]] | None:
         dtype = self._dtype(element, lengths)
         if self._left() >= element.count * dtype.itemsize:
             table = np.frombuffer(self._body, dtype, element.count, self._at)
             if all(np.all(table[f"n {k}"] == n) for k, n in lengths.items()):
                 self._at += element.count * dtype.itemsize
-                _store(
-                    element,
-                    {p.name: table[p.name] for p in element.properties},
-                    lengths,
-                )
-                return
-        if not lengths:
-            raise self._short_of(element)
-        self._row_by_row(element)
+                return {p.name: table[p.name] for p in element.properties}
+        return None
 
     def finish(self) -> None:
         rest = self._body[self._at :].strip(b" \t\r\n")
@@ -214,14 +260,7 @@ class _BinaryRows:
     def _left(self) -> int:
         return len(self._body) - self._at
 
-    def _short_of(self, element: PlyElement) -> FormatError:
-        return FormatError(
-            f"it is cut short: {element.count} rows of '{_short(element.name)}' don't "
-            f"fit into the {self._left()} bytes left"
-        )
-
     def _first_lengths(self, element: PlyElement) -> dict[str, int]:
-        """Lengths of the lists of the first row."""
         lengths: dict[str, int] = {}
         at = self._at
         for p in element.properties:
@@ -252,7 +291,6 @@ class _BinaryRows:
         return np.dtype(columns)
 
     def _row_by_row(self, element: PlyElement) -> None:
-        """Read rows whose lists differ in length."""
         begin = self._at
         where: dict[str, list[tuple[int, int]]] = {
             p.name: [] for p in element.properties
@@ -285,18 +323,18 @@ class _BinaryRows:
                 )
 
 
-class _TextRows:
-    """Takes the rows of one element after the other from words, wrapped anyhow."""
+class _TextRows(_Rows):
+    """Rows of words, wrapped anyhow."""
+
+    _unit = "numbers"
 
     def __init__(self, body: bytes) -> None:
         self._words = body.decode("latin-1").split()
         self._at = 0
 
-    def fill(self, element: PlyElement) -> None:
-        if element.count == 0:
-            _store(element, {}, {})
-            return
-        lengths = self._first_lengths(element)
+    def _alike(
+        self, element: PlyElement, lengths: dict[str, int]
+    ) -> dict[str, NDArray[Any]] | None:
         width = sum(1 + lengths.get(p.name, 0) for p in element.properties)
         end = self._at + element.count * width
         if end <= len(self._words):
@@ -314,24 +352,17 @@ class _TextRows:
                     at += 1 + n
             if even:
                 self._at = end
-                _store(element, columns, lengths)
-                return
-        if not lengths:
-            raise self._short_of(element)
-        self._row_by_row(element)
+                return columns
+        return None
 
     def finish(self) -> None:
-        if self._at != len(self._words):
+        if self._left():
             raise FormatError(
-                f"it holds {len(self._words) - self._at} numbers more than its header "
-                "says"
+                f"it holds {self._left()} numbers more than its header says"
             )
 
-    def _short_of(self, element: PlyElement) -> FormatError:
-        return FormatError(
-            f"it is cut short: {element.count} rows of '{_short(element.name)}' don't "
-            f"fit into the {len(self._words) - self._at} numbers left"
-        )
+    def _left(self) -> int:
+        return len(self._words) - self._at
 
     def _first_lengths(self, element: PlyElement) -> dict[str, int]:
         lengths: dict[str, int] = {}
@@ -381,7 +412,7 @@ class _TextRows:
 
 def _store(
     element: PlyElement,
-    columns: dict[str, NDArray[np.float64]],
+    columns: dict[str, NDArray[Any]],
     lengths: dict[str, int],
 ) -> None:
     """Keep the columns of an element whose lists are equally long."""

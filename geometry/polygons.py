@@ -10,13 +10,6 @@ from numpy.typing import NDArray
 _SAME = 1e-12
 
 
-def triangulate(
-    points: NDArray[np.float64], polygons: Sequence[Sequence[int]]
-) -> NDArray[np.int64]:
-    """Return the triangles (m, 3) of polygons given as a list of corners each."""
-    return cut_polygons(points, *end_to_end(polygons))[0]
-
-
 def end_to_end(
     polygons: Sequence[Sequence[int]],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -175,6 +175,15 @@ def torus(
     return TriangleMesh(vertices.reshape(-1, 3), faces)
 
 
+def joined(*meshes: TriangleMesh) -> TriangleMesh:
+    """Return several meshes as one; bodies that touch keep vertices of their own."""
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    return TriangleMesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=True)]),
+    )
+
+
 def _cells(n: int, m: int, rows: int, columns: int) -> NDArray[np.int64]:
     """Cut n x m cells of a lattice of rows x columns vertices in two; it may wrap."""
     i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))

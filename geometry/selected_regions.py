@@ -9,7 +9,7 @@ from .dominance import face_curvedness
 from .face_curvature import steep_directions
 from .mesh import TriangleMesh
 from .regions import DominantRegions, regions_of_pieces
-from .topology import adjacent_faces, mesh_edges
+from .topology import adjacent_faces
 
 
 def regions_of_faces(
@@ -51,7 +51,7 @@ def regions_of_faces(
     if not 0 < cone_half_angle < np.pi:
         raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
     curvedness, trusted = face_curvedness(mesh, field)
-    pairs = adjacent_faces(mesh_edges(mesh.faces), manifold_only=False)
+    pairs = adjacent_faces(mesh.edges, manifold_only=False)
     least = min_region_share * float(mesh.face_areas[faces].sum())
     pieces = cone_pieces(mesh, faces, pairs, least, cone_half_angle, keep_all=True)
     steep = steep_directions(mesh, field)

@@ -38,14 +38,13 @@ def shell_positions(
     """
     radius = 0.5 * (radius_m[0] + radius_m[1])
     centre = np.array(workspace.centre)
-    floor = -np.inf if workspace.floor_m is None else workspace.floor_m
     start = None if workspace.bearing is None else np.array(workspace.bearing)
     offered = n
     while True:
         directions = fibonacci_cap(
             offered, np.array(workspace.axis), workspace.half_angle, start=start
         )
-        kept = directions[radius * (directions @ np.array(workspace.up)) >= floor]
+        kept = directions[_stands(directions, radius, workspace)]
         if len(kept) >= n or not len(kept) or offered > _MOST_OFFERED * n:
             return centre + radius * kept
         offered = int(np.ceil(1.1 * offered * n / len(kept)))

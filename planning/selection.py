@@ -15,7 +15,7 @@ from scipy import sparse
 from solvers import CoverProblem, SolveStatus, solve_cover
 from solvers.cover import DEFAULT_BUDGET, solve_max_coverage
 
-_MORE = 2
+MORE = 2
 # Counted work for the marginal table's other counts, where no proof is claimed.
 _MARGINAL_BUDGET = 3e8
 
@@ -34,7 +34,7 @@ class Selection:
         best_rows: Most rows that k candidates were found to cover.
         best_rows_bound: Proven upper bound on that.
         one_fewer_bound: Proven most rows that k - 1 candidates cover.
-        by_count: Best candidates found for 1, 2, ... k + 2 devices.
+        by_count: Best candidates found for 1, 2, ... k + `more` devices.
         greedy: Candidates that the greedy cover takes.
     """
 
@@ -52,7 +52,12 @@ class Selection:
 
 
 def select_fewest(
-    covers: NDArray[np.bool_], share: float, *, max_count: int | None, seed: int
+    covers: NDArray[np.bool_],
+    share: float,
+    *,
+    max_count: int | None,
+    seed: int,
+    more: int = MORE,
 ) -> Selection:
     """Return the fewest candidates that cover a share of what all of them cover.
 
@@ -63,6 +68,7 @@ def select_fewest(
         share: Of the rows that any candidate serves, in (0, 1].
         max_count: Candidates allowed; None for no limit.
         seed: Of the heuristics.
+        more: Counts beyond the one taken for which the best is wanted too.
     """
     reachable = covers.any(axis=1)
     required = int(np.ceil(share * int(reachable.sum()) - 1e-9))
@@ -77,7 +83,7 @@ def select_fewest(
     bounds: dict[int, float] = {}
     rows: dict[int, int] = {}
     warm = np.empty(0, dtype=np.int64)
-    for count in range(1, min(allowed + _MORE, covers.shape[1]) + 1):
+    for count in range(1, min(allowed + more, covers.shape[1]) + 1):
         start = solution.selected if count == needed else warm
         best = solve_max_coverage(
             problem,

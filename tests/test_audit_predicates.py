@@ -10,7 +10,7 @@ import pytest
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import box, grid
+from geometry.primitives import box, grid, joined
 from planning.audit.occlusion import Shadow
 from planning.audit.optics import pixel_gradient, ring_coordinate, ring_gradient
 from planning.audit.predicates import (
@@ -44,14 +44,6 @@ def samples_on(mesh: TriangleMesh, n: int, seed: int = 3) -> AuditSamples:
         np.zeros(n, dtype=np.int64),
         np.ones(n, dtype=bool),
         np.full(n, mesh.area / n),
-    )
-
-
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    starts = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
-    return TriangleMesh(
-        np.vstack([m.vertices for m in meshes]),
-        np.vstack([m.faces + start for m, start in zip(meshes, starts, strict=True)]),
     )
 
 

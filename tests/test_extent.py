@@ -6,18 +6,10 @@ from scipy.spatial.transform import Rotation
 from geometry.bearing import bearing
 from geometry.extent import enclosing_ball, main_bodies
 from geometry.mesh import TriangleMesh
-from geometry.primitives import box, sphere, torus
+from geometry.primitives import box, joined, sphere, torus
 from geometry.readers import load_mesh
 
 Z = np.array([0.0, 0.0, 1.0])
-
-
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    starts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-    return TriangleMesh(
-        np.concatenate([m.vertices for m in meshes]),
-        np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=False)]),
-    )
 
 
 def moved(mesh: TriangleMesh, turn: np.ndarray, shift: np.ndarray) -> TriangleMesh:

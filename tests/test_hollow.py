@@ -19,7 +19,7 @@ from geometry.hollow import (
     measure_shell,
 )
 from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, sphere, torus
+from geometry.primitives import box, cylinder, joined, sphere, torus
 from geometry.rays import RayCaster
 from geometry.readers import load_mesh
 
@@ -27,14 +27,6 @@ SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(
     not SHARED.is_dir(), reason="the shared data lies beside the repository only"
 )
-
-
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    starts = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
-    return TriangleMesh(
-        np.concatenate([m.vertices for m in meshes]),
-        np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=True)]),
-    )
 
 
 def flipped(mesh: TriangleMesh) -> TriangleMesh:

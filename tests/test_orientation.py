@@ -10,7 +10,7 @@ from geometry.mesh import TriangleMesh
 from geometry.nesting import containers
 from geometry.openness import look_out, spots_on
 from geometry.orientation import orient
-from geometry.primitives import box, cylinder, grid, sphere, torus
+from geometry.primitives import box, cylinder, grid, joined, sphere, torus
 from geometry.rays import RayCaster
 from geometry.repair import clean
 
@@ -19,14 +19,6 @@ REWOUND = "faces rewound like their neighbours"
 FOLLOWED = "of these turned like the rest, being too small or hidden"
 PIECES = "pieces turned outwards"
 ONE_SIDED = "edges where a one-sided surface can't be wound alike"
-
-
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    starts = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
-    return TriangleMesh(
-        np.concatenate([m.vertices for m in meshes]),
-        np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=True)]),
-    )
 
 
 def welded(mesh: TriangleMesh) -> TriangleMesh:

@@ -5,7 +5,7 @@ import pytest
 
 from geometry.mesh import MeshError, TriangleMesh
 from geometry.orientation import orient
-from geometry.primitives import box, cylinder, grid, sphere
+from geometry.primitives import box, cylinder, grid, joined, sphere
 from geometry.readers import load_mesh
 from geometry.repair import clean
 from geometry.topology import adjacent_faces, components, mesh_edges
@@ -14,14 +14,6 @@ SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(
     not SHARED.is_dir(), reason="the shared data lies beside the repository only"
 )
-
-
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    starts = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
-    return TriangleMesh(
-        np.concatenate([m.vertices for m in meshes]),
-        np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=True)]),
-    )
 
 
 def flipped(mesh: TriangleMesh) -> TriangleMesh:
