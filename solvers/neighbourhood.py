@@ -4,14 +4,12 @@ Every sum is of integer-valued weights, hence exact, and every tie goes to the l
 index: the same seed and budget give the same answer on any machine.
 """
 
-from typing import cast
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from .reductions import ReducedCover
 from .status import WorkBudget
+from .swaps import Swaps
 
 
 def greedy(
@@ -65,21 +63,23 @@ def most_coverage(
         The best selection found, increasing.
     """
     rng = np.random.default_rng(seed)
-    current = _descend(cover, [int(s) for s in start], target, budget)
-    best, best_weight = current, cover.weight_of(np.array(current, dtype=np.int64))
+    best = Swaps(cover, (int(s) for s in start), budget)
+    _descend(best, target, budget)
     for kick in range(max_kicks):
-        if best_weight >= target or budget.exhausted or not best:
+        if best.covered >= target or budget.exhausted or not best.chosen:
             break
         # A wider neighbourhood the longer nothing helped.
-        width = min(len(best), 1 + kick % 4)
-        dropped = set(rng.choice(len(best), size=width, replace=False).tolist())
-        current = [s for i, s in enumerate(best) if i not in dropped]
-        current = _refill(cover, current, len(best), rng, budget)
-        current = _descend(cover, current, target, budget)
-        weight = cover.weight_of(np.array(current, dtype=np.int64))
-        if weight > best_weight:
-            best, best_weight = current, weight
-    return np.array(sorted(best), dtype=np.int64)
+        n_sets = len(best.chosen)
+        width = min(n_sets, 1 + kick % 4)
+        dropped = rng.choice(n_sets, size=width, replace=False).tolist()
+        current = best.copy()
+        for position in sorted(dropped, reverse=True):
+            current.drop(position)
+        _refill(current, n_sets, rng)
+        _descend(current, target, budget)
+        if current.covered > best.covered:
+            best = current
+    return np.array(sorted(best.chosen), dtype=np.int64)
 
 
 def prune(cover: ReducedCover, selected: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -140,60 +140,21 @@ def _counts(cover: ReducedCover, chosen: list[int]) -> NDArray[np.int64]:
     return counts
 
 
-def _refill(
-    cover: ReducedCover,
-    chosen: list[int],
-    n_sets: int,
-    rng: np.random.Generator,
-    budget: WorkBudget,
-) -> list[int]:
-    """Return the selection filled up with sets drawn from the eight of most gain."""
-    counts = _counts(cover, chosen)
-    while len(chosen) < n_sets:
-        gains = cover.by_set @ np.where(counts > 0, 0.0, cover.weights)
-        budget.spend(cover.entries)
-        top = np.argsort(-gains, kind="stable")[:8]
-        top = top[gains[top] > 0]
+def _refill(selection: Swaps, n_sets: int, rng: np.random.Generator) -> None:
+    """Fill the selection up with sets drawn from the eight of most gain."""
+    while len(selection.chosen) < n_sets:
+        top = np.argsort(-selection.gain, kind="stable")[:8]
+        top = top[selection.gain[top] > 0]
         if top.size == 0:
             break
-        chosen = [*chosen, int(rng.choice(top))]
-        counts[_members(cover, chosen[-1])] += 1
-    return chosen
+        selection.add(int(rng.choice(top)))
 
 
-def _descend(
-    cover: ReducedCover, chosen: list[int], target: float, budget: WorkBudget
-) -> list[int]:
-    """Return the selection after best swaps until none adds weight."""
-    counts = _counts(cover, chosen)
-    covered = float(cover.weights[counts > 0].sum())
-    while chosen and covered < target and not budget.exhausted:
-        change = _swap_gains(cover, chosen, counts, budget)
-        out, into = np.unravel_index(int(np.argmax(change)), change.shape)
-        if not change[out, into] > 0:
+def _descend(selection: Swaps, target: float, budget: WorkBudget) -> None:
+    """Make best swaps until none adds weight."""
+    while selection.chosen and selection.covered < target and not budget.exhausted:
+        change, out, into = selection.best_swap()
+        if not change > 0:
             break
-        counts[_members(cover, chosen[int(out)])] -= 1
-        chosen = [s for i, s in enumerate(chosen) if i != out] + [int(into)]
-        counts[_members(cover, int(into))] += 1
-        covered += float(change[out, into])
-    return chosen
-
-
-def _swap_gains(
-    cover: ReducedCover,
-    chosen: list[int],
-    counts: NDArray[np.int64],
-    budget: WorkBudget,
-) -> NDArray[np.float64]:
-    """Return the change in weight when chosen set i makes room for set j, (k, n_s)."""
-    open_gain = cover.by_set @ np.where(counts > 0, 0.0, cover.weights)
-    sole = [rows[counts[rows] == 1] for rows in (_members(cover, s) for s in chosen)]
-    rows = np.concatenate(sole)
-    owner = np.repeat(np.arange(len(chosen)), [r.size for r in sole])
-    released = sparse.csr_array(
-        (cover.weights[rows], (owner, rows)), shape=(len(chosen), counts.size)
-    )
-    regained = cast("sparse.csr_array", released @ cover.by_row).toarray()
-    share = rows.size / max(1, counts.size)
-    budget.spend(cover.entries * (1.0 + 3.0 * share) + regained.size)
-    return open_gain + regained - np.asarray(released.sum(axis=1))[:, None]
+        selection.drop(out)
+        selection.add(into)

@@ -17,6 +17,7 @@ from solvers.neighbourhood import (
 from solvers.reductions import reduce_cover
 from solvers.relaxation import cost_bound, coverage_bounds, tighten
 from solvers.status import WorkBudget
+from solvers.swaps import Swaps
 
 NONE = np.empty(0, dtype=np.int64)
 
@@ -216,6 +217,46 @@ def test_swaps_reach_a_local_optimum_and_count_right():
             for into in range(cover.n_sets):
                 swapped = np.append(best[best != out], into)
                 assert cover.weight_of(swapped) <= weight
+
+
+def assert_worths_are_true(cover, kept):
+    """Gains, regains and the best swap against weights counted anew, to the bit."""
+
+    def weight(chosen):
+        return cover.weight_of(np.array(chosen, dtype=np.int64))
+
+    assert kept.covered == weight(kept.chosen)
+    gain = [weight([*kept.chosen, j]) - kept.covered for j in range(cover.n_sets)]
+    assert kept.gain.tolist() == gain
+    changes = []
+    for i, s in enumerate(kept.chosen):
+        rest = kept.chosen[:i] + kept.chosen[i + 1 :]
+        with_j = [weight([*rest, j]) - weight(rest) for j in range(cover.n_sets)]
+        assert kept.regain[i].tolist() == (np.array(with_j) - gain).tolist()
+        changes.append(np.array(with_j) - with_j[s])
+    change, out, into = kept.best_swap()
+    assert change == np.max(changes)
+    assert (out, into) == divmod(int(np.argmax(changes)), cover.n_sets)
+
+
+@pytest.mark.parametrize("block", [2**18, 40])
+def test_worth_of_swaps_is_kept_to_the_bit_as_sets_come_and_go(block, monkeypatch):
+    monkeypatch.setattr("solvers.swaps._BLOCK", block)
+    for seed in range(6):
+        cover = random_cover(seed, n_e=60, n_s=12, density=0.4)
+        rng = np.random.default_rng(seed)
+        kept = Swaps(cover, [3, 0], plenty())
+        assert_worths_are_true(cover, kept)
+        aside, before = kept.copy(), (list(kept.chosen), kept.gain.tolist())
+        for _ in range(15):
+            free = np.setdiff1d(np.arange(cover.n_sets), kept.chosen)
+            if len(kept.chosen) < 2 or rng.random() < 0.6 and free.size:
+                kept.add(int(rng.choice(free)))
+            else:
+                kept.drop(int(rng.integers(len(kept.chosen))))
+            assert_worths_are_true(cover, kept)
+        assert (aside.chosen, aside.gain.tolist()) == before
+        assert_worths_are_true(cover, aside)
 
 
 def test_kicks_leave_local_optima():
