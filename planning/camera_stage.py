@@ -7,7 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera_spread import CameraSpread, spread_cameras
-from .cameras import CameraStage, lit_samples, measured_by, plan_cameras
+from .cameras import (
+    CameraCover,
+    CameraStage,
+    camera_stage,
+    lit_samples,
+    measured_by,
+    plan_cameras,
+)
 from .plan import PlannedCamera, PlannedProjector
 from .ring_axes import turn_ring_axes
 from .scene import Scene
@@ -50,19 +57,17 @@ def place_cameras(
         n_candidates: Poses offered.
         tilt: Tilt of the ring axes, or their shift.
     """
-    best = CameraSolution(
-        tuple(projectors), plan_cameras(scene, projectors, template, n_candidates)
-    )
+    kept = tuple(projectors)
+    best = plan_cameras(scene, kept, template, n_candidates)
     for _ in range(_ROUNDS):
-        rows = best.stage.rows
-        turned = turn_ring_axes(scene, best.projectors, best.stage.cameras, rows, tilt)
-        if all(a is b for a, b in zip(turned, best.projectors, strict=True)):
+        turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
+        if all(a is b for a, b in zip(turned, kept, strict=True)):
             break
-        stage = plan_cameras(scene, turned, template, n_candidates)
-        if not _better(stage, best.stage):
+        cover = plan_cameras(scene, turned, template, n_candidates)
+        if not _better(cover, best):
             break
-        best = CameraSolution(turned, stage)
-    return best
+        kept, best = turned, cover
+    return CameraSolution(kept, camera_stage(scene, best))
 
 
 def spread(
@@ -117,9 +122,12 @@ def spread(
     )
 
 
-def _better(new: CameraStage, old: CameraStage) -> bool:
-    a, b = new.certificate, old.certificate
-    counts = (a["needed"]["count"], b["needed"]["count"])
-    if counts[0] != counts[1]:
-        return counts[0] < counts[1]
-    return a["best_area"]["value_m2"] > b["best_area"]["value_m2"]
+def _better(new: CameraCover, old: CameraCover) -> bool:
+    """Whether fewer cameras are needed, or as many measure more area."""
+    if new.selection.needed != old.selection.needed:
+        return new.selection.needed < old.selection.needed
+    a, b = (
+        cover.selection.best_rows * cover.rows.target.samples.weight
+        for cover in (new, old)
+    )
+    return a > b

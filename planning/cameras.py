@@ -17,7 +17,7 @@ from .measurability import Rings
 from .plan import PlannedCamera, PlannedProjector
 from .projectors import lit_stages, merged
 from .scene import Scene
-from .selection import certificate, select_fewest
+from .selection import Selection, certificate, marginals, select_fewest
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
@@ -40,6 +40,28 @@ class LitSamples:
     lit: NDArray[np.bool_]
     lights: tuple[Light, ...]
     rings: tuple[Rings, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CameraCover:
+    """Cameras chosen for projectors as they are.
+
+    Attributes:
+        candidates: Poses offered, which are the reference set.
+        rows: Lit samples that the cover was solved on.
+        measured: Which candidate measures which sample, shape (n, m).
+        selection: Candidates taken, and what was proved of their number.
+    """
+
+    candidates: tuple[PlannedCamera, ...]
+    rows: LitSamples
+    measured: NDArray[np.bool_]
+    selection: Selection
+
+    @property
+    def cameras(self) -> tuple[PlannedCamera, ...]:
+        """The cameras taken."""
+        return tuple(self.candidates[i] for i in self.selection.chosen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +118,7 @@ def plan_cameras(
     projectors: Sequence[PlannedProjector],
     template: PlannedCamera,
     n_candidates: int,
-) -> CameraStage:
+) -> CameraCover:
     """Choose the fewest cameras that measure the required share of what is lit.
 
     Args:
@@ -131,16 +153,27 @@ def plan_cameras(
         target = merged(target, fresh_target)
         rows = lit_samples(scene, projectors, target)
         measured = np.concatenate([measured, seen])
+    return CameraCover(candidates, rows, measured, selection)
+
+
+def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
+    """Return what the stage found, with the best cameras for every other count."""
+    others = marginals(cover.measured, cover.selection, seed=scene.seed)
+    target = cover.rows.target
     return CameraStage(
-        tuple(candidates[i] for i in selection.chosen),
-        candidates,
-        rows,
+        cover.cameras,
+        cover.candidates,
+        cover.rows,
         {
-            number: tuple(candidates[i] for i in chosen)
-            for number, chosen in selection.by_count.items()
+            number: tuple(cover.candidates[i] for i in chosen)
+            for number, chosen in others.by_count.items()
         },
         certificate(
-            selection, len(rows.target), target.samples.weight, len(candidates)
+            cover.selection,
+            others,
+            n_rows=len(target),
+            row_area_m2=target.samples.weight,
+            n_candidates=len(cover.candidates),
         ),
     )
 

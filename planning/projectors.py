@@ -15,7 +15,7 @@ from .errors import InfeasibleLimitsError
 from .lighting import Target
 from .plan import PlannedProjector
 from .scene import Scene
-from .selection import MORE, Selection, certificate, select_fewest
+from .selection import Selection, certificate, marginals, select_fewest
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
@@ -74,7 +74,7 @@ def plan_projectors(
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
         raise InfeasibleLimitsError(_nothing_lit(stages, len(candidates)))
-    selection = _fewest(scene, stages, more=0)
+    selection = _fewest(scene, stages)
     # The best of a lattice lies beside the best there is.
     around = projectors_around(
         [candidates[i] for i in selection.chosen],
@@ -87,7 +87,7 @@ def plan_projectors(
     attempt = 0
     while True:
         attempt += 1
-        selection = _fewest(scene, stages, more=MORE)
+        selection = _fewest(scene, stages)
         fresh = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh_stages = lit_stages(scene, candidates, fresh)
         lit = fresh_stages == lighting.LIT
@@ -100,14 +100,13 @@ def plan_projectors(
     return _stage(scene, candidates, rows, stages, selection)
 
 
-def _fewest(scene: Scene, stages: NDArray[np.int8], *, more: int) -> Selection:
+def _fewest(scene: Scene, stages: NDArray[np.int8]) -> Selection:
     required = scene.requirements
     return select_fewest(
         stages == lighting.LIT,
         required.dominant_coverage,
         max_count=required.max_projectors,
         seed=scene.seed,
-        more=more,
     )
 
 
@@ -181,7 +180,14 @@ def _stage(
     stages: NDArray[np.int8],
     selection: Selection,
 ) -> ProjectorStage:
-    proof = certificate(selection, len(rows), rows.samples.weight, len(candidates))
+    others = marginals(stages == lighting.LIT, selection, seed=scene.seed)
+    proof = certificate(
+        selection,
+        others,
+        n_rows=len(rows),
+        row_area_m2=rows.samples.weight,
+        n_candidates=len(candidates),
+    )
     proof["excluded_pairs"] = {
         cause: int((stages == index).sum())
         for index, cause in enumerate(lighting.CAUSES)
@@ -193,7 +199,7 @@ def _stage(
         rows,
         {
             number: tuple(candidates[i] for i in chosen)
-            for number, chosen in selection.by_count.items()
+            for number, chosen in others.by_count.items()
         },
         proof,
     )

@@ -26,38 +26,47 @@ class Selection:
 
     Attributes:
         chosen: Candidates taken, at most the number allowed, shape (k,).
-        needed: Candidates of the smallest cover found, allowed or not.
+        smallest: The smallest cover found, allowed or not, shape (needed,).
         lower_bound: Proven least number of candidates for these rows.
         status: `optimal`, `feasible` or `infeasible`.
         proof: What proves the bound.
         required: Rows that must be covered.
         best_rows: Most rows that k candidates were found to cover.
         best_rows_bound: Proven upper bound on that.
-        one_fewer_bound: Proven most rows that k - 1 candidates cover.
-        by_count: Best candidates found for 1, 2, ... k + `more` devices.
-        greedy: Candidates that the greedy cover takes.
     """
 
     chosen: NDArray[np.int64]
-    needed: int
+    smallest: NDArray[np.int64]
     lower_bound: int
     status: str
     proof: str
     required: int
     best_rows: int
     best_rows_bound: int
-    one_fewer_bound: int
+
+    @property
+    def needed(self) -> int:
+        """Candidates of the smallest cover found, allowed or not."""
+        return len(self.smallest)
+
+
+@dataclass(frozen=True, eq=False)
+class Marginals:
+    """What other numbers of candidates than the one taken would give.
+
+    Attributes:
+        by_count: Best candidates found for 1, 2, ... k + `more` devices.
+        one_fewer_bound: Proven most rows that k - 1 candidates cover.
+        greedy: Candidates that the greedy cover takes.
+    """
+
     by_count: dict[int, NDArray[np.int64]]
+    one_fewer_bound: int
     greedy: int
 
 
 def select_fewest(
-    covers: NDArray[np.bool_],
-    share: float,
-    *,
-    max_count: int | None,
-    seed: int,
-    more: int = MORE,
+    covers: NDArray[np.bool_], share: float, *, max_count: int | None, seed: int
 ) -> Selection:
     """Return the fewest candidates that cover a share of what all of them cover.
 
@@ -68,54 +77,79 @@ def select_fewest(
         share: Of the rows that any candidate serves, in (0, 1].
         max_count: Candidates allowed; None for no limit.
         seed: Of the heuristics.
-        more: Counts beyond the one taken for which the best is wanted too.
     """
-    reachable = covers.any(axis=1)
-    required = int(np.ceil(share * int(reachable.sum()) - 1e-9))
-    problem = CoverProblem(
-        sparse.csr_array(covers[reachable]), required_weight=float(required)
-    )
-    solution = solve_cover(problem, seed=seed)
+    required = int(np.ceil(share * int(covers.any(axis=1).sum()) - 1e-9))
+    problem = _problem(covers, required)
+    solution = solve_cover(problem, seed=seed, heaviest=False)
     needed = len(solution.selected)
     lower_bound = int(np.ceil(solution.lower_bound - 1e-9))
     allowed = needed if max_count is None else min(needed, max_count)
-    by_count: dict[int, NDArray[np.int64]] = {}
-    bounds: dict[int, float] = {}
-    rows: dict[int, int] = {}
-    warm = np.empty(0, dtype=np.int64)
-    for count in range(1, min(allowed + more, covers.shape[1]) + 1):
-        start = solution.selected if count == needed else warm
-        best = solve_max_coverage(
-            problem,
-            count,
-            warm_start=start,
-            seed=seed,
-            budget=DEFAULT_BUDGET
-            if allowed - 1 <= count <= allowed
-            else _MARGINAL_BUDGET,
-        )
-        by_count[count] = warm = best.selected
-        bounds[count] = best.upper_bound
-        rows[count] = int(covers[:, best.selected].any(axis=1).sum())
-    one_fewer = int(np.floor(bounds[allowed - 1] + 1e-6)) if allowed > 1 else 0
-    if lower_bound >= allowed:
-        # Where fewer are proved too few, they fall short of what is required.
-        one_fewer = min(one_fewer, required - 1)
-    met = needed <= allowed and rows[allowed] >= required
+    best = solve_max_coverage(
+        problem,
+        allowed,
+        warm_start=solution.selected if allowed == needed else None,
+        seed=seed,
+    )
+    rows = _rows(covers, best.selected)
+    met = needed <= allowed and rows >= required
     status = SolveStatus.OPTIMAL if lower_bound >= needed else SolveStatus.FEASIBLE
     return Selection(
-        by_count[allowed],
-        needed,
+        best.selected,
+        solution.selected,
         min(lower_bound, needed),
         status.name.lower() if met else "infeasible",
         solution.proof,
         required,
-        rows[allowed],
-        int(np.floor(bounds[allowed] + 1e-6)),
-        one_fewer,
-        by_count,
-        _greedy_count(covers[reachable], required),
+        rows,
+        int(np.floor(best.upper_bound + 1e-6)),
     )
+
+
+def marginals(
+    covers: NDArray[np.bool_], selection: Selection, *, seed: int, more: int = MORE
+) -> Marginals:
+    """Return the best candidates for every other count, for the table in the plan.
+
+    Args:
+        covers: As the selection was made from.
+        selection: As it is kept.
+        seed: Of the heuristics.
+        more: Counts beyond the one taken for which the best is wanted.
+    """
+    problem = _problem(covers, selection.required)
+    taken = len(selection.chosen)
+    bound = 0.0
+    by_count: dict[int, NDArray[np.int64]] = {}
+    best = np.empty(0, dtype=np.int64)
+    for count in range(1, min(taken + more, covers.shape[1]) + 1):
+        if count == taken:
+            best = selection.chosen
+        else:
+            found = solve_max_coverage(
+                problem,
+                count,
+                warm_start=selection.smallest if count == selection.needed else best,
+                seed=seed,
+                budget=DEFAULT_BUDGET if count == taken - 1 else _MARGINAL_BUDGET,
+            )
+            best = found.selected
+            bound = found.upper_bound if count == taken - 1 else bound
+        by_count[count] = best
+    one_fewer = int(np.floor(bound + 1e-6))
+    if selection.lower_bound >= taken:
+        # Where fewer are proved too few, they fall short of what is required.
+        one_fewer = min(one_fewer, selection.required - 1)
+    return Marginals(by_count, one_fewer, _greedy_count(covers, selection.required))
+
+
+def _problem(covers: NDArray[np.bool_], required: int) -> CoverProblem:
+    """The program over the rows that some candidate serves."""
+    reachable = covers[covers.any(axis=1)]
+    return CoverProblem(sparse.csr_array(reachable), required_weight=float(required))
+
+
+def _rows(covers: NDArray[np.bool_], chosen: NDArray[np.int64]) -> int:
+    return int(covers[:, chosen].any(axis=1).sum())
 
 
 def _greedy_count(covers: NDArray[np.bool_], required: int) -> int:
@@ -129,7 +163,12 @@ def _greedy_count(covers: NDArray[np.bool_], required: int) -> int:
 
 
 def certificate(
-    selection: Selection, n_rows: int, row_area_m2: float, n_candidates: int
+    selection: Selection,
+    others: Marginals,
+    *,
+    n_rows: int,
+    row_area_m2: float,
+    n_candidates: int,
 ) -> dict[str, Any]:
     """Return the plan's certificate: what was proved, and over what."""
     count = len(selection.chosen)
@@ -145,13 +184,13 @@ def certificate(
             "proof": selection.proof,
         },
         "continuous": None,
-        "greedy_count": selection.greedy,
+        "greedy_count": others.greedy,
         "needed": {"count": selection.needed, "lower_bound": selection.lower_bound},
         "best_area": {
             "value_m2": selection.best_rows * row_area_m2,
             "upper_bound_m2": selection.best_rows_bound * row_area_m2,
         },
-        "one_fewer": {"upper_bound_m2": selection.one_fewer_bound * row_area_m2},
+        "one_fewer": {"upper_bound_m2": others.one_fewer_bound * row_area_m2},
     }
 
 

@@ -46,7 +46,12 @@ class WeightAnswer:
 
 
 def fewest_sets(
-    cover: ReducedCover, budget: WorkBudget, *, seed: int, max_sets: int | None = None
+    cover: ReducedCover,
+    budget: WorkBudget,
+    *,
+    seed: int,
+    max_sets: int | None = None,
+    heaviest: bool = True,
 ) -> CountAnswer:
     """Find the fewest sets that reach the required weight, with a lower bound.
 
@@ -55,6 +60,7 @@ def fewest_sets(
         budget: Counted work.
         seed: Seed of the neighbourhood search.
         max_sets: Sets allowed.
+        heaviest: Whether to look for more weight at the same count.
     """
     selected = prune(cover, greedy(cover, _EMPTY, budget))
     cap = cover.n_sets if max_sets is None else max_sets
@@ -85,7 +91,21 @@ def fewest_sets(
                 cover, selected, lower, cap, multipliers, budget
             )
             lower, proof = (proved, how) if proved > lower else (lower, proof)
-    return _count_answer(cover, selected, lower, proof, cap, budget, seed)
+    if selected.size > cap:
+        status = SolveStatus.INFEASIBLE if lower > cap else SolveStatus.UNKNOWN
+        settled, start = lower > cap, _EMPTY
+    else:
+        settled, start = lower >= selected.size, selected
+        status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
+    if heaviest or selected.size > cap:
+        # Its own allowance, so that a hard proof doesn't cost the larger area.
+        spare = budget.part(np.inf)
+        spare.units = 0.3 * budget.units
+        size = min(selected.size, cap)
+        selected = most_weight(cover, size, spare, seed=seed, start=start).selected
+    if not settled:
+        proof = f"{proof}; search cut by the {budget.reason}"
+    return CountAnswer(status, selected, float(lower), proof)
 
 
 def cheapest_sets(
@@ -263,35 +283,6 @@ def _improve(
             break
         selected = prune(cover, fewer)
     return selected
-
-
-def _count_answer(
-    cover: ReducedCover,
-    selected: NDArray[np.int64],
-    lower: int,
-    proof: str,
-    cap: int,
-    budget: WorkBudget,
-    seed: int,
-) -> CountAnswer:
-    """Close the solve: use what work is left for more weight at the same count."""
-    size = min(selected.size, cap)
-    start = selected if selected.size <= cap else _EMPTY
-    # Its own allowance, so that a hard proof doesn't cost the larger area.
-    spare = budget.part(np.inf)
-    spare.units = 0.3 * budget.units
-    best = most_weight(cover, size, spare, seed=seed, start=start)
-    if selected.size <= cap:
-        settled = lower >= selected.size
-        status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-        selected = best.selected
-    else:
-        settled = lower > cap
-        status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
-        selected = best.selected
-    if not settled:
-        proof = f"{proof}; search cut by the {budget.reason}"
-    return CountAnswer(status, selected, float(lower), proof)
 
 
 def _tuple_proof(n_sets: int, search: TupleSearch) -> str:

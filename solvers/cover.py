@@ -178,6 +178,7 @@ def solve_cover(
     time_limit: float = 60.0,
     seed: int = 0,
     budget: float = DEFAULT_BUDGET,
+    heaviest: bool = True,
 ) -> CoverSolution:
     """Find the fewest (or cheapest) sets that reach the required weight.
 
@@ -189,6 +190,8 @@ def solve_cover(
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
         seed: Seed of the neighbourhood search.
         budget: Counted work, in matrix entries touched; about 1e9 a second.
+        heaviest: Whether to look for the one of most weight among the covers of the
+            fewest sets; no for who asks `solve_max_coverage` next.
 
     Returns:
         The solution. An infeasible problem is an answer, not an error: its selection
@@ -206,7 +209,9 @@ def solve_cover(
     if cover.total < cover.required:
         return _unreachable(problem, cover, work)
     if problem.unit_costs:
-        answer = fewest_sets(cover, work, seed=seed, max_sets=max_sets)
+        answer = fewest_sets(
+            cover, work, seed=seed, max_sets=max_sets, heaviest=heaviest
+        )
         unit = float(problem.costs[0])
         bound = answer.lower_bound * unit
     else:

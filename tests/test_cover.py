@@ -136,6 +136,23 @@ def test_among_the_fewest_the_most_weight():
     assert pair.selected.tolist() == [1, 2]
 
 
+def test_the_most_weight_is_left_out_on_request_and_nothing_else():
+    lighter = 0
+    for seed in range(8):
+        covers, weights = visibility(200, 60, seed=seed)
+        problem = CoverProblem(covers, weights, min_coverage=0.85)
+        best = solve_cover(problem)
+        any_one = solve_cover(problem, heaviest=False)
+        assert (any_one.status, any_one.lower_bound) == (best.status, best.lower_bound)
+        assert (any_one.cost, any_one.proof) == (best.cost, best.proof)
+        assert any_one.shortfall() == 0.0
+        assert any_one.covered_weight <= best.covered_weight
+        lighter += any_one.covered_weight < best.covered_weight
+        few = [solve_cover(problem, max_sets=2, heaviest=h) for h in (True, False)]
+        assert few[0].selected.tolist() == few[1].selected.tolist()
+    assert lighter > 0
+
+
 def test_costs_decide_over_counts():
     sets = [{0, 1, 2}, {0}, {1}, {2}]
     dear = from_sets(sets, 3, costs=np.array([10.0, 1.0, 1.0, 1.0]))

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from planning.selection import certificate, select_fewest
+from planning.selection import certificate, marginals, select_fewest
 
 
 def brute(covers, required, count):
@@ -32,12 +32,15 @@ def test_count_bound_and_areas_against_brute_force(seed, share):
     assert found.status == ("optimal" if found.lower_bound == fewest else "feasible")
     assert found.status == "optimal"
     assert found.best_rows == best[fewest] <= found.best_rows_bound
+    others = marginals(covers, found, seed=0)
     if fewest > 1:
-        assert best[fewest - 1] <= found.one_fewer_bound < required
-    for count, chosen in found.by_count.items():
+        assert best[fewest - 1] <= others.one_fewer_bound < required
+    assert list(others.by_count) == list(range(1, min(fewest + 2, 9) + 1))
+    assert others.by_count[fewest].tolist() == found.chosen.tolist()
+    for count, chosen in others.by_count.items():
         assert len(chosen) <= count
         assert covers[:, chosen].any(axis=1).sum() == best[count]
-    assert found.greedy >= fewest
+    assert others.greedy >= fewest
 
 
 def test_too_few_allowed_gives_the_best_of_them_and_what_would_be_needed():
@@ -47,7 +50,11 @@ def test_too_few_allowed_gives_the_best_of_them_and_what_would_be_needed():
     assert len(found.chosen) == 2
     assert found.best_rows == found.best_rows_bound == 10
     assert (found.needed, found.lower_bound) == (4, 4)
-    proof = certificate(found, 20, 0.5, 4)
+    others = marginals(covers, found, seed=0)
+    assert others.one_fewer_bound == 5
+    assert covers[:, others.by_count[4]].any(axis=1).all()
+    proof = certificate(found, others, n_rows=20, row_area_m2=0.5, n_candidates=4)
+    assert proof["one_fewer"] == {"upper_bound_m2": 2.5}
     assert proof["count"] == 2
     assert proof["needed"] == {"count": 4, "lower_bound": 4}
     assert proof["best_area"] == {"value_m2": 5.0, "upper_bound_m2": 5.0}
