@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .diffusion import diffused
 from .mesh import TriangleMesh
-from .tensors import packed, principal, tangent_planes, unpacked
+from .quadric import fit_quadrics
+from .tensors import principal, tangent_planes, unpacked
 from .topology import Edges, components, face_pairs
 
 DEFAULT_RADIUS_SHARE = 0.02
@@ -135,10 +135,9 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
     valid = np.zeros(n, dtype=bool)
     k, directions = np.zeros((2, n)), np.zeros((2, n, 3))
     directions[0], directions[1] = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
-    # libigl reads out of bounds at faces without area and at vertices without a face.
     solid = mesh.faces[mesh.face_areas > 0]
     if len(solid):
-        # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
+        # Unit mean edge about the origin: the least that rounding costs.
         edge = mesh.mean_edge
         used, faces = _numbered(solid, n)
         part = mesh
@@ -168,52 +167,35 @@ def _averaged_fit(
     whole: NDArray[np.bool_],
     scale: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Fit, averaged over a scale in mean edges; the results are those of `_fit`.
+    """Fit, averaged over a scale in mean edges; and where there was one.
 
     Only vertices with a whole neighbourhood take part.
     """
     beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
     if beyond > 0:
         vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))
-    k, ways, fitted = _fit(vertices, faces, _RINGS)
-    fitted &= whole
-    # An exactly flat neighbourhood has no direction of its own, hence no normal.
-    normals = np.cross(ways[0], ways[1])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.where(length > 0.5, normals, _vertex_normals(vertices, faces))
-    length = np.where(length > 0.5, length, 1.0)
+    solid = _with_normals(vertices, faces)
+    normals = _vertex_normals(vertices, solid)
+    tensors, fitted, sensible = fit_quadrics(vertices, solid, normals)
+    fitted, sensible = fitted & whole, sensible & whole
+    if np.any(fitted & ~sensible):
+        # Those take over what is around them; where nothing is, they aren't known.
+        fitted &= _joined_to(sensible, laplacian)
     tensors = diffused(
-        packed((k[0], k[1]), (ways[0], ways[1])),
-        np.where(fitted, mass, 0.0),
+        tensors,
+        np.where(sensible, mass, 0.0),
         laplacian,
         max(_AVERAGED_SHARE * scale, _LEAST_EDGES),
     )
-    return *principal(unpacked(tensors), tangent_planes(normals / length)), fitted
+    return *principal(unpacked(tensors), tangent_planes(normals)), fitted
 
 
-def _fit(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], rings: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,).
-
-    Where there is no success, all are zero.
-    """
-    n = len(vertices)
-    k, ways, fitted = np.zeros((2, n)), np.zeros((2, n, 3)), np.zeros(n, dtype=bool)
-    faces = _with_normals(vertices, faces)
-    if len(faces) == 0:
-        return k, ways, fitted
-    used, local = _numbered(faces, n)
-    first, second, k_first, k_second, bad = igl.principal_curvature(
-        np.ascontiguousarray(vertices[used]), local, radius=rings, useKring=True
-    )
-    k[:, used] = np.stack([k_first, k_second])
-    ways[:, used] = np.stack([first, second])
-    fitted[used] = True
-    fitted &= np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
-    fitted[used[list(bad)]] = False
-    k[:, ~fitted], ways[:, ~fitted] = 0.0, 0.0
-    return k, ways, fitted
+def _joined_to(chosen: NDArray[np.bool_], laplacian: csr_array) -> NDArray[np.bool_]:
+    """Which nodes are connected to a chosen one, shape (n,)."""
+    count, label = connected_components(laplacian, directed=False)
+    held = np.zeros(count, dtype=bool)
+    held[label[chosen]] = True
+    return held[label]
 
 
 def _numbered(
@@ -243,7 +225,7 @@ def _vertex_normals(
 def _with_normals(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Leave out faces at vertices whose normals cancel: libigl crashes there.
+    """Leave out faces at vertices whose normals cancel: there is no plane to fit over.
 
     Two faces on the same three corners, turned against each other, do that.
     """

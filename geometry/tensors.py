@@ -27,6 +27,12 @@ def packed(
     return np.asarray((first + second) * _DOUBLED, dtype=np.float64)
 
 
+def packed_tensors(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return symmetric tensors (n, 3, 3) as six numbers each, of the same norm."""
+    i, j = _UPPER
+    return tensors[:, i, j] * _DOUBLED
+
+
 def unpacked(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return what `packed` packed, (n, 3, 3)."""
     return (tensors / _DOUBLED)[:, _PACKED_AT]
@@ -53,13 +59,14 @@ def principal(
     Returns:
         Shapes (2, n) and (2, n, 3).
     """
-    form = np.swapaxes(planes, 1, 2) @ tensors @ planes
-    half_sum = 0.5 * (form[:, 0, 0] + form[:, 1, 1])
-    half_gap = 0.5 * (form[:, 0, 0] - form[:, 1, 1])
-    twist = 0.5 * (form[:, 0, 1] + form[:, 1, 0])
+    a, b = planes[:, :, 0], planes[:, :, 1]
+    across_a = np.einsum("nij,nj->ni", tensors, a)
+    aa = np.einsum("ni,ni->n", across_a, a)
+    twist = np.einsum("ni,ni->n", across_a, b)
+    bb = np.einsum("nij,ni,nj->n", tensors, b, b, optimize=False)
+    half_sum, half_gap = 0.5 * (aa + bb), 0.5 * (aa - bb)
     spread = np.hypot(half_gap, twist)
     angle = 0.5 * np.arctan2(twist, half_gap)
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    a, b = planes[:, :, 0], planes[:, :, 1]
     ways = np.stack([cosine * a + sine * b, cosine * b - sine * a])
     return np.stack([half_sum + spread, half_sum - spread]), ways
