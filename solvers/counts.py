@@ -20,6 +20,8 @@ from .status import SolveStatus, WorkBudget
 _EMPTY = np.empty(0, dtype=np.int64)
 _INTEGER_PROOF = "branch and bound (HiGHS)"
 _LARGE_COUNT = 8
+# Restarts before a bound is asked whether more are worth it.
+_FIRST_KICKS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,24 +167,31 @@ def most_weight(
     for first in (start, _EMPTY) if start.size else (_EMPTY,):
         filled = greedy(cover, first, budget, n_sets=n_sets)
         best = max(best, filled, key=cover.weight_of)
+    kicks = budget.part(0.4 * budget.units)
     best = most_coverage(
-        cover,
-        best,
-        budget.part(0.4 * budget.units),
-        target=cover.total,
-        seed=seed,
-        max_kicks=20 + 10 * n_sets,
+        cover, best, kicks, target=cover.total, seed=seed, max_kicks=_FIRST_KICKS
     )
     weight = cover.weight_of(best)
     if weight >= cover.total:
         proof = "all that any set covers is covered"
         return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
-    least = max(1.0, np.floor(cover.total * 1e-11))
+    least = max(cover.grain, np.floor(cover.total * 1e-11))
     part = budget.part(0.2 * budget.units)
     step = tighten(
         cover.by_set, cover.weights, n_sets, weight + least, cover.weights, part
     )
     upper = float(coverage_bounds(cover, step.multipliers)[n_sets])
+    if upper >= weight + least:
+        # No more is to be had than the last whole grain below the bound.
+        best = most_coverage(
+            cover,
+            best,
+            kicks,
+            target=upper - upper % cover.grain,
+            seed=seed + 1,
+            max_kicks=20 + 10 * n_sets,
+        )
+        weight = cover.weight_of(best)
     if upper < weight + least:
         return WeightAnswer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
     search = best_tuple(

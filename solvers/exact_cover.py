@@ -10,6 +10,7 @@ over the open rows::
 Integer-valued weights make it exact, whatever the BLAS and its threads.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,11 +78,10 @@ def best_tuple(
     every = np.arange(cover.n_sets)
     upper = search.branch(every, cover.weights, multipliers, n_sets, [])
     found = search.selected
-    # What was pruned is below the target, which an incumbent has raised.
     return TupleSearch(
         selected=None if found is None else np.array(sorted(found), dtype=np.int64),
         weight=search.weight,
-        upper_bound=max(upper, search.target) if search.cut else search.target,
+        upper_bound=max(upper, search.refuted) if search.cut else search.refuted,
         complete=not search.cut,
         pairs_only=search.nodes == 0,
     )
@@ -107,13 +107,19 @@ class _Search:
         self.row_order = np.argsort(servers, kind="stable")
         self._total = cover.total
         # Improvements below this share of the total are rounding, not weight.
-        self._least = max(1.0, np.floor(self._total * ROUNDING))
+        self._least = max(cover.grain, np.floor(self._total * ROUNDING))
 
     def offer(self, chosen: list[int], weight: float) -> None:
         """Keep a selection that reaches the target, and ask for more from then on."""
         if weight >= self.target:
             self.selected, self.weight = chosen, weight
             self.target = weight + self._least
+
+    @property
+    def refuted(self) -> float:
+        """Most weight that a sum may have below the target, where all is pruned."""
+        grain = int(self.cover.grain)
+        return float((math.ceil(self.target) - 1) // grain * grain)
 
     @property
     def done(self) -> bool:

@@ -54,6 +54,11 @@ class ReducedCover:
         return float(self.weights.sum())
 
     @property
+    def grain(self) -> float:
+        """Integer-valued weight of which every row's, hence any sum, is a multiple."""
+        return float(np.gcd.reduce(self.weights.astype(np.int64), initial=0) or 1)
+
+    @property
     def entries(self) -> int:
         """Nonzeros of the matrix: the work of one product with a vector."""
         return int(self.by_set.nnz) + self.n_sets

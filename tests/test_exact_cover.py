@@ -94,6 +94,28 @@ def test_tuples_decide_to_the_last_unit_of_weight(k):
                 assert search.complete
 
 
+def test_sums_of_equal_weights_come_in_whole_grains():
+    """A target between two sums asks for the upper one, and refutes it if it's none."""
+    for seed in range(12):
+        covers = np.random.default_rng(seed).random((50, 12)) < 0.3
+        cover = reduce_cover(
+            sparse.csr_array(covers), np.full(50, 0.3), np.ones(12), 1.0
+        )
+        assert np.all(cover.weights % cover.grain == 0.0)
+        counts = cover.weights / cover.grain
+        assert np.gcd.reduce(counts.astype(int)) == 1
+        best = most_by_hand(cover, 3)
+        search = best_tuple(
+            cover,
+            3,
+            target=best + 1.0,
+            multipliers=cover.weights,
+            budget=plenty(),
+        )
+        assert search.selected is None
+        assert search.upper_bound == best
+
+
 def test_full_covers_branch_on_scarce_rows():
     """A planted exact cover of five among decoys that miss a row each."""
     rng = np.random.default_rng(2)
