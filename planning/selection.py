@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from solvers import CoverProblem, SolveStatus, solve_cover
-from solvers.cover import DEFAULT_BUDGET, solve_max_coverage
+from solvers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
 
 MORE = 2
 # Counted work for the marginal table's other counts, where no proof is claimed.
@@ -80,7 +80,8 @@ def select_fewest(
     """
     required = int(np.ceil(share * int(covers.any(axis=1).sum()) - 1e-9))
     problem = _problem(covers, required)
-    solution = solve_cover(problem, seed=seed, heaviest=False)
+    reduced = reduced_problem(problem)
+    solution = solve_cover(problem, seed=seed, heaviest=False, reduced=reduced)
     needed = len(solution.selected)
     lower_bound = int(np.ceil(solution.lower_bound - 1e-9))
     allowed = needed if max_count is None else min(needed, max_count)
@@ -89,6 +90,7 @@ def select_fewest(
         allowed,
         warm_start=solution.selected if allowed == needed else None,
         seed=seed,
+        reduced=reduced,
     )
     rows = _rows(covers, best.selected)
     met = needed <= allowed and rows >= required
@@ -117,6 +119,7 @@ def marginals(
         more: Counts beyond the one taken for which the best is wanted.
     """
     problem = _problem(covers, selection.required)
+    reduced = reduced_problem(problem)
     taken = len(selection.chosen)
     bound = 0.0
     by_count: dict[int, NDArray[np.int64]] = {}
@@ -131,6 +134,7 @@ def marginals(
                 warm_start=selection.smallest if count == selection.needed else best,
                 seed=seed,
                 budget=DEFAULT_BUDGET if count == taken - 1 else _MARGINAL_BUDGET,
+                reduced=reduced,
             )
             best = found.selected
             bound = found.upper_bound if count == taken - 1 else bound

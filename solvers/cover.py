@@ -179,6 +179,7 @@ def solve_cover(
     seed: int = 0,
     budget: float = DEFAULT_BUDGET,
     heaviest: bool = True,
+    reduced: ReducedCover | None = None,
 ) -> CoverSolution:
     """Find the fewest (or cheapest) sets that reach the required weight.
 
@@ -192,6 +193,7 @@ def solve_cover(
         budget: Counted work, in matrix entries touched; about 1e9 a second.
         heaviest: Whether to look for the one of most weight among the covers of the
             fewest sets; no for who asks `solve_max_coverage` next.
+        reduced: This problem's `reduced_problem`, where it is at hand.
 
     Returns:
         The solution. An infeasible problem is an answer, not an error: its selection
@@ -204,7 +206,7 @@ def solve_cover(
         nothing = np.empty(0, dtype=np.int64)
         proof = "no weight is required"
         return CoverSolution(problem, SolveStatus.OPTIMAL, nothing, 0.0, proof)
-    cover = _reduced(problem)
+    cover = _or_reduce(problem, problem.costs, reduced)
     work.spend(cover.entries)
     if cover.total < cover.required:
         return _unreachable(problem, cover, work)
@@ -229,6 +231,7 @@ def solve_max_coverage(
     time_limit: float = 60.0,
     seed: int = 0,
     budget: float = DEFAULT_BUDGET,
+    reduced: ReducedCover | None = None,
 ) -> MaxCoverageSolution:
     """Find the largest weight that at most ``n_sets`` sets cover; costs play no part.
 
@@ -239,6 +242,7 @@ def solve_max_coverage(
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
         seed: Seed of the neighbourhood search.
         budget: Counted work, in matrix entries touched.
+        reduced: This problem's `reduced_problem`, where it is at hand.
     """
     if not n_sets >= 0:
         raise ValueError(f"n_sets must be at least 0, got {n_sets}")
@@ -246,7 +250,7 @@ def solve_max_coverage(
     if start.size > n_sets or not np.all((start >= 0) & (start < problem.costs.size)):
         raise ValueError(f"warm_start must name at most {n_sets} sets of the problem")
     work = WorkBudget(budget, time_limit=time_limit)
-    cover = _reduced(problem, costs=np.ones(problem.costs.size))
+    cover = _or_reduce(problem, np.ones(problem.costs.size), reduced)
     work.spend(cover.entries)
     stand_in = cover.stand_in[start]
     answer = most_weight(
@@ -261,15 +265,28 @@ def solve_max_coverage(
     )
 
 
-def _reduced(
-    problem: CoverProblem, costs: NDArray[np.float64] | None = None
+def reduced_problem(problem: CoverProblem) -> ReducedCover:
+    """Return what both solvers search, to be made once for several questions.
+
+    Raises:
+        ValueError: If costs differ: where they don't count, more sets may be dropped.
+    """
+    if not problem.unit_costs:
+        raise ValueError("costs differ: solve each question from the problem itself")
+    return _or_reduce(problem, problem.costs, None)
+
+
+def _or_reduce(
+    problem: CoverProblem, costs: NDArray[np.float64], given: ReducedCover | None
 ) -> ReducedCover:
-    return reduce_cover(
-        problem.covers,
-        problem.weights,
-        problem.costs if costs is None else costs,
-        problem.required_weight,
-    )
+    if given is not None:
+        if given.stand_in.size != problem.costs.size:
+            raise ValueError(
+                f"reduced is of a problem of {given.stand_in.size} sets, not "
+                f"{problem.costs.size}"
+            )
+        return given
+    return reduce_cover(problem.covers, problem.weights, costs, problem.required_weight)
 
 
 def _unreachable(

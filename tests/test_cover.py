@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from solvers import CoverProblem, solve_cover
-from solvers.cover import MAX_ENTRIES, solve_max_coverage
+from solvers.cover import MAX_ENTRIES, reduced_problem, solve_max_coverage
 from solvers.reductions import reduce_cover
 from solvers.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.status import SolveStatus
@@ -151,6 +151,31 @@ def test_the_most_weight_is_left_out_on_request_and_nothing_else():
         few = [solve_cover(problem, max_sets=2, heaviest=h) for h in (True, False)]
         assert few[0].selected.tolist() == few[1].selected.tolist()
     assert lighter > 0
+
+
+@pytest.mark.parametrize("cost", [1.0, 2.5])
+def test_one_reduction_answers_every_question_as_its_own_would(cost):
+    covers, weights = visibility(200, 60, seed=2)
+    problem = CoverProblem(covers, weights, np.full(60, cost), 0.9)
+    once = reduced_problem(problem)
+    answers = [solve_cover(problem), solve_cover(problem, reduced=once)]
+    assert answers[0].selected.tolist() == answers[1].selected.tolist()
+    assert answers[0].lower_bound == answers[1].lower_bound
+    for k in (1, 2, 4):
+        best = [solve_max_coverage(problem, k, reduced=r) for r in (None, once)]
+        assert best[0].selected.tolist() == best[1].selected.tolist()
+        assert best[0].upper_bound == best[1].upper_bound
+
+
+def test_a_reduction_is_refused_where_it_does_not_belong():
+    problem = from_sets([{0, 1}, {2}], 3)
+    other = reduced_problem(from_sets([{0}, {1}, {2}], 3))
+    with pytest.raises(ValueError, match="of 3 sets, not 2"):
+        solve_cover(problem, reduced=other)
+    with pytest.raises(ValueError, match="of 3 sets, not 2"):
+        solve_max_coverage(problem, 1, reduced=other)
+    with pytest.raises(ValueError, match="costs differ"):
+        reduced_problem(from_sets([{0}, {1}], 2, costs=np.array([1.0, 2.0])))
 
 
 def test_costs_decide_over_counts():
