@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from .diffusion import diffused
 from .mesh import TriangleMesh
 from .quadric import fit_quadrics
-from .tensors import principal, tangent_planes, unpacked
+from .tensors import cross, principal, tangent_planes, unpacked
 from .topology import Edges, components, face_pairs
 
 DEFAULT_RADIUS_SHARE = 0.02
@@ -104,7 +104,11 @@ def principal_curvatures(
     """
     if radius is None:
         radius = DEFAULT_RADIUS_SHARE * mesh.size
-        return _curvatures(mesh, radius, max(radius, facet_size(mesh)))
+        # Facets are no larger than the longest edge.
+        fine = mesh.longest_edge <= radius
+        return _curvatures(
+            mesh, radius, radius if fine else max(radius, facet_size(mesh))
+        )
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
     return _curvatures(mesh, radius, radius)
@@ -120,7 +124,7 @@ def facet_size(mesh: TriangleMesh) -> float:
     edges = mesh.edges
     pairs, edge = face_pairs(edges)
     normals = mesh.face_normals[pairs]
-    sine = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1)
+    sine = np.linalg.norm(cross(normals[:, 0], normals[:, 1]), axis=1)
     turn = np.arctan2(sine, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
     # Below, it is the rounding of flat surface.
     turn[(turn > _SHARPEST_FACET) | (turn < _LEAST_TURN)] = 0.0
@@ -212,10 +216,10 @@ def _vertex_normals(
 ) -> NDArray[np.float64]:
     """Unit normals averaged over the area of each vertex's faces, (n, 3)."""
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sums = [
         np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
-        for part in cross.T
+        for part in weighted.T
     ]
     normals = np.stack(sums, axis=1)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -231,11 +235,11 @@ def _with_normals(
     """
     while len(faces):
         corners = vertices[faces]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        size = np.linalg.norm(cross, axis=1)
+        weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(weighted, axis=1)
         sums = [
             np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
-            for part in (*cross.T, size)
+            for part in (*weighted.T, size)
         ]
         length = np.linalg.norm(sums[:3], axis=0)
         lost = ~(length > _CANCELLED * sums[3])

@@ -2,9 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse import coo_array, csr_array
 
 from .parallel import mapped
+from .tensors import cross
 from .topology import Edges, mesh_edges
 
 # Share of the change that may be missing. A solve that has come this far moves nothing
@@ -38,7 +39,7 @@ def surface_laplacian(
     corners = vertices[faces]
     # The side opposite to corner k runs from corner k + 1 to k + 2.
     sides = [corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3] for k in range(3)]
-    double_area = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
+    double_area = np.linalg.norm(cross(sides[0], sides[1]), axis=1)
     double_area = np.maximum(double_area, 1e-300)
     # Edge k of a face is opposite to corner k + 2.
     weights = sum(
@@ -74,8 +75,8 @@ def vertex_areas(
 ) -> NDArray[np.float64]:
     """Return a third of the area of each vertex's faces, shape (n,)."""
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(cross, axis=1) / 6.0
+    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1) / 6.0
     corner = np.repeat(areas, 3)
     return np.bincount(faces.ravel(), corner, len(vertices)).astype(np.float64)
 
@@ -98,14 +99,20 @@ def diffused(
         laplacian: Positive semi-definite with zero row sums, shape (n, n).
         length: In the unit of the mass's square root.
     """
-    stiffness = (0.5 * length * length) * laplacian
-    system = (diags_array(mass) + stiffness).tocsr()
-    diagonal = system.diagonal()
+    columns, starts = laplacian.indices, laplacian.indptr
+    entries = (0.5 * length * length) * laplacian.data
+    stiffness = csr_array((entries.copy(), columns, starts), laplacian.shape)
+    rows = np.repeat(np.arange(len(mass)), np.diff(starts))
+    # Every node has an entry of its own (`graph_laplacian`), zero as it may be.
+    own = np.flatnonzero(columns == rows)
+    entries[own] += mass
+    diagonal = entries[own]
     root = np.sqrt(
         np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
     )
     # Scaled from both sides to a diagonal of ones, it needs no preconditioner.
-    system.data *= np.repeat(root, np.diff(system.indptr)) * root[system.indices]
+    entries *= root[rows] * root[columns]
+    system = csr_array((entries, columns, starts), laplacian.shape)
     # The change is what is solved for: it is small, so its digits are worth more.
     change = _conjugate_gradients(system, -root[:, None] * (stiffness @ values))
     return values + root[:, None] * change

@@ -1,8 +1,8 @@
 """A triangle mesh in metres, and where it came from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from .diffusion import surface_laplacian, vertex_areas
 from .extent import enclosing_ball, main_bodies
 from .file_origin import FileOrigin
+from .tensors import cross
 from .topology import Edges, mesh_edges
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
@@ -103,7 +104,7 @@ class TriangleMesh:
     @cached_property
     def _cross(self) -> NDArray[np.float64]:
         a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
-        return np.cross(b - a, c - a)
+        return cross(b - a, c - a)
 
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
@@ -123,7 +124,8 @@ class TriangleMesh:
     @cached_property
     def face_centroids(self) -> NDArray[np.float64]:
         """Centroid of each face in [m], shape (n_f, 3)."""
-        return _read_only(self.corners.mean(axis=1))
+        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
+        return _read_only((a + b + c) / 3.0)
 
     @cached_property
     def edges(self) -> Edges:
@@ -148,8 +150,10 @@ class TriangleMesh:
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner of the bounding box of the faces in [m], (2, 3)."""
-        used = self.corners.reshape(-1, 3)
-        return _read_only(np.stack([used.min(axis=0), used.max(axis=0)]))
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.faces] = True
+        points = self.vertices[used]
+        return _read_only(np.stack([points.min(axis=0), points.max(axis=0)]))
 
     @cached_property
     def main(self) -> NDArray[np.bool_]:
@@ -186,8 +190,24 @@ class TriangleMesh:
     @cached_property
     def mean_edge(self) -> float:
         """Mean edge length over the faces in [m]."""
-        edges = self.corners - np.roll(self.corners, 1, axis=1)
-        return float(np.linalg.norm(edges, axis=2).mean())
+        return float(np.mean(self._edge_lengths))
+
+    @cached_property
+    def longest_edge(self) -> float:
+        """Length of the longest edge in [m]."""
+        return float(np.max(self._edge_lengths))
+
+    @cached_property
+    def _edge_lengths(self) -> NDArray[np.float64]:
+        edges = self.corners - self.corners[:, [2, 0, 1]]
+        return np.sqrt(np.einsum("fki,fki->fk", edges, edges))
+
+    def tagged(self, source: MeshSource | None, origin: FileOrigin | None) -> Self:
+        """Return the same mesh from there, with what is known of it already."""
+        mesh = replace(self, source=source, origin=origin)
+        known = {name for name in self.__dict__ if name not in mesh.__dict__}
+        mesh.__dict__.update({name: self.__dict__[name] for name in known})
+        return mesh
 
 
 def _read_only(values: NDArray[_Scalar]) -> NDArray[_Scalar]:

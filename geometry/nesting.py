@@ -85,8 +85,10 @@ def _in_some_box(
     """Whether the box of each asked patch lies in that of another, closed one."""
     order = np.argsort(patch, kind="stable")
     start = np.searchsorted(patch[order], np.arange(len(closed)))
-    low = np.minimum.reduceat(mesh.corners.min(axis=1)[order], start)
-    high = np.maximum.reduceat(mesh.corners.max(axis=1)[order], start)
+    a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    low = np.minimum.reduceat(low[order], start)
+    high = np.maximum.reduceat(high[order], start)
     outer, rows = np.flatnonzero(closed), np.flatnonzero(asked)
     inside = np.zeros(len(closed), dtype=bool)
     if not len(outer):

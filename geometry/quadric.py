@@ -44,6 +44,7 @@ def fit_quadrics(
     """
     n = len(vertices)
     near = _adjacency(faces, n)
+    planes = tangent_planes(normals)
     tensors = np.zeros((n, 6))
     fitted, sensible = np.zeros((2, n), dtype=bool)
 
@@ -56,7 +57,9 @@ def fit_quadrics(
             around = rings.indices[rings.indptr[mine, None] + np.arange(count)]
             at = rows.start + mine
             fitted[at] = True
-            tensors[at], sensible[at] = _fit_alike(vertices, normals, at, around)
+            tensors[at], sensible[at] = _fit_alike(
+                vertices, normals, planes[at], at, around
+            )
 
     mapped(fit, [slice(i, min(i + _ROWS, n)) for i in range(0, n, _ROWS)])
     return tensors, fitted, sensible
@@ -77,6 +80,7 @@ def _adjacency(faces: NDArray[np.int64], n: int) -> csr_array:
 def _fit_alike(
     vertices: NDArray[np.float64],
     normals: NDArray[np.float64],
+    plane: NDArray[np.float64],
     at: NDArray[np.int64],
     around: NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -84,7 +88,6 @@ def _fit_alike(
     own = normals[at]
     facing = np.matmul(normals.take(around, axis=0), own[:, :, None])[:, :, 0] > 0.0
     facing |= (facing.sum(axis=1) < _LEAST_POINTS)[:, None]
-    plane = tangent_planes(own)
     offsets = vertices.take(around, axis=0)
     offsets -= vertices[at][:, None]
     offsets *= facing[:, :, None]
@@ -93,14 +96,9 @@ def _fit_alike(
     reach = np.sqrt(np.maximum(squared.sum(axis=1) / facing.sum(axis=1), 1e-300))
     frame = np.concatenate([plane, own[:, :, None]], axis=2) / reach[:, None, None]
     local = np.matmul(offsets, frame)
-    columns = np.empty((*around.shape, 6))
-    x, y = local[:, :, 0], local[:, :, 1]
-    columns[:, :, :2] = local[:, :, :2]
-    np.multiply(x, x, out=columns[:, :, 2])
-    np.multiply(x, _ROOT_2 * y, out=columns[:, :, 3])
-    np.multiply(y, y, out=columns[:, :, 4])
-    columns[:, :, 5] = local[:, :, 2]
-    moments = np.matmul(np.swapaxes(columns, 1, 2), columns)
+    x, y, z = local[:, :, 0], local[:, :, 1], local[:, :, 2]
+    columns = np.stack([x, y, x * x, _ROOT_2 * x * y, y * y, z], axis=1)
+    moments = np.matmul(columns, np.swapaxes(columns, 1, 2))
     form = _shape_form(_solved(moments))
     form /= reach[:, None, None]
     nearest = np.sqrt(np.where(squared > 0.0, squared, np.inf).min(axis=1))

@@ -102,23 +102,25 @@ def usable_mesh(
         repairs=repairs,
     )
     # Orientation turns faces and keeps their order, so that the origin stays theirs.
-    faces, turned = orient(TriangleMesh(vertices * scale, faces))
-    return TriangleMesh(
-        vertices * scale,
-        faces,
-        replace(source, repairs=repairs + turned + stray),
-        _origin(raw).of_faces(kept),
-    )
+    mesh = TriangleMesh(vertices * scale, faces)
+    faces, turned = orient(mesh)
+    if not np.array_equal(faces, mesh.faces):
+        mesh = TriangleMesh(mesh.vertices, faces)
+    source = replace(source, repairs=repairs + turned + stray)
+    return mesh.tagged(source, _origin(raw).of_faces(kept))
 
 
 def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
     """Longest side of the box of the main bodies, and what lies well outside of it."""
-    corners = mesh.corners[mesh.main].reshape(-1, 3)
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.faces[mesh.main]] = True
+    points = mesh.vertices[used]
+    low, high = points.min(axis=0), points.max(axis=0)
     longest = float((high - low).max())
     # What stands out by less changes no size that anyone reads.
     low, high = low - _STRAY * longest, high + _STRAY * longest
-    outside = np.any((mesh.corners < low) | (mesh.corners > high), axis=(1, 2))
+    off = np.any((mesh.vertices < low) | (mesh.vertices > high), axis=1)
+    outside = off[mesh.faces].any(axis=1)
     kind = "faces of fragments outside the rest, kept but left out of its size"
     count = int(outside.sum())
     found = (Repair(kind, count),) if count else ()

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .mesh import MeshError, Repair
+from .tensors import cross
 
 # A triangle whose height is below this share of its longest side has no normal.
 _FLAT = 1e-10
@@ -109,7 +110,7 @@ def _identical(
 
 def _drop_flat(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    double_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    double_area = np.linalg.norm(cross(b - a, c - a), axis=1)
     sides = np.stack([b - a, c - b, a - c])
     longest = np.einsum("kij,kij->ki", sides, sides).max(axis=0)
     keep = double_area > _FLAT * longest

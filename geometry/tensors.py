@@ -40,11 +40,22 @@ def unpacked(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def tangent_planes(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return two unit vectors across each unit normal, as columns, shape (n, 3, 2)."""
-    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    first = np.cross(normals, least).astype(np.float64)
+    least = np.argmin(np.abs(normals), axis=1)
+    rows = np.arange(len(normals))
+    # The cross product with the axis that is farthest from the normal.
+    first = np.zeros_like(normals)
+    first[rows, (least + 1) % 3] = normals[rows, (least + 2) % 3]
+    first[rows, (least + 2) % 3] = -normals[rows, (least + 1) % 3]
     first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
-    second = np.cross(normals, first).astype(np.float64)
-    return np.stack([first, second], axis=2)
+    return np.stack([first, cross(normals, first)], axis=2)
+
+
+def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the cross products of rows, (n, 3); numpy's own takes twice as long."""
+    product = np.empty_like(a)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        product[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
+    return product
 
 
 def principal(

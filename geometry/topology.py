@@ -30,8 +30,8 @@ class Edges:
 
 def mesh_edges(faces: NDArray[np.int64]) -> Edges:
     """Return the edges of triangles (n_f, 3)."""
-    ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    low, high = ends.min(axis=1), ends.max(axis=1)
+    begin, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
     span = int(faces.max()) + 1
     key, of_face, counts = np.unique(
         low * span + high, return_inverse=True, return_counts=True
