@@ -18,6 +18,8 @@ _AVERAGED_SHARE = 0.01
 # Of the length of an edge over the distance across it.
 _LARGEST_WEIGHT = 3.0
 _AREA_DIGITS = 1e-9
+# This share of what was chosen must be kept, if that takes no more pieces.
+_LEAST_KEPT, _MAX_PIECES, _MAX_HALVINGS = 0.5, 100, 6
 
 
 def cone_pieces(
@@ -35,8 +37,11 @@ def cone_pieces(
     that noise has turned is no feature) within the half angle of their mean. Of what
     doesn't fit, the part about its mean is taken as seen from its own front, then what
     is left on its sides. Parts below the least area join the adjacent piece that they
-    fit best; what fits none is dropped, or with `keep_all` a piece of its own.
-    Adjacent pieces stay apart only if their union fits no cone.
+    fit best; what fits none is dropped, or with `keep_all` a piece of its own. Where
+    more would be dropped than kept (a surface of many small parts, or of sharp corners
+    that fit no cone), the least area is halved until that ends, as long as that makes
+    no more than 100 pieces. Adjacent pieces stay apart only if their union fits no
+    cone.
 
     Args:
         mesh: The surface.
@@ -59,14 +64,27 @@ def cone_pieces(
         links,
         float(np.cos(half_angle)),
     )
-    piece = _split(patch, np.ones(len(faces), dtype=bool), least)
+    piece = _pieces(patch, least, keep_all=keep_all)
+    for _ in range(_MAX_HALVINGS):
+        if patch.areas[piece >= 0].sum() >= _LEAST_KEPT * patch.areas.sum():
+            break
+        least *= 0.5
+        finer = _pieces(patch, least, keep_all=keep_all)
+        if finer.max(initial=-1) >= _MAX_PIECES:
+            break
+        piece = finer
+    return _by_area(faces, piece, patch.areas, mesh.area)
+
+
+def _pieces(patch: Patch, least: float, *, keep_all: bool) -> NDArray[np.int64]:
+    """Number the pieces that fit and have the least area; -1: dropped."""
+    piece = _split(patch, np.ones(patch.n, dtype=bool), least)
     piece = merged(patch, piece, CONE_SHARE[0])
     piece = join_crumbs(patch, piece)
     if keep_all and np.any(piece < 0):
         rest = _split(patch, piece < 0, 0.0)
         piece = np.where(piece < 0, rest + piece.max(initial=-1) + 1, piece)
-    piece = merged(patch, piece, CONE_SHARE[1])
-    return _by_area(faces, piece, patch.areas, mesh.area)
+    return renumbered(merged(patch, piece, CONE_SHARE[1]))
 
 
 def averaged_normals(

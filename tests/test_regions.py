@@ -9,7 +9,7 @@ from geometry.curvature import CurvatureField, principal_curvatures
 from geometry.dominance import face_curvedness
 from geometry.face_curvature import face_curvature, steep_directions
 from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, grid, sphere, torus
+from geometry.primitives import box, cylinder, grid, joined, sphere, torus
 from geometry.readers import load_mesh
 from geometry.refinement import cut_for_curvature
 from geometry.regions import DominantRegions, dominant_regions
@@ -418,6 +418,23 @@ def test_the_regions_of_a_cube_lie_along_its_edges_whatever_its_triangles() -> N
         off = np.sort(0.05 - np.abs(cut.face_centroids), axis=1)[:, 1]
         assert inside[off < 0.003].all()
         assert not inside[off > 0.02].any()
+
+
+def test_edges_of_two_boxes_are_kept_though_their_parts_are_below_the_least() -> None:
+    # Sharp corners fit no cone, and what is left of an edge beside them is little.
+    one = box((1.0, 1.0, 1.0))
+    two = TriangleMesh(one.vertices + [4.5, 1.0, 1.0], one.faces)
+    mesh, _ = cut_for_curvature(joined(one, two))
+    found = regions_of(mesh)
+    assert 0.1 < found.dominant_share < 0.25
+    assert len(found) <= 100
+    assert max(region.cone_angle for region in found) <= np.pi / 4.0 + 1e-9
+    # Each of the corners has its part, and nothing lies in the middle of a side.
+    centres = mesh.face_centroids[found.face_region >= 0]
+    corners = np.concatenate([one.vertices, two.vertices])
+    away = np.linalg.norm(centres[:, None] - corners, axis=2)
+    assert away.min(axis=0).max() < 0.1
+    assert away.min(axis=1).max() < 0.5
 
 
 def test_equal_areas_are_numbered_by_their_lowest_face() -> None:
