@@ -7,6 +7,7 @@ from .cone_crumbs import join_crumbs
 from .cone_sums import CONE_SHARE, Patch, merged, renumbered
 from .diffusion import diffused, graph_laplacian
 from .mesh import TriangleMesh
+from .parallel import mapped
 from .topology import components
 
 _MAX_ROUNDS = 60
@@ -19,7 +20,7 @@ _AVERAGED_SHARE = 0.01
 _LARGEST_WEIGHT = 3.0
 _AREA_DIGITS = 1e-9
 # This share of what was chosen must be kept, if that takes no more pieces.
-_LEAST_KEPT, _MAX_PIECES, _MAX_HALVINGS = 0.5, 100, 6
+_LEAST_KEPT, _MAX_PIECES = 0.5, 100
 
 
 def cone_pieces(
@@ -65,18 +66,30 @@ def cone_pieces(
         float(np.cos(half_angle)),
     )
     piece = _pieces(patch, least, keep_all=keep_all)
-    for _ in range(_MAX_HALVINGS):
-        if patch.areas[piece >= 0].sum() >= _LEAST_KEPT * patch.areas.sum():
-            break
-        least *= 0.5
-        finer = _pieces(patch, least, keep_all=keep_all)
-        if finer.max(initial=-1) >= _MAX_PIECES:
-            break
-        piece = finer
+    if not keep_all:
+        piece = _more_kept(patch, piece, least)
     return _by_area(faces, piece, patch.areas, mesh.area)
 
 
-def _pieces(patch: Patch, least: float, *, keep_all: bool) -> NDArray[np.int64]:
+def _more_kept(
+    patch: Patch, piece: NDArray[np.int64], least: float
+) -> NDArray[np.int64]:
+    """The pieces for half the least area, and so on, until enough of it is kept."""
+    enough = _LEAST_KEPT * float(patch.areas.sum())
+    for leasts in (0.5 * least, 0.25 * least), (0.125 * least, 0.0625 * least):
+        if patch.areas[piece >= 0].sum() >= enough:
+            break
+        # Two at a time: the second is often needed, and there are cores for both.
+        for finer in mapped(lambda area: _pieces(patch, area), leasts):
+            if finer.max(initial=-1) >= _MAX_PIECES:
+                return piece
+            piece = finer
+            if patch.areas[piece >= 0].sum() >= enough:
+                break
+    return piece
+
+
+def _pieces(patch: Patch, least: float, *, keep_all: bool = False) -> NDArray[np.int64]:
     """Number the pieces that fit and have the least area; -1: dropped."""
     piece = _split(patch, np.ones(patch.n, dtype=bool), least)
     piece = merged(patch, piece, CONE_SHARE[0])
