@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from geometry.primitives import sphere
-from planning.cameras import lit_samples, measured_by, plan_cameras
+from planning.cameras import camera_stage, lit_samples, measured_by, plan_cameras
 from planning.claims import Devices, make_claims
 from planning.plan import PlannedCamera, PlannedProjector
 from planning.projectors import lit_stages, margins_of, merged, plan_projectors
@@ -42,7 +42,8 @@ def stages(scene):
     template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
     projectors = plan_projectors(made, template, 600, ring_offset=(tilt, -np.pi / 2))
     camera = PlannedCamera("", eye, rig.camera_device())
-    cameras = plan_cameras(made, projectors.projectors, camera, 400)
+    cover = plan_cameras(made, projectors.projectors, camera, 400)
+    cameras = camera_stage(made, cover)
     return made, projectors, cameras, tilt
 
 
