@@ -7,8 +7,9 @@ from scipy.sparse import coo_array, csr_array
 from .parallel import mapped
 from .tensors import packed_tensors, tangent_planes
 
-# Vertices that are worked on at a time: their neighbours' numbers stay in the cache.
-_ROWS = 4096
+# Vertices that a thread works on at a time: it takes long enough that handing over the
+# interpreter does not count.
+_ROWS = 32768
 # A quadric through its vertex has five coefficients; the vertex itself says nothing.
 _LEAST_POINTS = 6
 # Of normal equations in units of the neighbours' distance: less isn't determined.
