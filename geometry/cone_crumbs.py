@@ -74,8 +74,11 @@ def _best(
     """The adjacent piece whose axis is nearest to each crumb's mean, -1 without one."""
     sums, _ = patch.sums(crumb)
     owner = np.full(len(sums), -1, dtype=np.int64)
-    both = np.concatenate([patch.links, patch.links[:, ::-1]])
-    both = both[(crumb[both[:, 0]] >= 0) & (piece[both[:, 1]] >= 0)]
+    a, b = patch.links.T
+    free, taken = crumb >= 0, piece >= 0
+    forth = patch.links[free[a] & taken[b]]
+    back = patch.links[free[b] & taken[a]][:, ::-1]
+    both = np.concatenate([forth, back])
     key = np.unique(crumb[both[:, 0]] * len(axis) + piece[both[:, 1]])
     met = np.stack(np.divmod(key, len(axis)), axis=1)
     if len(met):

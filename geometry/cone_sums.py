@@ -1,6 +1,7 @@
 """Sums over the pieces of a patch of faces, and the merging of pieces."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,22 +38,28 @@ class Patch:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return area-weighted sums of normals (k, 3) and areas (k,) of pieces."""
         count = max(count, int(piece.max(initial=-1)) + 1)
-        held = np.flatnonzero(piece >= 0)
-        of, areas = piece[held], self.areas[held]
-        weighted = self.normals[held] * areas[:, None]
+        # What is in no piece is counted too, before the first.
+        of = piece + 1
         sums = [
-            np.bincount(of, values, count).astype(np.float64)
-            for values in (*weighted.T, areas)
+            np.bincount(of, values, count + 1)[1:].astype(np.float64)
+            for values in (*self._weighted, self.areas)
         ]
         return np.stack(sums[:3], axis=1), sums[3]
+
+    @cached_property
+    def _weighted(self) -> NDArray[np.float64]:
+        return np.ascontiguousarray((self.normals * self.areas[:, None]).T)
 
     def cosines(
         self, piece: NDArray[np.int64], axis: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return each face's normal times the axis (k, 3) of its piece, (n,)."""
-        if not len(axis):
-            return np.zeros(self.n)
-        return np.einsum("ij,ij->i", self.normals, axis[np.maximum(piece, 0)])
+        """Return each face's normal times the axis (k, 3) of its piece, or 0, (n,)."""
+        cosines = np.zeros(self.n)
+        held = np.flatnonzero(piece >= 0)
+        if len(axis):
+            normals, axes = self.normals[held], axis[piece[held]]
+            cosines[held] = np.einsum("ij,ij->i", normals, axes)
+        return cosines
 
     def shares(self, piece: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the share of each piece's area in the cone about its mean, (k,)."""
