@@ -17,7 +17,8 @@ from planning.reconstruction.decode import decode
 from planning.reconstruction.edges import find_edges
 from planning.reconstruction.patterns import Frames, RingPatterns, ring_patterns
 from planning.reconstruction.photometry import Photometry
-from planning.reconstruction.render import render_pair, view
+from planning.reconstruction.render import render_pair
+from planning.reconstruction.view import view
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
 

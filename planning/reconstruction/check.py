@@ -26,9 +26,10 @@ from .decode import Decoded, decode
 from .merge import merge
 from .patterns import ring_patterns
 from .photometry import Photometry
-from .render import View, render_pair, view
+from .render import render_pair
 from .result import PairCount, Reconstruction
 from .verdict import judge, measure_accuracy, measure_completeness
+from .view import View, view
 
 _DEFAULT_SAMPLES = 20_000
 # Rings that run more steeply along the viewing ray cross steps between surfaces, unless

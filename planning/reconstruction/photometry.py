@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _WAVELENGTHS_M = (0.009, 0.017, 0.031)
+# Rows that are blurred at a time: what is between both passes stays in the cache.
+_STRIP = 64
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,12 @@ class Photometry:
         reach = max(1, int(np.ceil(3.5 * self.camera_blur_px)))
         taps = np.exp(-0.5 * (np.arange(reach + 1) / self.camera_blur_px) ** 2)
         taps = (taps / (2.0 * taps.sum() - taps[0])).astype(np.float32)
-        return _smooth_rows(_smooth_rows(image, taps).T, taps).T
+        blurred = np.empty_like(image)
+        for first in range(0, len(image), _STRIP):
+            last = min(first + _STRIP, len(image))
+            strip = _smooth_columns(image, taps, first, last)
+            _smooth_rows(strip, taps, blurred[first:last])
+        return blurred
 
     def capture(
         self, grey: NDArray[np.float32], key: tuple[int, ...], gain: float
@@ -85,12 +92,26 @@ class Photometry:
         return np.clip(level, 0.0, 255.0, out=level).astype(np.uint8)
 
 
-def _smooth_rows(
-    image: NDArray[np.float32], taps: NDArray[np.float32]
+def _smooth_columns(
+    image: NDArray[np.float32], taps: NDArray[np.float32], first: int, last: int
 ) -> NDArray[np.float32]:
-    """Convolve along axis 0 with symmetric taps; beyond the border it is dark."""
-    result = image * taps[0]
-    for k in range(1, min(len(taps), len(image))):
-        result[k:] += taps[k] * image[:-k]
-        result[:-k] += taps[k] * image[k:]
+    """Convolve rows first to last along axis 0; beyond the border it is dark."""
+    n = len(image)
+    result = image[first:last] * taps[0]
+    for k in range(1, min(len(taps), n)):
+        low, high = max(first, k), min(last, n - k)
+        if low < last:
+            result[low - first :] += taps[k] * image[low - k : last - k]
+        if high > first:
+            result[: high - first] += taps[k] * image[first + k : high + k]
     return result
+
+
+def _smooth_rows(
+    image: NDArray[np.float32], taps: NDArray[np.float32], out: NDArray[np.float32]
+) -> None:
+    """Convolve along axis 1 into `out`; beyond the border it is dark."""
+    np.multiply(image, taps[0], out=out)
+    for k in range(1, min(len(taps), image.shape[1])):
+        out[:, k:] += taps[k] * image[:, :-k]
+        out[:, :-k] += taps[k] * image[:, k:]

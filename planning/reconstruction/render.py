@@ -1,155 +1,24 @@
-"""What the cameras record, by ray casting against the mesh that really stands there."""
+"""What the cameras record under a projector's patterns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from geometry.mesh import TriangleMesh
-from geometry.rays import RayCaster
+from geometry.rays import CHUNK, RayCaster, equal_parts
 
-from .calibration import CameraCalibration, ProjectorCalibration
+from .calibration import ProjectorCalibration
 from .patterns import Frames, Images, RingPatterns, ring_plane
 from .photometry import Photometry
+from .view import View
 
+# Blurred light reaches no further than this beyond the samples that are lit [px].
 _MARGIN_PX = 6
 # Standard deviation of the unit square that a pixel gathers light over.
 _PIXEL_SPREAD = 1.0 / np.sqrt(12.0)
 # Shadow rays stop this share of their length before the point they ask about.
 _SHADOW_SLACK = 2e-5
-_SUB = np.array([[-0.25, -0.25], [-0.25, 0.25], [0.25, -0.25], [0.25, 0.25]])
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """What a camera sees: samples of the surface, one a pixel and 4 at steps of depth.
-
-    Attributes:
-        camera: The camera that looks.
-        corner: Pixel (u, v) of the window's top-left pixel.
-        shape: Rows and columns of the window.
-        pixels: Flat index in the window of each sample, shape (n,).
-        weights: Share of the pixel that each sample stands for, shape (n,).
-        points: Surface points in the world [m], shape (n, 3).
-        normals: Face normals there, shape (n, 3).
-        rays: Viewing directions, shape (n, 3).
-        distances: From the camera [m], shape (n,).
-        albedo: Shape (n,).
-    """
-
-    camera: CameraCalibration
-    corner: tuple[int, int]
-    shape: tuple[int, int]
-    pixels: NDArray[np.int64]
-    weights: NDArray[np.float32]
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    rays: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    albedo: NDArray[np.float32]
-
-    def image(
-        self, values: NDArray[np.float32], chosen: NDArray[np.int64] | None = None
-    ) -> NDArray[np.float32]:
-        """Return the window (h, w) that samples, or some of them, make."""
-        pixels, weights = self.pixels, self.weights
-        if chosen is not None:
-            pixels, weights = pixels[chosen], weights[chosen]
-        rows, columns = self.shape
-        summed = np.bincount(pixels, weights * values, rows * columns)
-        return summed.astype(np.float32).reshape(self.shape)
-
-
-def view(
-    camera: CameraCalibration,
-    mesh: TriangleMesh,
-    caster: RayCaster,
-    photometry: Photometry,
-) -> View | None:
-    """Cast a camera's pixels against the mesh; None if it sees nothing of it."""
-    window = _window(camera, mesh)
-    if window is None:
-        return None
-    (left, top), (rows, columns) = window
-    v, u = np.divmod(np.arange(rows * columns), columns)
-    grid = np.column_stack([u + left, v + top]).astype(np.float64)
-    rays, faces, distances = _cast(camera, caster, grid)
-    if not np.any(faces >= 0):
-        return None
-    steps = _depth_steps(faces, distances, (rows, columns), camera.focal_px)
-    whole = np.flatnonzero((faces >= 0) & ~steps)
-    split = np.flatnonzero(steps)
-    fine = (grid[split][:, None] + _SUB).reshape(-1, 2)
-    fine_rays, fine_faces, fine_distances = _cast(camera, caster, fine)
-    hit = fine_faces >= 0
-    pixels = np.concatenate([whole, np.repeat(split, len(_SUB))[hit]])
-    all_rays = np.concatenate([rays[whole], fine_rays[hit]])
-    all_faces = np.concatenate([faces[whole], fine_faces[hit]])
-    reach = np.concatenate([distances[whole], fine_distances[hit]])
-    weights = np.ones(len(pixels), dtype=np.float32)
-    weights[len(whole) :] = 1.0 / len(_SUB)
-    points = camera.centre + reach[:, None] * all_rays
-    return View(
-        camera,
-        (left, top),
-        (rows, columns),
-        pixels,
-        weights,
-        points,
-        mesh.face_normals[all_faces],
-        all_rays,
-        reach,
-        photometry.albedo(points),
-    )
-
-
-def _window(
-    camera: CameraCalibration, mesh: TriangleMesh
-) -> tuple[tuple[int, int], tuple[int, int]] | None:
-    """Corner (u, v) and shape (rows, columns) of the image part that holds the mesh."""
-    pixels = camera.project(mesh.corners.reshape(-1, 3))
-    low, high = np.array([0, 0]), np.array(camera.resolution) - 1
-    if np.all(np.isfinite(pixels)):
-        low = np.maximum(low, np.floor(pixels.min(axis=0)).astype(int) - _MARGIN_PX)
-        high = np.minimum(high, np.ceil(pixels.max(axis=0)).astype(int) + _MARGIN_PX)
-    elif not np.any(np.isfinite(pixels)):
-        return None
-    columns, rows = (int(side) for side in high - low + 1)
-    if columns < 1 or rows < 1:
-        return None
-    return (int(low[0]), int(low[1])), (rows, columns)
-
-
-def _cast(
-    camera: CameraCalibration, caster: RayCaster, pixels: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    rays = camera.rays(pixels)
-    blind = ~np.isfinite(rays[:, 0])
-    if blind.any():
-        rays[blind] = -camera.world_from_device[:3, 2]
-    faces, distances = caster.first_hits(camera.centre, rays)
-    faces[blind] = -1
-    return rays, faces, distances
-
-
-def _depth_steps(
-    faces: NDArray[np.int64],
-    distances: NDArray[np.float64],
-    shape: tuple[int, int],
-    focal_px: float,
-) -> NDArray[np.bool_]:
-    """Pixels whose neighbour is the background or lies many pixels' width apart."""
-    depth = np.where(faces >= 0, distances, 1e9).astype(np.float32).reshape(shape)
-    steps = np.zeros(shape, dtype=bool)
-    for one, other, near, far in (
-        (depth[1:], depth[:-1], steps[1:], steps[:-1]),
-        (depth[:, 1:], depth[:, :-1], steps[:, 1:], steps[:, :-1]),
-    ):
-        jump = np.abs(one - other) > np.minimum(one, other) * (20.0 / focal_px)
-        near |= jump
-        far |= jump
-    return steps.ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +36,62 @@ class _Light:
     inner: NDArray[np.float32]
     outer: NDArray[np.float32]
     root: NDArray[np.float32]
+
+    @classmethod
+    def joined(cls, parts: "list[_Light]") -> "_Light":
+        """Return the light on the samples of all parts."""
+        names = [field.name for field in fields(cls)]
+        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+
+
+@dataclass(frozen=True, eq=False)
+class _Canvas:
+    """The part of a view's window that a projector lights.
+
+    Without its light a frame and its inverse are alike, so nothing is decoded there.
+
+    Attributes:
+        corner: Pixel (u, v) of the top-left pixel.
+        shape: Rows and columns.
+        pixels: Flat index of each sample of the view, senseless outside, shape (n,).
+        weights: Share of the pixel that each sample stands for, shape (n,).
+        inside: Samples inside.
+    """
+
+    corner: tuple[int, int]
+    shape: tuple[int, int]
+    pixels: NDArray[np.int64]
+    weights: NDArray[np.float32]
+    inside: NDArray[np.int64]
+
+    @classmethod
+    def about(cls, seen: View, lit: NDArray[np.int64]) -> "_Canvas":
+        """Return the bounding box of samples and a margin; all where there is none."""
+        rows, columns = seen.shape
+        v, u = np.divmod(seen.pixels, columns)
+        top, left, bottom, right = 0, 0, rows, columns
+        if len(lit):
+            top = max(0, int(v[lit].min()) - _MARGIN_PX)
+            left = max(0, int(u[lit].min()) - _MARGIN_PX)
+            bottom = min(rows, int(v[lit].max()) + 1 + _MARGIN_PX)
+            right = min(columns, int(u[lit].max()) + 1 + _MARGIN_PX)
+        inside = (v >= top) & (v < bottom) & (u >= left) & (u < right)
+        return cls(
+            (seen.corner[0] + left, seen.corner[1] + top),
+            (bottom - top, right - left),
+            (v - top) * (right - left) + (u - left),
+            seen.weights,
+            np.flatnonzero(inside),
+        )
+
+    def image(
+        self, values: NDArray[np.float32], samples: NDArray[np.int64]
+    ) -> NDArray[np.float32]:
+        """Return the image (h, w) that samples of these values make."""
+        rows, columns = self.shape
+        weighted = self.weights[samples] * values
+        summed = np.bincount(self.pixels[samples], weighted, rows * columns)
+        return summed.astype(np.float32).reshape(self.shape)
 
 
 def render_pair(
@@ -190,18 +115,20 @@ def render_pair(
         seed: Of the noise of this pair.
     """
     light = _shine(seen, projector, design, patterns, caster, photometry)
-    ambient = photometry.blur(seen.image(seen.albedo * np.float32(photometry.ambient)))
-    white = photometry.blur(seen.image(light.white, light.samples))
+    canvas = _Canvas.about(seen, light.samples)
+    around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
+    ambient = photometry.blur(canvas.image(around, canvas.inside))
+    white = photometry.blur(canvas.image(light.white, light.samples))
     brightest = float(np.percentile(white + ambient, 99.9))
     gain = photometry.exposure * 255.0 / max(brightest, 1e-9)
 
     parts = [
-        seen.image(light.white * _level(patterns.bit(bit), light), light.samples)
+        canvas.image(light.white * _level(patterns.bit(bit), light), light.samples)
         for bit in range(patterns.n_bits)
     ]
-    parts.append(seen.image(light.white * light.root, light.samples))
+    parts.append(canvas.image(light.white * light.root, light.samples))
     kind = np.uint8 if photometry.noisy else np.float32
-    stack: Images = np.empty((patterns.n_frames, *seen.shape), dtype=kind)
+    stack: Images = np.empty((patterns.n_frames, *canvas.shape), dtype=kind)
     stack[0] = photometry.capture(white + ambient, (*seed, 0), gain)
     stack[1] = photometry.capture(ambient, (*seed, 1), gain)
     for index, part in enumerate(parts):
@@ -210,7 +137,7 @@ def render_pair(
         stack[first] = photometry.capture(bright + ambient, (*seed, first), gain)
         bright = white - bright + ambient
         stack[first + 1] = photometry.capture(bright, (*seed, first + 1), gain)
-    return Frames(stack, seen.corner)
+    return Frames(stack, canvas.corner)
 
 
 def _level(bright: NDArray[np.float32], light: _Light) -> NDArray[np.float32]:
@@ -230,13 +157,41 @@ def _shine(
     caster: RayCaster,
     photometry: Photometry,
 ) -> _Light:
-    lit, cosine, pixels, depth = _reached(seen, projector, caster)
+    facing = _facing(seen, projector)
+    # In parts, so that what is between stays in the cache.
+    parts = [
+        _shine_on(seen, facing[part], projector, design, patterns, caster, photometry)
+        for part in equal_parts(len(facing), CHUNK) or [slice(0)]
+    ]
+    light = _Light.joined([light for light, _ in parts])
+    if projector.light == "parallel" or not len(light.samples):
+        return light
+    depth = np.concatenate([depth for _, depth in parts])
+    falloff = (float(np.median(depth)) / depth) ** 2
+    return replace(light, white=(light.white * falloff).astype(np.float32))
+
+
+def _shine_on(
+    seen: View,
+    facing: NDArray[np.int64],
+    projector: ProjectorCalibration,
+    design: ProjectorCalibration,
+    patterns: RingPatterns,
+    caster: RayCaster,
+    photometry: Photometry,
+) -> tuple[_Light, NDArray[np.float64]]:
+    """Light on those of some samples that it reaches, and their depths.
+
+    How it falls off with depth is left to the caller.
+    """
+    lit, cosine, pixels, depth = _reached(seen, facing, projector, caster)
     rays, normals = seen.rays[lit], seen.normals[lit]
     plane = ring_plane(design, pixels)
     rho = np.hypot(plane[:, 0], plane[:, 1])
-    diverging = projector.light == "diverging"
     # Ring coordinate in a metre across the beam.
-    scale = np.sqrt(1.0 + rho * rho) / depth if diverging else np.ones_like(rho)
+    scale = np.ones_like(rho)
+    if projector.light == "diverging":
+        scale = np.sqrt(1.0 + rho * rho) / depth
     across = _across(plane, rho, design)
     slant = np.einsum("ij,ij->i", across, rays) / np.einsum("ij,ij->i", normals, rays)
     stretch = 1.0 - 2.0 * slant * np.einsum("ij,ij->i", across, normals) + slant**2
@@ -247,41 +202,51 @@ def _shine(
     annulus = np.searchsorted(patterns.radii, rho)
     edges = np.concatenate([[-np.inf], patterns.radii, [np.inf]])
     drawn = ndtr((patterns.outer_radius - rho) / spread)
-    falloff = (float(np.median(depth)) / depth) ** 2 if diverging and len(lit) else 1.0
-    return _Light(
+    light = _Light(
         lit,
-        (seen.albedo[lit] * cosine * drawn * falloff).astype(np.float32),
+        (seen.albedo[lit] * cosine * drawn).astype(np.float32),
         annulus,
         ndtr((edges[annulus] - rho) / spread).astype(np.float32),
         ndtr((rho - edges[annulus + 1]) / spread).astype(np.float32),
         ndtr(patterns.root_side(plane) / spread).astype(np.float32),
     )
+    return light, depth
 
 
 def _reached(
-    seen: View, projector: ProjectorCalibration, caster: RayCaster
+    seen: View,
+    facing: NDArray[np.int64],
+    projector: ProjectorCalibration,
+    caster: RayCaster,
 ) -> tuple[
     NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:
     """Samples that the projector lights, their cos(incidence), pixels and depths."""
-    pixels, depth = projector.panel(seen.points)
+    pixels, depth = projector.panel(seen.points[facing])
+    drawn = projector.in_panel(pixels)
+    able, pixels, depth = facing[drawn], pixels[drawn], depth[drawn]
+    points = seen.points[able]
     if projector.light == "diverging":
-        reach = np.linalg.norm(seen.points - projector.centre, axis=1)
-        beams = (seen.points - projector.centre) / reach[:, None]
+        starts = projector.centre
+        beams = points - starts
+        reach = np.sqrt(np.einsum("ij,ij->i", beams, beams))
+        beams /= reach[:, None]
     else:
-        reach = depth
-        beams = np.broadcast_to(projector.axis, seen.points.shape)
-    cosine = -np.einsum("ij,ij->i", beams, seen.normals)
-    able = np.flatnonzero(projector.in_panel(pixels) & (cosine > 0.0))
-    beams, reach = beams[able], reach[able]
-    starts = (
-        projector.centre
-        if projector.light == "diverging"
-        else seen.points[able] - reach[:, None] * beams
-    )
+        beams, reach = np.broadcast_to(projector.axis, points.shape), depth
+        starts = points - reach[:, None] * beams
     shadowed = caster.occluded(starts, beams, reach * (1.0 - _SHADOW_SLACK))
-    lit = able[~shadowed]
-    return lit, cosine[lit], pixels[lit], depth[lit]
+    cosine = -np.einsum("ij,ij->i", beams, seen.normals[able])
+    lit = ~shadowed
+    return able[lit], cosine[lit], pixels[lit], depth[lit]
+
+
+def _facing(seen: View, projector: ProjectorCalibration) -> NDArray[np.int64]:
+    """Samples whose faces are turned towards the projector."""
+    along = seen.normals @ projector.axis
+    if projector.light == "diverging":
+        along = np.einsum("ij,ij->i", seen.normals, seen.points)
+        along -= seen.normals @ projector.centre
+    return np.flatnonzero(along < 0.0)
 
 
 def _across(
