@@ -10,14 +10,11 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .diffusion import diffused
 from .mesh import TriangleMesh
-from .quadric import fit_quadrics
+from .quadric import RINGS, fit_quadrics
 from .tensors import cross, principal, tangent_planes, unpacked
-from .topology import Edges, components, face_pairs
+from .topology import Edges, components, face_pairs, numbered
 
 DEFAULT_RADIUS_SHARE = 0.02
-# A quadric has six coefficients: one ring is too few. More rings would reach farther on
-# coarse meshes than on fine ones; the radius is kept by diffusion instead.
-_RINGS = 2
 # Tensors are averaged over this share of the scale, but no less than some neighbours:
 # a quadric leaves out what is cubic, which on irregular triangles is as good as noise.
 _AVERAGED_SHARE, _LEAST_EDGES = 0.5, 0.6
@@ -27,8 +24,6 @@ _FITTED_EDGES = 1.0
 # Turns sharper than this between two faces are creases of the object, not facets.
 _SHARPEST_FACET = np.deg2rad(40.0)
 _LEAST_TURN = 1e-6
-# A vertex normal shorter than this share of its faces' area is none.
-_CANCELLED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +136,13 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
     directions[0], directions[1] = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
     solid = mesh.faces[mesh.face_areas > 0]
     if len(solid):
-        # Unit mean edge about the origin: the least that rounding costs.
+        # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
         edge = mesh.mean_edge
-        used, faces = _numbered(solid, n)
+        used, faces = numbered(solid, n)
         part = mesh
         if len(used) < n or len(solid) < len(mesh.faces):
             part = TriangleMesh(mesh.vertices[used], faces)
-        whole = ~_near_border(part.vertices, part.edges, radius, _RINGS)
+        whole = ~_near_border(part.vertices, part.edges, radius, RINGS)
         vertices = (part.vertices - mesh.centre) / edge
         mass = part.vertex_areas / (edge * edge)
         found, ways, fitted = _averaged_fit(
@@ -178,9 +173,7 @@ def _averaged_fit(
     beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
     if beyond > 0:
         vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))
-    solid = _with_normals(vertices, faces)
-    normals = _vertex_normals(vertices, solid)
-    tensors, fitted, sensible = fit_quadrics(vertices, solid, normals)
+    tensors, normals, fitted, sensible = fit_quadrics(vertices, faces)
     fitted, sensible = fitted & whole, sensible & whole
     if np.any(fitted & ~sensible):
         # Those take over what is around them; where nothing is, they aren't known.
@@ -200,54 +193,6 @@ def _joined_to(chosen: NDArray[np.bool_], laplacian: csr_array) -> NDArray[np.bo
     held = np.zeros(count, dtype=bool)
     held[label[chosen]] = True
     return held[label]
-
-
-def _numbered(
-    faces: NDArray[np.int64], n: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Vertices of n that faces use, ascending, and the faces in their numbers."""
-    taken = np.zeros(n, dtype=bool)
-    taken[faces] = True
-    return np.flatnonzero(taken), (np.cumsum(taken) - 1)[faces]
-
-
-def _vertex_normals(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Unit normals averaged over the area of each vertex's faces, (n, 3)."""
-    corners = vertices[faces]
-    weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = [
-        np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
-        for part in weighted.T
-    ]
-    normals = np.stack(sums, axis=1)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.where(length > 0, normals / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
-
-
-def _with_normals(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Leave out faces at vertices whose normals cancel: there is no plane to fit over.
-
-    Two faces on the same three corners, turned against each other, do that.
-    """
-    while len(faces):
-        corners = vertices[faces]
-        weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        size = np.linalg.norm(weighted, axis=1)
-        sums = [
-            np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
-            for part in (*weighted.T, size)
-        ]
-        length = np.linalg.norm(sums[:3], axis=0)
-        lost = ~(length > _CANCELLED * sums[3])
-        kept = (size > 0) & ~lost[faces].any(axis=1)
-        if kept.all():
-            break
-        faces = faces[kept]
-    return faces
 
 
 def _near_border(

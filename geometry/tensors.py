@@ -27,12 +27,6 @@ def packed(
     return np.asarray((first + second) * _DOUBLED, dtype=np.float64)
 
 
-def packed_tensors(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return symmetric tensors (n, 3, 3) as six numbers each, of the same norm."""
-    i, j = _UPPER
-    return tensors[:, i, j] * _DOUBLED
-
-
 def unpacked(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return what `packed` packed, (n, 3, 3)."""
     return (tensors / _DOUBLED)[:, _PACKED_AT]

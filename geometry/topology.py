@@ -85,3 +85,12 @@ def components(pairs: NDArray[np.int64], n: int) -> tuple[int, NDArray[np.int64]
     rank = np.empty(count, dtype=np.int64)
     rank[np.argsort(first)] = np.arange(count)
     return int(count), rank[label]
+
+
+def numbered(
+    faces: NDArray[np.int64], n: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices of n that faces use, ascending, and the faces in their numbers."""
+    taken = np.zeros(n, dtype=bool)
+    taken[faces] = True
+    return np.flatnonzero(taken), (np.cumsum(taken) - 1)[faces]
