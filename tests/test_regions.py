@@ -456,7 +456,7 @@ def test_equal_areas_are_numbered_by_their_lowest_face() -> None:
     areas = np.array([region.area_m2 for region in found])
     twins = np.flatnonzero(np.abs(np.diff(areas)) < 1e-9 * pair.area)
     assert len(twins)
-    assert all(found[i].faces[0] < found[i + 1].faces[0] for i in twins)
+    assert all(found[i].faces[0] < found[i + 1].faces[0] for i in twins.tolist())
 
 
 def test_an_eyeball_in_its_socket_stays_curved() -> None:
