@@ -19,8 +19,9 @@ _AVERAGED_SHARE = 0.01
 # Of the length of an edge over the distance across it.
 _LARGEST_WEIGHT = 3.0
 _AREA_DIGITS = 1e-9
-# This share of what was chosen must be kept, if that takes no more pieces.
-_LEAST_KEPT, _MAX_PIECES = 0.5, 100
+# This share of what was chosen must be kept, if that takes no more pieces: where more is
+# dropped, a small change of the mesh drops other parts, and the target is another one.
+_LEAST_KEPT, _MAX_PIECES = 0.9, 200
 
 
 def cone_pieces(
@@ -39,9 +40,9 @@ def cone_pieces(
     doesn't fit, the part about its mean is taken as seen from its own front, then what
     is left on its sides. Parts below the least area join the adjacent piece that they
     fit best; what fits none is dropped, or with `keep_all` a piece of its own. Where
-    more would be dropped than kept (a surface of many small parts, or of sharp corners
-    that fit no cone), the least area is halved until that ends, as long as that makes
-    no more than 100 pieces. Adjacent pieces stay apart only if their union fits no
+    more than a tenth would be dropped (a surface of many small parts, or of sharp
+    corners that fit no cone), the least area is halved until that ends, down to a
+    sixteenth and as long as that makes no more than 200 pieces. Adjacent pieces stay apart only if their union fits no
     cone.
 
     Args:

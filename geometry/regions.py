@@ -81,7 +81,7 @@ def dominant_regions(
     a whole. If less than the share is curved at all, that is all. Islands and holes
     below ``min_region_share`` of the area vanish; what stays is cut into pieces that
     fit a cone (`cone_pieces`). What is smaller and fits no neighbour is dropped, unless
-    the whole surface is dominant, or more would be dropped than kept.
+    the whole surface is dominant, or that would be more than a tenth.
 
     Args:
         mesh: The surface.
