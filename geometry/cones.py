@@ -19,9 +19,10 @@ _AVERAGED_SHARE = 0.01
 # Of the length of an edge over the distance across it.
 _LARGEST_WEIGHT = 3.0
 _AREA_DIGITS = 1e-9
-# This share of what was chosen must be kept, if that takes no more pieces: where more is
-# dropped, a small change of the mesh drops other parts, and the target is another one.
+# This share of what was chosen must be kept, if that takes no more pieces: where more
+# is dropped, a small change of the mesh drops other parts, and the target is another.
 _LEAST_KEPT, _MAX_PIECES = 0.9, 200
+_HALVINGS = ((1.0 / 2.0, 1.0 / 4.0), (1.0 / 8.0, 1.0 / 16.0))
 
 
 def cone_pieces(
@@ -42,8 +43,8 @@ def cone_pieces(
     fit best; what fits none is dropped, or with `keep_all` a piece of its own. Where
     more than a tenth would be dropped (a surface of many small parts, or of sharp
     corners that fit no cone), the least area is halved until that ends, down to a
-    sixteenth and as long as that makes no more than 200 pieces. Adjacent pieces stay apart only if their union fits no
-    cone.
+    sixteenth and as long as that makes no more than 200 pieces. Adjacent pieces
+    stay apart only if their union fits no cone.
 
     Args:
         mesh: The surface.
@@ -66,7 +67,8 @@ def cone_pieces(
         links,
         float(np.cos(half_angle)),
     )
-    piece = _pieces(patch, least, keep_all=keep_all)
+    split = _split(patch, np.ones(patch.n, dtype=bool), least)
+    piece = _pieces(patch, split, least, keep_all=keep_all)
     if not keep_all:
         piece = _more_kept(patch, piece, least)
     return _by_area(faces, piece, patch.areas, mesh.area)
@@ -77,23 +79,29 @@ def _more_kept(
 ) -> NDArray[np.int64]:
     """The pieces for half the least area, and so on, until enough of it is kept."""
     enough = _LEAST_KEPT * float(patch.areas.sum())
-    for leasts in (0.5 * least, 0.25 * least), (0.125 * least, 0.0625 * least):
-        if patch.areas[piece >= 0].sum() >= enough:
-            break
+    if patch.areas[piece >= 0].sum() >= enough:
+        return piece
+    # Cutting doesn't depend on the least area but for where it ends.
+    split = _split(patch, np.ones(patch.n, dtype=bool), _HALVINGS[-1][-1] * least)
+    for halvings in _HALVINGS:
         # Two at a time: the second is often needed, and there are cores for both.
-        for finer in mapped(lambda area: _pieces(patch, area), leasts):
+        for finer in mapped(lambda part: _pieces(patch, split, part * least), halvings):
             if finer.max(initial=-1) >= _MAX_PIECES:
                 return piece
             piece = finer
             if patch.areas[piece >= 0].sum() >= enough:
-                break
+                return piece
     return piece
 
 
-def _pieces(patch: Patch, least: float, *, keep_all: bool = False) -> NDArray[np.int64]:
+def _pieces(
+    patch: Patch, split: NDArray[np.int64], least: float, *, keep_all: bool = False
+) -> NDArray[np.int64]:
     """Number the pieces that fit and have the least area; -1: dropped."""
-    piece = _split(patch, np.ones(patch.n, dtype=bool), least)
-    piece = merged(patch, piece, CONE_SHARE[0])
+    # The last entry is that of -1.
+    areas = np.append(patch.sums(split)[1], 0.0)
+    large = (split >= 0) & (areas[split] >= least)
+    piece = merged(patch, renumbered(np.where(large, split, -1)), CONE_SHARE[0])
     piece = join_crumbs(patch, piece)
     if keep_all and np.any(piece < 0):
         rest = _split(patch, piece < 0, 0.0)
