@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.cones import averaged_normals, normal_cone
 from geometry.curvature import CurvatureField, principal_curvatures
-from geometry.dominance import face_curvedness
+from geometry.dominance import dominant_faces, face_curvedness
 from geometry.face_curvature import face_curvature, steep_directions
 from geometry.mesh import TriangleMesh
 from geometry.primitives import box, cylinder, grid, joined, sphere, torus
@@ -170,6 +170,28 @@ def test_a_crumb_is_left_alone_only_if_it_fits_no_neighbour() -> None:
             continue
         union = np.concatenate([found[a].faces, found[b].faces])
         assert normal_cone(mesh, union)[1] > limit
+
+
+def test_no_more_than_a_tenth_of_what_is_dominant_is_dropped() -> None:
+    mesh = crumpled()
+    field = principal_curvatures(mesh)
+    curvedness, trusted = face_curvedness(mesh, field)
+    pairs = adjacent_faces(mesh.edges, manifold_only=False)
+    least = 0.01
+    dominant = dominant_faces(mesh, curvedness, trusted, pairs, 0.3, least * mesh.area)
+    # Held to the least area, more would be dropped here.
+    half_angle = np.deg2rad(50.0)
+    found = dominant_regions(
+        mesh,
+        field,
+        area_share=0.3,
+        min_region_share=least,
+        cone_half_angle=half_angle,
+    )
+    kept = found.face_region >= 0
+    assert not np.any(kept & ~dominant)
+    assert mesh.face_areas[kept].sum() >= 0.9 * mesh.face_areas[dominant].sum()
+    assert min(region.area_m2 for region in found) < least * mesh.area
 
 
 def test_mean_curvedness_is_that_of_the_shape() -> None:
