@@ -32,7 +32,7 @@ Measure = Callable[[_Array], NDArray[np.bool_]]
 _STEPS = (1.0, 0.5, 0.25)
 # Reach of the first proposals, as a share of the largest radius of the shell.
 _REACH = 0.4
-_MIN_REACH = 0.005
+_MIN_REACH = 0.02
 _SHRINK = 0.4
 # Proposals from one state, each knowing what the one before lost.
 _REPEATS = 4

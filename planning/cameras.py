@@ -23,6 +23,8 @@ _ROWS = 2000
 _CHECK_ROWS = 4000
 _ROUNDS = 3
 _STREAM = 200
+# Of a cosine: what this decides roughly, `measurability.view` decides exactly.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,23 +186,36 @@ def _measurable(
     """Whether a camera measures each sample, were there nothing in between."""
     scene.pulse()
     required = scene.requirements
-    seen = measurability.view(camera, rows.target, required.camera, None)
-    wanted = np.zeros(len(rows.target), dtype=bool)
-    normals = rows.target.samples.normals
+    # Most of what a candidate can't see faces away from it.
+    facing = _facing(camera, rows.target, required.camera.max_incidence)
+    target = rows.target.take(facing)
+    seen = measurability.view(camera, target, required.camera, None)
+    measured = np.zeros(len(target), dtype=bool)
     for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
-        open_pairs = np.flatnonzero(
-            (seen.stage == measurability.SEEN) & rows.lit[:, p] & ~wanted
-        )
+        lit = (seen.stage == measurability.SEEN) & rows.lit[facing, p]
+        open_pairs = np.flatnonzero(lit & ~measured)
         quality = measurability.pair_quality(
-            normals[open_pairs],
-            light.take(open_pairs),
-            rings.take(open_pairs),
+            target.samples.normals[open_pairs],
+            light.take(facing[open_pairs]),
+            rings.take(facing[open_pairs]),
             seen.take(open_pairs),
             required.triangulation,
         )
         stage = measurability.first_pair_failure(quality, required.triangulation)
-        wanted[open_pairs[stage == measurability.MEASURED]] = True
+        measured[open_pairs[stage == measurability.MEASURED]] = True
+    wanted = np.zeros(len(rows.target), dtype=bool)
+    wanted[facing[measured]] = True
     return wanted
+
+
+def _facing(
+    camera: PlannedCamera, target: Target, max_incidence: float
+) -> NDArray[np.int64]:
+    """Samples that a camera may meet within the incidence limit, rounding allowed."""
+    offsets = target.samples.points - camera.world_from_device[:3, 3]
+    along = -np.einsum("ij,ij->i", offsets, target.samples.normals)
+    distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
+    return np.flatnonzero(along >= (np.cos(max_incidence) - _ROUNDING) * distances)
 
 
 def furthest_failure(

@@ -44,8 +44,7 @@ class View:
         rays: Unit viewing rays r, shape (n, 3).
         distances: t in [m], shape (n,).
         facing: -N.r, shape (n,).
-        jacobian: J_r in the world in [1/px], shape (n, 3, 2); only where `within`.
-        within: Whether the sample projects into the image, shape (n,).
+        jacobian: J_r in the world in [1/px], shape (n, 3, 2); 0 where a limit fails.
     """
 
     stage: NDArray[np.int8]
@@ -53,7 +52,6 @@ class View:
     distances: NDArray[np.float64]
     facing: NDArray[np.float64]
     jacobian: NDArray[np.float64]
-    within: NDArray[np.bool_]
 
     def take(self, chosen: NDArray[np.int64]) -> "View":
         """Return the view of some of the samples."""
@@ -63,7 +61,6 @@ class View:
             self.distances[chosen],
             self.facing[chosen],
             self.jacobian[chosen],
-            self.within[chosen],
         )
 
 
@@ -100,8 +97,9 @@ def view(
     for index in range(len(tests) - 1, -1, -1):
         stage[~tests[index]] = index
     jacobian = np.zeros((len(points), 3, 2))
-    jacobian[within] = pose[:3, :3] @ device.ray_jacobian(local[within])
-    return View(stage, rays, distances, facing, jacobian, within)
+    seen = stage == SEEN
+    jacobian[seen] = pose[:3, :3] @ device.ray_jacobian(local[seen])
+    return View(stage, rays, distances, facing, jacobian)
 
 
 @dataclass(frozen=True, eq=False)
