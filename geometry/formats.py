@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .file_origin import FileOrigin, Properties
 from .gltf_format import read_glb, read_gltf
 from .ply_format import ply_surface, read_ply
-from .polygons import cut_polygons
+from .polygons import PolygonError, cut_polygons
 from .stl_format import read_stl
 from .text_formats import FormatError, read_obj, read_off
 from .three_mf_format import read_three_mf
@@ -121,7 +121,10 @@ def _of_polygons(
     vertex_properties: Properties | None = None,
     face_properties: Properties | None = None,
 ) -> RawMesh:
-    faces, polygon = cut_polygons(points, sizes, corners)
+    try:
+        faces, polygon = cut_polygons(points, sizes, corners)
+    except PolygonError as error:
+        raise FormatError(str(error)) from None
     origin = FileOrigin(
         polygon,
         faces,
@@ -140,9 +143,13 @@ def _glb(data: bytes, fetch: _Fetch) -> RawMesh:
 def _gltf(data: bytes, fetch: _Fetch) -> RawMesh:
     def beside(name: str) -> bytes:
         rooted = PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive
+        missing = FormatError(f"it needs the file '{name}', which isn't beside it")
         if fetch is None or rooted or ".." in name:
-            raise FormatError(f"it needs the file '{name}', which isn't beside it")
-        return fetch(name)
+            raise missing
+        try:
+            return fetch(name)
+        except (FileNotFoundError, KeyError):
+            raise missing from None
 
     return _in_stated_unit(*read_gltf(data, beside))
 

@@ -157,12 +157,12 @@ def _kind(share: float, wall_m: float | None, thin_m: float) -> str:
 def _sight(caster: RayCaster, spots: Spots) -> _Sight:
     openness = look_out(caster, spots, _RAYS).escaped / _RAYS
     wall = np.full(len(spots), np.inf)
-    start = spots.points - _OFFSET * caster.mesh.radius * spots.normals
+    start = spots.points - _OFFSET * caster.extent * spots.normals
     behind, distance = caster.first_hits(start, -spots.normals)
     normals = caster.mesh.face_normals[behind]
     leaves = np.einsum("ij,ij->i", normals, spots.normals) < 0
     through = (behind >= 0) & leaves
-    wall[through] = distance[through] + _OFFSET * caster.mesh.radius
+    wall[through] = distance[through] + _OFFSET * caster.extent
     inside = openness < HIDDEN
     thin = wall <= THIN * 2.0 * caster.mesh.radius
     unsure = np.flatnonzero(thin & ~inside & (openness < LESS_THAN_BEHIND))

@@ -1,4 +1,4 @@
-"""Which pieces of a surface lie wholly inside which closed ones."""
+"""Which pieces of a surface lie wholly inside which others."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,29 +23,30 @@ _MAX_PAIRS = 1 << 24
 def containers(
     mesh: TriangleMesh,
     patch: NDArray[np.int64],
-    closed: NDArray[np.bool_],
+    holding: NDArray[np.bool_],
     asked: NDArray[np.bool_],
     caster: RayCaster,
 ) -> list[NDArray[np.int64]]:
-    """Return the closed patches that wholly hold each patch, the outermost first.
+    """Return the patches that wholly hold each patch, the outermost first.
 
-    A point lies inside a closed patch if a ray from it crosses the patch an odd number
+    A point lies inside a patch if a ray from it crosses the patch an odd number
     of times; three rays vote, since one may pass through an edge. A patch is held if
     its points, spread over its area, lie inside: a body that sticks out isn't.
 
     Args:
         mesh: The surface.
         patch: Number of the patch of each face, shape (n_f,).
-        closed: Whether each patch is closed, shape (n,).
+        holding: Whether each patch may hold others, shape (n,): closed ones, and those
+            open ones that are closed but for a crack.
         asked: Patches of which the containers are wanted, shape (n,).
         caster: Of the mesh.
 
     Returns:
         For each patch, the patches that hold it; none where it wasn't asked.
     """
-    n = len(closed)
+    n = len(holding)
     held: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n
-    inner = _in_some_box(mesh, patch, closed, asked)
+    inner = _in_some_box(mesh, patch, holding, asked)
     if not inner.any():
         return held
     least = int(np.clip(_MAX_SPOTS // int(inner.sum()), 4, _SPOTS))
@@ -60,7 +61,7 @@ def containers(
     )
     pairs, counts = np.unique(pairs, return_counts=True)
     row, holder = np.divmod(pairs, n)
-    keep = (counts >= _WHOLLY * least) & closed[holder] & (row != holder)
+    keep = (counts >= _WHOLLY * least) & holding[holder] & (row != holder)
     row, holder = row[keep], holder[keep]
     depth = np.bincount(row, minlength=n)
     for index in np.unique(row):
@@ -79,18 +80,18 @@ def _span(
 def _in_some_box(
     mesh: TriangleMesh,
     patch: NDArray[np.int64],
-    closed: NDArray[np.bool_],
+    holding: NDArray[np.bool_],
     asked: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Whether the box of each asked patch lies in that of another, closed one."""
+    """Whether the box of each asked patch lies in that of another that may hold it."""
     order = np.argsort(patch, kind="stable")
-    start = np.searchsorted(patch[order], np.arange(len(closed)))
+    start = np.searchsorted(patch[order], np.arange(len(holding)))
     a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     low = np.minimum.reduceat(low[order], start)
     high = np.maximum.reduceat(high[order], start)
-    outer, rows = np.flatnonzero(closed), np.flatnonzero(asked)
-    inside = np.zeros(len(closed), dtype=bool)
+    outer, rows = np.flatnonzero(holding), np.flatnonzero(asked)
+    inside = np.zeros(len(holding), dtype=bool)
     if not len(outer):
         return inside
     for part in np.array_split(rows, -(-len(rows) * len(outer) // _MAX_PAIRS) or 1):
@@ -130,7 +131,7 @@ def _crossings(
     caster: RayCaster,
 ) -> NDArray[np.int64]:
     """One key ``point * n + patch`` for each wall that the ray of a point meets."""
-    step = _STEP * mesh.radius
+    step = _STEP * caster.extent
     alive = np.arange(len(points))
     at = points + step * direction
     keys: list[NDArray[np.int64]] = []

@@ -168,7 +168,7 @@ def look_out(
     around = np.arange(n_rays) * _GOLDEN
     escaped = np.empty(len(spots), dtype=np.int64)
     met_front = np.empty(len(spots), dtype=np.int64)
-    offset = side * _OFFSET * caster.mesh.radius
+    offset = side * _OFFSET * caster.extent
     step = max(_MAX_RAYS // n_rays, 1)
     for begin in range(0, len(spots), step):
         part = slice(begin, begin + step)

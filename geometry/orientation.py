@@ -29,6 +29,8 @@ _CLEAR_FRAGMENT = 0.6
 _SIGMAS = 3.0
 # Below this |volume| / area^1.5 a closed patch encloses nothing (a folded sheet).
 _EMPTY = 1e-6
+# An open patch above that may hold others; a sphere has 0.09, a half one 0.04.
+_BULGY = 0.02
 # A body that fills this share of the one around it is the inner wall of a shell.
 _LINING = 0.5
 
@@ -42,6 +44,7 @@ def orient(mesh: TriangleMesh) -> tuple[NDArray[np.int64], tuple[Repair, ...]]:
     2. A closed patch wholly inside another may be the inner wall of a hollow shell.
        If it fills at least half of the one around it, it is one, and is turned to face
        the other way than that. If not, it is turned together with the outermost one.
+       An open patch holds what is in it as well, if hardly a ray finds its opening.
     3. An open patch is turned if its back is seen from outside more than its front.
     4. A patch that nothing decides (flat, or never seen) is turned with the closed one
        that holds it, else if most of the decided area was.
@@ -175,7 +178,10 @@ def _by_holder(
 ) -> NDArray[np.int64]:
     """Decide what lies inside a closed patch after those that hold it."""
     asked = closed | (verdict == 0)
-    held = containers(caster.mesh, patch, closed, asked, caster)
+    area = np.bincount(patch, caster.mesh.face_areas)
+    # A wall with a crack holds what is in it just as well.
+    cracked = ~closed & (verdict != 0) & (np.abs(volume) > _BULGY * area**1.5)
+    held = containers(caster.mesh, patch, closed | cracked, asked, caster)
     result = verdict.copy()
     for row in sorted(
         (row for row in range(len(held)) if len(held[row])),

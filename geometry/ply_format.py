@@ -103,7 +103,7 @@ def ply_surface(
     Raises:
         FormatError: If there are no positions, or faces are stored as something else.
     """
-    if elements.get("tristrips") is not None:
+    if any(name.startswith("tristrip") for name in elements):
         raise FormatError("it stores triangle strips, which aren't read; store faces")
     vertex = elements.get("vertex")
     if vertex is None:

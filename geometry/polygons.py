@@ -8,6 +8,12 @@ from numpy.typing import NDArray
 
 # Corners closer than this share of the outline's width are one place.
 _SAME = 1e-12
+# Ear clipping takes time that grows with the square of the corners.
+_MOST_CORNERS = 3000
+
+
+class PolygonError(ValueError):
+    """A polygon can't be cut into triangles."""
 
 
 def end_to_end(
@@ -35,6 +41,9 @@ def cut_polygons(
 
     Returns:
         Vertex indices, shape (m, 3), and the polygon each was cut from, shape (m,).
+
+    Raises:
+        PolygonError: If a concave one has more than 3,000 corners.
     """
     starts = np.cumsum(sizes) - sizes
     cut: list[NDArray[np.int64]] = []
@@ -42,6 +51,8 @@ def cut_polygons(
     for size in np.unique(sizes[sizes >= 3]).tolist():
         which = np.flatnonzero(sizes == size)
         outline = corners[starts[which, None] + np.arange(size)]
+        if size > 3:
+            outline = _twins_alike(points, outline)
         fans = np.stack(
             [
                 np.stack([outline[:, 0], outline[:, k], outline[:, k + 1]], axis=1)
@@ -50,7 +61,13 @@ def cut_polygons(
             axis=1,
         )
         if size > 3:
-            for i in np.flatnonzero(_concave(points, fans)):
+            concave = np.flatnonzero(_concave(points, fans))
+            if len(concave) and size > _MOST_CORNERS:
+                raise PolygonError(
+                    f"polygon {which[concave[0]] + 1} is concave and has {size} "
+                    f"corners, at most {_MOST_CORNERS} can be cut; export triangles"
+                )
+            for i in concave:
                 fans[i] = _ears(points, outline[i])
         cut.append(fans.reshape(-1, 3))
         owner.append(np.repeat(which, size - 2))
@@ -59,6 +76,27 @@ def cut_polygons(
     owners = np.concatenate(owner)
     order = np.argsort(owners, kind="stable")
     return np.concatenate(cut)[order], owners[order]
+
+
+def _twins_alike(
+    points: NDArray[np.float64], outline: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Let polygons (n, k) with the same corners begin at the same one.
+
+    Else a polygon that is stored twice is cut along other diagonals the second time,
+    and its triangles aren't known as doubles.
+    """
+    used, index = np.unique(outline, return_inverse=True)
+    place = np.unique(points[used], axis=0, return_inverse=True)[1]
+    at = place.ravel()[index.reshape(outline.shape)]
+    _, first, twin = np.unique(
+        np.sort(at, axis=1), axis=0, return_index=True, return_inverse=True
+    )
+    model = first[twin.ravel()]
+    shift = np.argmax(at == at[model, :1], axis=1)
+    shift[model == np.arange(len(model))] = 0
+    turned = (shift[:, None] + np.arange(outline.shape[1])) % outline.shape[1]
+    return np.take_along_axis(outline, turned, axis=1)
 
 
 def _concave(points: NDArray[np.float64], fans: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -8,6 +8,7 @@ and the checkers each bring a policy of their own.
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -63,6 +64,15 @@ class RayCaster:
         _EmbreeMesh(self._scene, vertices, faces)
         # The first call commits the scene; do it here, where no thread races.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+
+    @cached_property
+    def extent(self) -> float:
+        """Length in [m] that offsets of rays are shares of.
+
+        The radius of the object, or a quarter of the bounding box's diagonal: far
+        fragments don't make the object larger, but every ray coarser.
+        """
+        return max(self.mesh.radius, 0.5 * self.reach / self.scale)
 
     def local(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return points in the caster's own frame, shape (n, 3)."""

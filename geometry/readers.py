@@ -7,12 +7,13 @@ import io
 import lzma
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import IO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .file_origin import FileOrigin
 from .formats import SUPPORTED, RawMesh, read_format
@@ -20,6 +21,7 @@ from .mesh import MeshError, MeshSource, Repair, TriangleMesh
 from .orientation import orient
 from .repair import clean
 from .text_formats import FormatError
+from .topology import numbered
 
 METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 UNITS = ("mm", "cm", "m", "in", "um")
@@ -32,6 +34,9 @@ _LIKELY_SIZE_M = 0.2
 _MAX_BYTES = 1 << 32
 # Fragments that stand out by this share of the longest side are reported.
 _STRAY = 0.01
+# Radii from the centre of the main bodies. Rays are precise to about 1e-6 of all that
+# there is, so to 0.1 mm on an object of 1 m.
+_FAR = 100.0
 _PIECE = 1 << 24
 
 
@@ -89,6 +94,8 @@ def usable_mesh(
         vertices, faces, kept, repairs = clean(raw.vertices, raw.faces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
+    vertices, faces, near, far = _without_far(vertices, faces)
+    kept, repairs = kept[near], repairs + far
     longest, stray = _longest_side(TriangleMesh(vertices, faces))
     name, scale = _scale(raw, longest, unit, size_mm)
     _check_size(path, longest, name, scale)
@@ -108,6 +115,29 @@ def usable_mesh(
         mesh = TriangleMesh(mesh.vertices, faces)
     source = replace(source, repairs=repairs + turned + stray)
     return mesh.tagged(source, _origin(raw).of_faces(kept))
+
+
+def _without_far(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[
+    NDArray[np.float64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    tuple[Repair, ...],
+]:
+    """Drop fragments so far away that rays at the object would lose their precision.
+
+    Returns:
+        Vertices, faces, which of the faces these were, and the repair.
+    """
+    mesh = TriangleMesh(vertices, faces)
+    far = np.linalg.norm(vertices - mesh.centre, axis=1) > _FAR * mesh.radius
+    near = np.flatnonzero(~far[faces].any(axis=1))
+    if len(near) == len(faces):
+        return vertices, faces, near, ()
+    used, local = numbered(faces[near], len(vertices))
+    kind = "faces of fragments more than 100 radii away removed"
+    return vertices[used], local, near, (Repair(kind, len(faces) - len(near)),)
 
 
 def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
@@ -234,9 +264,11 @@ def _unpack(path: Path, data: bytes) -> _Unpacked:
     if suffixes[-1] == "zip":
         return _from_zip(data)
     if suffixes[-1] in ("gz", "bz2"):
-        opened = gzip.open if suffixes[-1] == "gz" else bz2.open
-        with opened(io.BytesIO(data)) as stream:
-            content = _at_most(stream)
+        if suffixes[-1] == "gz":
+            with gzip.open(io.BytesIO(data)) as stream:
+                content = _at_most(_pieces(stream))
+        else:
+            content = _at_most(_bunzipped(data))
         return (suffixes[-2] if len(suffixes) > 1 else ""), content, None
     return suffixes[-1], data, lambda name: (path.parent / name).read_bytes()
 
@@ -256,19 +288,36 @@ def _from_zip(data: bytes) -> _Unpacked:
 
     def member(name: str) -> bytes:
         with archive.open(name) as stream:
-            return _at_most(stream)
+            return _at_most(_pieces(stream))
 
     kind = PurePosixPath(meshes[0]).suffix.lower().lstrip(".")
-    return kind, member(meshes[0]), lambda name: member(str(folder / name))
+    content = member(meshes[0])
+    return kind, content, lambda name: member(str(folder / name))
 
 
-def _at_most(stream: IO[bytes] | gzip.GzipFile | bz2.BZ2File) -> bytes:
-    # Asked for everything at once, gzip and bz2 set the largest size aside first.
-    pieces: list[bytes] = []
+def _bunzipped(data: bytes) -> Iterator[bytes]:
+    # The module's own file takes what is behind a stream and no stream for padding.
+    while data:
+        stream = bz2.BZ2Decompressor()
+        yield stream.decompress(data, _PIECE)
+        while not stream.eof:
+            if stream.needs_input:
+                raise EOFError("it ends before the end of its stream")
+            yield stream.decompress(b"", _PIECE)
+        data = stream.unused_data
+
+
+def _pieces(stream: IO[bytes] | gzip.GzipFile) -> Iterator[bytes]:
+    # Asked for everything at once, gzip sets the largest size aside first.
+    return iter(lambda: stream.read(_PIECE), b"")
+
+
+def _at_most(pieces: Iterable[bytes]) -> bytes:
+    held: list[bytes] = []
     total = 0
-    while piece := stream.read(_PIECE):
-        pieces.append(piece)
+    for piece in pieces:
+        held.append(piece)
         total += len(piece)
         if total > _MAX_BYTES:
             raise OSError(f"it unpacks to more than {_MAX_BYTES >> 30} GiB")
-    return b"".join(pieces)
+    return b"".join(held)

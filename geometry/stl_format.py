@@ -15,7 +15,11 @@ _FACET = (
     *(3 * ("vertex", None, None, None)),
     *("endloop", "endfacet"),
 )
-_SOLID = re.compile(r"\s*solid\b[^\r\n]*([\r\n].*?)\bendsolid\b[^\r\n]*", re.I | re.S)
+_SOLID = re.compile(
+    r"\s*solid\b([^\r\n]*)([\r\n].*?)\bendsolid\b([^\r\n]*)", re.I | re.S
+)
+# In the place of a solid's name.
+_GEOMETRY = re.compile(r"\bfacet\s+normal\b|\bendloop\b|\bendfacet\b", re.I)
 
 
 def read_stl(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -54,7 +58,12 @@ def _ascii(text: str) -> NDArray[np.float64]:
                 f"{read} of {facets} facets could be read; a 'solid' without its "
                 "'endsolid' may be cut short"
             )
-        parts.append(_facets(found[1].split()))
+        if _GEOMETRY.search(found[1]) or _GEOMETRY.search(found[3]):
+            raise FormatError(
+                "facets stand on the line of a 'solid' or 'endsolid', where its name "
+                "belongs"
+            )
+        parts.append(_facets(found[2].split()))
         at = found.end()
     return np.concatenate(parts)
 

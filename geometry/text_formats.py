@@ -18,9 +18,12 @@ _FREE_FORM = frozenset({"cstype", "curv", "curv2", "surf", "bmat", "bzp", "bsp",
 # An unknown word may be a damaged v or f, and leaving out one shifts all that follow.
 _NO_GEOMETRY = frozenset(
     "vt vn vp vc p l g o s mg usemtl mtllib usemap maplib lod bevel c_interp d_interp "
-    "shadow_obj trace_obj ctech stech deg step parm trim hole scrv sp end con call "
-    "csh".split()
+    "shadow_obj trace_obj ctech stech deg step parm trim hole scrv sp end con".split()
 )
+# What these bring in can't be known here.
+_ELSEWHERE = frozenset({"call", "csh"})
+# Names of files and groups; of these a backslash at the end is part.
+_NAMES = frozenset({"mtllib", "usemtl", "maplib", "usemap", "g", "o"})
 # "v" and x y z, with a weight, a colour, or both.
 _VERTEX_COLUMNS = (4, 5, 7, 8)
 # Up to here every whole number has a float64 of its own.
@@ -110,6 +113,11 @@ def read_obj(data: bytes) -> _PointsAndPolygons:
             raise FormatError(
                 f"line {number}: free-form geometry ('{words[0]}') isn't triangles"
             )
+        elif words[0] in _ELSEWHERE:
+            raise FormatError(
+                f"line {number}: '{words[0]}' brings in another file or program's "
+                "output; export the mesh as one file"
+            )
         elif words[0] not in _NO_GEOMETRY:
             raise FormatError(
                 f"line {number}: '{ascii(words[0][:20])[1:-1]}' isn't known in OBJ"
@@ -121,13 +129,16 @@ def read_obj(data: bytes) -> _PointsAndPolygons:
 def _obj_lines(text: str) -> Iterator[tuple[int, list[str]]]:
     """Yield line numbers and words, backslash continuations joined."""
     held = ""
-    for number, line in enumerate(_lines(text), 1):
+    lines = _lines(text)
+    for number, line in enumerate(lines, 1):
         line = held + line.split("#", 1)[0].rstrip()
-        if line.endswith("\\"):
+        words = line.split()
+        if line.endswith("\\") and words[0] not in _NAMES and number < len(lines):
             held = line[:-1] + " "
             continue
         held = ""
-        words = line.split()
+        if line.endswith("\\") and words[0] not in _NAMES:
+            words = line[:-1].split()
         if words:
             yield number, words
 

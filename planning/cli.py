@@ -247,7 +247,8 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
         )
     if not options["meshes"][0]:
         raise click.UsageError("--mesh '' names no file")
-    if len(options["meshes"]) > 1 or Path(options["meshes"][0]).is_dir():
+    # os.path answers for names that the system refuses; Path raises.
+    if len(options["meshes"]) > 1 or os.path.isdir(options["meshes"][0]):
         raise click.UsageError(
             "several meshes on one rig aren't built yet: give one file"
         )

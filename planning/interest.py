@@ -263,7 +263,7 @@ def _values(
     if data.startswith(_NUMPY):
         try:
             return np.load(io.BytesIO(data), allow_pickle=False)
-        except (ValueError, EOFError, OSError) as error:
+        except (ValueError, EOFError, OSError, MemoryError) as error:
             raise InputError(f"{where}: isn't a usable .npy file ({error})") from None
     words: list[str] = []
     try:

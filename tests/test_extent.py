@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -145,3 +147,29 @@ def test_a_fragment_does_not_decide_the_scale_of_a_file(tmp_path) -> None:
             len(speck.faces),
         )
     ]
+
+
+@pytest.mark.parametrize(("away", "stays"), [(5.0, True), (50.0, False)])
+def test_a_fragment_out_of_all_proportion_is_left_out(
+    away: float, stays: bool, tmp_path: Path
+) -> None:
+    ball = sphere(0.1, subdivisions=3)
+    corners = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0]])
+    fragment = TriangleMesh(corners + [away, 0.0, 0.0], np.array([[0, 1, 2]]))
+    whole = joined(fragment, ball)
+    path = tmp_path / "a.obj"
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (1e3 * whole.vertices).tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (whole.faces + 1).tolist()]
+    path.write_text("\n".join(lines))
+    mesh = load_mesh(path)
+    assert len(mesh.faces) == len(ball.faces) + stays
+    assert mesh.radius == pytest.approx(0.1, rel=1e-9)
+    assert mesh.source is not None
+    made = {repair.kind: repair.count for repair in mesh.source.repairs}
+    removed = "faces of fragments more than 100 radii away removed"
+    assert made.get(removed, 0) == 1 - stays
+    # A choice of the file's faces still finds the same ones.
+    assert mesh.origin is not None
+    np.testing.assert_array_equal(
+        mesh.origin.face, np.arange(1 - stays, len(whole.faces))
+    )

@@ -319,3 +319,13 @@ def test_the_real_bust_is_a_hollow_shell() -> None:
 def test_real_meshes_are_what_they_are(name: str, kind: str) -> None:
     mesh = load_mesh(SHARED / name, size_mm=100)
     assert measure_shell(RayCaster(mesh)).kind == kind
+
+
+@pytest.mark.parametrize("away", [1.0, 5.0])
+def test_a_fragment_far_away_makes_no_inside(away: float) -> None:
+    ball = sphere(0.1, subdivisions=4)
+    corners = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0]])
+    fragment = TriangleMesh(corners + [away, 0.0, 0.0], np.array([[0, 1, 2]]))
+    shell = measure_shell(RayCaster(joined(ball, fragment)))
+    assert shell.kind == SOLID
+    assert shell.inside_m2 == 0.0

@@ -196,6 +196,21 @@ def test_the_inner_wall_is_turned_where_its_winding_is_wrong() -> None:
     assert repairs == {TURNED: len(shells[1].faces), PIECES: 1}
 
 
+def test_a_crack_in_the_outer_wall_turns_no_inner_wall() -> None:
+    outer, inner = sphere(0.1, subdivisions=4), sphere(0.095, subdivisions=4)
+    cracked = TriangleMesh(outer.vertices, outer.faces[1:])
+    wound = joined(cracked, flipped(inner))
+    mesh, repairs = result(wound)
+    assert_oriented_like(mesh, wound)
+    assert repairs == {}
+    mesh, _ = result(joined(cracked, inner))
+    assert_oriented_like(mesh, wound)
+    # Half a wall is none: what lies in it is a body of its own.
+    half = TriangleMesh(outer.vertices, outer.faces[outer.face_centroids[:, 2] > 0.0])
+    mesh, _ = result(joined(half, inner))
+    assert_oriented_like(mesh, joined(half, inner))
+
+
 def test_a_small_part_inside_a_solid_keeps_its_side() -> None:
     """Parts inside a housing are no cavities, and cavities no parts."""
     part = moved(sphere(0.03, subdivisions=2), 0.02, 0.0, 0.0)

@@ -1,6 +1,7 @@
 """Traps of mesh libraries, each with a file made here: read whole or refused."""
 
 import base64
+import bz2
 import json
 import struct
 import zipfile
@@ -16,6 +17,10 @@ from geometry.readers import load_mesh
 # A unit right triangle times 30 mm, twice over: area 2 * 450 mm² as a 30 mm square.
 SQUARE = ((0, 0, 0), (30, 0, 0), (30, 30, 0), (0, 30, 0))
 AREA = 9e-4
+FACET = (
+    "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 30 0 0 vertex 0 30 0 "
+    "endloop endfacet"
+)
 V_LINES = "".join(f"v {x} {y} {z}\n" for x, y, z in SQUARE)
 
 
@@ -40,6 +45,8 @@ def refused(path: Path, content: str | bytes, message: str, **options) -> None:
         "f 1/5/6 2/5 3//6 4\n",
         "f\t1  2\t3 4   \n",
         "f 1 2 \\\n3 \\\n4",
+        "f 1 2 3 4 \\",
+        "mtllib C:\\parts\\\nf 1 2 3 4\n",
         "f 1 2 3\r\nf 1 3 4\r\n",
         "f 1 2 3\rf 1 3 4\r",
         "f +1 02 3 4\n",
@@ -67,6 +74,7 @@ def test_obj_corners_in_any_dress(faces: str, tmp_path: Path) -> None:
         (V_LINES + "v 1 2 3 v 4 5 6\nf 1 2 3\n", "could not convert"),
         (V_LINES + "v 1 2 3 4 5\nf 1 2 3\n", "line 5: a vertex has 5 numbers"),
         (V_LINES + "f 1 2 99999999999999999999\n", "face 1 names a vertex"),
+        (V_LINES + "call half.obj\nf 1 2 3\n", "line 5: 'call' brings in another"),
     ],
 )
 def test_obj_damage_is_refused_not_skipped(
@@ -420,6 +428,55 @@ def test_3mf_that_multiplies_without_end_is_refused_at_once(tmp_path: Path) -> N
     path = three_mf(tmp_path / "a.3mf", objects=objects, items='<item objectid="13"/>')
     with pytest.raises(MeshError, match="repeated without end"):
         load_mesh(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"solid a {FACET}\n{FACET}\nendsolid a\n",
+        f"solid a\n{FACET}\nendsolid a {FACET}\n",
+        f"solid a\n{FACET}\nendsolid a solid b {FACET}\n{FACET}\nendsolid\n",
+    ],
+)
+def test_stl_facets_in_the_place_of_a_name_are_refused(
+    text: str, tmp_path: Path
+) -> None:
+    refused(tmp_path / "a.stl", text, "facets stand on the line of a 'solid'")
+
+
+def test_a_bz2_file_damaged_behind_its_first_stream_is_refused(tmp_path: Path) -> None:
+    halves = [bz2.compress(part.encode()) for part in (V_LINES, "f 1 2 3 4\n")]
+    whole = b"".join(halves)
+    assert read(tmp_path / "a.obj.bz2", whole).area == pytest.approx(AREA)
+    damaged = halves[0] + b"X" + halves[1][1:]
+    refused(tmp_path / "b.obj.bz2", damaged, "can't be unpacked")
+    refused(tmp_path / "c.obj.bz2", whole[:-3], "ends before the end of its stream")
+
+
+@pytest.mark.parametrize("shift", [0, 1, 2, 3])
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_polygon_stored_twice_counts_once(
+    shift: int, way: int, tmp_path: Path
+) -> None:
+    again = np.roll([1, 2, 3, 4], shift)[::way]
+    text = V_LINES + "f 1 2 3 4\nf " + " ".join(map(str, again)) + "\n"
+    mesh = read(tmp_path / "a.obj", text)
+    assert len(mesh.faces) == 2
+    assert mesh.area == pytest.approx(AREA, rel=1e-12)
+    apart = V_LINES + V_LINES + "f 1 2 3 4\nf " + " ".join(map(str, again + 4))
+    assert read(tmp_path / "b.obj", apart).area == pytest.approx(AREA, rel=1e-12)
+
+
+def test_a_polygon_that_takes_minutes_to_cut_is_refused(tmp_path: Path) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 3002, endpoint=False)
+    radius = 30.0 + 5.0 * np.cos(angle * 1501.0)
+    lines = [
+        f"v {x} {y} 0\n"
+        for x, y in zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)
+    ]
+    corners = " ".join(str(k + 1) for k in range(3002))
+    text = "".join(lines) + f"f {corners}\n"
+    refused(tmp_path / "a.obj", text, "concave and has 3002 corners")
 
 
 def test_a_small_archive_of_much_is_not_set_aside_at_once(
