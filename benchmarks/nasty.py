@@ -83,8 +83,6 @@ def main() -> int:
 def _as_listed(table: ModuleType, name: str, ended: Ended) -> bool:
     if name in table.REFUSED:
         return ended.code == 3 and table.REFUSED[name] in ended.words
-    if name not in table.ENDS:
-        return name in table.READ and ended.code != 3
     code, words = table.ENDS[name]
     return ended.code == code and words in ended.words
 

@@ -94,9 +94,9 @@ def usable_mesh(
         vertices, faces, kept, repairs = clean(raw.vertices, raw.faces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    vertices, faces, near, far = _without_far(vertices, faces)
+    mesh, near, far = _without_far(TriangleMesh(vertices, faces))
     kept, repairs = kept[near], repairs + far
-    longest, stray = _longest_side(TriangleMesh(vertices, faces))
+    longest, stray = _longest_side(mesh)
     name, scale = _scale(raw, longest, unit, size_mm)
     _check_size(path, longest, name, scale)
     source = MeshSource(
@@ -109,7 +109,7 @@ def usable_mesh(
         repairs=repairs,
     )
     # Orientation turns faces and keeps their order, so that the origin stays theirs.
-    mesh = TriangleMesh(vertices * scale, faces)
+    mesh = TriangleMesh(mesh.vertices * scale, mesh.faces)
     faces, turned = orient(mesh)
     if not np.array_equal(faces, mesh.faces):
         mesh = TriangleMesh(mesh.vertices, faces)
@@ -118,26 +118,22 @@ def usable_mesh(
 
 
 def _without_far(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[
-    NDArray[np.float64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    tuple[Repair, ...],
-]:
+    mesh: TriangleMesh,
+) -> tuple[TriangleMesh, NDArray[np.int64], tuple[Repair, ...]]:
     """Drop fragments so far away that rays at the object would lose their precision.
 
     Returns:
-        Vertices, faces, which of the faces these were, and the repair.
+        What is left, which of the faces these were, and the repair.
     """
-    mesh = TriangleMesh(vertices, faces)
+    vertices, faces = mesh.vertices, mesh.faces
     far = np.linalg.norm(vertices - mesh.centre, axis=1) > _FAR * mesh.radius
     near = np.flatnonzero(~far[faces].any(axis=1))
     if len(near) == len(faces):
-        return vertices, faces, near, ()
+        return mesh, near, ()
     used, local = numbered(faces[near], len(vertices))
     kind = "faces of fragments more than 100 radii away removed"
-    return vertices[used], local, near, (Repair(kind, len(faces) - len(near)),)
+    removed = Repair(kind, len(faces) - len(near))
+    return TriangleMesh(vertices[used], local), near, (removed,)
 
 
 def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
