@@ -22,6 +22,8 @@ _AREA_DIGITS = 1e-9
 # This share of what was chosen must be kept, if that takes no more pieces: where more
 # is dropped, a small change of the mesh drops other parts, and the target is another.
 _LEAST_KEPT, _MAX_PIECES = 0.9, 200
+# Less than this share of the mesh is the rim of a plate: what fits no region isn't one.
+_NO_REST = 0.05
 _HALVINGS = ((1.0 / 2.0, 1.0 / 4.0), (1.0 / 8.0, 1.0 / 16.0))
 
 
@@ -43,7 +45,8 @@ def cone_pieces(
     fit best; what fits none is dropped, or with `keep_all` a piece of its own. Where
     more than a tenth would be dropped (a surface of many small parts, or of sharp
     corners that fit no cone), the least area is halved until that ends, down to a
-    sixteenth and as long as that makes no more than 200 pieces. Adjacent pieces
+    sixteenth and as long as that makes no more than 200 pieces; not so where what was
+    chosen is less than a twentieth of the mesh, as the rim of a plate. Adjacent pieces
     stay apart only if their union fits no cone.
 
     Args:
@@ -69,7 +72,7 @@ def cone_pieces(
     )
     split = _split(patch, np.ones(patch.n, dtype=bool), least)
     piece = _pieces(patch, split, least, keep_all=keep_all)
-    if not keep_all:
+    if not keep_all and patch.areas.sum() >= _NO_REST * mesh.area:
         piece = _more_kept(patch, piece, least)
     return _by_area(faces, piece, patch.areas, mesh.area)
 
