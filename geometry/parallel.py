@@ -24,7 +24,8 @@ def mapped(
 
     The items go to threads: it pays where the function spends its time in numpy and
     scipy, which let go of the interpreter. What an item gives must not depend on the
-    others, so that the number of threads changes nothing.
+    others, so that the number of threads changes nothing; nor may it call this again,
+    since it would wait for a thread that waits for it.
     """
     todo = list(items)
     threads = min(n_threads(), len(todo))

@@ -133,11 +133,12 @@ def _obj_lines(text: str) -> Iterator[tuple[int, list[str]]]:
     for number, line in enumerate(lines, 1):
         line = held + line.split("#", 1)[0].rstrip()
         words = line.split()
-        if line.endswith("\\") and words[0] not in _NAMES and number < len(lines):
-            held = line[:-1] + " "
-            continue
         held = ""
         if line.endswith("\\") and words[0] not in _NAMES:
+            # At the end of the file there is nothing to go on with.
+            if number < len(lines):
+                held = line[:-1] + " "
+                continue
             words = line[:-1].split()
         if words:
             yield number, words

@@ -43,7 +43,7 @@ def principal_curvature(
         rings: About each vertex that a quadric is fitted to.
     """
     if len(vertices) < _LARGE or n_threads() < 2 or not sys.executable:
-        return _unpacked(_fit(vertices, faces, rings), len(vertices))
+        return _unpacked(_fit(vertices, faces, rings))
     axis = int(np.argmax(np.ptp(vertices, axis=0)))
     low = vertices[:, axis] <= np.median(vertices[:, axis])
     parts = [_with_rim(vertices, faces, own, rings) for own in (low, ~low)]
@@ -54,10 +54,8 @@ def principal_curvature(
         there = _fit(*parts[1][1:], rings)
     n = len(vertices)
     k, ways, fitted = np.zeros((2, n)), np.zeros((2, n, 3)), np.zeros(n, dtype=bool)
-    for own, (used, points, _), found in zip(
-        (low, ~low), parts, (here, there), strict=True
-    ):
-        part_k, part_ways, part_fitted = _unpacked(found, len(points))
+    for own, (used, _, _), found in zip((low, ~low), parts, (here, there), strict=True):
+        part_k, part_ways, part_fitted = _unpacked(found)
         mine = own[used]
         k[:, used[mine]] = part_k[:, mine]
         ways[:, used[mine]] = part_ways[:, mine]
@@ -83,12 +81,12 @@ def _fit(vertices: NDArray[np.float64], faces: NDArray[np.int64], rings: int) ->
     return first, second, k_first, k_second, np.array(found[4], dtype=np.int64)
 
 
-def _unpacked(found: _Raw, n: int) -> Fit:
+def _unpacked(found: _Raw) -> Fit:
     first, second, k_first, k_second, bad = found
     k, ways = np.stack([k_first, k_second]), np.stack([first, second])
     fitted = np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
     fitted[bad] = False
-    return k.reshape(2, n), ways.reshape(2, n, 3), fitted
+    return k, ways, fitted
 
 
 def _with_rim(
