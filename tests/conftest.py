@@ -33,6 +33,12 @@ def shared_meshes() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def set_cover_files() -> ModuleType:
+    """The table of the published set covers that lie beside the repository."""
+    return _load("set_cover_files")
+
+
+@pytest.fixture(scope="session")
 def curved_shapes() -> ModuleType:
     """Shapes with their exact curvatures."""
     return _load("curved_shapes")
