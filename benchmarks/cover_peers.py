@@ -31,6 +31,8 @@ _CP_SAT_WORKERS = 8
 # Stating millions of entries in Python isn't the solver's time; a hung one is killed.
 _GRACE_SECONDS = 120.0
 _GRACE_SHARE = 1.25
+# SCIP's infinity is 1e20.
+_NO_BOUND = 1e19
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +122,8 @@ def ask_peer(
     found = said["selected"]
     selected = None if found is None else np.array(found, dtype=np.int64)
     bound = -math.inf if said["bound"] is None else float(said["bound"])
+    if bound < -_NO_BOUND:
+        bound = -math.inf
     return PeerAnswer("solved", selected, bound, said["seconds"], said["version"])
 
 

@@ -228,7 +228,7 @@ def _elements(
     shape = cast("tuple[int, ...]", matrix.shape)  # type: ignore[union-attr]
     if len(shape) != 2 or 0 in shape:
         raise ValueError(f"covers must be a matrix that isn't empty, got shape {shape}")
-    rows = sparse.csr_array(matrix)
+    rows = sparse.csr_array(matrix, copy=True)
     rows.sum_duplicates()
     size = int(rows.nnz) + sum(shape)
     if size > MAX_STATED_ENTRIES:

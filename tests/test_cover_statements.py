@@ -376,6 +376,18 @@ def test_bad_matrices_are_refused(covers, message):
             state(covers, 1)
 
 
+def test_an_entry_given_twice_is_no_second_set_and_stays():
+    twice = np.array([0, 0, 1])
+    spoiled = sparse.csr_array((np.ones(3), twice, [0, 2, 3]), shape=(2, 2))
+    with pytest.raises(ValueError, match="boolean or hold only 0 and 1"):
+        state_cover_relaxation(spoiled, 2.0, needs=[2, 1])
+    assert spoiled.nnz == 3
+    marked = sparse.csr_array((np.ones(3, bool), twice, [0, 2, 3]), shape=(2, 2))
+    found = solve_statement(state_cover_relaxation(marked, 2.0))
+    assert found.multipliers == pytest.approx([1.0, 1.0])
+    assert marked.nnz == 3
+
+
 def test_the_largest_statement_is_taken():
     covers = sparse.csr_array((MAX_STATED_ENTRIES - 1, 1))
     assert state_max_coverage(covers, 1).elements.size == MAX_STATED_ENTRIES - 1
