@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 from ._siblings import check_siblings
 
 if TYPE_CHECKING:
-    from .cover import CoverProblem as CoverProblem
     from .cover import CoverSolution as CoverSolution
     from .cover import solve_cover as solve_cover
+    from .cover_problem import CoverProblem as CoverProblem
     from .status import SolveStatus as SolveStatus
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
-    "CoverProblem": "cover",
+    "CoverProblem": "cover_problem",
     "CoverSolution": "cover",
     "SolveStatus": "status",
     "solve_cover": "cover",

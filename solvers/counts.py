@@ -5,46 +5,21 @@ then exact search over K-tuples. Each spends a share of one counted budget.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .answers import INTEGER_PROOF, NONE, CountAnswer, WeightAnswer, better, cut_short
 from .exact_cover import TupleSearch, best_tuple
-from .mixed_integer import fits, linear_multipliers, solve_integer
-from .neighbourhood import cheapest, greedy, most_coverage, prune
+from .mixed_integer import fits, solve_integer
+from .neighbourhood import greedy, most_coverage, prune
 from .reductions import ReducedCover
-from .relaxation import cost_bound, count_bound, coverage_bounds, tighten
+from .relaxation import count_bound, coverage_bounds, tighten
 from .status import SolveStatus, WorkBudget
 
-_EMPTY = np.empty(0, dtype=np.int64)
-_INTEGER_PROOF = "branch and bound (HiGHS)"
 _LARGE_COUNT = 8
 # Restarts before a bound is asked whether more are worth it.
 _FIRST_KICKS = 8
-
-
-@dataclass(frozen=True, eq=False)
-class CountAnswer:
-    """Fewest or cheapest sets that reach the weight; indices of the reduced cover.
-
-    The bound counts sets or sums costs, as was asked.
-    """
-
-    status: SolveStatus
-    selected: NDArray[np.int64]
-    lower_bound: float
-    proof: str
-
-
-@dataclass(frozen=True, eq=False)
-class WeightAnswer:
-    """Most weight of K sets; indices and weight of the reduced cover."""
-
-    status: SolveStatus
-    selected: NDArray[np.int64]
-    upper_bound: float
-    proof: str
 
 
 def fewest_sets(
@@ -64,7 +39,7 @@ def fewest_sets(
         max_sets: Sets allowed.
         heaviest: Whether to look for more weight at the same count.
     """
-    selected = prune(cover, greedy(cover, _EMPTY, budget))
+    selected = prune(cover, greedy(cover, NONE, budget))
     cap = cover.n_sets if max_sets is None else max_sets
     lower, proof = 1, "a positive weight needs a set"
     multipliers = cover.weights
@@ -95,7 +70,7 @@ def fewest_sets(
             lower, proof = (proved, how) if proved > lower else (lower, proof)
     if selected.size > cap:
         status = SolveStatus.INFEASIBLE if lower > cap else SolveStatus.UNKNOWN
-        settled, start = lower > cap, _EMPTY
+        settled, start = lower > cap, NONE
     else:
         settled, start = lower >= selected.size, selected
         status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
@@ -106,49 +81,8 @@ def fewest_sets(
         size = min(selected.size, cap)
         selected = most_weight(cover, size, spare, seed=seed, start=start).selected
     if not settled:
-        proof = f"{proof}; search cut by the {budget.reason}"
+        proof = cut_short(proof, budget)
     return CountAnswer(status, selected, float(lower), proof)
-
-
-def cheapest_sets(
-    cover: ReducedCover, budget: WorkBudget, *, seed: int, max_sets: int | None = None
-) -> CountAnswer:
-    """Find the cheapest sets that reach the required weight, with a lower bound.
-
-    Args:
-        cover: A cover whose sets together reach the required weight.
-        budget: Counted work.
-        seed: Seed of the neighbourhood search.
-        max_sets: Sets allowed; more of them leave the status ``UNKNOWN``.
-    """
-    selected = cheapest(
-        cover,
-        greedy(cover, _EMPTY, budget),
-        budget.part(0.2 * budget.units),
-        seed=seed,
-        max_kicks=300,
-    )
-    lower, proof = float(cover.costs.min()), "a positive weight needs a set"
-    multipliers = linear_multipliers(cover, budget.part(0.5 * budget.units))
-    if multipliers is not None:
-        bound = cost_bound(cover, multipliers)
-        if bound > lower:
-            lower, proof = bound, "linear relaxation"
-    cost = float(cover.costs[selected].sum())
-    if lower < cost * (1.0 - 1e-9) and fits(cover):
-        answer = solve_integer(cover, selected, budget)
-        selected = _better(cover, selected, answer.selected)
-        cost = float(cover.costs[selected].sum())
-        if answer.lower_bound > lower:
-            lower, proof = answer.lower_bound, _INTEGER_PROOF
-    settled = lower >= cost * (1.0 - 1e-5)
-    lower = cost if settled else lower
-    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-    if max_sets is not None and selected.size > max_sets:
-        status = SolveStatus.UNKNOWN
-    if not settled:
-        proof = f"{proof}; search cut by the {budget.reason}"
-    return CountAnswer(status, selected, lower, proof)
 
 
 def most_weight(
@@ -157,14 +91,14 @@ def most_weight(
     budget: WorkBudget,
     *,
     seed: int,
-    start: NDArray[np.int64] = _EMPTY,
+    start: NDArray[np.int64] = NONE,
 ) -> WeightAnswer:
     """Find the most weight that K sets cover, with an upper bound."""
     n_sets = min(n_sets, cover.n_sets)
     if n_sets == 0:
-        return WeightAnswer(SolveStatus.OPTIMAL, _EMPTY, 0.0, "no set is allowed")
-    best = _EMPTY
-    for first in (start, _EMPTY) if start.size else (_EMPTY,):
+        return WeightAnswer(SolveStatus.OPTIMAL, NONE, 0.0, "no set is allowed")
+    best = NONE
+    for first in (start, NONE) if start.size else (NONE,):
         filled = greedy(cover, first, budget, n_sets=n_sets)
         best = max(best, filled, key=cover.weight_of)
     kicks = budget.part(0.4 * budget.units)
@@ -208,7 +142,7 @@ def most_weight(
             SolveStatus.OPTIMAL, best, weight, _tuple_proof(n_sets, search)
         )
     upper = max(weight, min(upper, search.upper_bound))
-    proof = f"Lagrangian bound; search cut by the {budget.reason}"
+    proof = cut_short("Lagrangian bound", budget)
     return WeightAnswer(SolveStatus.FEASIBLE, best, upper, proof)
 
 
@@ -252,20 +186,11 @@ def _by_integers(
     if not fits(cover):
         return selected, lower, ""
     answer = solve_integer(cover, selected, budget)
-    selected = _better(cover, selected, answer.selected)
-    proved = math.ceil(answer.lower_bound / float(cover.costs[0]) - 1e-5)
-    return selected, max(lower, proved), _INTEGER_PROOF
-
-
-def _better(
-    cover: ReducedCover, selected: NDArray[np.int64], other: NDArray[np.int64] | None
-) -> NDArray[np.int64]:
-    """Return the cheaper of a cover and a proposal that may not be one."""
-    if other is None or cover.weight_of(other) < cover.required:
-        return selected
-    other = prune(cover, other)
-    cheaper = cover.costs[other].sum() < cover.costs[selected].sum() * (1.0 - 1e-12)
-    return other if cheaper else selected
+    selected = better(cover, selected, answer.selected)
+    if answer.bound is None:
+        return selected, lower, ""
+    proved = math.ceil(answer.bound / float(cover.costs[0]) - 1e-5)
+    return selected, max(lower, proved), INTEGER_PROOF
 
 
 def _improve(

@@ -1,11 +1,6 @@
 """Fewest or cheapest sets that cover enough weight, with a bound and its proof.
 
-Element e is covered by set s iff a_es = 1; weights w, costs c, required weight W::
-
-    minimise    sum_s c_s x_s
-    subject to  sum_s a_es x_s >= y_e,   sum_e w_e y_e >= W,   x, y in {0, 1}
-
-W is an absolute weight over frozen rows. Counts (unit costs) are solved by greedy and
+The program is stated in ``cover_problem``. Counts (unit costs) are solved by greedy and
 large-neighbourhood search from above, Lagrangian bound and exact search over tuples
 from below; among the covers of the fewest sets the one of most weight is sought.
 Costs go to the linear program and HiGHS' branch and bound.
@@ -15,96 +10,21 @@ References:
     Computer Vision and Image Understanding 61(1), 1995.
 """
 
-import dataclasses
-from dataclasses import dataclass, field
-from typing import cast
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
-from .counts import cheapest_sets, fewest_sets, most_weight
+from .answers import NONE, CountAnswer
+from .cheapest import cheapest_sets
+from .counts import fewest_sets, most_weight
+from .cover_problem import CoverProblem
+from .multicover import fewest_multicover, heaviest_of
 from .neighbourhood import greedy, prune
-from .reductions import WEIGHT_SLACK, ReducedCover, reduce_cover
+from .reductions import WEIGHT_SLACK, ReducedCover, reduce_problem
 from .status import SolveStatus, WorkBudget
 
-# Solving takes about six bytes an entry: 1.2 GB at this limit.
-MAX_ENTRIES = 200_000_000
 DEFAULT_BUDGET = 2e9
-
-
-@dataclass(frozen=True, eq=False)
-class CoverProblem:
-    """Data of a partial set cover.
-
-    Attributes:
-        covers: Whether element e is covered by set s, sparse or dense, boolean or 0
-            and 1, shape (n_e, n_s); kept as CSR.
-        weights: Weight of each element, at least 0, typically an area in [m²];
-            default ones.
-        costs: Cost of each set, positive; default ones.
-        min_coverage: Fraction of the total weight to cover, in (0, 1]; ignored if
-            ``required_weight`` is given.
-        required_weight: Weight W to cover, in the unit of the weights.
-
-    Raises:
-        ValueError: On wrong shapes, negative or non-finite numbers, or a matrix of
-            more than ``MAX_ENTRIES`` entries.
-    """
-
-    covers: sparse.csr_array
-    weights: NDArray[np.float64] = field(default=None)  # type: ignore[assignment]
-    costs: NDArray[np.float64] = field(default=None)  # type: ignore[assignment]
-    min_coverage: float = 1.0
-    required_weight: float = field(default=None)  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        covers = _boolean(self.covers)
-        object.__setattr__(self, "covers", covers)
-        n_e, n_s = cast("tuple[int, int]", covers.shape)
-        weights = _vector("weights", self.weights, n_e)
-        if not np.all((weights >= 0.0) & np.isfinite(weights)):
-            raise ValueError("weights must be finite and at least 0")
-        costs = _vector("costs", self.costs, n_s)
-        if not np.all((costs > 0.0) & np.isfinite(costs)):
-            raise ValueError("costs must be finite and positive")
-        if not 0.0 < self.min_coverage <= 1.0:
-            raise ValueError(f"min_coverage must be in (0, 1], got {self.min_coverage}")
-        with np.errstate(over="ignore"):
-            total = float(weights.sum())
-        if not np.isfinite(total):
-            raise ValueError("weights must have a finite sum")
-        given = cast("float | None", self.required_weight)
-        required = self.min_coverage * total if given is None else float(given)
-        if not (required >= 0.0 and np.isfinite(required)):
-            raise ValueError(f"required_weight must be at least 0, got {required}")
-        for name, value in (("weights", weights), ("costs", costs)):
-            value.flags.writeable = False
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "required_weight", required)
-
-    @property
-    def total_weight(self) -> float:
-        """Weight of all elements."""
-        return float(self.weights.sum())
-
-    @property
-    def unit_costs(self) -> bool:
-        """Whether every set costs the same, so that counting decides."""
-        return bool(np.all(self.costs == self.costs[:1]))
-
-    def covered_weight(self, selected: ArrayLike) -> float:
-        """Return the weight that a selection covers."""
-        index = np.asarray(selected, dtype=np.int64)
-        if index.size == 0:
-            return 0.0
-        covered = np.asarray(self.covers[:, index].sum(axis=1)).ravel() > 0
-        return float(self.weights[covered].sum())
-
-    @property
-    def best_weight(self) -> float:
-        """Weight covered when every set is taken."""
-        return float(self.weights[np.diff(self.covers.indptr) > 0].sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,13 +56,22 @@ class CoverSolution:
         """Weight that the selection covers, recomputed from the problem."""
         return self.problem.covered_weight(self.selected)
 
+    @property
+    def covered_weights(self) -> NDArray[np.float64]:
+        """The same in each row set, shape (n_g,)."""
+        return self.problem.covered_weights(self.selected)
+
     def shortfall(self) -> float:
-        """Return the missing share of the total weight, recomputed; 0 if met."""
-        required, total = self.problem.required_weight, self.problem.total_weight
-        missing = required - self.covered_weight
-        if missing <= 2.0 * WEIGHT_SLACK * max(required, total):
-            return 0.0
-        return missing / total if total > 0 else 1.0
+        """Return the missing share of a row set's weight, recomputed; 0 if met.
+
+        Of several row sets it is the largest.
+        """
+        required, totals = self.problem.required_weight, self.problem.total_weights
+        missing = required - self.covered_weights
+        size = np.maximum(self.problem.total_weight, required)
+        missing[missing <= 2.0 * WEIGHT_SLACK * size] = 0.0
+        shares = missing / np.where(totals > 0, totals, np.maximum(missing, 1e-300))
+        return float(shares.max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,28 +128,35 @@ def solve_cover(
         The solution. An infeasible problem is an answer, not an error: its selection
         covers all the weight that can be covered (or the most with ``max_sets``).
     """
+    fixed = problem.fixed
     if max_sets is not None and not max_sets >= 1:
         raise ValueError(f"max_sets must be at least 1, got {max_sets}")
+    if max_sets is not None and not max_sets >= fixed.size:
+        raise ValueError(f"max_sets is {max_sets}, but {fixed.size} sets are fixed")
     work = WorkBudget(budget, time_limit=time_limit)
-    if problem.required_weight == 0.0:
-        nothing = np.empty(0, dtype=np.int64)
-        proof = "no weight is required"
-        return CoverSolution(problem, SolveStatus.OPTIMAL, nothing, 0.0, proof)
-    cover = _or_reduce(problem, problem.costs, reduced)
+    cover = _or_reduce(problem, reduced)
     work.spend(cover.entries)
-    if cover.total < cover.required:
-        return _unreachable(problem, cover, work)
-    if problem.unit_costs:
-        answer = fewest_sets(
-            cover, work, seed=seed, max_sets=max_sets, heaviest=heaviest
-        )
+    free = None if max_sets is None else max_sets - fixed.size
+    if not np.any(cover.quotas > 0):
+        nothing = "no weight is required"
+        proof = "the fixed sets suffice" if fixed.size else nothing
+        answer = CountAnswer(SolveStatus.OPTIMAL, NONE, 0.0, proof)
+    elif not cover.reachable:
+        answer = _unreachable(cover, work)
+    elif problem.unit_costs:
+        search = fewest_sets if cover.simple else fewest_multicover
+        answer = search(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
         unit = float(problem.costs[0])
-        bound = answer.lower_bound * unit
+        answer = replace(answer, lower_bound=answer.lower_bound * unit)
     else:
-        answer = cheapest_sets(cover, work, seed=seed, max_sets=max_sets)
-        bound = answer.lower_bound
-    selected = cover.kept[answer.selected]
-    return CoverSolution(problem, answer.status, selected, bound, answer.proof)
+        answer = cheapest_sets(cover, work, seed=seed, max_sets=free)
+    return CoverSolution(
+        problem,
+        answer.status,
+        np.union1d(fixed, cover.kept[answer.selected]),
+        answer.lower_bound + float(problem.costs[fixed].sum()),
+        answer.proof,
+    )
 
 
 def solve_max_coverage(
@@ -244,24 +180,36 @@ def solve_max_coverage(
         budget: Counted work, in matrix entries touched.
         reduced: This problem's `reduced_problem`, where it is at hand.
     """
+    fixed = problem.fixed
     if not n_sets >= 0:
         raise ValueError(f"n_sets must be at least 0, got {n_sets}")
+    if not n_sets >= fixed.size:
+        raise ValueError(f"n_sets is {n_sets}, but {fixed.size} sets are fixed")
     start = np.unique(np.asarray([] if warm_start is None else warm_start, dtype=int))
     if start.size > n_sets or not np.all((start >= 0) & (start < problem.costs.size)):
         raise ValueError(f"warm_start must name at most {n_sets} sets of the problem")
+    free = n_sets - fixed.size
     work = WorkBudget(budget, time_limit=time_limit)
-    cover = _or_reduce(problem, np.ones(problem.costs.size), reduced)
+    cover = _or_reduce(problem, reduced, costs=np.ones(problem.costs.size))
     work.spend(cover.entries)
-    stand_in = cover.stand_in[start]
-    answer = most_weight(
-        cover, n_sets, work, seed=seed, start=np.unique(stand_in[stand_in >= 0])
-    )
-    selected = cover.kept[answer.selected]
+    known = cover.stand_in[np.setdiff1d(start, fixed)]
+    known = np.unique(known[known >= 0])[:free]
+    search = most_weight if cover.simple else heaviest_of
+    answer = search(cover, free, work, seed=seed, start=known)
+    selected = np.union1d(fixed, cover.kept[answer.selected])
+    if problem.covered_weight(start) > problem.covered_weight(selected):
+        # Only where sets that stand in for others coincide.
+        selected = start
     covered = problem.covered_weight(selected)
     optimal = answer.status is SolveStatus.OPTIMAL
-    upper = covered if optimal else max(covered, answer.upper_bound * cover.unit)
+    upper = (cover.settled + answer.upper_bound) * cover.unit
     return MaxCoverageSolution(
-        problem, n_sets, answer.status, selected, upper, answer.proof
+        problem,
+        n_sets,
+        answer.status,
+        selected,
+        covered if optimal else max(covered, upper),
+        answer.proof,
     )
 
 
@@ -273,56 +221,28 @@ def reduced_problem(problem: CoverProblem) -> ReducedCover:
     """
     if not problem.unit_costs:
         raise ValueError("costs differ: solve each question from the problem itself")
-    return _or_reduce(problem, problem.costs, None)
+    return reduce_problem(problem)
 
 
 def _or_reduce(
-    problem: CoverProblem, costs: NDArray[np.float64], given: ReducedCover | None
+    problem: CoverProblem,
+    given: ReducedCover | None,
+    *,
+    costs: NDArray[np.float64] | None = None,
 ) -> ReducedCover:
-    if given is not None:
-        if given.stand_in.size != problem.costs.size:
-            raise ValueError(
-                f"reduced is of a problem of {given.stand_in.size} sets, not "
-                f"{problem.costs.size}"
-            )
-        return given
-    return reduce_cover(problem.covers, problem.weights, costs, problem.required_weight)
-
-
-def _unreachable(
-    problem: CoverProblem, cover: ReducedCover, work: WorkBudget
-) -> CoverSolution:
-    """Answer a problem whose requirement exceeds the weight of all sets together."""
-    everything = dataclasses.replace(cover, required=cover.total)
-    few = prune(everything, greedy(everything, np.empty(0, dtype=np.int64), work))
-    proof = "all sets together cover less than is required"
-    return CoverSolution(
-        problem, SolveStatus.INFEASIBLE, cover.kept[few], float("inf"), proof
-    )
-
-
-def _boolean(given: object) -> sparse.csr_array:
-    """Return a boolean CSR matrix, or say what is wrong with the one given."""
-    matrix = given if sparse.issparse(given) else np.asarray(given)
-    shape = matrix.shape  # type: ignore[union-attr]
-    if len(shape) != 2:
-        raise ValueError(f"covers must be a matrix, got shape {shape}")
-    if not shape[0] * shape[1] <= MAX_ENTRIES:
+    if given is None:
+        return reduce_problem(problem, costs=costs)
+    if given.stand_in.size != problem.costs.size:
         raise ValueError(
-            f"covers has {shape[0]} x {shape[1]} entries, more than the limit of "
-            f"{MAX_ENTRIES}: use fewer samples or candidates"
+            f"reduced is of a problem of {given.stand_in.size} sets, not "
+            f"{problem.costs.size}"
         )
-    rows = sparse.csr_array(matrix)
-    rows.sum_duplicates()
-    if rows.dtype != bool and not np.all((rows.data == 0) | (rows.data == 1)):
-        raise ValueError("covers must be boolean or hold only 0 and 1")
-    rows = cast("sparse.csr_array", rows.astype(bool))
-    rows.eliminate_zeros()
-    return rows
+    return given
 
 
-def _vector(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
-    values = np.ones(n) if given is None else np.array(given, dtype=np.float64)
-    if values.shape != (n,):
-        raise ValueError(f"{name} must be ({n},), got {values.shape}")
-    return values
+def _unreachable(cover: ReducedCover, work: WorkBudget) -> CountAnswer:
+    """Answer a problem whose requirement exceeds the weight of all sets together."""
+    everything = replace(cover, quotas=cover.totals)
+    few = prune(everything, greedy(everything, NONE, work))
+    proof = "all sets together cover less than is required"
+    return CountAnswer(SolveStatus.INFEASIBLE, few, float("inf"), proof)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .reductions import ReducedCover
-from .relaxation import ROUNDING, tighten
+from .relaxation import rounding, tighten
 from .status import WorkBudget
 
 # Larger covers aren't searched: the dense copy takes a byte an entry.
@@ -107,7 +107,8 @@ class _Search:
         self.row_order = np.argsort(servers, kind="stable")
         self._total = cover.total
         # Improvements below this share of the total are rounding, not weight.
-        self._least = max(cover.grain, np.floor(self._total * ROUNDING))
+        self._rounding = rounding(cover.weights.size)
+        self._least = max(cover.grain, np.floor(self._total * self._rounding))
 
     def offer(self, chosen: list[int], weight: float) -> None:
         """Keep a selection that reaches the target, and ask for more from then on."""
@@ -207,7 +208,7 @@ class _Search:
     ) -> NDArray[np.bool_]:
         """Columns that reach the target together with the r - 1 best others."""
         top = np.sort(values)[::-1][: r - 1].sum()
-        return (covered + rest + top + values) * (1.0 + ROUNDING) >= self.target
+        return (covered + rest + top + values) * (1.0 + self._rounding) >= self.target
 
     def _bound(
         self,
@@ -224,7 +225,7 @@ class _Search:
         rest = float(np.sum(open_weights - multipliers))
         by_gain = covered + float(np.sort(gains)[::-1][:r].sum())
         by_price = covered + rest + float(np.sort(prices)[::-1][:r].sum())
-        bound = min(by_gain, by_price) * (1.0 + ROUNDING)
+        bound = min(by_gain, by_price) * (1.0 + self._rounding)
         return bound, prices, multipliers
 
     def _children(
@@ -247,7 +248,7 @@ class _Search:
         for i in np.flatnonzero(firsts):
             alive[i] = False
             others = prices[np.flatnonzero(alive)[: r - 1]]
-            bound = (floor + float(prices[i] + others.sum())) * (1.0 + ROUNDING)
+            bound = (floor + float(prices[i] + others.sum())) * (1.0 + self._rounding)
             if self.done:
                 break
             if bound < self.target:

@@ -1,14 +1,16 @@
 """Covers as linear and mixed-integer programs for HiGHS, over plain arrays.
 
-    minimise c x   subject to   A x >= y,  w y >= W,  0 <= y <= 1,  x binary
+    minimise c x   subject to   A x >= r y,  w_g y >= W_g for each row set g,
+                                1 x <= K,  0 <= y <= 1,  x binary
 
-One thread and limits on iterations and nodes, so that the answer doesn't depend on the
-machine. What comes back is a proposal: selections and linear bounds are evaluated again
-by the caller. Only the bound of branch and bound is HiGHS' own word.
+or with the largest w y as the aim. One thread and limits on iterations and nodes, so
+that the answer doesn't depend on the machine. What comes back is a proposal: selections
+and linear bounds are evaluated again by the caller. Only the bound of branch and bound
+is HiGHS' own word.
 """
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,8 @@ _UNITS_PER_ROOT = 100_000.0
 _UNITS_PER_FULL_ROOT = 20_000.0
 _UNITS_PER_NODE = 3_000.0
 _MAX_ENTRIES = 60_000
+# HiGHS' own tolerance, relative to the bound.
+TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +36,14 @@ class IntegerAnswer:
 
     Attributes:
         selected: The best selection, to be checked, or None.
-        lower_bound: HiGHS' bound on the cost, less its tolerance.
+        bound: HiGHS' bound on the cost from below, or on the weight from above, with
+            its tolerance; None if it has none.
+        infeasible: Whether no selection meets the constraints, by its word.
     """
 
     selected: NDArray[np.int64] | None
-    lower_bound: float
+    bound: float | None
+    infeasible: bool
 
 
 def linear_multipliers(
@@ -49,7 +56,7 @@ def linear_multipliers(
     steps = int(budget.remaining / (_UNITS_PER_ITERATION * cover.entries))
     if steps < 1:
         return None
-    solver = _model(cover, integer=False, budget=budget)
+    solver = _model(cover, budget)
     solver.setOptionValue("simplex_iteration_limit", min(steps, 10_000_000))
     solver.run()
     budget.spend(
@@ -60,7 +67,9 @@ def linear_multipliers(
     dual = np.asarray(solver.getSolution().row_dual, dtype=np.float64)
     if dual.size < cover.weights.size:
         return None
-    return np.clip(np.nan_to_num(dual[: cover.weights.size]), 0.0, None)
+    return _cost_unit(cover) * np.clip(
+        np.nan_to_num(dual[: cover.weights.size]), 0.0, None
+    )
 
 
 def fits(cover: ReducedCover) -> bool:
@@ -69,62 +78,137 @@ def fits(cover: ReducedCover) -> bool:
 
 
 def solve_integer(
-    cover: ReducedCover, start: NDArray[np.int64], budget: WorkBudget
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    *,
+    max_sets: int | None = None,
 ) -> IntegerAnswer:
-    """Run branch and bound from a known cover, up to a number of nodes."""
-    root = _UNITS_PER_FULL_ROOT if _is_full(cover) else _UNITS_PER_ROOT
+    """Look for the cheapest cover by branch and bound, up to a number of nodes.
+
+    Args:
+        cover: The cover.
+        start: A selection to start from.
+        budget: Counted work.
+        max_sets: Sets allowed.
+    """
+    return _branch(cover, start, budget, max_sets=max_sets, heaviest=False)
+
+
+def heaviest_integer(
+    cover: ReducedCover, start: NDArray[np.int64], budget: WorkBudget, *, n_sets: int
+) -> IntegerAnswer:
+    """Look for the most weight of K sets that meet the requirements."""
+    return _branch(cover, start, budget, max_sets=n_sets, heaviest=True)
+
+
+def _branch(
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    *,
+    max_sets: int | None,
+    heaviest: bool,
+) -> IntegerAnswer:
+    light = cover.full and not heaviest
+    root = _UNITS_PER_FULL_ROOT if light else _UNITS_PER_ROOT
     spare = budget.remaining / cover.entries - root
     if not spare > 0 or budget.exhausted:
-        return IntegerAnswer(None, 0.0)
-    solver = _model(cover, integer=True, budget=budget)
+        return IntegerAnswer(None, None, infeasible=False)
+    solver = _model(cover, budget, integer=True, max_sets=max_sets, heaviest=heaviest)
     solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
     _warm_start(solver, cover, start)
     solver.run()
+    return _answer(solver, cover, root, budget, heaviest=heaviest)
+
+
+def _answer(
+    solver: Any,  # noqa: ANN401
+    cover: ReducedCover,
+    root: float,
+    budget: WorkBudget,
+    *,
+    heaviest: bool,
+) -> IntegerAnswer:
+    import highspy
+
     info = solver.getInfo()
     nodes = _UNITS_PER_NODE * max(0, int(info.mip_node_count))
     budget.spend((root + nodes) * cover.entries)
+    if solver.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
+        return IntegerAnswer(None, None, infeasible=True)
     values = np.asarray(solver.getSolution().col_value, dtype=np.float64)
     n = cover.n_sets
-    selected = np.flatnonzero(values[:n] > 0.5) if values.size >= n else None
+    found = bool(solver.getSolution().value_valid) and values.size >= n
+    selected = np.flatnonzero(values[:n] > 0.5) if found else None
     bound = float(info.mip_dual_bound)
-    bound = bound if np.isfinite(bound) else 0.0
-    return IntegerAnswer(selected, max(0.0, bound - 1e-6 * max(1.0, abs(bound))))
+    if not np.isfinite(bound):
+        return IntegerAnswer(selected, None, infeasible=False)
+    tolerance = TOLERANCE * max(1.0, abs(bound))
+    if heaviest:
+        weight = float(cover.weights.mean()) * (tolerance - bound)
+        return IntegerAnswer(selected, weight, infeasible=False)
+    cost = _cost_unit(cover) * max(0.0, bound - tolerance)
+    return IntegerAnswer(selected, cost, infeasible=False)
 
 
-def _model(cover: ReducedCover, *, integer: bool, budget: WorkBudget) -> Any:  # noqa: ANN401
+def _cost_unit(cover: ReducedCover) -> float:
+    """Return what costs are divided by: 1 unless they are far from it."""
+    mean = float(cover.costs.mean()) if cover.n_sets else 1.0
+    # A power of two, so that whole costs stay whole in some unit.
+    return 1.0 if 1e-3 < mean < 1e5 else float(2.0 ** np.round(np.log2(mean)))
+
+
+def _model(
+    cover: ReducedCover,
+    budget: WorkBudget,
+    *,
+    integer: bool = False,
+    max_sets: int | None = None,
+    heaviest: bool = False,
+) -> Any:  # noqa: ANN401
     """Return a HiGHS instance that holds the program."""
     import highspy
 
     n_e, n_s = cover.weights.size, cover.n_sets
-    full = _is_full(cover)
+    # Weights of mean 1, so that the solver's tolerance is a small share of a row.
+    weights = cover.weights / cover.weights.mean()
+    needed = cover.quotas / cover.weights.mean()
+    with_rows = heaviest or not cover.full
     link: sparse.csr_array = cover.by_row
-    quota = np.empty(0)
-    if not full:
-        # Weights of mean 1, so that the solver's tolerance is a small share of a row.
-        quota = cover.weights / cover.weights.mean()
-        link = sparse.csr_array(
-            sparse.vstack(
-                [
-                    sparse.hstack([link, -sparse.eye_array(n_e)]),
-                    sparse.csr_array(np.concatenate([np.zeros(n_s), quota])[None]),
-                ]
-            )
+    lower = cover.needs.astype(np.float64)
+    cost = cover.costs / _cost_unit(cover)
+    if with_rows:
+        own = sparse.dia_array((-lower[None], [0]), shape=(n_e, n_e))
+        groups = sparse.csr_array(
+            (weights, (cover.row_sets, np.arange(n_e))), shape=(needed.size, n_e)
         )
-    n_rows, n_columns = cast("tuple[int, int]", link.shape)
+        link = _stack([[link, own], [None, groups]])
+        lower = np.concatenate([np.zeros(n_e), needed])
+        cost = np.concatenate(
+            [np.zeros(n_s), -weights] if heaviest else [cost, np.zeros(n_e)]
+        )
+    upper = np.full(lower.size, highspy.kHighsInf)
+    if max_sets is not None:
+        ones = np.zeros((1, cost.size))
+        ones[0, :n_s] = 1.0
+        link = _stack([[link], [sparse.csr_array(ones)]])
+        lower, upper = np.append(lower, 0.0), np.append(upper, float(max_sets))
     lp: Any = highspy.HighsLp()
-    lp.num_col_, lp.num_row_ = n_columns, n_rows
-    lp.col_cost_ = np.concatenate([cover.costs, np.zeros(n_columns - n_s)])
-    lp.col_lower_, lp.col_upper_ = np.zeros(n_columns), np.ones(n_columns)
-    needed = cover.required / cover.weights.mean()
-    lp.row_lower_ = np.ones(n_e) if full else np.append(np.zeros(n_e), needed)
-    lp.row_upper_ = np.full(lp.num_row_, highspy.kHighsInf)
+    lp.num_col_, lp.num_row_ = cost.size, lower.size
+    lp.col_cost_ = cost
+    lp.col_lower_, lp.col_upper_ = np.zeros(cost.size), np.ones(cost.size)
+    lp.row_lower_, lp.row_upper_ = lower, upper
     lp.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
     lp.a_matrix_.start_ = link.indptr.astype(np.int32)
     lp.a_matrix_.index_ = link.indices.astype(np.int32)
     lp.a_matrix_.value_ = link.data.astype(np.float64)
     if integer:
-        kinds = [highspy.HighsVarType.kInteger] * n_s
-        kinds += [highspy.HighsVarType.kContinuous] * (n_columns - n_s)
+        whole, free = highspy.HighsVarType.kInteger, highspy.HighsVarType.kContinuous
+        kinds = [whole] * n_s
+        if with_rows:
+            # Half of the service is no half of a row.
+            kinds += [whole if need > 1 else free for need in cover.needs]
         lp.integrality_ = kinds
     solver = highspy.Highs()
     for name, value in (
@@ -141,9 +225,8 @@ def _model(cover: ReducedCover, *, integer: bool, budget: WorkBudget) -> Any:  #
     return solver
 
 
-def _is_full(cover: ReducedCover) -> bool:
-    """Whether no row may be lost, so that the rows' own variables fall away."""
-    return cover.total - cover.required < float(cover.weights.min(initial=np.inf))
+def _stack(blocks: list[list[sparse.sparray | None]]) -> sparse.csr_array:
+    return sparse.csr_array(sparse.block_array(blocks))
 
 
 def _warm_start(
@@ -156,8 +239,7 @@ def _warm_start(
     values = np.zeros(solver.getNumCol())
     values[start] = 1.0
     if values.size > cover.n_sets:
-        counts = np.asarray(cover.by_set[start].sum(axis=0)).ravel()
-        values[cover.n_sets :] = np.minimum(counts, 1.0)
+        values[cover.n_sets :] = cover.served(start) >= cover.needs
     known = highspy.HighsSolution()
     known.col_value = values.tolist()
     solver.setSolution(known)

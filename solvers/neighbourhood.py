@@ -21,26 +21,31 @@ def greedy(
 ) -> NDArray[np.int64]:
     """Extend a selection by the set of most new weight a unit of cost.
 
-    Stops at the required weight or, if ``n_sets`` is given, at that many sets.
+    A row that more than one set must serve gives its weight in equal parts. Stops when
+    every row set has what it requires or, if ``n_sets`` is given, at that many sets.
 
     Returns:
         Selected sets in the order of choice.
     """
     chosen = [int(s) for s in start]
-    counts = _counts(cover, chosen)
-    covered = float(cover.weights[counts > 0].sum())
-    while True:
-        full = covered >= cover.required if n_sets is None else len(chosen) >= n_sets
-        if full:
-            break
-        gains = cover.by_set @ np.where(counts > 0, 0.0, cover.weights)
+    counts = cover.served(np.array(chosen, dtype=np.int64))
+    parts = cover.weights / cover.needs
+    while n_sets is None or len(chosen) < n_sets:
+        open_rows = counts < cover.needs
+        if n_sets is None:
+            covered = cover.by_row_set(np.where(open_rows, 0.0, cover.weights))
+            lacking = covered < cover.quotas
+            if not np.any(lacking):
+                break
+            open_rows &= lacking[cover.row_sets]
+        gains = cover.by_set @ np.where(open_rows, parts, 0.0)
+        gains[chosen] = 0.0
         budget.spend(cover.entries)
         best = int(np.argmax(gains / cover.costs if n_sets is None else gains))
         if not gains[best] > 0:
             break
         chosen.append(best)
-        covered += float(gains[best])
-        counts[_members(cover, best)] += 1
+        counts[cover.members(best)] += 1
     return np.array(chosen, dtype=np.int64)
 
 
@@ -83,14 +88,19 @@ def most_coverage(
 
 
 def prune(cover: ReducedCover, selected: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Drop sets, dearest first, while the required weight is still reached."""
+    """Drop sets, dearest first, while what is required is still reached."""
     chosen = [int(s) for s in selected]
-    counts = _counts(cover, chosen)
-    covered = float(cover.weights[counts > 0].sum())
+    counts = cover.served(selected)
+    covered = cover.by_row_set(np.where(counts >= cover.needs, cover.weights, 0.0))
     for s in sorted(chosen, key=lambda s: (-cover.costs[s], -s)):
-        rows = _members(cover, s)
-        loss = float(cover.weights[rows[counts[rows] == 1]].sum())
-        if covered - loss >= cover.required:
+        rows = cover.members(s)
+        lost = rows[counts[rows] == cover.needs[rows]]
+        loss = np.bincount(
+            cover.row_sets[lost],
+            weights=cover.weights[lost],
+            minlength=cover.quotas.size,
+        )
+        if np.all(covered - loss >= cover.quotas):
             chosen.remove(s)
             counts[rows] -= 1
             covered -= loss
@@ -104,17 +114,19 @@ def cheapest(
     *,
     seed: int,
     max_kicks: int,
+    max_sets: int | None = None,
 ) -> NDArray[np.int64]:
-    """Lower the cost of a selection that reaches the required weight.
+    """Lower the cost of a selection that reaches what is required.
 
-    Drops some sets at random, lets greedy repair the cover, keeps what is cheaper.
+    Drops some sets at random, lets greedy repair the cover, keeps what is cheaper, or
+    smaller while more sets are selected than allowed.
 
     Returns:
         The cheapest selection found, increasing.
     """
     rng = np.random.default_rng(seed)
     best = prune(cover, start)
-    best_cost = float(cover.costs[best].sum())
+    worth = _worth(cover, best, max_sets)
     for _ in range(max_kicks):
         if budget.exhausted or best.size == 0:
             break
@@ -122,22 +134,20 @@ def cheapest(
         kept = np.sort(rng.choice(best, size=n_kept, replace=False))
         fresh = int(rng.integers(cover.n_sets))
         trial = prune(cover, greedy(cover, np.union1d(kept, [fresh]), budget))
-        cost = float(cover.costs[trial].sum())
-        if cost < best_cost * (1.0 - 1e-12):
-            best, best_cost = trial, cost
+        other = _worth(cover, trial, max_sets)
+        if other[0] < worth[0] or (
+            other[0] == worth[0] and other[1] < worth[1] * (1.0 - 1e-12)
+        ):
+            best, worth = trial, other
     return best
 
 
-def _members(cover: ReducedCover, s: int) -> NDArray[np.signedinteger]:
-    """Rows that set s covers."""
-    return cover.by_set.indices[cover.by_set.indptr[s] : cover.by_set.indptr[s + 1]]
-
-
-def _counts(cover: ReducedCover, chosen: list[int]) -> NDArray[np.int64]:
-    counts = np.zeros(cover.weights.size, dtype=np.int64)
-    for s in chosen:
-        counts[_members(cover, s)] += 1
-    return counts
+def _worth(
+    cover: ReducedCover, selected: NDArray[np.int64], max_sets: int | None
+) -> tuple[int, float]:
+    """Return the sets above the number allowed, then the cost."""
+    excess = 0 if max_sets is None else max(0, selected.size - max_sets)
+    return excess, float(cover.costs[selected].sum())
 
 
 def _refill(selection: Swaps, n_sets: int, rng: np.random.Generator) -> None:

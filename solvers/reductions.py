@@ -1,7 +1,10 @@
 """Make a cover smaller without changing its optimum, and its arithmetic exact.
 
-Valid for partial cover: equal rows merge with added weight; column j goes if a column l
-has a_j subset of a_l and c_l <= c_j. Row dominance is *not* valid there and isn't used.
+Valid for partial cover: equal rows merge with added weight; column j goes if r columns
+that stay each serve all that j serves and cost no more, r the largest need among j's
+rows: wherever j is taken, one of them is free to take its place, or all are taken and j
+adds nothing. Row dominance is *not* valid for partial cover and isn't used here. Fixed
+sets are taken out with what they serve; rows that too few sets serve are lost.
 
 Weights become integers below 2^52 (a power of two times the given ones, rounded), kept
 as float64: sums of them are exact in any order, so neither BLAS nor the number of
@@ -9,10 +12,13 @@ threads can decide a comparison.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+
+from .cover_problem import CoverProblem
 
 WEIGHT_SLACK = 1e-12
 _SKETCH_WORDS = 4
@@ -23,23 +29,30 @@ class ReducedCover:
     """A partial cover ready for search.
 
     Attributes:
-        by_set: Ones where set s covers row e, shape (n_s, n_e), CSR.
+        by_set: Ones where set s serves row e, shape (n_s, n_e), CSR.
         by_row: The transpose, shape (n_e, n_s), CSR.
         weights: Integer-valued weight of each row, positive, shape (n_e,).
+        needs: Sets that must serve each row, positive, shape (n_e,).
+        row_sets: Row set of each row, shape (n_e,).
+        quotas: Integer-valued weight to reach in each row set, rounded in favour of
+            reaching it, shape (n_g,).
         costs: Cost of each set, shape (n_s,).
-        required: Integer-valued weight to reach; rounding is in favour of reaching it.
         unit: Weight in the caller's unit that one integer step stands for.
+        settled: Integer-valued weight that the fixed sets cover already.
         kept: The caller's index of each set, increasing, shape (n_s,).
-        stand_in: For each of the caller's sets the set here that covers at least as
-            much for at most its cost, -1 where it covers nothing.
+        stand_in: For each of the caller's sets the set here that may take its place,
+            -1 where it serves nothing.
     """
 
     by_set: sparse.csr_array
     by_row: sparse.csr_array
     weights: NDArray[np.float64]
+    needs: NDArray[np.int64]
+    row_sets: NDArray[np.int64]
+    quotas: NDArray[np.float64]
     costs: NDArray[np.float64]
-    required: float
     unit: float
+    settled: float
     kept: NDArray[np.int64]
     stand_in: NDArray[np.int64]
 
@@ -48,12 +61,39 @@ class ReducedCover:
         """Number of sets left."""
         return self.kept.size
 
+    @cached_property
+    def simple(self) -> bool:
+        """Whether one set suffices for any row and there is one row set."""
+        return self.quotas.size == 1 and bool(np.all(self.needs == 1))
+
+    @property
+    def required(self) -> float:
+        """Integer-valued weight to reach, all row sets together."""
+        return float(self.quotas.sum())
+
     @property
     def total(self) -> float:
-        """Integer-valued weight of all rows that some set covers."""
+        """Integer-valued weight of all rows that can be covered."""
         return float(self.weights.sum())
 
     @property
+    def totals(self) -> NDArray[np.float64]:
+        """The same by row set, shape (n_g,)."""
+        return self.by_row_set(self.weights)
+
+    @property
+    def reachable(self) -> bool:
+        """Whether all sets together reach what is required."""
+        return bool(np.all(self.totals >= self.quotas))
+
+    @cached_property
+    def full(self) -> bool:
+        """Whether no row may be lost."""
+        lightest = np.full(self.quotas.size, np.inf)
+        np.minimum.at(lightest, self.row_sets, self.weights)
+        return bool(np.all(self.totals - self.quotas < lightest))
+
+    @cached_property
     def grain(self) -> float:
         """Integer-valued weight of which every row's, hence any sum, is a multiple."""
         return float(np.gcd.reduce(self.weights.astype(np.int64), initial=0) or 1)
@@ -63,12 +103,70 @@ class ReducedCover:
         """Nonzeros of the matrix: the work of one product with a vector."""
         return int(self.by_set.nnz) + self.n_sets
 
+    def members(self, s: int) -> NDArray[np.signedinteger]:
+        """Return the rows that set s serves."""
+        return self.by_set.indices[self.by_set.indptr[s] : self.by_set.indptr[s + 1]]
+
+    def by_row_set(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return sums over each row set, shape (n_g,)."""
+        return np.bincount(self.row_sets, weights=values, minlength=self.quotas.size)
+
+    def served(self, selected: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return how many of the selected sets serve each row, shape (n_e,)."""
+        return np.bincount(
+            self.by_set[selected].indices, minlength=self.weights.size
+        ).astype(np.int64)
+
     def weight_of(self, selected: NDArray[np.int64]) -> float:
         """Return the exact integer-valued weight that sets cover together."""
-        if selected.size == 0:
-            return 0.0
-        counts = np.asarray(self.by_set[selected].sum(axis=0)).ravel()
-        return float(self.weights[counts > 0].sum())
+        return float(self.weights[self.served(selected) >= self.needs].sum())
+
+    def meets(self, selected: NDArray[np.int64]) -> bool:
+        """Whether a selection reaches what every row set requires."""
+        covered = np.where(self.served(selected) >= self.needs, self.weights, 0.0)
+        return bool(np.all(self.by_row_set(covered) >= self.quotas))
+
+
+def reduce_problem(
+    problem: CoverProblem, *, costs: NDArray[np.float64] | None = None
+) -> ReducedCover:
+    """Return an equivalent cover with fewer rows and columns.
+
+    Args:
+        problem: The cover.
+        costs: Costs to count with instead of the problem's, positive, shape (n_s,).
+    """
+    costs = problem.costs if costs is None else costs
+    exponent = _exponent(problem.total_weight)
+    scaled = np.ldexp(problem.weights, exponent)
+    whole = np.rint(scaled)
+    inexact = problem_sums(problem, (whole != scaled).astype(np.float64))
+    quotas = np.ldexp(problem.required_weight, exponent) * (1.0 - WEIGHT_SLACK)
+    quotas = np.floor(quotas - 0.5 * inexact)
+
+    already = np.asarray(problem.covers[:, problem.fixed].sum(axis=1)).ravel()
+    needs = problem.needs - already
+    done = problem_sums(problem, np.where(needs <= 0, whole, 0.0))
+    servers = np.diff(problem.covers.indptr) - already
+    live = (whole > 0) & (needs > 0) & (servers >= needs)
+    rows = _merge_rows(problem, live, needs)
+    dense = np.unpackbits(rows.bits, axis=1, count=costs.size).astype(bool)
+    merged = rows.sum(whole[live])
+    kept, stand_in = _undominated(dense, merged, needs[live][rows.first], costs)
+    by_row = sparse.csr_array(sparse.csr_array(dense[:, kept]), dtype=np.float64)
+    return ReducedCover(
+        by_set=sparse.csr_array(by_row.T),
+        by_row=by_row,
+        weights=merged,
+        needs=needs[live][rows.first],
+        row_sets=problem.row_sets[live][rows.first],
+        quotas=np.maximum(quotas - done, 0.0),
+        costs=costs[kept],
+        unit=float(np.ldexp(1.0, -exponent)),
+        settled=float(done.sum()),
+        kept=kept,
+        stand_in=stand_in,
+    )
 
 
 def reduce_cover(
@@ -77,59 +175,72 @@ def reduce_cover(
     costs: NDArray[np.float64],
     required: float,
 ) -> ReducedCover:
-    """Return an equivalent cover with fewer rows and columns.
-
-    Args:
-        covers: Boolean, shape (n_e, n_s).
-        weights: Non-negative, shape (n_e,).
-        costs: Positive, shape (n_s,).
-        required: Weight to reach, in the unit of the weights.
-
-    Returns:
-        The reduced cover; rows that nothing covers or that weigh nothing are gone.
-    """
-    total = float(weights.sum())
-    exponent = 51 - int(np.floor(np.log2(total))) if total > 0 else 0
-    scaled = np.ldexp(weights, exponent)
-    whole = np.rint(scaled)
-    inexact = int(np.count_nonzero(whole != scaled))
-    needed = np.ldexp(required, exponent) * (1.0 - WEIGHT_SLACK) - 0.5 * inexact
-
-    live = (whole > 0) & (np.diff(covers.indptr) > 0)
-    bits, merged = _merge_rows(covers[live], whole[live])
-    dense = np.unpackbits(bits, axis=1, count=costs.size).astype(bool)
-    kept, stand_in = _undominated(dense, merged, costs)
-    by_row = sparse.csr_array(sparse.csr_array(dense[:, kept]), dtype=np.float64)
-    return ReducedCover(
-        by_set=sparse.csr_array(by_row.T),
-        by_row=by_row,
-        weights=merged,
-        costs=costs[kept],
-        required=max(0.0, float(np.floor(needed))),
-        unit=float(np.ldexp(1.0, -exponent)),
-        kept=kept,
-        stand_in=stand_in,
+    """Return an equivalent of a plain partial cover."""
+    return reduce_problem(
+        CoverProblem(covers, weights, costs, required_weight=np.array(required))
     )
 
 
+def _exponent(total: float) -> int:
+    return 51 - int(np.floor(np.log2(total))) if total > 0 else 0
+
+
+def problem_sums(
+    problem: CoverProblem, values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return sums over each row set of a problem, shape (n_g,)."""
+    return np.bincount(problem.row_sets, weights=values, minlength=problem.n_row_sets)
+
+
+@dataclass(frozen=True, eq=False)
+class _DistinctRows:
+    """Rows that differ in what serves them, in their need or their row set.
+
+    Attributes:
+        bits: Packed rows, shape (n, bytes).
+        first: First of the rows given that is like it, shape (n,).
+        inverse: Which of these each row given is, shape (n_given,).
+    """
+
+    bits: NDArray[np.uint8]
+    first: NDArray[np.int64]
+    inverse: NDArray[np.int64]
+
+    def sum(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Add up what belongs to like rows."""
+        return np.bincount(
+            self.inverse, weights=values, minlength=self.first.size
+        ).astype(np.float64)
+
+
 def _merge_rows(
-    covers: sparse.csr_array, weights: NDArray[np.float64]
-) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Return distinct rows, bit-packed, and the summed weight of each."""
-    packed = np.packbits(covers.toarray(), axis=1)
+    problem: CoverProblem, live: NDArray[np.bool_], needs: NDArray[np.int64]
+) -> _DistinctRows:
+    """Return the distinct rows among the live ones, without the fixed sets."""
+    covers = problem.covers[live]
+    dense = covers.toarray()
+    dense[:, problem.fixed] = False
+    packed = np.packbits(dense, axis=1)
     if packed.shape[0] == 0 or packed.shape[1] == 0:
-        return packed[:0], weights[:0]
-    key = np.ascontiguousarray(packed).view(f"V{packed.shape[1]}").ravel()
+        none = np.empty(0, dtype=np.int64)
+        return _DistinctRows(packed[:0], none, none)
+    labels = np.stack([needs[live], problem.row_sets[live]], axis=1)
+    marked = np.ascontiguousarray(np.hstack([labels.view(np.uint8), packed]))
+    key = marked.view(f"V{marked.shape[1]}").ravel()
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
-    summed = np.bincount(inverse.ravel(), weights=weights).astype(np.float64)
-    return packed[first[order]], summed[order]
+    rank = np.empty(order.size, dtype=np.int64)
+    rank[order] = np.arange(order.size)
+    return _DistinctRows(packed[first[order]], first[order], rank[inverse.ravel()])
 
 
 def _undominated(
-    dense: NDArray[np.bool_], weights: NDArray[np.float64], costs: NDArray[np.float64]
+    dense: NDArray[np.bool_],
+    weights: NDArray[np.float64],
+    needs: NDArray[np.int64],
+    costs: NDArray[np.float64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the columns that no other makes superfluous, and who stands in for each.
+    """Return the columns that no others make superfluous, and who stands in for each.
 
     The first are column numbers, increasing; the second count among these.
     """
@@ -140,6 +251,9 @@ def _undominated(
     order = order[gains[order] > 0]
     words = _column_words(dense[:, order])
     sketch = np.ascontiguousarray(words[:, :_SKETCH_WORDS])
+    rivals_wanted = np.ones(order.size, dtype=np.int64)
+    for need in np.unique(needs[needs > 1]):
+        rivals_wanted[dense[needs == need].any(axis=0)[order]] = need
 
     better = np.arange(order.size)
     standing = np.zeros(order.size, dtype=np.int64)
@@ -149,7 +263,7 @@ def _undominated(
         rivals = rivals[costs[order[rivals]] <= costs[order[j]]]
         rivals = rivals[~np.any(sketch[j] & ~sketch[rivals], axis=1)]
         rivals = rivals[~np.any(words[j] & ~words[rivals], axis=1)]
-        if rivals.size:
+        if rivals.size >= rivals_wanted[j]:
             better[j] = rivals[0]
         else:
             standing[n_standing] = j

@@ -1,18 +1,20 @@
 """Bounds on covers from multipliers, safe whatever made the multipliers.
 
-Most weight of K sets: for any 0 <= lambda <= w::
+Covered y_i costs r_i service, so the rows ask together at least for::
 
-    w(union S) <= sum_i (w_i - lambda_i) + sum_{j in S} lambda(a_j)
+    need(lambda) = sum_g min {sum_{i in G_g} lambda_i r_i y_i :
+                              sum_{i in G_g} w_i y_i >= W_g, 0 <= y <= 1}
 
-since a covered row pays lambda_i at least once. The least of the right side over
-lambda is the bound of the linear program (Lagrangian duality). Fewest sets: the first K
-whose bound reaches W.
+a fractional knapsack for each row set, and a set pays at most lambda(a_j). So for any
+lambda >= 0, with reduced costs d_j = c_j - lambda(a_j):
 
-Cheapest sets: for any lambda >= 0, with reduced costs d_j = c_j - lambda(a_j)::
+* fewest sets: the first K whose K dearest sets pay need(lambda);
+* cheapest (of at most K) sets: cost >= need(lambda) + the (K) least min(0, d_j);
+* most weight of K sets, with lambda <= w: sum_i (w_i - lambda_i) and the K dearest
+  sum_i a_ij lambda_i / r_i.
 
-    cost >= min {lambda y : w y >= W, 0 <= y <= 1} + sum_j min(0, d_j)
-
-The printed bound is evaluated here in numpy; the linear program only proposes lambda.
+The best lambda gives the bound of the linear program (Lagrangian duality). The printed
+bound is evaluated here in numpy; the linear program only proposes lambda.
 """
 
 from dataclasses import dataclass
@@ -24,10 +26,13 @@ from scipy import sparse
 from .reductions import ReducedCover
 from .status import WorkBudget
 
-# Rounding of sums of real multipliers, relative to the total weight.
-ROUNDING = 1e-11
 # Steps after which a descent that hardly moves is given up.
 _LOOK_BACK = 30
+
+
+def rounding(n_rows: int) -> float:
+    """Return the share by which a sum of non-negative numbers over rows may be off."""
+    return 1e-11 + n_rows * 2.0 * float(np.finfo(float).eps)
 
 
 def coverage_bounds(
@@ -40,50 +45,89 @@ def coverage_bounds(
         multipliers: Any numbers, shape (n_e,); clipped into [0, w].
     """
     clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
-    prices = np.sort(cover.by_set @ clipped)[::-1]
+    prices = np.sort(cover.by_set @ (clipped / cover.needs))[::-1]
     rest = float(np.sum(cover.weights - clipped))
     bounds = rest + np.concatenate([[0.0], np.cumsum(prices)])
-    return np.minimum(bounds * (1.0 + ROUNDING), cover.total)
+    return np.minimum(bounds * (1.0 + rounding(clipped.size)), cover.total)
 
 
 def count_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> int:
-    """Return a lower bound on the number of sets that reach the required weight.
+    """Return a lower bound on the number of sets that reach what is required.
 
     It is n_s + 1 where no number of sets reaches it.
+
+    Args:
+        cover: The cover.
+        multipliers: Any numbers, shape (n_e,); negative ones count as 0.
     """
-    reaches = coverage_bounds(cover, multipliers) >= cover.required
-    return int(np.argmax(reaches)) if np.any(reaches) else cover.n_sets + 1
+    given = _usable(multipliers)
+    paid = np.concatenate([[0.0], np.cumsum(np.sort(cover.by_set @ given)[::-1])])
+    slack = rounding(given.size)
+    enough = paid * (1.0 + slack) >= least_service(cover, given) * (1.0 - slack)
+    return int(np.argmax(enough)) if np.any(enough) else cover.n_sets + 1
 
 
-def cost_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
-    """Return a lower bound on the cost of any selection that reaches the weight.
+def cost_bound(
+    cover: ReducedCover,
+    multipliers: NDArray[np.float64],
+    *,
+    max_sets: int | None = None,
+) -> float:
+    """Return a lower bound on the cost of any selection that reaches what is required.
 
     Args:
         cover: The cover.
         multipliers: Any numbers, shape (n_e,), in cost; negative ones count as 0.
+        max_sets: Sets allowed.
     """
-    given = np.clip(np.nan_to_num(multipliers), 0.0, None)
+    given = _usable(multipliers)
     prices = cover.by_set @ given
+    asked = least_service(cover, given)
     with np.errstate(divide="ignore", invalid="ignore"):
         fit = float(np.min(np.where(prices > 0, cover.costs / prices, np.inf)))
     best = 0.0
     for scale in (1.0, fit if np.isfinite(fit) else 0.0):
-        reduced = cover.costs - scale * prices
-        bound = scale * _cheapest_rows(cover, given) + np.minimum(reduced, 0.0).sum()
-        best = max(best, float(bound))
+        gains = np.sort(np.minimum(cover.costs - scale * prices, 0.0))[:max_sets]
+        # Both sums may be off by a share of their own size.
+        error = rounding(given.size + prices.size) * (scale * asked - gains.sum())
+        best = max(best, float(scale * asked + gains.sum() - error))
     return best * (1.0 - 1e-9)
 
 
-def _cheapest_rows(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
-    """Return min lambda y, 0 <= y <= 1, w y >= W: a fractional knapsack."""
-    order = np.argsort(multipliers / cover.weights, kind="stable")
-    reached = np.cumsum(cover.weights[order])
-    last = int(np.searchsorted(reached, cover.required))
-    if last >= order.size:
-        return float(multipliers.sum())
-    before = reached[last - 1] if last else 0.0
-    share = (cover.required - before) / cover.weights[order[last]]
-    return float(multipliers[order[:last]].sum() + share * multipliers[order[last]])
+def least_service(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
+    """Return need(lambda), what rows that meet the requirements ask for at least.
+
+    Args:
+        cover: The cover.
+        multipliers: Numbers of at least 0, shape (n_e,).
+    """
+    return cheapest_rows(cover, multipliers)[1]
+
+
+def cheapest_rows(
+    cover: ReducedCover, multipliers: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """Return the fractional rows y, shape (n_e,), that attain need(lambda), and it.
+
+    Args:
+        cover: The cover.
+        multipliers: Numbers of at least 0, shape (n_e,).
+    """
+    prices = multipliers * cover.needs
+    order = np.lexsort((prices / cover.weights, cover.row_sets))
+    weights, groups = cover.weights[order], cover.row_sets[order]
+    before = np.cumsum(weights) - weights
+    starts = np.searchsorted(groups, np.arange(cover.quotas.size))
+    ahead = np.append(before, weights.sum())[starts]
+    missing = cover.quotas[groups] - (before - ahead[groups])
+    rows = np.zeros(weights.size)
+    rows[order] = np.clip(missing / weights, 0.0, 1.0)
+    return rows, float(prices @ rows)
+
+
+def _usable(multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return multipliers of at least 0 whose sums don't overflow."""
+    return np.clip(np.nan_to_num(multipliers), 0.0, 1e200)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,4 +219,4 @@ def _dearest(
     chosen = np.zeros(prices.size)
     chosen[top] = 1.0
     rest = float(np.sum(weights - multipliers))
-    return (rest + float(prices[top].sum())) * (1.0 + ROUNDING), chosen
+    return (rest + float(prices[top].sum())) * (1.0 + rounding(share.size)), chosen

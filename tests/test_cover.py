@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from solvers import CoverProblem, solve_cover
-from solvers.cover import MAX_ENTRIES, reduced_problem, solve_max_coverage
+from solvers.cover import reduced_problem, solve_max_coverage
+from solvers.cover_problem import MAX_ENTRIES
 from solvers.reductions import reduce_cover
 from solvers.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.status import SolveStatus
@@ -359,8 +360,8 @@ def test_reduction_keeps_the_weights_exact():
         ({"min_coverage": 0.0}, r"min_coverage must be in \(0, 1\]"),
         ({"min_coverage": np.nan}, r"min_coverage must be in \(0, 1\]"),
         ({"min_coverage": 1.1}, r"min_coverage must be in \(0, 1\]"),
-        ({"required_weight": np.nan}, "required_weight must be at least 0"),
-        ({"required_weight": -1.0}, "required_weight must be at least 0"),
+        ({"required_weight": np.nan}, "required_weight must be finite and at least 0"),
+        ({"required_weight": -1.0}, "required_weight must be finite and at least 0"),
     ],
 )
 def test_bad_numbers_are_refused(arguments, message):
