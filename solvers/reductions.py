@@ -113,9 +113,10 @@ class ReducedCover:
 
     def served(self, selected: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return how many of the selected sets serve each row, shape (n_e,)."""
-        return np.bincount(
-            self.by_set[selected].indices, minlength=self.weights.size
-        ).astype(np.int64)
+        counts = np.zeros(self.weights.size, dtype=np.int64)
+        for s in selected:
+            counts[self.members(int(s))] += 1
+        return counts
 
     def weight_of(self, selected: NDArray[np.int64]) -> float:
         """Return the exact integer-valued weight that sets cover together."""

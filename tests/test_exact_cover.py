@@ -332,8 +332,8 @@ def test_costs_by_search_linear_bound_and_integers(share):
         answer = solve_integer(cover, start, plenty())
         assert cover.weight_of(answer.selected) >= cover.required
         assert cover.costs[answer.selected].sum() == pytest.approx(least)
-        assert answer.lower_bound == pytest.approx(least, rel=1e-5)
-        assert answer.lower_bound <= least
+        assert answer.bound == pytest.approx(least, rel=1e-5)
+        assert answer.bound <= least
 
 
 def test_loss_of_a_light_row_isn_t_taken_for_a_full_cover():
@@ -343,4 +343,4 @@ def test_loss_of_a_light_row_isn_t_taken_for_a_full_cover():
     cover = reduce_cover(sparse.csr_array(covers), weights, np.ones(3), 22.0)
     answer = solve_integer(cover, np.arange(3), plenty())
     assert answer.selected.tolist() == [0]
-    assert answer.lower_bound == pytest.approx(1.0, abs=1e-5)
+    assert answer.bound == pytest.approx(1.0, abs=1e-5)
