@@ -26,7 +26,6 @@ import numpy as np
 from cover_peers import SOLVERS, PeerAnswer, PeerProblem, ask_peer
 from cover_runs import OurRun, for_peers, machine_line, peer_cell, run_ours
 from numpy.typing import NDArray
-from scipy import sparse
 from visibility_instances import Instance, covers
 
 from solvers import CoverProblem
@@ -57,7 +56,7 @@ class Tally:
         against: How often ours was `better` than, `equal` to, `worse` than the best
             peer, or met `none` that found anything.
         bounds_above: Rows in which a peer's bound, rounded up, is above ours.
-        versions: Names and versions of peers.
+        versions: Names and versions of peers, and what kept any from answering.
         faults: Contradictions, each a sentence.
     """
 
@@ -159,7 +158,7 @@ def _row(
             cost = _checked(seen, selected, required)
             if cost is None:
                 tally.faults.append(f"{name}: {peer}'s selection sees too little")
-        _note(answer, tally)
+        _note(peer, answer, tally)
         found.append(math.inf if cost is None else cost)
         bounds.append(answer.bound)
         cells += [f"{seconds:.0f}"] if len(found) == 2 else []
@@ -208,9 +207,11 @@ def _checked(
     return chosen.size if int(covered.sum()) >= required else None
 
 
-def _note(answer: PeerAnswer, tally: Tally) -> None:
+def _note(peer: str, answer: PeerAnswer, tally: Tally) -> None:
     known = answer.state == "solved"
-    tally.versions.add(answer.said if known else f"{answer.state} ({answer.said})")
+    tally.versions.add(
+        answer.said if known else f"{peer} {answer.state} ({answer.said})"
+    )
 
 
 def _compare(name: str, found: list[float], bounds: list[float], tally: Tally) -> None:
