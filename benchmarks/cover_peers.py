@@ -113,6 +113,8 @@ def ask_peer(
             )
         except subprocess.TimeoutExpired:
             return PeerAnswer("killed", said="didn't stop at its limit")
+        except OSError as error:
+            return PeerAnswer("failed", said=f"{error.strerror}: the interpreter")
     if done.returncode == ABSENT:
         return PeerAnswer("absent", said=done.stderr.strip())
     if done.returncode != 0:
@@ -184,9 +186,11 @@ def _highs(problem: PeerProblem, seconds: float, threads: int) -> _Said:
         ("time_limit", seconds),
     ):
         solver.setOptionValue(name, option)
-    solver.passModel(lp)
+    if solver.passModel(lp) == highspy.HighsStatus.kError:
+        raise RuntimeError("HiGHS refused the problem")
     begin = time.perf_counter()
-    solver.run()
+    if solver.run() == highspy.HighsStatus.kError:
+        raise RuntimeError("HiGHS failed")
     taken = time.perf_counter() - begin
     info = solver.getInfo()
     values = np.asarray(solver.getSolution().col_value)

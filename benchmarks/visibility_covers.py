@@ -50,9 +50,7 @@ class Tally:
     """What the rows come to.
 
     Attributes:
-        instances: Rows so far.
-        proved: Rows whose gap is closed.
-        largest_gap: Largest gap of ours.
+        ours: For each size, whether ours closed the gap, the gap, and its wall time.
         against: How often ours was `better` than, `equal` to, `worse` than the best
             peer, or met `none` that found anything.
         bounds_above: Rows in which a peer's bound, rounded up, is above ours.
@@ -60,9 +58,7 @@ class Tally:
         faults: Contradictions, each a sentence.
     """
 
-    instances: int = 0
-    proved: int = 0
-    largest_gap: float = 0.0
+    ours: dict[str, list[tuple[bool, float, float]]] = field(default_factory=dict)
     against: Counter[str] = field(default_factory=Counter)
     bounds_above: int = 0
     versions: set[str] = field(default_factory=set)
@@ -76,10 +72,11 @@ def main() -> int:
     asked += [(peer, True) for peer in given.peers if given.reduced]
     headings = [f"{peer}{' reduced' * reduced}" for peer, reduced in asked]
     columns = [*COLUMNS, *(["peers' limit [s]", *headings] if asked else [])]
+    most = f", at most {given.peer_most:g} s" if given.peer_most < math.inf else ""
     print(
         f"{machine_line()}\n\nOurs: time limit {given.time_limit:g} s, work budget "
-        f"{given.budget:.0e} units. Peers: {given.factor:g} times our wall time, "
-        f"{given.peer_least:g} to {given.peer_most:g} s.\n\n"
+        f"{given.budget:.0e} units. Peers: {given.factor:g} times our wall time, at "
+        f"least {given.peer_least:g} s{most}.\n\n"
         f"| {' | '.join(columns)} |\n|{len(columns) * '---|'}",
         flush=True,
     )
@@ -139,9 +136,8 @@ def _row(
     if ours is None:
         tally.faults.append(f"{name}: our selection sees less than {required} samples")
     size = math.inf if ours is None else ours
-    tally.instances += 1
-    tally.proved += run.proved
-    tally.largest_gap = max(tally.largest_gap, size - run.bound)
+    shape = f"{instance.samples:,} x {instance.candidates:,}"
+    tally.ours.setdefault(shape, []).append((run.proved, size - run.bound, run.wall))
     cells = [instance.name, f"{share:g}", *_our_cells(run, size)]
     if not asked:
         return cells
@@ -227,10 +223,14 @@ def _compare(name: str, found: list[float], bounds: list[float], tally: Tally) -
 
 
 def _summary(tally: Tally, *, asked: bool, seconds: float) -> None:
-    print(
-        f"\n{tally.instances} instances, {tally.proved} proved; our largest gap is "
-        f"{tally.largest_gap:g}; {seconds:.0f} s in all."
-    )
+    print()
+    for shape, rows in tally.ours.items():
+        proved, gaps, walls = zip(*rows, strict=True)
+        print(
+            f"* {shape}: {len(rows)} instances, {sum(proved)} proved; our largest gap "
+            f"is {max(gaps):g}, our longest time {max(walls):.1f} s."
+        )
+    print(f"* {seconds:.0f} s in all.")
     if asked:
         against = tally.against
         print(
