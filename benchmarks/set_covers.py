@@ -68,7 +68,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="published set covers")
     parser.add_argument("names", nargs="*", help="instances, default all")
     parser.add_argument("--time-limit", type=float, default=120.0, help="[s] each")
-    parser.add_argument("--budget", type=float, default=1e12, help="units of work")
+    parser.add_argument("--budget", type=float, default=2e10, help="units of work")
     parser.add_argument("--peers", action="store_true", help="run HiGHS too")
     parser.add_argument("--peer-python", default=sys.executable)
     return parser.parse_args()

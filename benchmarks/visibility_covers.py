@@ -100,7 +100,7 @@ def _arguments() -> argparse.Namespace:
     shares = (1.0, 0.99, 0.95, 0.90)
     parser.add_argument("--shares", nargs="+", type=float, default=shares)
     parser.add_argument("--time-limit", type=float, default=60.0, help="ours, [s]")
-    parser.add_argument("--budget", type=float, default=1e12, help="units of work")
+    parser.add_argument("--budget", type=float, default=1e10, help="units of work")
     parser.add_argument("--factor", type=float, default=10.0, help="times our time")
     parser.add_argument("--peers", nargs="*", default=[*SOLVERS], choices=[*SOLVERS])
     parser.add_argument("--peer-python", default=sys.executable)
