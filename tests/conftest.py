@@ -50,6 +50,12 @@ def small_job() -> ModuleType:
     return _load("small_job")
 
 
+@pytest.fixture(scope="session")
+def cap_trees() -> ModuleType:
+    """Trees of cells on a circle and a sphere, whose optimum is known."""
+    return _load("cap_trees")
+
+
 def _load(name: str) -> ModuleType:
     path = Path(__file__).with_name(f"{name}.py")
     spec = importlib.util.spec_from_file_location(f"ringrig_tests_{name}", path)

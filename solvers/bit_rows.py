@@ -1,0 +1,106 @@
+"""Rows of bits, 64 to a word: packed, compared and weighed without unpacking them.
+
+Bit rows of one problem have the same number of words; bits past the last row are 0.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+_CHUNK = 128
+_LARGE = 4096
+# Distinct values up to which counting bits under masks beats looking bytes up.
+_FEW_VALUES = 8
+
+
+def words_for(n_rows: int) -> int:
+    """Return the number of 64-bit words of a bit row."""
+    return -(-n_rows // 64)
+
+
+def pack_rows(serves: NDArray[np.bool_]) -> NDArray[np.uint64]:
+    """Return bit rows, shape (n_cells, n_words), of a matrix (n_cells, n_rows)."""
+    serves = np.asarray(serves, dtype=bool)
+    if serves.ndim != 2:
+        raise ValueError(f"serves must be a matrix, got shape {serves.shape}")
+    packed = np.zeros((serves.shape[0], words_for(serves.shape[1]) * 8), dtype=np.uint8)
+    packed[:, : -(-serves.shape[1] // 8)] = np.packbits(serves, axis=1)
+    return packed.view(np.uint64)
+
+
+def unpack_rows(rows: NDArray[np.uint64], n_rows: int) -> NDArray[np.bool_]:
+    """Return the matrix, shape (n_cells, n_rows), of a few bit rows."""
+    whole = np.ascontiguousarray(rows)
+    return np.unpackbits(whole.view(np.uint8), axis=1, count=n_rows).astype(bool)
+
+
+def exceeds(
+    rows: NDArray[np.uint64], limits: NDArray[np.uint64], of: NDArray[np.int64]
+) -> int:
+    """Return the first row that isn't within ``limits[of]``, or -1."""
+    for part in parts(of.size):
+        outside = np.any(rows[part] & ~limits[of[part]], axis=1)
+        if np.any(outside):
+            return part.start + int(np.argmax(outside))
+    return -1
+
+
+def check_padding(rows: NDArray[np.uint64], n_rows: int) -> None:
+    """Raise ValueError if a bit past the last row is set: no weight belongs to it."""
+    if rows.size == 0:
+        return
+    last = pack_rows(np.ones((1, n_rows), dtype=bool))[0, -1]
+    bad = np.flatnonzero(rows[:, -1] & ~last)
+    if bad.size:
+        raise ValueError(
+            f"bit row {bad[0]} has bits set past its {n_rows} rows: pack it with "
+            f"pack_rows"
+        )
+
+
+def parts(n: int, size: int = _LARGE) -> Iterator[slice]:
+    """Return the slices that cut n things into parts of a size."""
+    return (slice(i, min(i + size, n)) for i in range(0, n, size))
+
+
+class BitSum:
+    """Exact sum of integer values over the bits that are set.
+
+    Few distinct values are counted under one mask each; many are looked up a byte at a
+    time.
+    """
+
+    def __init__(self, values: NDArray[np.int64]) -> None:
+        n = values.size
+        distinct = np.unique(values[values != 0])
+        self._masks = None
+        if distinct.size <= _FEW_VALUES:
+            self._values = distinct.astype(np.int64)
+            self._masks = pack_rows(values == distinct[:, None])
+            return
+        padded = np.zeros((words_for(n) * 8, 8), dtype=np.int64)
+        padded.reshape(-1)[:n] = values
+        bits = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1)
+        self._table = (padded @ bits.T.astype(np.int64)).ravel()
+        self._offsets = np.arange(padded.shape[0], dtype=np.intp) * 256
+
+    @property
+    def units(self) -> float:
+        """Work that a word costs."""
+        return 28.0 if self._masks is None else 2.0 * max(1, self._values.size)
+
+    def __call__(self, rows: NDArray[np.uint64]) -> NDArray[np.int64]:
+        """Return the sum of each bit row, shape (n,)."""
+        if self._masks is not None:
+            total = np.zeros(len(rows), dtype=np.int64)
+            for value, mask in zip(self._values, self._masks, strict=True):
+                counts = np.bitwise_count(rows & mask)
+                total += value * counts.sum(axis=1, dtype=np.int64)
+            return total
+        total = np.empty(len(rows), dtype=np.int64)
+        for part in parts(len(rows), _CHUNK):
+            places = np.ascontiguousarray(rows[part]).view(np.uint8).astype(np.intp)
+            places += self._offsets
+            total[part] = self._table.take(places).sum(axis=1)
+        return total

@@ -1,0 +1,518 @@
+"""Bounds over cells: against brute force, known optima, and random poses."""
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from threadpoolctl import threadpool_limits
+
+from solvers.bit_rows import pack_rows, unpack_rows
+from solvers.cell_bound import CellStatus, bound_count, multiplier_bound
+from solvers.cell_problem import CellProblem, whole_rows
+from solvers.cell_store import CellStore
+from solvers.cell_tuples import _split, refute_tuples
+from solvers.cell_twigs import Twigs
+from solvers.cells import ArrayTree
+from solvers.status import WorkBudget
+
+DEG = np.pi / 180.0
+PLENTY = 1e12
+
+
+def serves_enough(problem, rows):
+    """Return whether poses with these rows, shape (K, n_rows), serve enough."""
+    served = rows.sum(axis=0) >= problem.needs
+    each = np.bincount(
+        problem.row_sets,
+        problem.weights * served,
+        minlength=problem.required_weight.size,
+    )
+    return bool(np.all(each >= problem.required_weight * (1 - 1e-11)))
+
+
+def fewest(problem, leaves, most):
+    """Return the fewest cells, with repetition, that serve enough; inf if > most."""
+    for k in range(most + 1):
+        for cells in itertools.combinations_with_replacement(range(len(leaves)), k):
+            if serves_enough(problem, leaves[list(cells)]):
+                return k
+    return math.inf
+
+
+def random_tree(rng, n_rows, *, density=None):
+    """Return a tree of 2 to 4 levels and some ten leaves, in places loose."""
+    depth, parents, levels = int(rng.integers(2, 5)), [-1], [0]
+    for _ in range(int(rng.integers(6, 18))):
+        above = int(rng.choice([c for c, level in enumerate(levels) if level < depth]))
+        parents.append(above)
+        levels.append(levels[above] + 1)
+    parents = np.array(parents)
+    n_leaves = parents.size - np.unique(parents[parents >= 0]).size
+    density = rng.uniform(0.15, 0.6) if density is None else density
+    leaves = rng.random((n_leaves, n_rows)) < density
+    tree = ArrayTree.from_leaves(parents, pack_rows(leaves), n_rows)
+    if rng.random() < 0.3:
+        loose = unpack_rows(tree.rows, n_rows)
+        loose[0] = True
+        tree = ArrayTree(parents, pack_rows(loose), n_rows)
+    return tree, leaves
+
+
+def random_problem(rng, leaves, *, plain=False):
+    """Return a problem of random kind that is rarely out of reach."""
+    n = leaves.shape[1]
+    weights = [
+        np.ones(n),
+        rng.integers(0, 6, n).astype(float),
+        rng.random(n),
+        rng.random(n) ** 8,
+    ][int(rng.integers(4))]
+    redundancy = np.ones(n, dtype=int)
+    row_sets = np.zeros(n, dtype=int)
+    if not plain and rng.random() < 0.5:
+        redundancy = rng.integers(0, 3, n)
+    if not plain and rng.random() < 0.4:
+        row_sets = rng.integers(0, 2, n)
+    n_sets = int(row_sets.max()) + 1
+    reach = leaves.any(axis=0) | (redundancy == 0)
+    weight = np.bincount(row_sets, weights * reach, minlength=n_sets)
+    share = rng.choice([1.0, 0.9, 0.7, 0.4], n_sets)
+    return CellProblem(weights, share * weight, redundancy, row_sets)
+
+
+def random_case(seed, **kinds):
+    rng = np.random.default_rng(seed)
+    tree, leaves = random_tree(rng, int(rng.integers(3, 12)))
+    return tree, leaves, random_problem(rng, leaves, **kinds)
+
+
+@pytest.mark.parametrize("block", range(20))
+def test_what_is_complete_equals_brute_force(block):
+    statuses = set()
+    for seed in range(25 * block, 25 * block + 25):
+        tree, leaves, problem = random_case(seed)
+        count = 1 + seed % 4
+        truth = fewest(problem, leaves, count)
+        answer = bound_count(problem, tree, count, budget=PLENTY)
+        statuses.add(answer.status)
+        if answer.status is CellStatus.INFEASIBLE:
+            assert fewest(problem, np.repeat(leaves, 2, axis=0), 5) == math.inf
+            continue
+        assert answer.lower_bound == min(truth, count), seed
+        assert (answer.status is CellStatus.PROVED) == (truth >= count)
+        if answer.survivor is not None:
+            cells = unpack_rows(tree.rows[answer.survivor], tree.n_rows)
+            assert len(cells) == truth < count
+            assert serves_enough(problem, cells)
+            assert np.all(np.isin(answer.survivor, tree.leaves))
+    assert {CellStatus.PROVED, CellStatus.SURVIVED} <= statuses
+
+
+@pytest.mark.parametrize("n_poses", [2, 3])
+@pytest.mark.parametrize("multipliers", ["none", "weights", "random", "one"])
+def test_the_tuple_search_equals_brute_force(n_poses, multipliers):
+    outcomes = []
+    for seed in range(150):
+        tree, leaves, problem = random_case(10_000 + seed)
+        whole = whole_rows(problem)
+        rng = np.random.default_rng(seed)
+        prices = {
+            "none": np.zeros(tree.n_rows),
+            "weights": problem.weights,
+            "random": rng.random(tree.n_rows),
+            "one": np.eye(tree.n_rows)[0],
+        }[multipliers]
+        budget = WorkBudget(PLENTY)
+        store = CellStore(tree, budget)
+        if seed % 3 == 0:
+            store.split(np.array([0]))
+            store.split(store.frontier[:1])
+        found = refute_tuples(whole, store, n_poses, whole.multipliers(prices), budget)
+        enough = any(
+            serves_enough(problem, leaves[list(cells)])
+            for cells in itertools.combinations_with_replacement(
+                range(len(leaves)), n_poses
+            )
+        )
+        assert found.refuted == (not enough), seed
+        outcomes.append(enough)
+        if enough:
+            names = store.names[found.survivor]
+            assert names.size == n_poses
+            assert np.all(np.isin(names, tree.leaves))
+            assert serves_enough(problem, unpack_rows(tree.rows[names], tree.n_rows))
+    assert 20 < sum(outcomes) < 140
+
+
+def test_two_poses_in_one_cell_are_two_poses():
+    # One root, two halves: each half serves one of two rows, so that both poses stand
+    # in the root, one in each half.
+    parents = np.array([-1, 0, 0])
+    halves = ArrayTree.from_leaves(parents, pack_rows(np.eye(2, dtype=bool)), 2)
+    answer = bound_count(CellProblem(np.ones(2), 2.0), halves, 3)
+    assert answer.lower_bound == 2
+    assert answer.survivor.tolist() == [1, 2]
+    assert bound_count(CellProblem(np.ones(2), 1.0), halves, 3).lower_bound == 1
+
+
+def test_two_poses_in_one_leaf_serve_what_needs_two():
+    only = ArrayTree(np.array([-1]), pack_rows(np.ones((1, 3), dtype=bool)), 3)
+    problem = CellProblem(np.ones(3), 3.0, np.array([1, 2, 3]))
+    answer = bound_count(problem, only, 5)
+    assert answer.lower_bound == 3
+    assert answer.survivor.tolist() == [0, 0, 0]
+    assert bound_count(problem, only, 3).status is CellStatus.PROVED
+    two = CellProblem(np.ones(3), 2.0, np.array([1, 2, 3]))
+    assert bound_count(two, only, 5).survivor.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("n_poses", [1, 2, 3, 4])
+def test_every_multiset_of_leaves_is_met_once(n_poses):
+    for seed in range(6):
+        tree, leaves, problem = random_case(seed)
+        store = CellStore(tree, WorkBudget(PLENTY))
+        twigs = Twigs(
+            whole_rows(problem), store, n_poses, np.zeros(tree.n_rows, dtype=np.int64)
+        )
+        stack, ends = [np.full((1, n_poses), twigs.root)], []
+        while stack:
+            node = stack.pop()
+            parts, ended = _split(node, twigs)
+            if ended is None:
+                stack += [part[None] for part in parts if np.all(part >= 0)]
+            else:
+                ends.append(tuple(sorted(twigs.cell(int(t)) for t in ended)))
+        names = np.sort(store.names[np.unique(ends)])
+        np.testing.assert_array_equal(names, tree.leaves)
+        assert len(set(ends)) == len(ends)
+        assert len(ends) == math.comb(len(leaves) + n_poses - 1, n_poses)
+
+
+def test_a_cut_bound_is_true_and_says_so():
+    cut = 0
+    for seed in range(300):
+        tree, leaves, problem = random_case(20_000 + seed)
+        count = 1 + seed % 4
+        truth = fewest(problem, leaves, count)
+        budget = 10.0 ** np.random.default_rng(seed).uniform(4.5, 7.5)
+        answer = bound_count(problem, tree, count, budget=budget)
+        if answer.status is CellStatus.INFEASIBLE:
+            continue
+        assert answer.lower_bound <= truth
+        if answer.status is CellStatus.CUT:
+            cut += 1
+            assert answer.lower_bound < count
+            assert answer.proof.endswith("search cut by the work budget")
+    assert cut > 30
+    tree, leaves, problem = random_case(3)
+    answer = bound_count(problem, tree, 9, time_limit=0.0)
+    assert answer.proof.endswith("search cut by the time limit")
+    assert answer.lower_bound <= fewest(problem, leaves, 8)
+
+
+NUMBERS = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.sampled_from([0.0, -1.0, np.nan, np.inf, -np.inf, 1e308, 5e-324]),
+    st.floats(0.0, 10.0),
+)
+CASES = [random_case(seed) for seed in range(30_000, 30_040)]
+TRUTHS = [fewest(problem, leaves, 4) for _, leaves, problem in CASES]
+
+
+def most_of(problem, leaves, k):
+    return max(
+        float(problem.weights @ (leaves[list(cells)].sum(axis=0) >= problem.needs))
+        for cells in itertools.combinations_with_replacement(range(len(leaves)), k)
+    )
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    st.integers(0, len(CASES) - 1), arrays(np.float64, 12, elements=NUMBERS), st.data()
+)
+def test_the_bound_holds_for_any_multipliers(case, numbers, data):
+    tree, leaves, problem = CASES[case]
+    multipliers = numbers[: tree.n_rows]
+    k = data.draw(st.integers(0, 2))
+    dearest = data.draw(st.sampled_from([0, 2**40, 2**48, 2**50]))
+    bound, most = multiplier_bound(
+        problem, tree, multipliers, n_poses=k, dearest=dearest
+    )
+    if TRUTHS[case] < math.inf:
+        assert bound <= TRUTHS[case]
+    assert most >= most_of(problem, leaves, k) * (1 - 1e-15)
+
+
+def test_the_answer_derives_its_own_bound_again():
+    beyond = 0
+    for seed in range(60):
+        tree, leaves, problem = random_case(seed)
+        answer = bound_count(problem, tree, 3, budget=PLENTY)
+        if answer.status is CellStatus.INFEASIBLE:
+            continue
+        bound, most = answer.rederived()
+        assert (bound, most) == (answer.by_multipliers, answer.most_weight)
+        assert most >= most_of(problem, leaves, 2) * (1 - 1e-15)
+        assert min(bound, 3) <= answer.lower_bound
+        beyond += answer.lower_bound > bound
+    assert beyond >= 3
+
+
+def test_a_spoiled_answer_is_caught():
+    caught = 0
+    for seed in range(60):
+        tree, _, problem = random_case(seed)
+        good = bound_count(problem, tree, 3, budget=PLENTY)
+        if good.by_multipliers < 2 or good.status is CellStatus.INFEASIBLE:
+            continue
+        rows = good.multipliers.copy()
+        rows[int(np.argmax(rows))] = 0
+        for spoiled in (
+            dataclasses.replace(good, multipliers=rows),
+            dataclasses.replace(good, dearest=good.dearest // 2),
+            dataclasses.replace(good, by_multipliers=good.by_multipliers + 1),
+        ):
+            bound, most = spoiled.rederived()
+            assert bound <= good.by_multipliers
+            assert most >= good.most_weight or spoiled.dearest == good.dearest
+            caught += (bound, most) != (spoiled.by_multipliers, spoiled.most_weight)
+    assert caught > 30
+
+
+def test_order_of_rows_and_cells_changes_nothing():
+    for seed in range(40):
+        tree, _, problem = random_case(seed)
+        rng = np.random.default_rng(seed)
+        rows = rng.permutation(tree.n_rows)
+        turned = CellProblem(
+            problem.weights[rows],
+            problem.required_weight,
+            problem.needs[rows],
+            problem.row_sets[rows],
+        )
+        # Another order of cells in which parents still come first.
+        depth = np.zeros(tree.parents.size)
+        for cell in range(1, depth.size):
+            depth[cell] = depth[tree.parents[cell]] + 1
+        order = np.lexsort((rng.random(depth.size), depth))
+        place = np.argsort(order)
+        dense = unpack_rows(tree.rows, tree.n_rows)[order][:, rows]
+        above = tree.parents[order]
+        parents = np.where(above >= 0, place[above], -1)
+        other = ArrayTree(parents, pack_rows(dense), tree.n_rows)
+        one = bound_count(problem, tree, 4, budget=PLENTY)
+        two = bound_count(turned, other, 4, budget=PLENTY)
+        assert (one.lower_bound, one.status) == (two.lower_bound, two.status)
+
+
+def test_no_requirement_needs_no_pose_and_none_reaches_too_much():
+    tree, leaves, _ = random_case(1)
+    weights = np.ones(tree.n_rows)
+    nothing = bound_count(CellProblem(weights, 0.0), tree, 2)
+    assert nothing.lower_bound == 0
+    assert nothing.survivor.size == 0
+    zero = bound_count(CellProblem(0 * weights, 0.0), tree, 2)
+    assert zero.lower_bound == 0
+    reach = float(leaves.any(axis=0).sum())
+    beyond = bound_count(CellProblem(weights, reach + 0.5), tree, 2)
+    assert beyond.status is CellStatus.INFEASIBLE
+    assert beyond.lower_bound == math.inf
+    fixed = CellProblem(weights, reach, np.zeros(tree.n_rows, dtype=int))
+    assert bound_count(fixed, tree, 2).lower_bound == 0
+
+
+# Synthetic workspaces whose optimum is known.
+
+
+def on_circle(cap_trees, n, reach, depth):
+    """Return arcs that serve exactly ``reach`` of n even points, wherever they lie."""
+    spacing = 2 * np.pi / n
+    points = cap_trees.circle(spacing * (np.arange(n) + 0.3))
+    return cap_trees.CircleTree(points, (reach - 0.5) / 2 * spacing, depth)
+
+
+@pytest.mark.parametrize(
+    ("n", "reach", "share"),
+    [(60, 20, 1.0), (60, 21, 1.0), (61, 20, 1.0), (97, 14, 1.0), (96, 16, 0.9)],
+)
+def test_the_circle_needs_as_many_arcs_as_divide_it(cap_trees, n, reach, share):
+    # An arc of (reach - 1/2) spacings holds reach - 1 or reach points; cells of under
+    # 1/8 spacing each side add none.
+    tree = on_circle(cap_trees, n, reach, 3 + int(np.ceil(np.log2(n))))
+    needed = math.ceil(share * n)
+    truth = math.ceil(needed / reach)
+    answer = bound_count(CellProblem(np.ones(n), needed), tree, truth)
+    assert answer.status is CellStatus.PROVED
+    assert answer.lower_bound == truth
+    assert answer.most_weight < needed or answer.by_multipliers < truth
+    # One more claimed: the true number survives, and its cells are such a cover.
+    more = bound_count(CellProblem(np.ones(n), needed), tree, truth + 1)
+    assert more.status is CellStatus.SURVIVED
+    assert more.lower_bound == truth == more.survivor.size
+    rows = tree.serves(more.survivor)
+    assert rows.any(axis=0).sum() >= needed
+
+
+@pytest.mark.parametrize("redundancy", [2, 3])
+def test_the_circle_twice_needs_twice_as_many(cap_trees, redundancy):
+    tree = on_circle(cap_trees, 48, 16, 9)
+    problem = CellProblem(np.ones(48), 48.0, np.full(48, redundancy))
+    answer = bound_count(problem, tree, 3 * redundancy)
+    assert answer.status is CellStatus.PROVED
+    assert answer.lower_bound == 3 * redundancy
+
+
+def test_two_row_sets_need_their_own_shares(cap_trees):
+    # Half the circle is one mesh, half the other; arcs reach a quarter.
+    tree = on_circle(cap_trees, 64, 16, 9)
+    row_sets = (np.arange(64) >= 32).astype(int)
+    both = CellProblem(np.ones(64), [32.0, 16.0], None, row_sets)
+    assert bound_count(both, tree, 3).status is CellStatus.PROVED
+    either = CellProblem(np.ones(64), 48.0)
+    assert bound_count(either, tree, 3).status is CellStatus.PROVED
+    one = CellProblem(np.ones(64), [32.0, 0.0], None, row_sets)
+    more = bound_count(one, tree, 3)
+    assert (more.lower_bound, more.status) == (2, CellStatus.SURVIVED)
+
+
+# Covering radii of the sphere by equal caps: 3 caps 90, 4 caps 70.5288 (tetrahedron),
+# 5 caps 63.4349, 6 caps 54.7356 (octahedron) degrees. K caps of angle a that serve all
+# of a point set cover the sphere with caps of a + delta, delta the largest hole of the
+# set; so with a + delta below the covering radius of K, K caps aren't enough.
+def hole(points):
+    far = np.random.default_rng(0).normal(size=(20_000, 3))
+    far /= np.linalg.norm(far, axis=1, keepdims=True)
+    return float(np.arccos(np.clip((far @ points.T).max(axis=1), -1, 1)).max())
+
+
+@pytest.mark.parametrize(
+    ("degrees", "too_few", "truth"), [(71.0, 90.0, 4), (80.0, 90.0, 4)]
+)
+def test_the_sphere_needs_a_tetrahedron(cap_trees, degrees, too_few, truth):
+    points = cap_trees.spread(300)
+    assert degrees * DEG + hole(points) < too_few * DEG
+    tree = cap_trees.SphereTree(points, degrees * DEG, 5)
+    answer = bound_count(CellProblem(np.ones(300), 300.0), tree, truth)
+    assert answer.status is CellStatus.PROVED
+    assert answer.lower_bound == truth
+    assert "multisets of 3 cells" in answer.proof
+
+
+def test_just_below_the_tetrahedron_four_caps_fail(cap_trees):
+    points = cap_trees.spread(600)
+    assert 63.4349 < 63.5 < 63.5 + hole(points) / DEG < 70.5288
+    tree = cap_trees.SphereTree(points, 63.5 * DEG, 6)
+    answer = bound_count(CellProblem(np.ones(600), 600.0), tree, 6)
+    assert answer.lower_bound == 5
+    assert "multisets of 4 cells" in answer.proof
+
+
+SOLIDS = {
+    4: (70.5288, [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),
+    6: (54.7356, np.concatenate([np.eye(3), -np.eye(3)])),
+    12: (
+        37.3774,
+        [
+            np.roll([0, s, t * (1 + 5**0.5) / 2], k)
+            for k in range(3)
+            for s in (1, -1)
+            for t in (1, -1)
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("count", [4, 6, 12])
+def test_no_bound_beats_a_platonic_cover(cap_trees, count):
+    radius, axes = SOLIDS[count]
+    axes = np.array(axes, dtype=float)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    points = cap_trees.spread(500)
+    wide = (radius + 1e-3) * DEG
+    assert np.all((axes @ points.T).max(axis=0) >= np.cos(wide))
+    tree = cap_trees.SphereTree(points, wide, 4)
+    answer = bound_count(CellProblem(np.ones(500), 500.0), tree, count + 1, budget=1e9)
+    assert answer.lower_bound <= count
+    assert answer.status in (CellStatus.SURVIVED, CellStatus.CUT)
+    # The areas of caps prove 3, 5 and 10; coarse cells lose up to two of them.
+    assert answer.lower_bound >= math.ceil(2 / (1 - math.cos(wide))) - 2
+
+
+@pytest.mark.parametrize("kind", ["circle", "sphere"])
+def test_rows_of_cells_hold_what_their_poses_serve(cap_trees, kind):
+    rng = np.random.default_rng(5)
+    if kind == "circle":
+        tree = cap_trees.CircleTree(cap_trees.circle(rng.uniform(0, 7, 200)), 0.5, 10)
+        cells = rng.integers(0, 2**11 - 1, 250)
+    else:
+        tree = cap_trees.SphereTree(cap_trees.spread(200), 0.5, 6)
+        cells = rng.integers(0, 2 * (4**7 - 1), 250)
+    held = {}
+    for cell in cells:
+        poses = tree.inside(cell, rng, 400)
+        served = np.any(poses @ tree.points.T >= np.cos(tree.radius), axis=0)
+        above = [int(cell)]
+        while tree.level(np.array(above[-1:]))[0] > 0:
+            above.append(int(tree.parent(np.array(above[-1:]))[0]))
+        new = [c for c in above if c not in held]
+        if new:
+            held |= dict(zip(new, tree.serves(np.array(new)), strict=True))
+        assert not any(np.any(served & ~held[c]) for c in above)
+
+
+def test_no_cover_by_free_poses_beats_the_bound(cap_trees):
+    rng = np.random.default_rng(11)
+    for _ in range(4):
+        points = rng.normal(size=(150, 3)) * rng.uniform(0.3, 1.0, 3)
+        points /= np.linalg.norm(points, axis=1, keepdims=True)
+        weights, radius = rng.random(150), rng.uniform(25, 45) * DEG
+        needed = rng.choice([0.8, 0.9, 0.95]) * weights.sum()
+        poses = np.concatenate([points, rng.normal(size=(17_000, 3))])
+        poses /= np.linalg.norm(poses, axis=1, keepdims=True)
+        serves = poses @ points.T >= np.cos(radius)
+        found = greedy(serves, weights, needed)
+        tree = cap_trees.SphereTree(points, radius, 5)
+        answer = bound_count(CellProblem(weights, needed), tree, found + 1, budget=1e9)
+        assert 2 <= answer.lower_bound <= found
+        top = np.argsort(-(serves @ weights))[:3000]
+        for _ in range(200):
+            few = rng.choice(top, found, replace=False)
+            assert weights[serves[few].any(axis=0)].sum() <= answer.most_weight
+
+
+def greedy(serves, weights, needed):
+    left, found = weights.copy(), 0
+    while weights.sum() - left.sum() < needed:
+        left[serves[int(np.argmax(serves @ left))]] = 0.0
+        found += 1
+    return found
+
+
+def test_cells_made_when_asked_for_prove_the_same(cap_trees):
+    lazy = cap_trees.SphereTree(cap_trees.spread(120), 66 * DEG, 4)
+    whole, names = cap_trees.flatten(lazy)
+    problem = CellProblem(np.random.default_rng(0).random(120), 50.0)
+    lazy.asked = 0
+    one, two = bound_count(problem, lazy, 4), bound_count(problem, whole, 4)
+    assert (one.lower_bound, one.status) == (two.lower_bound, two.status)
+    np.testing.assert_array_equal(one.multipliers, two.multipliers)
+    np.testing.assert_array_equal(one.survivor, names[two.survivor])
+    assert one.cells_used == lazy.asked + 6 < names.size
+
+
+def test_threads_change_nothing(cap_trees):
+    tree = cap_trees.SphereTree(cap_trees.spread(200), 50 * DEG, 4)
+    problem = CellProblem(np.random.default_rng(0).random(200), 80.0)
+    answers = []
+    for threads in (1, 2):
+        with threadpool_limits(threads):
+            answers.append(bound_count(problem, tree, 6, budget=1e9))
+    one, two = answers
+    np.testing.assert_array_equal(one.multipliers, two.multipliers)
+    for name in ("lower_bound", "status", "cells_used", "tuples_met", "proof"):
+        assert getattr(one, name) == getattr(two, name)
