@@ -1,0 +1,205 @@
+"""Fewest sets that cover every row, at equal costs: the order of the methods.
+
+Few rows decide. The search (``row_weighting``) looks for one set less over a subset of
+the rows; a find that misses rows of the whole takes some of these in, one that misses
+none is a better cover. Where it finds nothing, what is left are critical rows: a small
+program whose rows and columns shrink again by dominance, and which branch and bound
+(``row_generation``) refutes, or answers, and so on. A bound over a subset of the rows
+holds for all of them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .reductions import ReducedCover
+from .row_dominance import essential
+from .row_generation import integer_cover, linear_cover
+from .row_weighting import RowWeighting
+from .status import SolveStatus, WorkBudget
+
+_LINEAR_PROOF = "linear relaxation by rows"
+_INTEGER_PROOF = "branch and bound (HiGHS) over critical rows"
+# Missed rows that are taken in at a time.
+_BATCH = 5
+# Exchanges without a find after which rows count as critical: first, and then later.
+_FIRST_STEPS = 2_000
+_STEPS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class FullAnswer:
+    """Fewest sets that cover every row; indices of the reduced cover given."""
+
+    status: SolveStatus
+    selected: NDArray[np.int64]
+    lower_bound: float
+    proof: str
+
+
+def fewest_full(
+    cover: ReducedCover,
+    budget: WorkBudget,
+    *,
+    seed: int,
+    start: NDArray[np.int64],
+    lower: int,
+) -> FullAnswer:
+    """Find the fewest sets that cover every row, with a lower bound.
+
+    Args:
+        cover: A cover of equal costs of which no row's weight may be lost.
+        budget: Counted work; the clock only cuts.
+        seed: Seed of the search.
+        start: Sets that cover every row.
+        lower: Sets known to be necessary.
+
+    Returns:
+        The answer; its selection is never larger than the start, its bound never below
+        ``lower``.
+
+    Raises:
+        ValueError: If the start leaves a row open.
+    """
+    served = cover.by_row.astype(bool).toarray()
+    start = np.unique(np.asarray(start, dtype=np.int64))
+    if not served[:, start].any(axis=1).all():
+        raise ValueError(f"start of {start.size} sets must cover every row")
+    budget.spend(float(served.size))
+    rows, columns = essential(served, budget.part(0.12 * budget.units))
+    search = _Search(served[np.ix_(rows, columns)], budget, seed, start.size)
+    search.lower = lower
+    search.run()
+    if search.best is not None:
+        start = np.sort(columns[search.best])
+    settled = search.lower >= start.size
+    proof = search.proof or "bound given"
+    if not settled:
+        proof = f"{proof}; search cut by the {budget.reason}"
+    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
+    return FullAnswer(status, start, float(min(search.lower, start.size)), proof)
+
+
+class _Search:
+    """Cover, bound and critical rows of a full cover under search."""
+
+    def __init__(
+        self, covers: NDArray[np.bool_], budget: WorkBudget, seed: int, size: int
+    ) -> None:
+        self.covers = covers
+        self.budget = budget
+        self.best: NDArray[np.int64] | None = None
+        self.size = size
+        self.lower = 0
+        self.proof = ""
+        self._seed = seed
+        self._known = _greedy(covers, budget)
+        self._rows = np.empty(0, dtype=np.int64)
+        self._weights = np.ones(len(covers))
+        self._offer(self._known)
+
+    def run(self) -> None:
+        """Search, bound, refute, and search on with what is left."""
+        linear = linear_cover(self.covers, self.budget.part(0.3 * self.budget.units))
+        self._raise(linear.lower_bound, _LINEAR_PROOF)
+        self._rows = linear.rows
+        whole = self.budget.units
+        self._improve(_FIRST_STEPS, self.budget.part(0.2 * whole))
+        self._improve(_STEPS, self.budget.part(0.2 * whole))
+        proving = self.budget.part(self.budget.remaining - 0.1 * whole)
+        while not self.settled and self._refute(proving):
+            self._improve(_STEPS, proving)
+        while not self.settled and not self.budget.exhausted:
+            self._improve(4 * _STEPS, self.budget)
+
+    @property
+    def settled(self) -> bool:
+        """Whether no smaller cover is left to be found."""
+        return self.lower >= self.size
+
+    def _offer(self, selected: NDArray[np.int64]) -> None:
+        """Keep a cover of every row if it is smaller."""
+        self._known = selected if selected.size <= self._known.size else self._known
+        if selected.size < self.size:
+            self.best, self.size = selected, selected.size
+
+    def _raise(self, bound: int, proof: str) -> None:
+        if bound > self.lower:
+            self.lower, self.proof = bound, proof
+
+    def _take_in(self, selected: NDArray[np.int64]) -> bool:
+        """Add some rows that a selection misses; return whether it misses any.
+
+        Those of fewest sets come first, and none that shares half of its sets with one
+        taken just before.
+        """
+        missed = np.flatnonzero(~self.covers[:, selected].any(axis=1))
+        self.budget.spend(float(len(self.covers) * selected.size))
+        order = np.argsort(self.covers[missed].sum(axis=1), kind="stable")
+        taken: list[int] = []
+        for row in missed[order]:
+            sets = self.covers[row]
+            near = self.covers[taken][:, sets].sum(axis=1)
+            if not np.any(2 * near > np.count_nonzero(sets)):
+                taken.append(int(row))
+            if len(taken) == _BATCH:
+                break
+        self._rows = np.union1d(self._rows, np.array(taken, dtype=np.int64))
+        return missed.size > 0
+
+    def _improve(self, max_steps: int, budget: WorkBudget) -> None:
+        """Look for smaller covers until the rows taken in resist."""
+        selected = self._known
+        while not self.settled and not budget.exhausted:
+            self._seed += 1
+            search = RowWeighting(
+                self.covers[self._rows],
+                selected,
+                seed=self._seed,
+                weights=self._weights[self._rows],
+            )
+            budget.spend(4.0 * search.covers.size)
+            while search.chosen.size >= self.size:
+                search.drop()
+            found = search.search(max_steps, budget)
+            self._weights[self._rows] = search.weights
+            if not found:
+                break
+            selected = search.chosen
+            if not self._take_in(selected):
+                self._offer(np.sort(selected))
+
+    def _refute(self, budget: WorkBudget) -> bool:
+        """Leave the critical rows to branch and bound; return whether to go on."""
+        part = self.covers[self._rows]
+        rows, columns = essential(part, budget)
+        known = _stand_ins(part[rows][:, self._known], part[np.ix_(rows, columns)])
+        answer = integer_cover(part[np.ix_(rows, columns)], known, budget)
+        self._raise(answer.lower_bound, _INTEGER_PROOF)
+        if answer.selected is None:
+            return False
+        selected = columns[answer.selected]
+        if not self._take_in(selected):
+            self._offer(selected)
+        return True
+
+
+def _stand_ins(
+    dropped: NDArray[np.bool_], kept: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Return for each dropped column the first kept one that covers as much."""
+    lacks = dropped.T.astype(np.float32) @ ~kept
+    return np.unique(np.argmin(lacks, axis=1)).astype(np.int64)
+
+
+def _greedy(covers: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
+    """Return sets that cover every row, the one of most open rows first, increasing."""
+    left = covers
+    chosen: list[int] = []
+    while len(left):
+        best = int(np.argmax(left.sum(axis=0)))
+        budget.spend(2.0 * left.size)
+        chosen.append(best)
+        left = left[~left[:, best]]
+    return np.sort(np.array(chosen, dtype=np.int64))

@@ -1,0 +1,78 @@
+"""Rows and columns that a full cover can do without.
+
+Where every row must be covered, a row whose columns include all of another's is covered
+with it, and a column whose rows another has too is never needed (costs being equal).
+Each rule makes room for the other, so they take turns until neither finds anything.
+Neither changes the fewest columns. The row rule is *not* valid where rows may be lost.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .status import WorkBudget
+
+# Passes after which what is left to find isn't worth looking for.
+_MAX_ROUNDS = 10
+# What comparing two words costs, and the calls for one pivot.
+_UNITS_PER_WORD = 8.0
+_CALL_UNITS = 3e4
+
+
+def essential(
+    covers: NDArray[np.bool_], budget: WorkBudget
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows and columns, increasing, of a smaller cover with the same optimum.
+
+    Args:
+        covers: Whether column s covers row e, shape (n_e, n_s).
+        budget: Work; where it ends, what wasn't compared is kept.
+    """
+    rows, columns = (np.arange(n, dtype=np.int64) for n in covers.shape)
+    left = covers
+    for _ in range(_MAX_ROUNDS):
+        kept_rows = minimal(left, budget)
+        left = left[kept_rows]
+        kept_columns = minimal(~left.T, budget)
+        unchanged = kept_rows.size == rows.size and kept_columns.size == columns.size
+        left = left[:, kept_columns]
+        rows, columns = rows[kept_rows], columns[kept_columns]
+        if unchanged or budget.exhausted:
+            break
+    return rows, columns
+
+
+def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
+    """Return the sets that include no other, and the first of equal ones, increasing.
+
+    Args:
+        sets: Whether element i is in set k, shape (n_sets, n_elements).
+        budget: Work; where it ends, sets that weren't compared are kept.
+    """
+    order = np.lexsort((np.arange(len(sets)), sets.sum(axis=1)))
+    words = _words(sets)[:, order]
+    alive = np.ones(order.size, dtype=bool)
+    # A superset is larger, so only later sets of this order can include the pivot.
+    rest = np.arange(order.size)
+    while rest.size > 1 and not budget.exhausted:
+        pivot, rest = rest[0], rest[1:]
+        larger = rest
+        spent = 0
+        for word in words:
+            spent += larger.size
+            larger = larger[(word[pivot] & ~word[larger]) == 0]
+            if larger.size == 0:
+                break
+        budget.spend(_UNITS_PER_WORD * spent + _CALL_UNITS)
+        if larger.size:
+            alive[larger] = False
+            rest = rest[alive[rest]]
+    return np.sort(order[alive]).astype(np.int64)
+
+
+def _words(sets: NDArray[np.bool_]) -> NDArray[np.uint64]:
+    """Return the sets' bits, shape (n_words, n_sets), elements in random order."""
+    n_sets, n_elements = sets.shape
+    padded = np.zeros((n_sets, -(-max(n_elements, 1) // 64) * 64), dtype=bool)
+    # Shuffled, so that the first words are a fair sketch of the set.
+    padded[:, :n_elements] = sets[:, np.random.default_rng(0).permutation(n_elements)]
+    return np.ascontiguousarray(np.packbits(padded, axis=1).view(np.uint64).T)
