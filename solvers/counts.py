@@ -18,8 +18,9 @@ from .relaxation import count_bound, coverage_bounds, tighten
 from .status import SolveStatus, WorkBudget
 
 _LARGE_COUNT = 8
-# Restarts before a bound is asked whether more are worth it.
-_FIRST_KICKS = 8
+# Moves before a bound is asked whether more are worth it, and after.
+_FIRST_MOVES = 60
+_MOVES = 1_000
 
 
 def fewest_sets(
@@ -103,7 +104,7 @@ def most_weight(
         best = max(best, filled, key=cover.weight_of)
     kicks = budget.part(0.4 * budget.units)
     best = most_coverage(
-        cover, best, kicks, target=cover.total, seed=seed, max_kicks=_FIRST_KICKS
+        cover, best, kicks, target=cover.total, seed=seed, max_moves=_FIRST_MOVES
     )
     weight = cover.weight_of(best)
     if weight >= cover.total:
@@ -123,7 +124,7 @@ def most_weight(
             kicks,
             target=upper - upper % cover.grain,
             seed=seed + 1,
-            max_kicks=20 + 10 * n_sets,
+            max_moves=_MOVES,
         )
         weight = cover.weight_of(best)
     if upper < weight + least:
@@ -202,7 +203,6 @@ def _improve(
 ) -> NDArray[np.int64]:
     """Return a cover of fewer sets while the neighbourhood search finds one."""
     while selected.size > lower:
-        size = selected.size - 1
         without = [np.delete(selected, i) for i in range(selected.size)]
         start = max(without, key=cover.weight_of)
         fewer = most_coverage(
@@ -211,7 +211,7 @@ def _improve(
             budget,
             target=cover.required,
             seed=seed,
-            max_kicks=20 + 10 * size,
+            max_moves=_MOVES,
         )
         if cover.weight_of(fewer) < cover.required:
             break

@@ -1,4 +1,4 @@
-"""Good covers fast: greedy choice, swaps, and a large-neighbourhood search.
+"""Good covers fast: greedy choice, tabu search, and a large-neighbourhood search.
 
 Every sum is of integer-valued weights, hence exact, and every tie goes to the lowest
 index: the same seed and budget give the same answer on any machine.
@@ -10,6 +10,11 @@ from numpy.typing import NDArray
 from .reductions import ReducedCover
 from .status import WorkBudget
 from .swaps import Swaps
+
+# Moves for which a set that went may not come back: from the first to below the second.
+_AWAY = (6, 16)
+# What came may not go for a move, and one more for each of so many sets selected.
+_SETTLING = 4
 
 
 def greedy(
@@ -56,35 +61,42 @@ def most_coverage(
     *,
     target: float,
     seed: int,
-    max_kicks: int,
+    max_moves: int,
 ) -> NDArray[np.int64]:
-    """Raise the weight that a selection covers without more sets.
+    """Raise the weight that a selection covers without more sets, by tabu search.
 
-    Best swaps until none helps; then some sets are dropped, refilled half at random,
-    and so on from the best selection so far. Ends at the target, at the budget or
-    after ``max_kicks`` restarts.
+    Makes the best swap even where it loses weight; for some moves, drawn at random, what
+    went may not come back and what came may not go, unless that beats the best so far.
 
     Returns:
         The best selection found, increasing.
+
+    References:
+        Glover, "Tabu search - part I", ORSA Journal on Computing 1(3), 1989.
     """
     rng = np.random.default_rng(seed)
-    best = Swaps(cover, (int(s) for s in start), budget)
-    _descend(best, target, budget)
-    for kick in range(max_kicks):
-        if best.covered >= target or budget.exhausted or not best.chosen:
+    swaps = Swaps(cover, (int(s) for s in start), budget)
+    best, most = list(swaps.chosen), swaps.covered
+    enters = np.zeros(cover.n_sets, dtype=np.int64)
+    leaves = np.zeros(cover.n_sets, dtype=np.int64)
+    for move in range(max_moves):
+        if most >= target or budget.exhausted or not best:
             break
-        # A wider neighbourhood the longer nothing helped.
-        n_sets = len(best.chosen)
-        width = min(n_sets, 1 + kick % 4)
-        dropped = rng.choice(n_sets, size=width, replace=False).tolist()
-        current = best.copy()
-        for position in sorted(dropped, reverse=True):
-            current.drop(position)
-        _refill(current, n_sets, rng)
-        _descend(current, target, budget)
-        if current.covered > best.covered:
-            best = current
-    return np.array(sorted(best.chosen), dtype=np.int64)
+        barred = enters > move
+        barred[swaps.chosen] = True
+        change, out, into = swaps.best_swap(
+            stay=leaves[swaps.chosen] > move, barred=barred, beyond=most - swaps.covered
+        )
+        if not np.isfinite(change):
+            continue
+        gone = swaps.chosen[out]
+        swaps.drop(out)
+        swaps.add(into)
+        enters[gone] = move + int(rng.integers(*_AWAY))
+        leaves[into] = move + 1 + int(rng.integers(1, 2 + len(best) // _SETTLING))
+        if swaps.covered > most:
+            best, most = list(swaps.chosen), swaps.covered
+    return np.array(sorted(best), dtype=np.int64)
 
 
 def prune(cover: ReducedCover, selected: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -148,23 +160,3 @@ def _worth(
     """Return the sets above the number allowed, then the cost."""
     excess = 0 if max_sets is None else max(0, selected.size - max_sets)
     return excess, float(cover.costs[selected].sum())
-
-
-def _refill(selection: Swaps, n_sets: int, rng: np.random.Generator) -> None:
-    """Fill the selection up with sets drawn from the eight of most gain."""
-    while len(selection.chosen) < n_sets:
-        top = np.argsort(-selection.gain, kind="stable")[:8]
-        top = top[selection.gain[top] > 0]
-        if top.size == 0:
-            break
-        selection.add(int(rng.choice(top)))
-
-
-def _descend(selection: Swaps, target: float, budget: WorkBudget) -> None:
-    """Make best swaps until none adds weight."""
-    while selection.chosen and selection.covered < target and not budget.exhausted:
-        change, out, into = selection.best_swap()
-        if not change > 0:
-            break
-        selection.drop(out)
-        selection.add(into)

@@ -11,7 +11,6 @@ goes changes them only by the rows whose n_e goes between 0, 1 and 2. The weight
 integers, so what was added and taken away again leaves no trace of rounding.
 """
 
-import copy
 from collections.abc import Iterable
 
 import numpy as np
@@ -56,16 +55,6 @@ class Swaps:
         for s in chosen:
             self.add(s)
 
-    def copy(self) -> "Swaps":
-        """Return the same selection, to be changed apart."""
-        other = copy.copy(self)
-        other.chosen = self.chosen.copy()
-        other.gain = self.gain.copy()
-        other.regain = self.regain.copy()
-        other._counts = self._counts.copy()
-        other._owners = self._owners.copy()
-        return other
-
     def add(self, s: int) -> None:
         """Select one set more."""
         rows = self._members(s)
@@ -92,11 +81,26 @@ class Swaps:
         self._owners[rows] -= s + 1
         self.regain += self._sums_by_owner(self.chosen, rows[self._counts[rows] == 1])
 
-    def best_swap(self) -> tuple[float, int, int]:
-        """Return the largest change in weight, the position that goes, what comes."""
+    def best_swap(
+        self,
+        *,
+        stay: NDArray[np.bool_] | None = None,
+        barred: NDArray[np.bool_] | None = None,
+        beyond: float = np.inf,
+    ) -> tuple[float, int, int]:
+        """Return the largest change in weight, the position that goes, what comes.
+
+        Args:
+            stay: Positions that may not go, shape (k,); default none.
+            barred: Sets that may not come, shape (n_s,); default none.
+            beyond: Change above which neither counts.
+        """
         losses = self.regain[np.arange(len(self.chosen)), self.chosen]
         change = self.regain + self.gain - losses[:, None]
         self._budget.spend(float(change.size))
+        if stay is not None and barred is not None:
+            tabu = stay[:, None] | barred
+            change[tabu & (change <= beyond)] = -np.inf
         out, into = np.unravel_index(int(np.argmax(change)), change.shape)
         return float(change[out, into]), int(out), int(into)
 
