@@ -4,6 +4,7 @@ Bit rows of one problem have the same number of words; bits past the last row ar
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,30 @@ def check_padding(rows: NDArray[np.uint64], n_rows: int) -> None:
 def parts(n: int, size: int = _LARGE) -> Iterator[slice]:
     """Return the slices that cut n things into parts of a size."""
     return (slice(i, min(i + size, n)) for i in range(0, n, size))
+
+
+class GrowingArray:
+    """Rows of an array to which more are appended, in room that grows by halves."""
+
+    def __init__(self, like: NDArray[Any]) -> None:
+        self._data = like.copy()
+        self.size = len(like)
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """What was appended so far; valid until more is."""
+        return self._data[: self.size]
+
+    def append(self, more: NDArray[Any]) -> None:
+        """Append rows of the same shape."""
+        stop = self.size + len(more)
+        if stop > len(self._data):
+            room = (max(stop, 3 * self.size // 2), *self._data.shape[1:])
+            new = np.empty(room, dtype=self._data.dtype)
+            new[: self.size] = self.values
+            self._data = new
+        self._data[self.size : stop] = more
+        self.size = stop
 
 
 class BitSum:

@@ -72,12 +72,12 @@ class MultiplierSearch:
         while self.bound <= n_poses and not self._budget.exhausted:
             frontier = self._store.frontier
             prices = self._store.prices(frontier, self.multipliers)
-            self._split(frontier[prices >= allowed + 0.5 * gap])
+            split = self._split(frontier[prices >= allowed + 0.5 * gap])
             frontier = self._store.frontier
             prices = self._store.prices(frontier, self.multipliers)
             self._measure(int(prices.max(initial=0)))
             before, gap = gap, self.dearest - allowed
-            if gap > _WORTH * before:
+            if not split or gap >= _WORTH * before:
                 self._drilled = self.multipliers
                 break
 

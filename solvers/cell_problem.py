@@ -130,7 +130,7 @@ class WholeRows:
         return np.floor(values * (2.0**_BITS / float(values @ cost))).astype(np.int64)
 
     def least_cost(self, multipliers: NDArray[np.int64]) -> Fraction:
-        """Return the least cost of serving enough, or a little less."""
+        """Return the least cost of serving enough: need(lambda), or a little less."""
         costs = multipliers * self.needs
         least = Fraction(0)
         for g, needed in enumerate(self.needed):

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .bit_rows import BitSum, check_padding, exceeds, parts, words_for
+from .bit_rows import BitSum, GrowingArray, check_padding, exceeds, parts, words_for
 from .cells import MAX_BYTES, CellBatch, CellTree, check_size
 from .status import WorkBudget
 
@@ -15,58 +15,60 @@ class CellStore:
 
     Attributes:
         tree: Where they come from.
-        size: Number of cells so far.
         full: Whether a split was refused, because of ``MAX_BYTES``.
     """
 
     def __init__(self, tree: CellTree, budget: WorkBudget) -> None:
         self.tree = tree
-        self.size = 0
         self.full = False
         self._budget = budget
         self._words = words_for(tree.n_rows)
         roots = tree.roots()
         check_size(roots.cells.size, tree.n_rows)
-        self._names = np.empty(0, dtype=np.int64)
-        self._level = np.empty(0, dtype=np.int64)
-        self._first = np.empty(0, dtype=np.int64)
-        self._number = np.empty(0, dtype=np.int64)
-        self._rows = np.empty((0, self._words), dtype=np.uint64)
+        none = np.empty(0, dtype=np.int64)
+        self._name, self._level = GrowingArray(none), GrowingArray(none)
+        self._first, self._number = GrowingArray(none), GrowingArray(none)
+        self._row = GrowingArray(np.empty((0, self._words), dtype=np.uint64))
         self._append(roots, np.zeros(roots.cells.size, dtype=np.int64))
         self.n_roots = self.size
 
     @property
+    def size(self) -> int:
+        """Number of cells so far."""
+        return self._name.size
+
+    @property
     def names(self) -> NDArray[np.int64]:
         """The tree's name of each cell."""
-        return self._names[: self.size]
+        return self._name.values
 
     @property
     def levels(self) -> NDArray[np.int64]:
         """Splits between a root and each cell."""
-        return self._level[: self.size]
+        return self._level.values
 
     @property
     def rows(self) -> NDArray[np.uint64]:
         """Bit rows, shape (size, n_words)."""
-        return self._rows[: self.size]
+        return self._row.values
 
     @property
     def frontier(self) -> NDArray[np.int64]:
         """Cells that aren't split yet, which hold every pose together."""
-        return np.flatnonzero(self._number[: self.size] <= 0)
+        return np.flatnonzero(self._number.values <= 0)
 
     def is_split(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which cells have children here."""
-        return self._number[cells] > 0
+        return self._number.values[cells] > 0
 
     def may_split(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which cells the tree hasn't been asked about."""
-        return self._number[cells] == _UNASKED
+        return self._number.values[cells] == _UNASKED
 
     def children(self, cell: int) -> NDArray[np.int64]:
         """Return the children that a cell has here."""
-        first = self._first[cell]
-        return np.arange(first, first + max(0, self._number[cell]))
+        first = self._first.values[cell]
+        return np.arange(first, first + max(0, self._number.values[cell]))
 
     def split(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
         """Ask the tree for the children of cells; return those that came.
@@ -86,10 +88,10 @@ class CellStore:
             self.full = True
             return np.empty(0, dtype=np.int64)
         self._check(asked, batch)
-        self._number[asked] = number
-        self._first[asked] = self.size + np.cumsum(number) - number
+        self._number.values[asked] = number
+        self._first.values[asked] = self.size + np.cumsum(number) - number
         before = self.size
-        self._append(batch, self._level[asked[batch.parents]] + 1)
+        self._append(batch, self._level.values[asked[batch.parents]] + 1)
         return np.arange(before, self.size)
 
     def prices(
@@ -100,7 +102,7 @@ class CellStore:
         self._budget.spend(cells.size * self._words * price.units + 3e5)
         found = np.empty(cells.size, dtype=np.int64)
         for part in parts(cells.size):
-            found[part] = price(self._rows[cells[part]])
+            found[part] = price(self.rows[cells[part]])
         return found
 
     def _room(self, n: int) -> bool:
@@ -109,8 +111,7 @@ class CellStore:
     def _check(self, asked: NDArray[np.int64], batch: CellBatch) -> None:
         if not np.all(np.diff(batch.parents) >= 0):
             raise ValueError("children must come in the order of the cells asked for")
-        check_padding(batch.rows, self.tree.n_rows)
-        bad = exceeds(batch.rows, self._rows, asked[batch.parents])
+        bad = exceeds(batch.rows, self.rows, asked[batch.parents])
         if bad >= 0:
             parent = self.names[asked[batch.parents[bad]]]
             raise ValueError(
@@ -126,19 +127,9 @@ class CellStore:
                 f"{batch.rows.dtype} {batch.rows.shape}"
             )
         check_padding(batch.rows, self.tree.n_rows)
-        stop = self.size + n
-        if stop > self._names.size:
-            self._grow(max(stop, 3 * self._names.size // 2))
-        new = slice(self.size, stop)
-        self._names[new], self._level[new] = batch.cells, levels
-        self._first[new], self._number[new] = 0, _UNASKED
-        self._rows[new] = batch.rows
-        self.size = stop
+        self._name.append(batch.cells)
+        self._level.append(levels)
+        self._first.append(np.zeros(n, dtype=np.int64))
+        self._number.append(np.full(n, _UNASKED))
+        self._row.append(batch.rows)
         self._budget.spend(2.0 * n * self._words)
-
-    def _grow(self, capacity: int) -> None:
-        for name in ("_names", "_level", "_first", "_number", "_rows"):
-            old = getattr(self, name)
-            new = np.zeros((capacity, *old.shape[1:]), dtype=old.dtype)
-            new[: self.size] = old[: self.size]
-            setattr(self, name, new)

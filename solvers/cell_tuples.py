@@ -65,9 +65,10 @@ def refute_tuples(
     stack = [np.full((1, n_poses), twigs.root)]
     met = 0
     while stack:
+        nodes, ended = _split(stack.pop(), twigs)
+        # With the store full, what could be split looks as if it couldn't.
         if budget.exhausted or store.full:
             return TupleAnswer(refuted=False, survivor=None, met=met)
-        nodes, ended = _split(stack.pop(), twigs)
         if ended is not None:
             cells = np.array(sorted(twigs.cell(int(t)) for t in ended))
             return TupleAnswer(refuted=False, survivor=cells, met=met)

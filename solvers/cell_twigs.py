@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .bit_rows import BitSum
+from .bit_rows import BitSum, GrowingArray
 from .cell_problem import WholeRows
 from .cell_store import CellStore
 
@@ -41,31 +41,29 @@ class Twigs:
         dearest = int(prices[store.frontier].max(initial=0))
         self.floor = math.ceil(whole.least_cost(multipliers))
         self._least = self.floor - (n_poses - 1) * dearest
-        self._kept = prices >= self._least
-        self._rows = store.rows.copy()
+        self._kept = GrowingArray(prices >= self._least)
         self._trim()
         self._groups: list[NDArray[np.int64]] = []
-        self._halves = np.empty((0, 2), dtype=np.int64)
-        self._coarseness = np.empty(0, dtype=np.int64)
-        self._cost = np.empty(0, dtype=np.int64)
-        self._bits = np.empty((0, self._rows.shape[1]), dtype=np.uint64)
-        roots = np.arange(store.n_roots)
-        self.root = self._make([roots[self._kept[: store.n_roots]]])[0]
+        none = np.empty(0, dtype=np.int64)
+        self._halves = GrowingArray(np.empty((0, 2), dtype=np.int64))
+        self._coarseness, self._cost = GrowingArray(none), GrowingArray(none)
+        self._bits = GrowingArray(store.rows[:0])
+        self.root = self._make([self._remaining(np.arange(store.n_roots))])[0]
 
     @property
     def costs(self) -> NDArray[np.int64]:
         """lambda(S) of each twig."""
-        return self._cost
+        return self._cost.values
 
     @property
     def rows(self) -> NDArray[np.uint64]:
         """Bit row of each twig, over what remains of it."""
-        return self._bits
+        return self._bits.values
 
     @property
     def coarseness(self) -> NDArray[np.int64]:
         """Rank of each twig: split the smallest first."""
-        return self._coarseness
+        return self._coarseness.values
 
     def cell(self, twig: int) -> int:
         """Return the cell that a twig which can't be split consists of."""
@@ -77,23 +75,28 @@ class Twigs:
         A half is `VOID` where nothing remains of it; of a twig that can't be split the
         first half is the twig itself.
         """
-        new = np.unique(twigs[self._halves[twigs, 0] == _UNKNOWN])
+        halves = self._halves.values
+        new = np.unique(twigs[halves[twigs, 0] == _UNKNOWN])
         single = [int(t) for t in new if self._groups[t].size == 1]
         self._ask(np.array([self.cell(t) for t in single], dtype=np.int64))
         parts: list[NDArray[np.int64]] = []
         for twig in new:
             parts += self._parts(int(twig))
         made = np.array(self._make(parts), dtype=np.int64).reshape(-1, 2)
-        self._halves[new] = made
-        ends = [t for t in single if not self._store.is_split(self._groups[t])[0]]
-        self._halves[ends] = np.array([[t, VOID] for t in ends]).reshape(-1, 2)
-        return self._halves[twigs]
+        halves = self._halves.values
+        halves[new] = made
+        for twig in single:
+            if not self._store.is_split(self._groups[twig])[0]:
+                halves[twig] = twig, VOID
+        return halves[twigs]
+
+    def _remaining(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        return cells[self._kept.values[cells]]
 
     def _parts(self, twig: int) -> list[NDArray[np.int64]]:
         group = self._groups[twig]
         if group.size == 1:
-            group = self._store.children(int(group[0]))
-            group = group[self._kept[group]]
+            group = self._remaining(self._store.children(int(group[0])))
         middle = (group.size + 1) // 2
         return [group[:middle], group[middle:]]
 
@@ -104,15 +107,14 @@ class Twigs:
         self._groups += filled
         numbers = iter(range(first, first + len(filled)))
         if filled:
-            bits = np.stack([np.bitwise_or.reduce(self._rows[g]) for g in filled])
+            bits = np.stack([self._union(g) for g in filled])
             levels = self._store.levels
             # Deeper levels are finer, and among one level's groups the smaller ones.
             ranks = [(int(levels[g[0]]) << 32) - g.size for g in filled]
-            self._bits = np.concatenate([self._bits, bits])
-            self._cost = np.concatenate([self._cost, self._price(bits)])
-            self._coarseness = np.concatenate([self._coarseness, ranks])
-            unknown = np.full((len(filled), 2), _UNKNOWN)
-            self._halves = np.concatenate([self._halves, unknown])
+            self._bits.append(bits)
+            self._cost.append(self._price(bits))
+            self._coarseness.append(np.array(ranks))
+            self._halves.append(np.full((len(filled), 2), _UNKNOWN))
         return [next(numbers) if g.size else VOID for g in groups]
 
     def _ask(self, cells: NDArray[np.int64]) -> None:
@@ -120,14 +122,26 @@ class Twigs:
         new = self._store.split(cells)
         if new.size:
             prices = self._store.prices(new, self._multipliers)
-            self._kept = np.concatenate([self._kept, prices >= self._least])
-            self._rows = np.concatenate([self._rows, self._store.rows[new]])
+            self._kept.append(prices >= self._least)
+
+    def _union(self, group: NDArray[np.int64]) -> NDArray[np.uint64]:
+        """Return what a group's cells serve, as far as they remain."""
+        place = np.where(group < self._place.size, group, 0)
+        trimmed = np.where(group < self._place.size, self._place[place], _UNKNOWN)
+        rows = self._store.rows[group[trimmed < 0]]
+        whole = np.bitwise_or.reduce(rows, axis=0)
+        return whole | np.bitwise_or.reduce(
+            self._trimmed[trimmed[trimmed >= 0]], axis=0
+        )
 
     def _trim(self) -> None:
         """Reduce what is split to the union of its remaining parts, deepest first."""
-        split = np.flatnonzero(self._store.is_split(np.arange(self._store.size)))
+        store, kept = self._store, self._kept.values
+        split = np.flatnonzero(store.is_split(np.arange(store.size)))
+        self._place = np.full(store.size, _UNKNOWN)
+        self._place[split] = np.arange(split.size)
+        self._trimmed = np.zeros((split.size, store.rows.shape[1]), dtype=np.uint64)
         for cell in split[::-1]:
-            parts = self._store.children(int(cell))
-            parts = parts[self._kept[parts]]
-            self._kept[cell] = parts.size > 0
-            self._rows[cell] = np.bitwise_or.reduce(self._rows[parts])
+            parts = self._remaining(store.children(int(cell)))
+            kept[cell] = parts.size > 0
+            self._trimmed[self._place[cell]] = self._union(parts)

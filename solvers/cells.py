@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from .bit_rows import check_padding, exceeds, words_for
 
-# Bit rows of all cells together; 100,000 cells x 8,192 rows take 0.1 GB.
+# Bit rows of all cells together, 100,000 cells x 8,192 rows take 0.1 GB; a bound holds
+# at most three times this.
 MAX_BYTES = 2_000_000_000
 
 

@@ -13,6 +13,7 @@ from solvers.bit_rows import BitSum, pack_rows, unpack_rows
 from solvers.cell_bound import CellStatus, bound_count
 from solvers.cell_problem import CellProblem, whole_rows
 from solvers.cell_store import CellStore
+from solvers.cell_tuples import refute_tuples
 from solvers.cells import ArrayTree, CellBatch
 from solvers.status import WorkBudget
 
@@ -284,3 +285,24 @@ def test_multipliers_survive_being_stored():
 def test_chunks_cover_everything():
     found = [i for p in bit_rows.parts(10_001) for i in range(p.start, p.stop)]
     assert found == list(range(10_001))
+
+
+def test_a_full_store_makes_no_leaves(monkeypatch, cap_trees):
+    # What there is no room to split isn't handed back as if it couldn't be split.
+    tree = cap_trees.SphereTree(cap_trees.spread(300), np.deg2rad(80.0), 6)
+    whole = whole_rows(CellProblem(np.ones(300), 300.0))
+    monkeypatch.setattr(cell_store, "MAX_BYTES", 100 * 40)
+    store, none = CellStore(tree, WorkBudget(1e9)), np.zeros(300, dtype=np.int64)
+    found = refute_tuples(whole, store, 3, none, WorkBudget(1e12))
+    assert store.full
+    assert (found.refuted, found.survivor) == (False, None)
+    assert found.met > 0
+
+
+def test_a_price_that_meets_its_share_exactly_ends_the_search():
+    # Two leaves, two rows each, all four needed: the ratio is 2 exactly.
+    rows = np.kron(np.eye(2, dtype=bool), np.ones((1, 2), dtype=bool))
+    tree = ArrayTree(np.array([-1, -1]), pack_rows(rows), 4)
+    answer = bound_count(CellProblem(np.ones(4), 4.0), tree, 3, budget=1e15)
+    assert (answer.lower_bound, answer.by_multipliers) == (2, 2)
+    assert answer.survivor.tolist() == [0, 1]
