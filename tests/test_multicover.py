@@ -228,25 +228,25 @@ def test_tuples_equal_brute_force(share):
 
 def test_exchanges_only_raise_the_worth_and_find_small_covers():
     found = 0
-    for seed in range(24):
+    for seed in range(12):
         problem = random_cover(seed, n_s=10)
         cover = reduce_problem(problem)
         fewest = min(k for k, ones in met_by(problem).items() if ones)
         start = greedy(cover, NONE, plenty(), n_sets=fewest)
-        kicked = exchange(cover, start, plenty(), seed=0, max_kicks=60, heaviest=False)
+        kicked = exchange(cover, start, plenty(), seed=0, max_kicks=40, heaviest=False)
         assert kicked.size <= fewest
         assert worth_of(cover, kicked) >= worth_of(cover, start)
         found += cover.meets(kicked)
         if cover.meets(kicked):
             more = exchange(
-                cover, kicked, plenty(), seed=0, max_kicks=60, heaviest=True
+                cover, kicked, plenty(), seed=0, max_kicks=40, heaviest=True
             )
             assert cover.meets(more)
             assert cover.weight_of(more) >= cover.weight_of(kicked)
             best = heaviest_integer(cover, more, plenty(), n_sets=fewest)
             assert cover.weight_of(more) <= best.bound
             assert cover.weight_of(best.selected) == cover.weight_of(more)
-    assert found == 24
+    assert found == 12
 
 
 @pytest.mark.parametrize("n_sets", [None, 3])
@@ -279,7 +279,7 @@ def test_max_coverage_counts_rows_only_when_served_often_enough():
 def test_permuted_rows_and_columns_need_as_many():
     rng = np.random.default_rng(0)
     problem = random_cover(5, n_e=80, n_s=30, share=0.8)
-    best = solve_cover(problem)
+    best = solve_cover(problem, heaviest=False)
     assert best.status is SolveStatus.OPTIMAL
     for _ in range(2):
         rows, columns = rng.permutation(80), rng.permutation(30)
@@ -290,7 +290,7 @@ def test_permuted_rows_and_columns_need_as_many():
             needs=problem.needs[rows],
             row_sets=problem.row_sets[rows],
         )
-        solution = solve_cover(moved)
+        solution = solve_cover(moved, heaviest=False)
         assert solution.status is SolveStatus.OPTIMAL
         assert solution.cost == best.cost
 
@@ -301,7 +301,7 @@ def test_same_answer_with_one_and_two_threads():
         "from solvers import solve_cover\n"
         "for seed in (1, 4):\n"
         "    problem = random_cover(seed, n_e=150, n_s=40, share=0.8)\n"
-        "    s = solve_cover(problem, budget=3e8)\n"
+        "    s = solve_cover(problem, budget=1e8)\n"
         "    print(s.selected.tolist(), s.lower_bound, s.proof, s.covered_weight)\n"
     )
     answers = [
