@@ -3,9 +3,9 @@
 Few rows decide. The search (``row_weighting``) looks for one set less over a subset of
 the rows; a find that misses rows of the whole takes some of these in, one that misses
 none is a better cover. Where it finds nothing, what is left are critical rows: a small
-program whose rows and columns shrink again by dominance, and which branch and bound
-(``row_generation``) refutes, or answers, and so on. A bound over a subset of the rows
-holds for all of them.
+program that branch and bound refutes or answers, on pairs of rows (``row_branching``)
+or, where many sets are alike, by HiGHS (``row_generation``), and so on. A bound over a
+subset of the rows holds for all of them.
 """
 
 from dataclasses import dataclass
@@ -14,12 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .reductions import ReducedCover
+from .row_branching import branch_on_rows
 from .row_dominance import essential
 from .row_generation import integer_cover, linear_cover
 from .row_weighting import RowWeighting
 from .status import SolveStatus, WorkBudget
+from .symmetry import may_be_symmetric
 
 _LINEAR_PROOF = "linear relaxation by rows"
+_BRANCHING_PROOF = "branch and bound on pairs of rows"
 _INTEGER_PROOF = "branch and bound (HiGHS) over critical rows"
 # Missed rows that are taken in at a time.
 _BATCH = 5
@@ -101,14 +104,17 @@ class _Search:
 
     def run(self) -> None:
         """Search, bound, refute, and search on with what is left."""
-        linear = linear_cover(self.covers, self.budget.part(0.3 * self.budget.units))
+        whole = self.budget.units
+        linear = linear_cover(self.covers, self.budget.part(0.3 * whole))
         self._raise(linear.lower_bound, _LINEAR_PROOF)
         self._rows = linear.rows
-        whole = self.budget.units
         self._improve(_FIRST_STEPS, self.budget.part(0.2 * whole))
         self._improve(_STEPS, self.budget.part(0.2 * whole))
         proving = self.budget.part(self.budget.remaining - 0.1 * whole)
-        while not self.settled and self._refute(proving):
+        # Alike sets are what HiGHS knows how to handle, and pairs of rows don't.
+        alike = may_be_symmetric(self.covers)
+        refute = self._by_integers if alike else self._by_rows
+        while not self.settled and refute(proving):
             self._improve(_STEPS, proving)
         while not self.settled and not self.budget.exhausted:
             self._improve(4 * _STEPS, self.budget)
@@ -170,8 +176,17 @@ class _Search:
             if not self._take_in(selected):
                 self._offer(np.sort(selected))
 
-    def _refute(self, budget: WorkBudget) -> bool:
-        """Leave the critical rows to branch and bound; return whether to go on."""
+    def _by_rows(self, budget: WorkBudget) -> bool:
+        """Branch on pairs of rows; return whether a smaller cover came of it."""
+        answer = branch_on_rows(self.covers, self._rows, self.size, budget)
+        self._raise(answer.lower_bound, _BRANCHING_PROOF)
+        if answer.selected is None:
+            return False
+        self._offer(answer.selected)
+        return True
+
+    def _by_integers(self, budget: WorkBudget) -> bool:
+        """Leave the critical rows to HiGHS; return whether to go on."""
         part = self.covers[self._rows]
         rows, columns = essential(part, budget)
         known = _stand_ins(part[rows][:, self._known], part[np.ix_(rows, columns)])

@@ -6,8 +6,8 @@ give, evaluated here in numpy, for any y >= 0::
 
     count >= sum_e y_e + sum_j min(0, 1 - y a_j)
 
-The integer program looks for fewer sets than known that cover the subset. One thread and
-limits on iterations and nodes, so that the answer doesn't depend on the machine.
+The integer program looks for fewer sets than known that cover the subset. One thread,
+and limits on iterations and nodes, so that the answer doesn't depend on the machine.
 """
 
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
     """
     n_rows, n_sets = covers.shape
     rows = np.argsort(covers.sum(axis=1), kind="stable")[:_FIRST_ROWS]
-    solver = _program(covers[rows], budget)
+    solver = program(covers[rows], budget)
     primal, dual = np.zeros(n_sets), np.zeros(rows.size)
     best, taken = 0, np.zeros(n_rows, dtype=bool)
     taken[rows] = True
@@ -132,7 +132,7 @@ def integer_cover(
     import highspy
 
     n_sets = covers.shape[1]
-    solver = _program(covers, budget, integer=True)
+    solver = program(covers, budget, integer=True)
     start = highspy.HighsSolution()
     start.col_value = np.isin(np.arange(n_sets), known).astype(float).tolist()
     solver.setSolution(start)
@@ -158,7 +158,7 @@ def _seconds(budget: WorkBudget) -> float:
     return float(max(0.01, min(budget.time_left, 1e9)))
 
 
-def _program(
+def program(
     covers: NDArray[np.bool_], budget: WorkBudget, *, integer: bool = False
 ) -> Any:  # noqa: ANN401
     """Return a HiGHS instance that holds min sum x, A x >= 1, 0 <= x <= 1."""

@@ -1,0 +1,286 @@
+"""Full covers of equal costs against brute force, planted covers and known optima."""
+
+import gzip
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from solvers.full_cover import fewest_full
+from solvers.reductions import reduce_cover
+from solvers.row_dominance import essential, minimal
+from solvers.row_generation import integer_cover, least_count, linear_cover
+from solvers.row_weighting import RowWeighting
+from solvers.status import SolveStatus, WorkBudget
+
+SETCOVER = Path(__file__).resolve().parents[2] / "shared" / "data" / "setcover"
+PLENTY = 1e11
+
+
+def random_rows(seed, *, most_rows=18, most_sets=9):
+    rng = np.random.default_rng(seed)
+    n_e = int(rng.integers(1, most_rows + 1))
+    n_s = int(rng.integers(1, most_sets + 1))
+    covers = rng.random((n_e, n_s)) < rng.choice([0.15, 0.3, 0.5])
+    covers[np.arange(n_e), rng.integers(0, n_s, n_e)] = True
+    return covers
+
+
+def fewest_by_hand(covers):
+    n_s = covers.shape[1]
+    for k in range(n_s + 1):
+        for chosen in itertools.combinations(range(n_s), k):
+            if covers[:, chosen].any(axis=1).all():
+                return k
+    raise AssertionError("some row has no set")
+
+
+def reduced(covers):
+    n_e, n_s = covers.shape
+    return reduce_cover(
+        sparse.csr_array(covers), np.ones(n_e), np.ones(n_s), float(n_e)
+    )
+
+
+def solve(covers, budget=PLENTY, *, seed=0, lower=1, start=None):
+    cover = reduced(covers)
+    everything = np.arange(cover.n_sets) if start is None else start
+    answer = fewest_full(
+        cover, WorkBudget(budget), seed=seed, start=everything, lower=lower
+    )
+    assert covers[:, cover.kept[answer.selected]].any(axis=1).all()
+    assert np.all(np.diff(answer.selected) > 0)
+    return answer
+
+
+def triples_of_affine_space(dimension):
+    """Lines of the affine space over three elements: a Steiner triple system."""
+    points = np.array(list(itertools.product(range(3), repeat=dimension)))
+    lines = []
+    for i, j in itertools.combinations(range(len(points)), 2):
+        third = (-points[i] - points[j]) % 3
+        k = int(np.flatnonzero((points == third).all(axis=1))[0])
+        if j < k:
+            row = np.zeros(len(points), dtype=bool)
+            row[[i, j, k]] = True
+            lines.append(row)
+    return np.array(lines)
+
+
+def planted(seed, *, n_e, n_s, n_parts):
+    """Rows split among a few sets, hidden among smaller parts of unions of them."""
+    rng = np.random.default_rng(seed)
+    part = rng.permutation(np.arange(n_e) % n_parts)
+    decoys = rng.random((n_e, n_s - n_parts)) < 0.5 / n_parts
+    # One private row a part, which no decoy covers: no fewer sets can do.
+    for p in range(n_parts):
+        decoys[np.flatnonzero(part == p)[0]] = False
+    covers = np.concatenate([part[:, None] == np.arange(n_parts), decoys], axis=1)
+    return covers[:, rng.permutation(n_s)]
+
+
+@pytest.mark.parametrize("first", range(0, 300, 60))
+def test_equals_brute_force_and_bounds_hold_however_the_budget_cuts(first):
+    for seed in range(first, first + 60):
+        covers = random_rows(seed)
+        best = fewest_by_hand(covers)
+        for budget in (PLENTY, 3e6, 1e5, 0.0):
+            answer = solve(covers, budget, seed=seed)
+            assert answer.lower_bound <= best <= answer.selected.size, seed
+            if answer.status is SolveStatus.OPTIMAL or budget == PLENTY:
+                assert answer.status is SolveStatus.OPTIMAL, seed
+                assert answer.lower_bound == answer.selected.size == best, seed
+            else:
+                assert answer.status is SolveStatus.FEASIBLE
+                assert "work budget" in answer.proof
+
+
+@pytest.mark.parametrize(("dimension", "n_lines", "fewest"), [(2, 12, 5), (3, 117, 18)])
+def test_steiner_triples_have_the_known_covers(dimension, n_lines, fewest):
+    """A cover is what is left of a largest cap: 4 of 9 points, 9 of 27."""
+    covers = triples_of_affine_space(dimension)
+    assert covers.shape == (n_lines, 3**dimension)
+    answer = solve(covers)
+    assert answer.status is SolveStatus.OPTIMAL
+    assert answer.selected.size == answer.lower_bound == fewest
+    assert "branch and bound" in answer.proof
+
+
+def test_shared_stn27_is_proved():
+    path = SETCOVER / "stn27.gz"
+    if not path.exists():
+        pytest.skip(f"{path.name} is not beside the repository")
+    numbers = np.array(gzip.decompress(path.read_bytes()).split(), dtype=np.int64)
+    triples = numbers[2:].reshape(-1, 3) - 1
+    covers = np.zeros((len(triples), numbers[0]), dtype=bool)
+    np.put_along_axis(covers, triples, values=True, axis=1)
+    answer = solve(covers)
+    assert (answer.selected.size, answer.lower_bound) == (18, 18.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_planted_covers_are_found_and_proved(seed):
+    covers = planted(seed, n_e=300, n_s=80, n_parts=9)
+    answer = solve(covers, seed=seed)
+    assert answer.status is SolveStatus.OPTIMAL
+    assert answer.selected.size == 9
+
+
+def test_search_alone_finds_what_greedy_does_not():
+    """Greedy takes the set of four; rows that stay open outweigh it."""
+    covers = np.zeros((6, 3), dtype=bool)
+    for s, members in enumerate([[0, 1, 3, 4], [0, 1, 2], [3, 4, 5]]):
+        covers[members, s] = True
+    search = RowWeighting(covers, np.array([0, 1]), seed=0)
+    assert search.open_rows.tolist() == [5]
+    assert search.search(100, WorkBudget(PLENTY))
+    assert sorted(search.chosen.tolist()) == [1, 2]
+    assert search.open_rows.size == 0
+
+
+def test_search_keeps_its_book():
+    for seed in range(20):
+        covers = random_rows(seed, most_rows=40, most_sets=25)
+        rng = np.random.default_rng(seed)
+        size = int(rng.integers(1, covers.shape[1] + 1))
+        chosen = np.sort(rng.permutation(covers.shape[1])[:size])
+        search = RowWeighting(covers, chosen, seed=seed)
+        for _ in range(12):
+            found = search.search(1, WorkBudget(PLENTY))
+            picked = covers[:, search.chosen]
+            counts = picked.sum(axis=1)
+            assert found == (counts > 0).all()
+            assert search.open_rows.tolist() == np.flatnonzero(counts == 0).tolist()
+            alone = (counts == 1) * search.weights
+            assert search.losses().tolist() == (alone @ picked).tolist()
+            assert np.unique(search.chosen).size == size
+        if size > 1:
+            worst = search.losses().min()
+            total = search.weights[picked.any(axis=1)].sum()
+            search.drop()
+            left = search.weights[covers[:, search.chosen].any(axis=1)].sum()
+            assert total - left == worst
+
+
+def test_only_rows_that_stay_open_grow_heavier():
+    """Five of ten disjoint rows can be covered: each step leaves five open."""
+    search = RowWeighting(np.eye(10, dtype=bool), np.arange(5), seed=1)
+    assert not search.search(200, WorkBudget(PLENTY))
+    assert search.weights.sum() == 10 + 200 * 5
+    assert search.weights.max() < 2 * search.weights.min()
+    none = RowWeighting(np.eye(3, dtype=bool), np.arange(1), seed=0)
+    assert not none.search(200, WorkBudget(0.0))
+    assert none.weights.sum() == 3
+
+
+def test_dominance_keeps_the_optimum():
+    smaller = 0
+    for seed in range(150):
+        covers = random_rows(seed)
+        rows, columns = essential(covers, WorkBudget(PLENTY))
+        left = covers[np.ix_(rows, columns)]
+        assert fewest_by_hand(left) == fewest_by_hand(covers), seed
+        partly = essential(covers, WorkBudget(6e4))
+        assert fewest_by_hand(covers[np.ix_(*partly)]) == fewest_by_hand(covers)
+        smaller += left.size < covers.size
+        # Whatever covers the rows left covers all.
+        for chosen in itertools.combinations(columns, min(3, columns.size)):
+            whole = covers[:, list(chosen)].any(axis=1).all()
+            assert whole == covers[np.ix_(rows, chosen)].any(axis=1).all()
+    assert smaller > 100
+
+
+def test_minimal_sets_are_those_that_include_no_other():
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        sets = rng.random((30, int(rng.choice([3, 8, 130])))) < 0.4
+        includes = ~np.any(sets[None, :, :] & ~sets[:, None, :], axis=2)
+        equal = includes & includes.T
+        earlier = np.tril(np.ones((30, 30), dtype=bool), -1)
+        goes = (includes & ~equal) | (equal & earlier)
+        kept = np.flatnonzero(~goes.any(axis=1))
+        assert minimal(sets, WorkBudget(PLENTY)).tolist() == kept.tolist()
+
+
+def test_counts_by_any_multipliers_are_bounds():
+    for seed in range(60):
+        covers = random_rows(seed)
+        best = fewest_by_hand(covers)
+        rng = np.random.default_rng(seed)
+        for scale in (0.1, 0.5, 1.0, 3.0):
+            given = scale * rng.normal(size=len(covers))
+            assert least_count(covers, given) <= best
+        assert least_count(covers, np.full(len(covers), np.nan)) == 0
+    assert least_count(np.eye(4, dtype=bool), np.ones(4)) == 4
+
+
+def test_linear_bound_by_rows_is_that_of_all_rows():
+    """The lines of a plane of order three: each point shares 1/4 of each line."""
+    n = 600
+    around = np.arange(n)
+    covers = (around[:, None] - around) % n < 7
+    linear = linear_cover(covers, WorkBudget(PLENTY))
+    assert linear.lower_bound == 86 == int(np.ceil(n / 7))
+    assert linear.primal.sum() == pytest.approx(n / 7)
+    assert np.all(covers @ linear.primal > 1 - 1e-5)
+
+
+def test_branch_and_bound_refutes_or_finds_less():
+    for seed in range(25):
+        covers = random_rows(seed, most_rows=30)
+        best = fewest_by_hand(covers)
+        everything = np.arange(covers.shape[1])
+        found = integer_cover(covers, everything, WorkBudget(PLENTY))
+        assert found.lower_bound <= best
+        if best < everything.size:
+            assert found.selected is not None
+            assert covers[:, found.selected].any(axis=1).all()
+            assert best <= found.selected.size < everything.size
+        known = next(
+            np.array(chosen)
+            for chosen in itertools.combinations(everything, best)
+            if covers[:, chosen].any(axis=1).all()
+        )
+        settled = integer_cover(covers, known, WorkBudget(PLENTY))
+        assert settled.selected is None
+        assert settled.lower_bound == best
+
+
+def test_same_answer_twice_and_as_many_when_permuted():
+    rng = np.random.default_rng(5)
+    covers = rng.random((250, 60)) < 0.12
+    covers[np.arange(250), rng.integers(0, 60, 250)] = True
+    once, again = (solve(covers, 3e9, seed=3) for _ in range(2))
+    assert once.selected.tolist() == again.selected.tolist()
+    assert (once.lower_bound, once.proof) == (again.lower_bound, again.proof)
+    assert once.status is SolveStatus.OPTIMAL
+    for _ in range(2):
+        rows, columns = rng.permutation(250), rng.permutation(60)
+        moved = solve(covers[rows][:, columns], 3e9, seed=3)
+        assert moved.status is SolveStatus.OPTIMAL
+        assert moved.selected.size == once.selected.size
+
+
+def test_what_is_known_is_kept():
+    covers = np.eye(4, dtype=bool)
+    answer = solve(covers, 0.0, lower=4)
+    assert answer.status is SolveStatus.OPTIMAL
+    assert answer.lower_bound == 4.0
+    cover = reduced(covers)
+    with pytest.raises(ValueError, match="start of 3 sets must cover every row"):
+        fewest_full(cover, WorkBudget(1e9), seed=0, start=np.arange(3), lower=1)
+
+
+def test_clock_cuts_and_says_so():
+    rng = np.random.default_rng(7)
+    covers = rng.random((200, 80)) < 0.06
+    covers[np.arange(200), rng.integers(0, 80, 200)] = True
+    cover = reduced(covers)
+    work = WorkBudget(PLENTY, time_limit=0.0)
+    start = np.arange(cover.n_sets)
+    answer = fewest_full(cover, work, seed=0, start=start, lower=1)
+    assert answer.status is SolveStatus.FEASIBLE
+    assert "time limit" in answer.proof
+    assert answer.lower_bound <= solve(covers, 1e10).selected.size
