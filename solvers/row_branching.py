@@ -6,7 +6,8 @@ of S goes. Where many sets are nearly alike, both sides raise the bound, whereas
 or leaving a single set leaves its twins. What is left is a full cover again.
 
 Rows of the whole that a node's relaxation misses by much are taken in as they are met:
-any subset of the rows bounds the whole. Every node is bounded by multipliers evaluated here, whatever the linear program says::
+any subset of the rows bounds the whole. Every node is bounded by multipliers evaluated
+here, whatever the linear program says::
 
     count >= sum_e y_e + sum_j min(0, 1 - y a_j)
 

@@ -75,9 +75,9 @@ class RowWeighting:
     def losses(self) -> NDArray[np.float64]:
         """Return the weight that each selected set covers alone, shape (k,)."""
         alone = (self._counts == 1).nonzero()[0]
-        return np.bincount(
-            self._owners[alone], self.weights[alone], minlength=self.chosen.size
-        )
+        owners, n_chosen = self._owners[alone], self.chosen.size
+        sums = np.bincount(owners, self.weights[alone], minlength=n_chosen)
+        return sums.astype(np.float64, copy=False)
 
     def drop(self) -> None:
         """Give up the set of least loss."""

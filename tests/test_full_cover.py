@@ -10,10 +10,12 @@ from scipy import sparse
 
 from solvers.full_cover import fewest_full
 from solvers.reductions import reduce_cover
+from solvers.row_branching import _Tree, branch_on_rows
 from solvers.row_dominance import essential, minimal
 from solvers.row_generation import integer_cover, least_count, linear_cover
 from solvers.row_weighting import RowWeighting
 from solvers.status import SolveStatus, WorkBudget
+from solvers.symmetry import column_colours, may_be_symmetric
 
 SETCOVER = Path(__file__).resolve().parents[2] / "shared" / "data" / "setcover"
 PLENTY = 1e11
@@ -248,16 +250,68 @@ def test_branch_and_bound_refutes_or_finds_less():
         assert settled.lower_bound == best
 
 
+def test_branching_on_pairs_of_rows_refutes_or_finds_less():
+    branched = 0
+    for seed in range(120):
+        covers = random_rows(seed, most_rows=40, most_sets=11)
+        best = fewest_by_hand(covers)
+        for first in (np.arange(len(covers)), np.array([0])):
+            tree = _Tree(covers, first, best, WorkBudget(PLENTY))
+            refuted = tree.run()
+            assert refuted.selected is None
+            assert refuted.lower_bound == best, seed
+            branched += tree.made > 2
+        found = branch_on_rows(covers, first, best + 1, WorkBudget(PLENTY))
+        assert found.selected is not None
+        assert found.selected.size == best
+        assert covers[:, found.selected].any(axis=1).all()
+        for budget in (0.0, 3e6, 1e7):
+            cut = branch_on_rows(covers, first, best, WorkBudget(budget))
+            assert cut.lower_bound <= best, seed
+    assert branched > 20
+
+
+def test_branching_settles_an_odd_hole():
+    """An odd ring of n rows, two a set: one more than half, where LP says half."""
+    for n in (3, 5, 9, 15):
+        ring = np.eye(n, dtype=bool) | np.eye(n, k=1, dtype=bool)
+        ring[-1, 0] = True
+        assert linear_cover(ring, WorkBudget(PLENTY)).primal.sum() == n / 2
+        refuted = branch_on_rows(ring, np.arange(n), n // 2 + 1, WorkBudget(PLENTY))
+        assert refuted.lower_bound == n // 2 + 1
+        assert refuted.selected is None
+
+
+def test_colours_tell_apart_what_no_symmetry_exchanges():
+    lines = triples_of_affine_space(2)
+    assert np.unique(column_colours(lines)).size == 1
+    assert may_be_symmetric(lines)
+    # A path of four: ends and middles.
+    path = np.array([[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1]], dtype=bool)
+    colours = column_colours(path)
+    assert colours[0] == colours[3] != colours[1] == colours[2]
+    rng = np.random.default_rng(0)
+    chance = rng.random((60, 30)) < 0.3
+    assert np.unique(column_colours(chance)).size == 30
+    assert not may_be_symmetric(chance)
+    order = rng.permutation(9)
+    marked = np.concatenate([lines, np.eye(9, dtype=bool)[:1]])
+    shape = np.bincount(column_colours(marked)).tolist()
+    assert sorted(shape) == [1, 8]
+    moved = np.bincount(column_colours(marked[:, order])).tolist()
+    assert sorted(moved) == sorted(shape)
+
+
 def test_same_answer_twice_and_as_many_when_permuted():
     rng = np.random.default_rng(5)
-    covers = rng.random((250, 60)) < 0.12
-    covers[np.arange(250), rng.integers(0, 60, 250)] = True
+    covers = rng.random((120, 40)) < 0.15
+    covers[np.arange(120), rng.integers(0, 40, 120)] = True
     once, again = (solve(covers, 3e9, seed=3) for _ in range(2))
     assert once.selected.tolist() == again.selected.tolist()
     assert (once.lower_bound, once.proof) == (again.lower_bound, again.proof)
     assert once.status is SolveStatus.OPTIMAL
     for _ in range(2):
-        rows, columns = rng.permutation(250), rng.permutation(60)
+        rows, columns = rng.permutation(120), rng.permutation(40)
         moved = solve(covers[rows][:, columns], 3e9, seed=3)
         assert moved.status is SolveStatus.OPTIMAL
         assert moved.selected.size == once.selected.size
@@ -283,4 +337,4 @@ def test_clock_cuts_and_says_so():
     answer = fewest_full(cover, work, seed=0, start=start, lower=1)
     assert answer.status is SolveStatus.FEASIBLE
     assert "time limit" in answer.proof
-    assert answer.lower_bound <= solve(covers, 1e10).selected.size
+    assert answer.lower_bound <= solve(covers, 1e8).selected.size
