@@ -27,6 +27,8 @@ MAX_ONES = 40_000_000
 # Beyond this a need can't be told from a mistake, and labels would fill the memory.
 _MAX_NEED = 1_000
 _MAX_ROW_SETS = 10_000
+# Sums of costs within this and its inverse neither vanish nor overflow.
+_LEAST_COST = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,7 @@ class CoverProblem:
             and 1, shape (n_e, n_s); kept as CSR.
         weights: Weight of each element, at least 0, typically an area in [m²];
             default ones.
-        costs: Cost of each set, positive; default ones.
+        costs: Cost of each set, positive, from 1e-100 to 1e100; default ones.
         min_coverage: Fraction of the weight of each row set to cover, in (0, 1], one
             number or one for each row set; ignored if ``required_weight`` is given.
         required_weight: Weight W_g to cover in each row set, in the unit of the
@@ -70,12 +72,14 @@ class CoverProblem:
         if not np.all((weights >= 0.0) & np.isfinite(weights)):
             raise ValueError("weights must be finite and at least 0")
         costs = _vector("costs", self.costs, n_s)
-        if not np.all((costs > 0.0) & np.isfinite(costs)):
-            raise ValueError("costs must be finite and positive")
-        for name, values in (("weights", weights), ("costs", costs)):
-            with np.errstate(over="ignore"):
-                if not np.isfinite(values.sum()):
-                    raise ValueError(f"{name} must have a finite sum")
+        if not np.all((costs >= _LEAST_COST) & (costs <= 1.0 / _LEAST_COST)):
+            raise ValueError(
+                "costs must be finite and positive, from "
+                f"{_LEAST_COST:g} to {1.0 / _LEAST_COST:g}"
+            )
+        with np.errstate(over="ignore"):
+            if not np.isfinite(weights.sum()):
+                raise ValueError("weights must have a finite sum")
         row_sets = _row_sets(self.row_sets, n_e)
         totals = _sums(weights, row_sets)
         values = {

@@ -23,6 +23,8 @@ from .status import WorkBudget
 
 _LOOK_BACK = 30
 _MEMORY = 0.9
+# Squared; below it nothing is lacking.
+_LEAST_LACK = 1e-18
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +56,14 @@ def ascend(
         start: Multipliers to start from, at least 0, shape (n_e,).
         budget: Work; two matrix products a step.
         target: Value beyond which the bound need not go.
-        n_sets: K, to refute that many sets; default the cost is bounded.
+        n_sets: K, to refute that many sets; the multipliers keep their sum of
+            r_i lambda_i. Default the cost is bounded.
         max_steps: Steps at most.
     """
     best = np.maximum(start, 0.0)
+    if n_sets is not None and not np.any(best > 0):
+        best = cover.weights / cover.needs
+    size = float(cover.needs @ best)
     value, rows, sets = _evaluate(cover, best, n_sets)
     mean_rows, mean_sets = rows.copy(), sets.copy()
     step, stale, mark = 1.0, 0, value
@@ -68,11 +74,15 @@ def ascend(
         lack = cover.needs * mean_rows - cover.by_row @ mean_sets
         moving = (lack > 0) | (best > 0)
         length = float(np.sum(lack[moving] ** 2))
-        if not length > 0:
+        if not length > _LEAST_LACK:
             break
         scale = max(float(cover.needs @ best), 1e-300)
         ambition = max(target - value, 1e-3 * scale)
         trial = np.maximum(best + step * ambition / length * lack, 0.0)
+        if n_sets is not None:
+            # Else the way to a value of 0 would be to make all prices 0.
+            left = float(cover.needs @ trial)
+            trial = trial * (size / left) if left > 1e-100 * size else best
         reached, rows, sets = _evaluate(cover, trial, n_sets)
         budget.spend(3.0 * cover.entries + 40.0 * best.size + 3e4)
         mean_rows = _MEMORY * mean_rows + (1.0 - _MEMORY) * rows

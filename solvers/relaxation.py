@@ -60,7 +60,7 @@ def count_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> int:
         cover: The cover.
         multipliers: Any numbers, shape (n_e,); negative ones count as 0.
     """
-    given = _usable(multipliers)
+    given, _ = _usable(multipliers)
     paid = np.concatenate([[0.0], np.cumsum(np.sort(cover.by_set @ given)[::-1])])
     slack = rounding(given.size)
     enough = paid * (1.0 + slack) >= least_service(cover, given) * (1.0 - slack)
@@ -80,13 +80,14 @@ def cost_bound(
         multipliers: Any numbers, shape (n_e,), in cost; negative ones count as 0.
         max_sets: Sets allowed.
     """
-    given = _usable(multipliers)
+    given, unit = _usable(multipliers)
     prices = cover.by_set @ given
     asked = least_service(cover, given)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        fit = float(np.min(np.where(prices > 0, cover.costs / prices, np.inf)))
+    fit = float(
+        np.min((cover.costs / np.maximum(prices, 1e-200))[prices > 0], initial=np.inf)
+    )
     best = 0.0
-    for scale in (1.0, fit if np.isfinite(fit) else 0.0):
+    for scale in (unit, fit if np.isfinite(fit) else 0.0):
         gains = np.sort(np.minimum(cover.costs - scale * prices, 0.0))[:max_sets]
         # Both sums may be off by a share of their own size.
         error = rounding(given.size + prices.size) * (scale * asked - gains.sum())
@@ -125,9 +126,14 @@ def cheapest_rows(
     return rows, float(prices @ rows)
 
 
-def _usable(multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return multipliers of at least 0 whose sums don't overflow."""
-    return np.clip(np.nan_to_num(multipliers), 0.0, 1e200)
+def _usable(multipliers: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Return multipliers from 0 to 1, and what to multiply them by to have those given.
+
+    Near the least and the largest numbers there are, sums would lose their digits.
+    """
+    given = np.clip(np.nan_to_num(multipliers), 0.0, 1e200)
+    _, exponent = np.frexp(given.max(initial=0.0))
+    return np.ldexp(given, -exponent), float(np.ldexp(1.0, exponent))
 
 
 @dataclass(frozen=True, eq=False)

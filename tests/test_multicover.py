@@ -173,7 +173,7 @@ def test_costs_under_a_limit_on_the_number():
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 2**16),
-    scale=st.sampled_from([0.0, 1e-30, 0.3, 1.0, 50.0, 1e250, np.inf, np.nan]),
+    scale=st.sampled_from([0.0, 5e-324, 1e-309, 1e-30, 0.3, 1.0, 50.0, 1e250, np.inf, np.nan]),
 )
 def test_bounds_hold_for_any_multipliers(seed, scale):
     rng = np.random.default_rng(seed)
@@ -342,7 +342,8 @@ def test_same_answer_with_one_and_two_threads():
             {"min_coverage": [0.5, 0.5, 0.5], "row_sets": [0, 1, 1]},
             r"min_coverage must be one number or \(2,\)",
         ),
-        ({"costs": [1e308, 1e308]}, "costs must have a finite sum"),
+        ({"costs": [1.0, 1e101]}, "costs must be finite and positive"),
+        ({"costs": [1.0, 1e-101]}, "costs must be finite and positive"),
     ],
 )
 def test_bad_numbers_are_refused(arguments, message):
