@@ -358,3 +358,28 @@ def test_an_unknown_set_is_refused():
     assert problem.covered_weight([1, 1]) == 3.0
     twice = CoverProblem(np.ones((3, 2), dtype=bool), needs=2)
     assert twice.covered_weight([1, 1]) == 0.0
+
+
+def test_another_highs_with_more_threads_costs_no_bound():
+    """Its scheduler belongs to the process and refuses another number of threads."""
+    code = (
+        "import highspy\n"
+        "other = highspy.Highs()\n"
+        "other.setOptionValue('output_flag', False)\n"
+        "other.setOptionValue('threads', 2)\n"
+        "other.setOptionValue('parallel', 'on')\n"
+        "other.minimize(other.addBinary())\n"
+        "from tests.test_multicover import random_cover\n"
+        "import numpy as np\n"
+        "from solvers import solve_cover\n"
+        "costs = np.random.default_rng(0).uniform(1, 2, 12)\n"
+        "print(solve_cover(random_cover(2, costs=costs)).proof)\n"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).resolve().parents[1],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert answer.stdout == "branch and bound (HiGHS)\n"
