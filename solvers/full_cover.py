@@ -31,6 +31,12 @@ _FIRST_STEPS = 2_000
 _STEPS = 20_000
 
 
+# Reduced costs are asked again while they leave less than this share of the sets.
+_ROUNDS = 4
+_FEWER = 0.9
+_ROUNDING = 1e-6
+
+
 @dataclass(frozen=True, eq=False)
 class FullAnswer:
     """Fewest sets that cover every row; indices of the reduced cover given."""
@@ -109,13 +115,14 @@ class _Search:
         self._raise(linear.lower_bound, _LINEAR_PROOF)
         self._rows = linear.rows
         self._improve(_FIRST_STEPS, self.budget.part(0.2 * whole))
-        self._improve(_STEPS, self.budget.part(0.2 * whole))
-        proving = self.budget.part(self.budget.remaining - 0.1 * whole)
         # Alike sets are what HiGHS knows how to handle, and pairs of rows don't.
         alike = may_be_symmetric(self.covers)
         refute = self._by_integers if alike else self._by_rows
-        while not self.settled and refute(proving):
-            self._improve(_STEPS, proving)
+        for steps, share in ((_FIRST_STEPS, 0.1), (_STEPS, 0.9)):
+            proving = self.budget.part(share * self.budget.remaining)
+            while not self.settled and refute(proving):
+                self._improve(steps, proving)
+            self._improve(_STEPS, self.budget.part(0.2 * whole))
         while not self.settled and not self.budget.exhausted:
             self._improve(4 * _STEPS, self.budget)
 
@@ -177,13 +184,27 @@ class _Search:
                 self._offer(np.sort(selected))
 
     def _by_rows(self, budget: WorkBudget) -> bool:
-        """Branch on pairs of rows; return whether a smaller cover came of it."""
-        answer = branch_on_rows(self.covers, self._rows, self.size, budget)
+        """Refute covers of as many sets as the bound; return whether to go on."""
+        size = self.lower + 1
+        part, columns = self.covers, np.arange(self.covers.shape[1])
+        for _ in range(_ROUNDS):
+            linear = linear_cover(part, budget)
+            kept = linear.needed + linear.reduced < self.lower + _ROUNDING
+            left = part[:, kept]
+            if linear.lower_bound >= size or not left.any(axis=1).all():
+                self._raise(size, _BRANCHING_PROOF)
+                return True
+            if np.count_nonzero(kept) > _FEWER * kept.size:
+                break
+            # Without the dear sets more rows include others.
+            rows, fewer = essential(left, budget.part(0.2 * budget.remaining))
+            part, columns = left[np.ix_(rows, fewer)], columns[kept][fewer]
+        linear = linear_cover(part, budget)
+        answer = branch_on_rows(part, linear.rows, size, budget)
         self._raise(answer.lower_bound, _BRANCHING_PROOF)
-        if answer.selected is None:
-            return False
-        self._offer(answer.selected)
-        return True
+        if answer.selected is not None:
+            self._offer(columns[answer.selected])
+        return answer.lower_bound >= size or answer.selected is not None
 
     def _by_integers(self, budget: WorkBudget) -> bool:
         """Leave the critical rows to HiGHS; return whether to go on."""

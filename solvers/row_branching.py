@@ -33,11 +33,13 @@ from .status import WorkBudget
 _ROUNDING = 1e-7
 _INTEGRAL = 1e-6
 # Pairs whose two sides are bounded before one is branched on.
-_TRIED = 6
+_TRIED = 3
 # Rows missed by more than a share are taken in, so many at a time.
 _MISSED = 0.25
 _BATCH = 5
 _PAIRS = 400
+# A node's program may stop this far above what refutes it.
+_BEYOND = 0.02
 _UNITS_PER_ITERATION = 4.0
 _CALL_UNITS = 2e6
 
@@ -84,7 +86,7 @@ class _Tree:
         self.cut = size - 1 + _ROUNDING
         self.size = size
         self.budget = budget
-        self.linear = _Linear(covers[rows], budget)
+        self.linear = _Linear(covers[rows], self.cut + _BEYOND, budget)
         self.nodes: list[tuple[int, int, int, _Node]] = []
         self.made = 0
 
@@ -201,13 +203,16 @@ class _Linear:
         rows: Rows of the cover that are in every node's program, shape (m, n_s).
     """
 
-    def __init__(self, rows: NDArray[np.bool_], budget: WorkBudget) -> None:
+    def __init__(
+        self, rows: NDArray[np.bool_], enough: float, budget: WorkBudget
+    ) -> None:
         import highspy
 
         self.rows = rows
         self.budget = budget
         self._solver = program(rows, budget)
         self._solver.setOptionValue("presolve", "off")
+        self._solver.setOptionValue("objective_bound", enough)
         self._added: tuple[NDArray[np.bool_], ...] = ()
         self._allowed = np.ones(rows.shape[1], dtype=bool)
         self._basic = highspy.HighsBasisStatus.kBasic

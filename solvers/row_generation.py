@@ -36,11 +36,15 @@ class LinearCover:
 
     Attributes:
         lower_bound: Sets that any cover needs at least, by the multipliers.
+        needed: The same before it was rounded up.
+        reduced: Sets that a cover with set j needs beyond these, shape (n_s,).
         rows: Rows that the solution meets without slack, increasing.
         primal: Share of each set, shape (n_s,).
     """
 
     lower_bound: int
+    needed: float
+    reduced: NDArray[np.float64]
     rows: NDArray[np.int64]
     primal: NDArray[np.float64]
 
@@ -66,10 +70,21 @@ def least_count(covers: NDArray[np.bool_], multipliers: NDArray[np.float64]) -> 
         covers: Whether set s covers row e, shape (n_e, n_s).
         multipliers: Any numbers, shape (n_e,); negative ones count as 0.
     """
+    return _rounded_up(_priced(covers, multipliers)[0])
+
+
+def _priced(
+    covers: NDArray[np.bool_], multipliers: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64]]:
+    """Return the bound by multipliers, not rounded up, and the reduced costs."""
     given = np.clip(np.nan_to_num(multipliers), 0.0, 1.0)
     reduced = 1.0 - given @ covers.astype(np.float64)
     bound = float(given.sum() + np.minimum(reduced, 0.0).sum())
-    return max(0, int(np.ceil(bound * (1.0 - 1e-9) - _ROUNDING)))
+    return bound * (1.0 - 1e-9), reduced
+
+
+def _rounded_up(bound: float) -> int:
+    return max(0, int(np.ceil(bound - _ROUNDING)))
 
 
 def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
@@ -83,7 +98,8 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
     rows = np.argsort(covers.sum(axis=1), kind="stable")[:_FIRST_ROWS]
     solver = program(covers[rows], budget)
     primal, dual = np.zeros(n_sets), np.zeros(rows.size)
-    best, taken = 0, np.zeros(n_rows, dtype=bool)
+    taken = np.zeros(n_rows, dtype=bool)
+    needed, reduced = 0.0, np.ones(n_sets)
     taken[rows] = True
     tight = np.sort(rows)
     while not budget.exhausted:
@@ -99,7 +115,9 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
         primal = np.asarray(solution.col_value, dtype=np.float64)
         if dual.size != rows.size or primal.size != n_sets:
             break
-        best = max(best, least_count(covers[rows], dual))
+        bound, costs = _priced(covers[rows], dual)
+        if bound > needed:
+            needed, reduced = bound, costs
         support = np.flatnonzero(primal > 0)
         reached = covers[:, support] @ primal[support]
         tight = np.sort(rows[reached[rows] < 1.0 + _VIOLATED])
@@ -112,7 +130,7 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
             solver.addRow(1.0, np.inf, sets.size, sets, np.ones(sets.size))
         rows = np.concatenate([rows, missed])
         taken[missed] = True
-    return LinearCover(best, tight, primal)
+    return LinearCover(_rounded_up(needed), needed, reduced, tight, primal)
 
 
 def integer_cover(
