@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .answers import INTEGER_PROOF, NONE, CountAnswer, WeightAnswer, better, cut_short
 from .exact_cover import TupleSearch, best_tuple
+from .full_cover import fewest_full
 from .mixed_integer import fits, solve_integer
 from .neighbourhood import greedy, most_coverage, prune
 from .reductions import ReducedCover
@@ -21,6 +22,8 @@ _LARGE_COUNT = 8
 # Moves before a bound is asked whether more are worth it, and after.
 _FIRST_MOVES = 60
 _MOVES = 1_000
+# Work after which the first bounds are asked whether more search is worth it.
+_FIRST_UNITS = 4e8
 
 
 def fewest_sets(
@@ -47,7 +50,15 @@ def fewest_sets(
     sized = count_bound(cover, multipliers)
     if sized > lower:
         lower, proof = sized, "sum of the largest sets"
-    selected = _improve(cover, selected, lower, budget.part(0.02 * budget.units), seed)
+    asked = {"seed": seed, "cap": cap, "heaviest": heaviest}
+    if cover.full:
+        full = fewest_full(cover, budget, seed=seed, start=selected, lower=lower)
+        better_proof = full.proof if full.lower_bound > lower else proof
+        return _closed(
+            cover, full.selected, int(full.lower_bound), better_proof, budget, **asked
+        )
+    first = min(0.02 * budget.units, _FIRST_UNITS)
+    selected = _improve(cover, selected, lower, budget.part(first), seed)
 
     lagrangian = budget.part(0.25 * budget.units)
     while lower < min(selected.size, cap + 1):
@@ -65,24 +76,42 @@ def fewest_sets(
     methods = [_by_tuples, _by_integers]
     for method in methods if lower < _LARGE_COUNT else methods[::-1]:
         if lower < min(selected.size, cap + 1):
+            part = budget.part(0.8 * budget.remaining)
             selected, proved, how = method(
-                cover, selected, lower, cap, multipliers, budget
+                cover, selected, lower, cap, multipliers, part
             )
             lower, proof = (proved, how) if proved > lower else (lower, proof)
+    while lower < selected.size and not budget.exhausted:
+        seed += 1
+        selected = _improve(cover, selected, lower, budget, seed)
+    return _closed(cover, selected, lower, proof, budget, **asked)
+
+
+def _closed(
+    cover: ReducedCover,
+    selected: NDArray[np.int64],
+    lower: int,
+    proof: str,
+    budget: WorkBudget,
+    *,
+    seed: int,
+    cap: int,
+    heaviest: bool,
+) -> CountAnswer:
+    """Return the answer, of most weight where that is asked for."""
     if selected.size > cap:
         status = SolveStatus.INFEASIBLE if lower > cap else SolveStatus.UNKNOWN
         settled, start = lower > cap, NONE
     else:
         settled, start = lower >= selected.size, selected
         status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-    if heaviest or selected.size > cap:
+    if selected.size > cap or (heaviest and not cover.full):
         # Its own allowance, so that a hard proof doesn't cost the larger area.
         spare = budget.part(np.inf)
         spare.units = 0.3 * budget.units
         size = min(selected.size, cap)
         selected = most_weight(cover, size, spare, seed=seed, start=start).selected
-    if not settled:
-        proof = cut_short(proof, budget)
+    proof = proof if settled else cut_short(proof, budget)
     return CountAnswer(status, selected, float(lower), proof)
 
 

@@ -23,6 +23,8 @@ from .status import WorkBudget
 _BLOCK = 2**18
 # What a change costs however few rows it touches.
 _CALL_UNITS = 3e4
+# What a multiply-add of a product of matrices costs.
+_PRODUCT_UNIT = 0.3
 # Owner of rows that no chosen set covers.
 _NOBODY = -1
 
@@ -113,12 +115,20 @@ class Swaps:
     ) -> NDArray[np.float64]:
         """Return w(rows of owner o that set j covers), shape (n_owners, n_s)."""
         n_sets = self._cover.n_sets
-        mine = np.array(owners, dtype=np.int64)[:, None] + 1 == self._owners[rows]
-        factors = mine * self._cover.weights[rows]
-        self._budget.spend(float(rows.size * n_sets) + factors.size + _CALL_UNITS)
+        place = np.zeros(n_sets + 1, dtype=np.int64)
+        place[np.array(owners, dtype=np.int64) + 1] = np.arange(len(owners))
+        owner = place[self._owners[rows]]
+        # Sorted by owner, so that a block of rows has few of them.
+        order = np.argsort(owner, kind="stable")
+        rows, owner = rows[order], owner[order]
         total = np.zeros((len(owners), n_sets))
         step = max(1, _BLOCK // max(1, n_sets))
         for start in range(0, rows.size, step):
             part = slice(start, start + step)
-            total += factors[:, part] @ self._serves[rows[part]].astype(np.float64)
+            few = np.arange(owner[part][0], owner[part][-1] + 1)
+            factors = (few[:, None] == owner[part]) * self._cover.weights[rows[part]]
+            serves = self._serves[rows[part]].astype(np.float64)
+            total[few] += factors @ serves
+            self._budget.spend(serves.size * (1.0 + _PRODUCT_UNIT * few.size))
+        self._budget.spend(total.size + _CALL_UNITS)
         return total
