@@ -27,8 +27,9 @@ MAX_ONES = 40_000_000
 # Beyond this a need can't be told from a mistake, and labels would fill the memory.
 _MAX_NEED = 1_000
 _MAX_ROW_SETS = 10_000
-# Sums of costs within this and its inverse neither vanish nor overflow.
+# What is within these and their inverses neither vanishes nor overflows.
 _LEAST_COST = 1e-100
+_LEAST_TOTAL = 1e-250
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +39,8 @@ class CoverProblem:
     Attributes:
         covers: Whether element e is served by set s, sparse or dense, boolean or 0
             and 1, shape (n_e, n_s); kept as CSR.
-        weights: Weight of each element, at least 0, typically an area in [m²];
-            default ones.
+        weights: Weight of each element, at least 0, typically an area in [m²],
+            together 0 or from 1e-250 to 1e250; default ones.
         costs: Cost of each set, positive, from 1e-100 to 1e100; default ones.
         min_coverage: Fraction of the weight of each row set to cover, in (0, 1], one
             number or one for each row set; ignored if ``required_weight`` is given.
@@ -78,8 +79,12 @@ class CoverProblem:
                 f"{_LEAST_COST:g} to {1.0 / _LEAST_COST:g}"
             )
         with np.errstate(over="ignore"):
-            if not np.isfinite(weights.sum()):
-                raise ValueError("weights must have a finite sum")
+            total = float(weights.sum())
+        if not (total == 0.0 or _LEAST_TOTAL <= total <= 1.0 / _LEAST_TOTAL):
+            raise ValueError(
+                f"weights must have a finite sum, 0 or from {_LEAST_TOTAL:g} to "
+                f"{1.0 / _LEAST_TOTAL:g}, got {total:g}"
+            )
         row_sets = _row_sets(self.row_sets, n_e)
         totals = _sums(weights, row_sets)
         values = {

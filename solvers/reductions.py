@@ -141,9 +141,7 @@ def reduce_problem(
     exponent = _exponent(problem.total_weight)
     scaled = np.ldexp(problem.weights, exponent)
     whole = np.rint(scaled)
-    inexact = problem_sums(problem, (whole != scaled).astype(np.float64))
-    quotas = np.ldexp(problem.required_weight, exponent) * (1.0 - WEIGHT_SLACK)
-    quotas = np.floor(quotas - 0.5 * inexact)
+    quotas = _quotas(problem, exponent, whole != scaled)
 
     already = np.asarray(problem.covers[:, problem.fixed].sum(axis=1)).ravel()
     needs = problem.needs - already
@@ -180,6 +178,20 @@ def reduce_cover(
     return reduce_problem(
         CoverProblem(covers, weights, costs, required_weight=np.array(required))
     )
+
+
+def _quotas(
+    problem: CoverProblem, exponent: int, inexact: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the whole weight that each row set must reach, rounded in its favour."""
+    total = problem.total_weight
+    if not total > 0:
+        # Nothing can be had, so anything is too much.
+        return (problem.required_weight > 0).astype(np.float64)
+    # More than there is can't be had, however much more.
+    asked = np.ldexp(np.minimum(problem.required_weight, 4.0 * total), exponent)
+    off = 0.5 * problem_sums(problem, inexact.astype(np.float64))
+    return np.floor(asked * (1.0 - WEIGHT_SLACK) - off)
 
 
 def _exponent(total: float) -> int:

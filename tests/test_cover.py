@@ -383,6 +383,39 @@ def test_bad_matrices_are_refused(covers, message):
         CoverProblem(covers)
 
 
+def test_too_many_ones_are_refused_before_they_are_worked_on(monkeypatch):
+    monkeypatch.setattr("solvers.cover_problem.MAX_ONES", 3)
+    CoverProblem(np.eye(3, dtype=bool))
+    for covers in (np.eye(4, dtype=bool), sparse.csr_array(np.eye(4, dtype=bool))):
+        with pytest.raises(ValueError, match="4 nonzero entries, more than the limit"):
+            CoverProblem(covers)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "cost"),
+    [
+        ({"required_weight": 1e308}, SolveStatus.INFEASIBLE, 2.0),
+        ({"required_weight": 1e-320}, SolveStatus.OPTIMAL, 0.0),
+        ({"weights": [1e249, 1.0, 1e-300]}, SolveStatus.OPTIMAL, 1.0),
+        ({"weights": [1e-249, 1e-249, 1e-249]}, SolveStatus.OPTIMAL, 2.0),
+        ({"weights": [0, 0, 0], "required_weight": 0.3}, SolveStatus.INFEASIBLE, 0.0),
+        ({"weights": [0, 0, 0]}, SolveStatus.OPTIMAL, 0.0),
+        ({"costs": [1e100, 1e-100, 1e-100]}, SolveStatus.OPTIMAL, 2e-100),
+        ({"needs": 1000}, SolveStatus.INFEASIBLE, 0.0),
+        ({"row_sets": [0, 5, 9]}, SolveStatus.OPTIMAL, 2.0),
+        ({"fixed": [0, 1, 2, 2]}, SolveStatus.OPTIMAL, 3.0),
+    ],
+)
+def test_absurd_numbers_are_answered(arguments, status, cost):
+    covers = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]], dtype=bool)
+    problem = CoverProblem(covers, **arguments)
+    solution = solve_cover(problem)
+    assert solution.status is status
+    assert solution.cost == pytest.approx(cost)
+    most = solve_max_coverage(problem, 3)
+    assert most.covered_weight <= most.upper_bound
+
+
 def test_bad_limits_are_refused():
     problem = from_sets([{0}], 1)
     with pytest.raises(ValueError, match="max_sets must be at least 1"):
