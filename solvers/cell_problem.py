@@ -123,11 +123,13 @@ class WholeRows:
         if top == 0.0:
             return np.zeros(values.size, dtype=np.int64)
         whole = bool(np.all(values == np.floor(values)))
-        if whole and top < 2.0**_BITS and float(values @ cost) <= 2.0**_BITS:
+        if whole and top < 2.0**_BITS and float(np.sum(values * cost)) <= 2.0**_BITS:
             return values.astype(np.int64)
-        # Scaled to at most 1 first, so that no sum overflows.
+        # Scaled to at most 1 first, so that no sum overflows; sums without BLAS, whose
+        # rounding depends on its threads.
         values = values / top
-        return np.floor(values * (2.0**_BITS / float(values @ cost))).astype(np.int64)
+        scale = 2.0**_BITS / float(np.sum(values * cost))
+        return np.floor(values * scale).astype(np.int64)
 
     def least_cost(self, multipliers: NDArray[np.int64]) -> Fraction:
         """Return the least cost of serving enough: need(lambda), or a little less."""

@@ -126,13 +126,12 @@ class Twigs:
 
     def _union(self, group: NDArray[np.int64]) -> NDArray[np.uint64]:
         """Return what a group's cells serve, as far as they remain."""
-        place = np.where(group < self._place.size, group, 0)
-        trimmed = np.where(group < self._place.size, self._place[place], _UNKNOWN)
-        rows = self._store.rows[group[trimmed < 0]]
-        whole = np.bitwise_or.reduce(rows, axis=0)
-        return whole | np.bitwise_or.reduce(
-            self._trimmed[trimmed[trimmed >= 0]], axis=0
-        )
+        known = group[group < self._place.size]
+        place = self._place[known]
+        plain = np.concatenate([known[place < 0], group[group >= self._place.size]])
+        whole = np.bitwise_or.reduce(self._store.rows[plain], axis=0)
+        trimmed = self._trimmed[place[place >= 0]]
+        return whole | np.bitwise_or.reduce(trimmed, axis=0)
 
     def _trim(self) -> None:
         """Reduce what is split to the union of its remaining parts, deepest first."""

@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import linprog
 from threadpoolctl import threadpool_limits
 
 from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cell_bound import CellStatus, bound_count, multiplier_bound
+from solvers.cell_multipliers import MultiplierSearch
 from solvers.cell_problem import CellProblem, whole_rows
 from solvers.cell_store import CellStore
 from solvers.cell_tuples import _split, refute_tuples
@@ -246,6 +248,38 @@ def test_the_bound_holds_for_any_multipliers(case, numbers, data):
     if TRUTHS[case] < math.inf:
         assert bound <= TRUTHS[case]
     assert most >= most_of(problem, leaves, k) * (1 - 1e-15)
+
+
+def fractional_fewest(problem, leaves):
+    """Return the optimum of the linear program over all leaves."""
+    n, rows = leaves.shape
+    n_sets = problem.required_weight.size
+    member = (problem.row_sets == np.arange(n_sets)[:, None]) * problem.weights
+    served = np.hstack([-leaves.T.astype(float), np.diag(problem.needs.astype(float))])
+    enough = np.hstack([np.zeros((n_sets, n)), -member])
+    upper = np.concatenate([np.zeros(rows), -problem.required_weight * (1 - 1e-12)])
+    bounds = [(0, None)] * n + [(0, 1)] * rows
+    costs = np.concatenate([np.ones(n), np.zeros(rows)])
+    return linprog(costs, np.vstack([served, enough]), upper, bounds=bounds).fun
+
+
+def test_multipliers_reach_the_linear_program_over_leaves():
+    reached, worth = 0, set()
+    for seed in range(120):
+        tree, leaves, problem = random_case(40_000 + seed)
+        optimum = fractional_fewest(problem, leaves)
+        if optimum is None or abs(optimum - round(optimum)) < 1e-4:
+            continue
+        whole, budget = whole_rows(problem), WorkBudget(PLENTY)
+        search = MultiplierSearch(whole, CellStore(tree, budget), budget)
+        k = 1
+        while search.refute(k):
+            k += 1
+        assert search.bound == math.ceil(optimum), seed
+        reached += 1
+        worth.add(search.bound)
+    assert reached > 20
+    assert {2.0, 3.0} <= worth
 
 
 def test_the_answer_derives_its_own_bound_again():

@@ -11,6 +11,7 @@ from scipy.optimize import linprog
 from solvers import bit_rows, cell_store, cells
 from solvers.bit_rows import BitSum, pack_rows, unpack_rows
 from solvers.cell_bound import CellStatus, bound_count
+from solvers.cell_multipliers import MultiplierSearch
 from solvers.cell_problem import CellProblem, whole_rows
 from solvers.cell_store import CellStore
 from solvers.cell_tuples import refute_tuples
@@ -299,10 +300,17 @@ def test_a_full_store_makes_no_leaves(monkeypatch, cap_trees):
     assert found.met > 0
 
 
-def test_a_price_that_meets_its_share_exactly_ends_the_search():
-    # Two leaves, two rows each, all four needed: the ratio is 2 exactly.
+def test_a_ratio_that_is_whole_is_its_own_bound_and_ends_the_search():
+    # Two leaves, two rows each, all four needed, without any slack for rounding.
     rows = np.kron(np.eye(2, dtype=bool), np.ones((1, 2), dtype=bool))
     tree = ArrayTree(np.array([-1, -1]), pack_rows(rows), 4)
-    answer = bound_count(CellProblem(np.ones(4), 4.0), tree, 3, budget=1e15)
-    assert (answer.lower_bound, answer.by_multipliers) == (2, 2)
-    assert answer.survivor.tolist() == [0, 1]
+    problem = CellProblem(np.ones(4), 4.0)
+    whole = whole_rows(problem)
+    exact, budget = dataclasses.replace(whole, needed=(whole.total,)), WorkBudget(1e8)
+    search = MultiplierSearch(exact, CellStore(tree, budget), budget)
+    assert search.ratio == 2
+    assert not search.refute(2)
+    assert search.bound == 2
+    assert not budget.exhausted
+    answer = bound_count(problem, tree, 3)
+    assert (answer.lower_bound, answer.survivor.tolist()) == (2, [0, 1])
