@@ -28,7 +28,7 @@ _INTEGER_PROOF = "branch and bound (HiGHS) over critical rows"
 _BATCH = 5
 # Exchanges without a find after which rows count as critical: first, and then later.
 _FIRST_STEPS = 2_000
-_STEPS = 20_000
+_STEPS = 60_000
 
 
 # Reduced costs are asked again while they leave less than this share of the sets.
@@ -122,9 +122,9 @@ class _Search:
             proving = self.budget.part(share * self.budget.remaining)
             while not self.settled and refute(proving):
                 self._improve(steps, proving)
-            self._improve(_STEPS, self.budget.part(0.2 * whole))
+            self._improve(_STEPS, self.budget.part(0.15 * whole))
         while not self.settled and not self.budget.exhausted:
-            self._improve(4 * _STEPS, self.budget)
+            self._improve(_STEPS, self.budget)
 
     @property
     def settled(self) -> bool:

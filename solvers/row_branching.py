@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .row_generation import IntegerCover, program
+from .row_generation import IntegerCover, needed_sets, program
 from .status import WorkBudget
 
 _ROUNDING = 1e-7
@@ -256,8 +256,9 @@ class _Linear:
         reduced = 1.0 - dual[:n_base] @ self._values
         for y, row in zip(dual[n_base:], added, strict=True):
             reduced[row] -= y
-        bound = float(dual.sum() + np.minimum(reduced[allowed], 0.0).sum())
-        bound = bound * (1.0 - 1e-9) if self._served(allowed, added) else np.inf
+        bound = needed_sets(dual, reduced[allowed])
+        if not self._served(allowed, added):
+            bound = np.inf
         kept = self._solver.getBasis()
         status = list(kept.row_status)
         basis = list(kept.col_status), status[:n_base], status[n_base:]

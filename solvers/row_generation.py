@@ -79,8 +79,15 @@ def _priced(
     """Return the bound by multipliers, not rounded up, and the reduced costs."""
     given = np.clip(np.nan_to_num(multipliers), 0.0, 1.0)
     reduced = 1.0 - given @ covers.astype(np.float64)
-    bound = float(given.sum() + np.minimum(reduced, 0.0).sum())
-    return bound * (1.0 - 1e-9), reduced
+    return needed_sets(given, reduced), reduced
+
+
+def needed_sets(
+    multipliers: NDArray[np.float64], reduced: NDArray[np.float64]
+) -> float:
+    """Return the bound by multipliers and the reduced costs of the sets allowed."""
+    bound = float(multipliers.sum() + np.minimum(reduced, 0.0).sum())
+    return bound * (1.0 - 1e-9)
 
 
 def _rounded_up(bound: float) -> int:

@@ -252,7 +252,7 @@ def test_branch_and_bound_refutes_or_finds_less():
 
 def test_branching_on_pairs_of_rows_refutes_or_finds_less():
     branched = 0
-    for seed in range(120):
+    for seed in range(60):
         covers = random_rows(seed, most_rows=40, most_sets=11)
         best = fewest_by_hand(covers)
         for first in (np.arange(len(covers)), np.array([0])):
@@ -268,7 +268,23 @@ def test_branching_on_pairs_of_rows_refutes_or_finds_less():
         for budget in (0.0, 3e6, 1e7):
             cut = branch_on_rows(covers, first, best, WorkBudget(budget))
             assert cut.lower_bound <= best, seed
-    assert branched > 20
+    assert branched > 10
+
+
+def test_branching_finds_what_relaxations_hide():
+    """Rows of three sets each: far from the linear bound, so dear sets are needed."""
+    for seed in range(15):
+        rng = np.random.default_rng(seed)
+        covers = np.zeros((40, 13), dtype=bool)
+        for row in covers:
+            row[rng.choice(13, size=3, replace=False)] = True
+        best = fewest_by_hand(covers)
+        every = np.arange(40)
+        refuted = branch_on_rows(covers, every, best, WorkBudget(PLENTY))
+        assert (refuted.selected, refuted.lower_bound) == (None, best)
+        found = branch_on_rows(covers, every, best + 1, WorkBudget(PLENTY))
+        assert found.selected is not None, seed
+        assert found.selected.size == best
 
 
 def test_branching_settles_an_odd_hole():
