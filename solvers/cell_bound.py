@@ -103,8 +103,8 @@ def multiplier_bound(
         dearest: Cells are split while they cost more; 0 goes down to the leaves.
 
     Returns:
-        The number of poses that is needed at least, not counting that no number may be
-        enough; and the weight that K poses serve at most, in the problem's unit.
+        The number of poses that is needed at least, inf if no cell serves anything that
+        counts; and the weight that K poses serve at most, in the problem's unit.
     """
     whole = whole_rows(problem)
     given = whole.multipliers(multipliers)

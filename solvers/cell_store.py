@@ -8,6 +8,8 @@ from .cells import MAX_BYTES, CellBatch, CellTree, check_size
 from .status import WorkBudget
 
 _UNASKED = -1
+# Cells asked about at once, so that the limit is met before much is made.
+_ASKED = 1024
 
 
 class CellStore:
@@ -79,20 +81,24 @@ class CellStore:
         Raises:
             ValueError: If a child serves a row that its parent misses.
         """
+        before = self.size
         asked = cells[self.may_split(cells)]
-        if asked.size == 0 or self.full:
-            return np.empty(0, dtype=np.int64)
+        for part in parts(asked.size, _ASKED):
+            self._ask(asked[part])
+        return np.arange(before, self.size)
+
+    def _ask(self, asked: NDArray[np.int64]) -> None:
+        if self.full:
+            return
         batch = self.tree.children(self.names[asked])
-        number = np.bincount(batch.parents, minlength=asked.size)
         if not self._room(batch.cells.size):
             self.full = True
-            return np.empty(0, dtype=np.int64)
+            return
         self._check(asked, batch)
+        number = np.bincount(batch.parents, minlength=asked.size)
         self._number.values[asked] = number
         self._first.values[asked] = self.size + np.cumsum(number) - number
-        before = self.size
-        self._append(batch, self._level.values[asked[batch.parents]] + 1)
-        return np.arange(before, self.size)
+        self._append(batch, self.levels[asked[batch.parents]] + 1)
 
     def prices(
         self, cells: NDArray[np.int64], multipliers: NDArray[np.int64]

@@ -50,13 +50,18 @@ def fewest_sets(
     sized = count_bound(cover, multipliers)
     if sized > lower:
         lower, proof = sized, "sum of the largest sets"
-    asked = {"seed": seed, "cap": cap, "heaviest": heaviest}
+
+    def closed(selected: NDArray[np.int64], lower: int, proof: str) -> CountAnswer:
+        heavier = heaviest and not cover.full
+        return _closed(
+            cover, selected, lower, proof, budget, seed=seed, cap=cap, heaviest=heavier
+        )
+
     if cover.full:
         full = fewest_full(cover, budget, seed=seed, start=selected, lower=lower)
-        better_proof = full.proof if full.lower_bound > lower else proof
-        return _closed(
-            cover, full.selected, int(full.lower_bound), better_proof, budget, **asked
-        )
+        if full.lower_bound > lower:
+            lower, proof = int(full.lower_bound), full.proof
+        return closed(full.selected, lower, proof)
     first = min(0.02 * budget.units, _FIRST_UNITS)
     selected = _improve(cover, selected, lower, budget.part(first), seed)
 
@@ -81,10 +86,11 @@ def fewest_sets(
                 cover, selected, lower, cap, multipliers, part
             )
             lower, proof = (proved, how) if proved > lower else (lower, proof)
+    again = seed
     while lower < selected.size and not budget.exhausted:
-        seed += 1
-        selected = _improve(cover, selected, lower, budget, seed)
-    return _closed(cover, selected, lower, proof, budget, **asked)
+        again += 1
+        selected = _improve(cover, selected, lower, budget, again)
+    return closed(selected, lower, proof)
 
 
 def _closed(
@@ -105,7 +111,7 @@ def _closed(
     else:
         settled, start = lower >= selected.size, selected
         status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-    if selected.size > cap or (heaviest and not cover.full):
+    if selected.size > cap or heaviest:
         # Its own allowance, so that a hard proof doesn't cost the larger area.
         spare = budget.part(np.inf)
         spare.units = 0.3 * budget.units

@@ -151,7 +151,7 @@ class CoverProblem:
 def _sums(
     values: NDArray[np.float64], row_sets: NDArray[np.int64], n: int = 0
 ) -> NDArray[np.float64]:
-    return np.bincount(row_sets, weights=values, minlength=max(n, 1))
+    return np.bincount(row_sets, weights=values, minlength=max(n, 1)).astype(np.float64)
 
 
 def _boolean(given: object) -> sparse.csr_array:

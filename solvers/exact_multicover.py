@@ -240,12 +240,13 @@ def _must_take(node: ReducedCover) -> NDArray[np.bool_]:
     """
     spare = (node.totals - node.quotas)[node.row_sets]
     indispensable = np.flatnonzero(node.weights > spare)
+    firsts = np.ones(node.kept.size, dtype=bool)
     if indispensable.size == 0:
-        return np.ones(node.by_row.shape[1], dtype=bool)
+        return firsts
     servers = np.diff(node.by_row.indptr)[indispensable]
     row = int(indispensable[int(np.argmin(servers))])
     start, stop = node.by_row.indptr[row : row + 2]
-    firsts = np.zeros(node.by_row.shape[1], dtype=bool)
+    firsts[:] = False
     firsts[node.by_row.indices[start:stop]] = True
     return firsts
 

@@ -109,7 +109,9 @@ class ReducedCover:
 
     def by_row_set(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return sums over each row set, shape (n_g,)."""
-        return np.bincount(self.row_sets, weights=values, minlength=self.quotas.size)
+        return np.bincount(
+            self.row_sets, weights=values, minlength=self.quotas.size
+        ).astype(np.float64)
 
     def served(self, selected: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return how many of the selected sets serve each row, shape (n_e,)."""
@@ -202,7 +204,9 @@ def problem_sums(
     problem: CoverProblem, values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return sums over each row set of a problem, shape (n_g,)."""
-    return np.bincount(problem.row_sets, weights=values, minlength=problem.n_row_sets)
+    return np.bincount(
+        problem.row_sets, weights=values, minlength=problem.n_row_sets
+    ).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +270,8 @@ def _undominated(
     sketch = np.ascontiguousarray(words[:, :_SKETCH_WORDS])
     rivals_wanted = np.ones(order.size, dtype=np.int64)
     for need in np.unique(needs[needs > 1]):
-        rivals_wanted[dense[needs == need].any(axis=0)[order]] = need
+        served = np.any(dense[needs == need], axis=0)
+        rivals_wanted[np.flatnonzero(served[order])] = need
 
     better = np.arange(order.size)
     standing = np.zeros(order.size, dtype=np.int64)
