@@ -87,7 +87,7 @@ def fewest_sets(
             )
             lower, proof = (proved, how) if proved > lower else (lower, proof)
     again = seed
-    while lower < selected.size and not budget.exhausted:
+    while lower < min(selected.size, cap + 1) and not budget.exhausted:
         again += 1
         selected = _improve(cover, selected, lower, budget, again)
     return closed(selected, lower, proof)
