@@ -41,7 +41,7 @@ _PAIRS = 400
 # A node's program may stop this far above what refutes it.
 _BEYOND = 0.02
 _UNITS_PER_ITERATION = 4.0
-_CALL_UNITS = 2e6
+_CALL_UNITS = 5e6
 
 
 @dataclass(frozen=True, eq=False)

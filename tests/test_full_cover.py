@@ -287,6 +287,39 @@ def test_branching_finds_what_relaxations_hide():
         assert found.selected.size == best
 
 
+def rows_of_three(seed):
+    rng = np.random.default_rng(seed)
+    covers = np.zeros((30, 11), dtype=bool)
+    for row in covers:
+        row[rng.choice(11, size=3, replace=False)] = True
+    return covers
+
+
+def test_children_share_out_every_smaller_cover():
+    """Also those with a set that costs all of what the relaxation leaves."""
+    ring = np.eye(5, dtype=bool) | np.roll(np.eye(5, dtype=bool), 1, axis=0)
+    with_single_rows = np.concatenate([ring, np.eye(5, dtype=bool)], axis=1)
+    shared_out = 0
+    for covers in (with_single_rows, *map(rows_of_three, range(15))):
+        n_e, n_s = covers.shape
+        best = fewest_by_hand(covers)
+        tree = _Tree(covers, np.arange(n_e), best + 1, WorkBudget(PLENTY))
+        root = tree.linear.solve(np.ones(n_s, dtype=bool), (), None)
+        assert root is not None
+        children = tree._branch(root)
+        assert children is not None
+        for chosen in map(list, itertools.combinations(range(n_s), best)):
+            if covers[:, chosen].any(axis=1).all():
+                shared_out += 1
+                homes = [
+                    child.allowed[chosen].all()
+                    and all(row[chosen].any() for row in child.added)
+                    for child in children
+                ]
+                assert sum(homes) == 1, chosen
+    assert shared_out > 15
+
+
 def test_branching_settles_an_odd_hole():
     """An odd ring of n rows, two a set: one more than half, where LP says half."""
     for n in (3, 5, 9, 15):
@@ -306,6 +339,8 @@ def test_colours_tell_apart_what_no_symmetry_exchanges():
     path = np.array([[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1]], dtype=bool)
     colours = column_colours(path)
     assert colours[0] == colours[3] != colours[1] == colours[2]
+    longer = np.eye(5, 6, dtype=bool) | np.eye(5, 6, k=1, dtype=bool)
+    assert np.unique(column_colours(longer)).size == 3
     rng = np.random.default_rng(0)
     chance = rng.random((60, 30)) < 0.3
     assert np.unique(column_colours(chance)).size == 30
