@@ -74,7 +74,8 @@ def main() -> int:
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
         f"cores (one used), python {platform.python_version()}, numpy "
-        f"{np.__version__}, HiGHS {highspy.Highs().version()}\n"
+        f"{np.__version__}, HiGHS {highspy.Highs().version()}, load before the run "
+        f"{os.getloadavg()[0]:.1f}\n"
     )
     print(HEAD)
     print("|" + (HEAD.count("|") - 1) * "---|")
