@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cell_problem import WholeRows
+from .highs import run_highs
 from .status import WorkBudget
 
 # Work of one simplex iteration for each row and cell in hand.
@@ -93,7 +94,7 @@ class MultiplierProgram:
             return None
         self._solver.setOptionValue("simplex_iteration_limit", steps)
         self._solver.setOptionValue("time_limit", self._clock())
-        self._solver.run()
+        run_highs(self._solver)
         taken = self._solver.getInfo().simplex_iteration_count
         self._budget.spend(max(0, int(taken)) * cost + 1e5)
         solution = self._solver.getSolution()

@@ -39,7 +39,10 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class FullAnswer:
-    """Fewest sets that cover every row; indices of the reduced cover given."""
+    """Fewest sets that cover every row; indices of the reduced cover given.
+
+    Whoever gave the budget says what it cut.
+    """
 
     status: SolveStatus
     selected: NDArray[np.int64]
@@ -84,8 +87,6 @@ def fewest_full(
         start = np.sort(columns[search.best])
     settled = search.lower >= start.size
     proof = search.proof or "bound given"
-    if not settled:
-        proof = f"{proof}; search cut by the {budget.reason}"
     status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
     return FullAnswer(status, start, float(min(search.lower, start.size)), proof)
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .highs import run_highs
 from .reductions import ReducedCover
 from .status import WorkBudget
 
@@ -58,7 +59,7 @@ def linear_multipliers(
         return None
     solver = _model(cover, budget)
     solver.setOptionValue("simplex_iteration_limit", min(steps, 10_000_000))
-    _run(solver)
+    run_highs(solver)
     budget.spend(
         float(solver.getInfo().simplex_iteration_count)
         * _UNITS_PER_ITERATION
@@ -118,7 +119,7 @@ def _branch(
     solver = _model(cover, budget, integer=True, max_sets=max_sets, heaviest=heaviest)
     solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
     _warm_start(solver, cover, start)
-    _run(solver)
+    run_highs(solver)
     return _answer(solver, cover, root, budget, heaviest=heaviest)
 
 
@@ -223,22 +224,6 @@ def _model(
         solver.setOptionValue(name, value)
     solver.passModel(lp)
     return solver
-
-
-def _run(solver: Any) -> None:  # noqa: ANN401
-    """Run HiGHS, also where another in this process has run with more threads.
-
-    Raises:
-        RuntimeError: If it refuses for another reason.
-    """
-    import highspy
-
-    if solver.run() != highspy.HighsStatus.kError:
-        return
-    # Its scheduler belongs to the process and refuses another number of threads.
-    highspy.Highs.resetGlobalScheduler(True)
-    if solver.run() == highspy.HighsStatus.kError:
-        raise RuntimeError(f"HiGHS failed: {solver.getModelStatus()}")
 
 
 def _stack(blocks: list[list[sparse.sparray | None]]) -> sparse.csr_array:

@@ -65,8 +65,8 @@ def most_coverage(
 ) -> NDArray[np.int64]:
     """Raise the weight that a selection covers without more sets, by tabu search.
 
-    Makes the best swap even where it loses weight; for some moves, drawn at random, what
-    went may not come back and what came may not go, unless that beats the best so far.
+    Makes the best swap even where it loses weight; for some moves, drawn at random,
+    what went may not come back and what came may not go, unless that beats the best.
 
     Returns:
         The best selection found, increasing.

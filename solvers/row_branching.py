@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .highs import run_highs
 from .row_generation import IntegerCover, needed_sets, program
 from .status import WorkBudget
 
@@ -245,7 +246,7 @@ class _Linear:
             self._basis.row_status = [*base, *new, *local, *last][: n_base + len(added)]
             self._basis.valid = True
             self._solver.setBasis(self._basis)
-        self._solver.run()
+        run_highs(self._solver)
         steps = float(self._solver.getInfo().simplex_iteration_count)
         self.budget.spend(_UNITS_PER_ITERATION * self._entries * steps + _CALL_UNITS)
         solution = self._solver.getSolution()

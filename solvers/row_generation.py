@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .highs import run_highs
 from .status import WorkBudget
 
 _FIRST_ROWS = 200
@@ -114,7 +115,7 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
         steps = int(budget.remaining / (_UNITS_PER_ITERATION * entries))
         solver.setOptionValue("simplex_iteration_limit", max(1, min(steps, 10**7)))
         solver.setOptionValue("time_limit", solver.getRunTime() + _seconds(budget))
-        solver.run()
+        run_highs(solver)
         done = float(solver.getInfo().simplex_iteration_count)
         budget.spend(_UNITS_PER_ITERATION * entries * done + 2.0 * covers.size)
         solution = solver.getSolution()
@@ -164,7 +165,7 @@ def integer_cover(
     solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
     # One set less ends it: the rows that it misses are taken in first.
     solver.setOptionValue("objective_target", known.size - 0.5)
-    solver.run()
+    run_highs(solver)
     info = solver.getInfo()
     nodes = _UNITS_PER_NODE * max(0, int(info.mip_node_count))
     budget.spend((_UNITS_PER_ROOT + nodes) * entries)
