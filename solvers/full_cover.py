@@ -26,6 +26,8 @@ _BRANCHING_PROOF = "branch and bound on pairs of rows"
 _INTEGER_PROOF = "branch and bound (HiGHS) over critical rows"
 # Missed rows that are taken in at a time.
 _BATCH = 5
+# All of so few rows are searched from the start.
+_FEW_ROWS = 400
 # Exchanges without a find after which rows count as critical: first, and then later.
 _FIRST_STEPS = 2_000
 _STEPS = 60_000
@@ -114,7 +116,8 @@ class _Search:
         whole = self.budget.units
         linear = linear_cover(self.covers, self.budget.part(0.3 * whole))
         self._raise(linear.lower_bound, _LINEAR_PROOF)
-        self._rows = linear.rows
+        few = len(self.covers) <= _FEW_ROWS
+        self._rows = np.arange(len(self.covers)) if few else linear.rows
         self._improve(_FIRST_STEPS, self.budget.part(0.2 * whole))
         # Alike sets are what HiGHS knows how to handle, and pairs of rows don't.
         alike = may_be_symmetric(self.covers)
