@@ -20,15 +20,12 @@ References:
 
 import dataclasses
 import heapq
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .highs import run_highs
-from .row_generation import IntegerCover, needed_sets, program
+from .node_program import Node, NodeProgram
+from .row_generation import IntegerCover
 from .status import WorkBudget
 
 _ROUNDING = 1e-7
@@ -41,21 +38,6 @@ _BATCH = 5
 _PAIRS = 400
 # A node's program may stop this far above what refutes it.
 _BEYOND = 0.02
-_UNITS_PER_ITERATION = 4.0
-_CALL_UNITS = 5e6
-
-
-@dataclass(frozen=True, eq=False)
-class _Node:
-    """A part of the covers: sets that may still be taken, rows that were added."""
-
-    bound: float
-    allowed: NDArray[np.bool_]
-    added: tuple[NDArray[np.bool_], ...]
-    basis: tuple[list[Any], list[Any], list[Any]]
-    primal: NDArray[np.float64]
-    reduced: NDArray[np.float64]
-    dual: NDArray[np.float64]
 
 
 def branch_on_rows(
@@ -87,8 +69,8 @@ class _Tree:
         self.cut = size - 1 + _ROUNDING
         self.size = size
         self.budget = budget
-        self.linear = _Linear(covers[rows], self.cut + _BEYOND, budget)
-        self.nodes: list[tuple[int, int, int, _Node]] = []
+        self.linear = NodeProgram(covers[rows], self.cut + _BEYOND, budget)
+        self.nodes: list[tuple[int, int, int, Node]] = []
         self.made = 0
 
     def run(self) -> IntegerCover:
@@ -119,7 +101,7 @@ class _Tree:
     def _is_cover(self, support: NDArray[np.int64]) -> bool:
         return bool(self.covers[:, support].any(axis=1).all())
 
-    def _take_in(self, node: _Node) -> _Node | None:
+    def _take_in(self, node: Node) -> Node | None:
         """Return the node bounded over more rows, or None if it misses none by much."""
         support = np.flatnonzero(node.primal > _INTEGRAL)
         reached = self.covers[:, support] @ node.primal[support]
@@ -131,17 +113,17 @@ class _Tree:
         self.linear.take_in(self.covers[missed[order[:_BATCH]]])
         return self.linear.solve(node.allowed, node.added, node.basis)
 
-    def _push(self, node: _Node, depth: int) -> None:
+    def _push(self, node: Node, depth: int) -> None:
         if node.bound > self.cut:
             return
         level = max(0, int(np.ceil(node.bound - _ROUNDING)))
         self.made += 1
         heapq.heappush(self.nodes, (level, depth, -self.made, node))
 
-    def _branch(self, node: _Node) -> list[_Node] | None:
+    def _branch(self, node: Node) -> list[Node] | None:
         """Return the children worth keeping, or None where the budget ended."""
         allowed = node.allowed & (node.bound + node.reduced <= self.cut)
-        best: list[_Node] = []
+        best: list[Node] = []
         best_gain = -1.0
         room = self.cut - node.bound + 0.01
         for pair in self._pairs(node, allowed):
@@ -157,9 +139,7 @@ class _Tree:
                 break
         return best
 
-    def _pairs(
-        self, node: _Node, allowed: NDArray[np.bool_]
-    ) -> list[NDArray[np.bool_]]:
+    def _pairs(self, node: Node, allowed: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
         """Return sets over pairs of rows, of about half a set in the relaxation."""
         rows = np.concatenate([self.linear.rows, *(row[None] for row in node.added)])
         if node.dual.size != len(rows):
@@ -195,112 +175,3 @@ class _Tree:
         if not pairs:
             pairs.append(np.arange(allowed.size) == np.flatnonzero(allowed)[0])
         return pairs
-
-
-class _Linear:
-    """Linear program of a node, from the optimal basis of its parent.
-
-    Attributes:
-        rows: Rows of the cover that are in every node's program, shape (m, n_s).
-    """
-
-    def __init__(
-        self, rows: NDArray[np.bool_], enough: float, budget: WorkBudget
-    ) -> None:
-        import highspy
-
-        self.rows = rows
-        self.budget = budget
-        self._solver = program(rows, budget)
-        self._solver.setOptionValue("presolve", "off")
-        self._solver.setOptionValue("objective_bound", enough)
-        self._added: tuple[NDArray[np.bool_], ...] = ()
-        self._allowed = np.ones(rows.shape[1], dtype=bool)
-        self._basic = highspy.HighsBasisStatus.kBasic
-        self._basis = highspy.HighsBasis()
-        self._measure()
-
-    def take_in(self, rows: NDArray[np.bool_]) -> None:
-        """Add rows to every node's program."""
-        self._change(self._allowed, ())
-        self._add(rows)
-        self.rows = np.concatenate([self.rows, rows])
-        self._measure()
-
-    def solve(
-        self,
-        allowed: NDArray[np.bool_],
-        added: tuple[NDArray[np.bool_], ...],
-        basis: tuple[list[Any], list[Any], list[Any]] | None,
-    ) -> _Node | None:
-        """Return the node bounded, or None where the budget ended before."""
-        if self.budget.exhausted:
-            return None
-        self._change(allowed, added)
-        n_base = len(self.rows)
-        if basis is not None:
-            columns, base, local = basis
-            new = [self._basic] * (n_base - len(base))
-            last = [self._basic] * (len(added) - len(local))
-            self._basis.col_status = columns
-            self._basis.row_status = [*base, *new, *local, *last][: n_base + len(added)]
-            self._basis.valid = True
-            self._solver.setBasis(self._basis)
-        run_highs(self._solver)
-        steps = float(self._solver.getInfo().simplex_iteration_count)
-        self.budget.spend(_UNITS_PER_ITERATION * self._entries * steps + _CALL_UNITS)
-        solution = self._solver.getSolution()
-        dual = np.clip(np.nan_to_num(np.asarray(solution.row_dual)), 0.0, None)
-        primal = np.asarray(solution.col_value, dtype=np.float64)
-        if dual.size != n_base + len(added) or primal.size != allowed.size:
-            dual, primal = np.zeros(n_base + len(added)), np.zeros(allowed.size)
-        reduced = 1.0 - dual[:n_base] @ self._values
-        for y, row in zip(dual[n_base:], added, strict=True):
-            reduced[row] -= y
-        bound = needed_sets(dual, reduced[allowed])
-        if not self._served(allowed, added):
-            bound = np.inf
-        kept = self._solver.getBasis()
-        status = list(kept.row_status)
-        basis = list(kept.col_status), status[:n_base], status[n_base:]
-        return _Node(bound, allowed, added, basis, primal, reduced, dual)
-
-    def _measure(self) -> None:
-        self._values = self.rows.astype(np.float64)
-        self._entries = float(np.count_nonzero(self.rows) + sum(self.rows.shape))
-
-    def _served(
-        self, allowed: NDArray[np.bool_], added: tuple[NDArray[np.bool_], ...]
-    ) -> bool:
-        """Whether the sets allowed cover every row at all."""
-        if not np.all(self._values @ allowed.astype(np.float64) > 0):
-            return False
-        return all(bool(np.any(row & allowed)) for row in added)
-
-    def _change(
-        self, allowed: NDArray[np.bool_], added: tuple[NDArray[np.bool_], ...]
-    ) -> None:
-        """Bring the program from the node solved last to another."""
-        moved = np.flatnonzero(allowed != self._allowed).astype(np.int32)
-        if moved.size:
-            upper = allowed[moved].astype(np.float64)
-            self._solver.changeColsBounds(
-                moved.size, moved, np.zeros(moved.size), upper
-            )
-            self._allowed = allowed
-        common = 0
-        for old, new in zip(self._added, added, strict=False):
-            if old is not new:
-                break
-            common += 1
-        first, stop = len(self.rows) + common, len(self.rows) + len(self._added)
-        if stop > first:
-            stale = np.arange(first, stop, dtype=np.int32)
-            self._solver.deleteRows(stale.size, stale)
-        self._add(added[common:])
-        self._added = added
-
-    def _add(self, rows: Iterable[NDArray[np.bool_]]) -> None:
-        for row in rows:
-            sets = np.flatnonzero(row).astype(np.int32)
-            self._solver.addRow(1.0, np.inf, sets.size, sets, np.ones(sets.size))

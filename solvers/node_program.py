@@ -1,0 +1,141 @@
+"""Linear programs of the nodes of ``row_branching``, one HiGHS instance for all.
+
+Each starts from the optimal basis of its parent. What a node may claim is evaluated
+here from its multipliers, whatever HiGHS says of them.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .highs import run_highs
+from .row_generation import needed_sets, program
+from .status import WorkBudget
+
+_UNITS_PER_ITERATION = 4.0
+_CALL_UNITS = 5e6
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A part of the covers: sets that may still be taken, rows that were added."""
+
+    bound: float
+    allowed: NDArray[np.bool_]
+    added: tuple[NDArray[np.bool_], ...]
+    basis: tuple[list[Any], list[Any], list[Any]]
+    primal: NDArray[np.float64]
+    reduced: NDArray[np.float64]
+    dual: NDArray[np.float64]
+
+
+class NodeProgram:
+    """Linear program of a node, from the optimal basis of its parent.
+
+    Attributes:
+        rows: Rows of the cover that are in every node's program, shape (m, n_s).
+    """
+
+    def __init__(
+        self, rows: NDArray[np.bool_], enough: float, budget: WorkBudget
+    ) -> None:
+        import highspy
+
+        self.rows = rows
+        self.budget = budget
+        self._solver = program(rows, budget)
+        self._solver.setOptionValue("presolve", "off")
+        self._solver.setOptionValue("objective_bound", enough)
+        self._added: tuple[NDArray[np.bool_], ...] = ()
+        self._allowed = np.ones(rows.shape[1], dtype=bool)
+        self._basic = highspy.HighsBasisStatus.kBasic
+        self._basis = highspy.HighsBasis()
+        self._measure()
+
+    def take_in(self, rows: NDArray[np.bool_]) -> None:
+        """Add rows to every node's program."""
+        self._change(self._allowed, ())
+        self._add(rows)
+        self.rows = np.concatenate([self.rows, rows])
+        self._measure()
+
+    def solve(
+        self,
+        allowed: NDArray[np.bool_],
+        added: tuple[NDArray[np.bool_], ...],
+        basis: tuple[list[Any], list[Any], list[Any]] | None,
+    ) -> Node | None:
+        """Return the node bounded, or None where the budget ended before."""
+        if self.budget.exhausted:
+            return None
+        self._change(allowed, added)
+        n_base = len(self.rows)
+        if basis is not None:
+            columns, base, local = basis
+            new = [self._basic] * (n_base - len(base))
+            last = [self._basic] * (len(added) - len(local))
+            self._basis.col_status = columns
+            self._basis.row_status = [*base, *new, *local, *last][: n_base + len(added)]
+            self._basis.valid = True
+            self._solver.setBasis(self._basis)
+        run_highs(self._solver)
+        steps = float(self._solver.getInfo().simplex_iteration_count)
+        self.budget.spend(_UNITS_PER_ITERATION * self._entries * steps + _CALL_UNITS)
+        solution = self._solver.getSolution()
+        dual = np.clip(np.nan_to_num(np.asarray(solution.row_dual)), 0.0, None)
+        primal = np.asarray(solution.col_value, dtype=np.float64)
+        if dual.size != n_base + len(added) or primal.size != allowed.size:
+            dual, primal = np.zeros(n_base + len(added)), np.zeros(allowed.size)
+        reduced = 1.0 - dual[:n_base] @ self._values
+        for y, row in zip(dual[n_base:], added, strict=True):
+            reduced[row] -= y
+        bound = needed_sets(dual, reduced[allowed])
+        if not self._served(allowed, added):
+            bound = np.inf
+        kept = self._solver.getBasis()
+        status = list(kept.row_status)
+        basis = list(kept.col_status), status[:n_base], status[n_base:]
+        return Node(bound, allowed, added, basis, primal, reduced, dual)
+
+    def _measure(self) -> None:
+        self._values = self.rows.astype(np.float64)
+        self._entries = float(np.count_nonzero(self.rows) + sum(self.rows.shape))
+
+    def _served(
+        self, allowed: NDArray[np.bool_], added: tuple[NDArray[np.bool_], ...]
+    ) -> bool:
+        """Whether the sets allowed cover every row at all."""
+        if not np.all(self._values @ allowed.astype(np.float64) > 0):
+            return False
+        return all(bool(np.any(row & allowed)) for row in added)
+
+    def _change(
+        self, allowed: NDArray[np.bool_], added: tuple[NDArray[np.bool_], ...]
+    ) -> None:
+        """Bring the program from the node solved last to another."""
+        moved = np.flatnonzero(allowed != self._allowed).astype(np.int32)
+        if moved.size:
+            upper = allowed[moved].astype(np.float64)
+            self._solver.changeColsBounds(
+                moved.size, moved, np.zeros(moved.size), upper
+            )
+            self._allowed = allowed
+        common = 0
+        for old, new in zip(self._added, added, strict=False):
+            if old is not new:
+                break
+            common += 1
+        first, stop = len(self.rows) + common, len(self.rows) + len(self._added)
+        if stop > first:
+            stale = np.arange(first, stop, dtype=np.int32)
+            self._solver.deleteRows(stale.size, stale)
+        self._add(added[common:])
+        self._added = added
+
+    def _add(self, rows: Iterable[NDArray[np.bool_]]) -> None:
+        for row in rows:
+            sets = np.flatnonzero(row).astype(np.int32)
+            self._solver.addRow(1.0, np.inf, sets.size, sets, np.ones(sets.size))
