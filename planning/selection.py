@@ -149,7 +149,9 @@ def marginals(
 def _problem(covers: NDArray[np.bool_], required: int) -> CoverProblem:
     """The program over the rows that some candidate serves."""
     reachable = covers[covers.any(axis=1)]
-    return CoverProblem(sparse.csr_array(reachable), required_weight=np.array([required]))
+    return CoverProblem(
+        sparse.csr_array(reachable), required_weight=np.array([required])
+    )
 
 
 def _rows(covers: NDArray[np.bool_], chosen: NDArray[np.int64]) -> int:
