@@ -173,7 +173,9 @@ def test_costs_under_a_limit_on_the_number():
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 2**16),
-    scale=st.sampled_from([0.0, 5e-324, 1e-309, 1e-30, 0.3, 1.0, 50.0, 1e250, np.inf, np.nan]),
+    scale=st.sampled_from(
+        [0.0, 5e-324, 1e-309, 1e-30, 0.3, 1.0, 50.0, 1e250, np.inf, np.nan]
+    ),
 )
 def test_bounds_hold_for_any_multipliers(seed, scale):
     rng = np.random.default_rng(seed)
