@@ -2,9 +2,9 @@
 
 Samples lie all over the surface, each for the same area. Candidates stand on a sphere
 of two half diagonals about the middle of the mesh. Wide fields look at the middle and
-hold the whole object; narrow ones are cones that look at one random sample each, so that
-where to aim matters too. A sample is seen within 60 degrees of incidence, inside the
-cone, and unoccluded.
+hold the whole object; narrow ones are cones that look at one random sample each, so
+that where to aim matters too. A sample is seen within 60 degrees of incidence, inside
+the cone, and unoccluded.
 """
 
 from dataclasses import dataclass

@@ -6,23 +6,35 @@ from typing import TYPE_CHECKING
 from ._siblings import check_siblings
 
 if TYPE_CHECKING:
+    from .cell_bound import bound_count as bound_count
+    from .cell_problem import CellProblem as CellProblem
+    from .cells import ArrayTree as ArrayTree
     from .cover import CoverSolution as CoverSolution
     from .cover import solve_cover as solve_cover
+    from .cover import solve_max_coverage as solve_max_coverage
     from .cover_problem import CoverProblem as CoverProblem
     from .status import SolveStatus as SolveStatus
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
+    "ArrayTree": "cells",
+    "CellProblem": "cell_problem",
     "CoverProblem": "cover_problem",
     "CoverSolution": "cover",
     "SolveStatus": "status",
+    "bound_count": "cell_bound",
     "solve_cover": "cover",
+    "solve_max_coverage": "cover",
 }
 __all__ = [
+    "ArrayTree",
+    "CellProblem",
     "CoverProblem",
     "CoverSolution",
     "SolveStatus",
+    "bound_count",
     "solve_cover",
+    "solve_max_coverage",
 ]
 
 
