@@ -122,7 +122,9 @@ class _Search:
         # Alike sets are what HiGHS knows how to handle, and pairs of rows don't.
         alike = may_be_symmetric(self.covers)
         refute = self._by_integers if alike else self._by_rows
-        for steps, share in ((_FIRST_STEPS, 0.1), (_STEPS, 0.9)):
+        # HiGHS can't go on where it was cut, so it isn't tried shortly first.
+        tries = ((_FIRST_STEPS, 0.1), (_STEPS, 0.9))
+        for steps, share in tries[1:] if alike else tries:
             proving = self.budget.part(share * self.budget.remaining)
             while not self.settled and refute(proving):
                 self._improve(steps, proving)

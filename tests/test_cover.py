@@ -1,9 +1,9 @@
 """Covers against brute force, known optima, and checkers that can say no."""
 
 import dataclasses
-import gzip
 import itertools
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +22,6 @@ from solvers.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.status import SolveStatus
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-SETCOVER = Path(__file__).resolve().parents[2] / "shared" / "data" / "setcover"
 
 
 def from_sets(sets, n_elements, **arguments):
@@ -436,30 +435,44 @@ def test_values_are_frozen():
         solution.problem.weights[0] = 2.0
 
 
-def test_steiner_triples_27_are_proved():
-    path = SETCOVER / "stn27.gz"
-    if not path.exists():
-        pytest.skip("the shared set cover instances aren't here")
-    numbers = np.array(gzip.decompress(path.read_bytes()).split(), dtype=np.int64)
-    triples = numbers[2:].reshape(-1, 3) - 1
-    covers = np.zeros((len(triples), int(numbers[0])), dtype=bool)
-    np.put_along_axis(covers, triples, values=True, axis=1)
-    solution = solve_cover(CoverProblem(covers), budget=2e10)
-    assert solution.status is SolveStatus.OPTIMAL
-    assert solution.lower_bound == solution.cost == 18.0
+def test_the_example_of_the_page_runs(capsys):
+    page = Path(__file__).resolve().parents[1] / "docs" / "covers.md"
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.S)
+    exec(compile(code, page, "exec"), {})
+    assert capsys.readouterr().out.startswith("[0 2] 2.0 proven optimal ")
 
 
-def test_viewpoints_of_map_1_are_covered_by_25():
-    path = SETCOVER / "viewpoints_map1_900x900.txt"
-    if not path.exists():
+def published(set_cover_files, name):
+    instance = set_cover_files.BY_NAME[name]
+    if not instance.path.exists():
         pytest.skip("the shared set cover instances aren't here")
-    lines = [line.split() for line in path.read_text().splitlines() if line.strip()]
-    covers = np.zeros((900, len(lines)), dtype=bool)
-    for s, line in enumerate(lines):
-        covers[[int(e) for e in line[8:]], s] = True
+    return instance, *instance.read()
+
+
+@pytest.mark.parametrize("name", ["map1", "map2", "stn27", "scpe1"])
+def test_published_covers_are_proved(name, set_cover_files):
+    instance, covers, _ = published(set_cover_files, name)
     solution = solve_cover(CoverProblem(covers), budget=2e10)
     assert solution.status is SolveStatus.OPTIMAL
-    assert solution.lower_bound == solution.cost == 25.0
+    assert solution.shortfall() == 0.0
+    assert solution.lower_bound == solution.cost == instance.fewest
+
+
+@pytest.mark.parametrize("name", ["scp41", "scp61", "scpcyc06"])
+def test_published_covers_are_nearly_reached_by_little_work(name, set_cover_files):
+    instance, covers, _ = published(set_cover_files, name)
+    solution = solve_cover(CoverProblem(covers), budget=2e9)
+    assert solution.shortfall() == 0.0
+    assert solution.lower_bound <= instance.fewest <= solution.cost
+    assert solution.cost <= instance.fewest + 1
+
+
+@pytest.mark.parametrize("name", ["scp41", "scp61"])
+def test_published_costs_are_proved(name, set_cover_files):
+    instance, covers, costs = published(set_cover_files, name)
+    solution = solve_cover(CoverProblem(covers, costs=costs), budget=2e10)
+    assert solution.status is SolveStatus.OPTIMAL
+    assert solution.lower_bound == solution.cost == instance.cheapest
 
 
 def test_same_answer_with_one_and_two_threads():
