@@ -114,11 +114,12 @@ class _Search:
     def run(self) -> None:
         """Search, bound, refute, and search on with what is left."""
         whole = self.budget.units
-        linear = linear_cover(self.covers, self.budget.part(0.3 * whole))
+        self._rows = _spread_rows(self.covers)
+        self._improve(_FIRST_STEPS, self.budget.part(0.25 * whole))
+        linear = linear_cover(self.covers, self.budget.part(0.25 * whole))
         self._raise(linear.lower_bound, _LINEAR_PROOF)
-        few = len(self.covers) <= _FEW_ROWS
-        self._rows = np.arange(len(self.covers)) if few else linear.rows
-        self._improve(_FIRST_STEPS, self.budget.part(0.2 * whole))
+        self._rows = np.union1d(self._rows, linear.rows)
+        self._improve(_FIRST_STEPS, self.budget.part(0.15 * whole))
         # Alike sets are what HiGHS knows how to handle, and pairs of rows don't.
         alike = may_be_symmetric(self.covers)
         refute = self._by_integers if alike else self._by_rows
@@ -233,6 +234,16 @@ def _stand_ins(
     """Return for each dropped column the first kept one that covers as much."""
     lacks = dropped.T.astype(np.float32) @ ~kept
     return np.unique(np.argmin(lacks, axis=1)).astype(np.int64)
+
+
+def _spread_rows(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return some rows to start from: all of few, else those of fewest sets and more."""
+    if len(covers) <= _FEW_ROWS:
+        return np.arange(len(covers))
+    order = np.argsort(covers.sum(axis=1), kind="stable")
+    half = _FEW_ROWS // 2
+    more = np.linspace(half, len(covers) - 1, half).astype(np.int64)
+    return np.sort(np.concatenate([order[:half], order[more]]))
 
 
 def _greedy(covers: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
