@@ -237,7 +237,7 @@ def _stand_ins(
 
 
 def _spread_rows(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return some rows to start from: all of few, else those of fewest sets and more."""
+    """Return rows to start from: all of few, else those of fewest sets, and more."""
     if len(covers) <= _FEW_ROWS:
         return np.arange(len(covers))
     order = np.argsort(covers.sum(axis=1), kind="stable")
