@@ -30,6 +30,8 @@ MAX_ROWS = 1_000_000
 # The required weight is lowered by this share, as in covers over candidates.
 WEIGHT_SLACK = 1e-12
 _BITS = 51
+# Sums within this and its inverse neither vanish nor overflow.
+_LEAST_TOTAL = 1e-250
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,12 @@ class CellProblem:
         _non_negative("required_weight", required)
         needs = _counts("needs", self.needs, weights.size, 1)
         row_sets = _counts("row_sets", self.row_sets, weights.size, 0)
+        total = float(np.sum(weights))
+        if not (total == 0.0 or _LEAST_TOTAL <= total <= 1.0 / _LEAST_TOTAL):
+            raise ValueError(
+                f"weights sum to {total:g}, must be 0 or from {_LEAST_TOTAL:g} to "
+                f"{1.0 / _LEAST_TOTAL:g}"
+            )
         if not np.all(row_sets < required.size):
             raise ValueError(
                 f"row_sets names set {int(row_sets.max())}, but required_weight has "
@@ -178,7 +186,11 @@ def whole_rows(problem: CellProblem) -> WholeRows:
     inexact = whole != scaled
     sets = np.arange(problem.required_weight.size)
     lost = [0.5 * np.count_nonzero(inexact & (problem.row_sets == g)) for g in sets]
-    needed = np.ldexp(problem.required_weight, exponent) * (1.0 - WEIGHT_SLACK) - lost
+    # More than there is can't be had, however much more; of nothing, nothing.
+    asked = np.minimum(problem.required_weight, 4.0 * total)
+    needed = np.ldexp(asked, exponent) * (1.0 - WEIGHT_SLACK) - lost
+    if not total > 0:
+        needed = (problem.required_weight > 0).astype(np.float64)
     return WholeRows(
         weights=whole.astype(np.int64),
         needed=tuple(max(0, int(np.floor(x))) for x in needed),

@@ -62,7 +62,8 @@ def refute_tuples(
     if twigs.root == VOID:
         return TupleAnswer(refuted=True, survivor=None, met=0)
     enough = Enough(whole, n_poses)
-    stack = [np.full((1, n_poses), twigs.root)]
+    start, _ = _weigh(np.full((1, n_poses), twigs.root), twigs, enough)
+    stack = [start] if len(start) else []
     met = 0
     while stack:
         nodes, ended = _split(stack.pop(), twigs)

@@ -57,7 +57,9 @@ def cheapest_sets(
         if max_sets is None or other.size <= max_sets:
             selected = other
         cost = float(cover.costs[selected].sum())
-        if answer.bound is not None and answer.bound > lower:
+        # A bound above a cover that was counted here is none.
+        believed = answer.bound is not None and answer.bound <= cost * (1.0 + _SETTLED)
+        if believed and answer.bound > lower:
             lower, proof = answer.bound, INTEGER_PROOF
     settled = lower >= cost * (1.0 - _SETTLED)
     status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE

@@ -226,7 +226,8 @@ def _by_integers(
     if answer.bound is None:
         return selected, lower, ""
     proved = math.ceil(answer.bound / float(cover.costs[0]) - 1e-5)
-    return selected, max(lower, proved), INTEGER_PROOF
+    # A bound above a cover that was counted here is none.
+    return selected, proved if proved <= selected.size else lower, INTEGER_PROOF
 
 
 def _improve(

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .answers import NONE, CountAnswer
 from .cheapest import cheapest_sets
 from .counts import fewest_sets, most_weight
-from .cover_problem import CoverProblem
+from .cover_problem import CoverProblem, set_names, whole_number
 from .multicover import fewest_multicover, heaviest_of
 from .neighbourhood import greedy, prune
 from .reductions import WEIGHT_SLACK, ReducedCover, reduce_problem
@@ -35,8 +35,10 @@ class CoverSolution:
         problem: The problem this answers.
         status: How the solve ended.
         selected: Chosen sets in increasing order, shape (k,); if the status is
-            ``INFEASIBLE``, few sets that cover all that can be covered.
+            ``INFEASIBLE``, few sets that cover all that can be covered, or of as
+            many as are allowed those that cover most.
         lower_bound: Proven lower bound on the cost of any cover; inf if infeasible.
+            Where HiGHS' bound comes within 1e-5 of the cost, it is the cost.
         proof: What proves the bound, and what cut the proof short if anything did.
     """
 
@@ -129,7 +131,7 @@ def solve_cover(
         covers all the weight that can be covered (or the most with ``max_sets``).
     """
     fixed = problem.fixed
-    if max_sets is not None and not max_sets >= 1:
+    if max_sets is not None and not whole_number("max_sets", max_sets) >= 1:
         raise ValueError(f"max_sets must be at least 1, got {max_sets}")
     if max_sets is not None and not max_sets >= fixed.size:
         raise ValueError(f"max_sets is {max_sets}, but {fixed.size} sets are fixed")
@@ -142,7 +144,7 @@ def solve_cover(
         proof = "the fixed sets suffice" if fixed.size else nothing
         answer = CountAnswer(SolveStatus.OPTIMAL, NONE, 0.0, proof)
     elif not cover.reachable:
-        answer = _unreachable(cover, work)
+        answer = _unreachable(cover, work, seed, free)
     elif problem.unit_costs:
         search = fewest_sets if cover.simple else fewest_multicover
         answer = search(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
@@ -181,12 +183,13 @@ def solve_max_coverage(
         reduced: This problem's `reduced_problem`, where it is at hand.
     """
     fixed = problem.fixed
-    if not n_sets >= 0:
+    if not whole_number("n_sets", n_sets) >= 0:
         raise ValueError(f"n_sets must be at least 0, got {n_sets}")
     if not n_sets >= fixed.size:
         raise ValueError(f"n_sets is {n_sets}, but {fixed.size} sets are fixed")
-    start = np.unique(np.asarray([] if warm_start is None else warm_start, dtype=int))
-    if start.size > n_sets or not np.all((start >= 0) & (start < problem.costs.size)):
+    given = () if warm_start is None else warm_start
+    start = set_names("warm_start", given, problem.costs.size)
+    if start.size > n_sets:
         raise ValueError(f"warm_start must name at most {n_sets} sets of the problem")
     free = n_sets - fixed.size
     work = WorkBudget(budget, time_limit=time_limit)
@@ -197,9 +200,11 @@ def solve_max_coverage(
     search = most_weight if cover.simple else heaviest_of
     answer = search(cover, free, work, seed=seed, start=known)
     selected = np.union1d(fixed, cover.kept[answer.selected])
-    if problem.covered_weight(start) > problem.covered_weight(selected):
+    warm = np.union1d(fixed, start)
+    better = problem.covered_weight(warm) > problem.covered_weight(selected)
+    if better and warm.size <= n_sets:
         # Only where sets that stand in for others coincide.
-        selected = start
+        selected = warm
     covered = problem.covered_weight(selected)
     optimal = answer.status is SolveStatus.OPTIMAL
     upper = (cover.settled + answer.upper_bound) * cover.unit
@@ -232,17 +237,19 @@ def _or_reduce(
 ) -> ReducedCover:
     if given is None:
         return reduce_problem(problem, costs=costs)
-    if given.stand_in.size != problem.costs.size:
-        raise ValueError(
-            f"reduced is of a problem of {given.stand_in.size} sets, not "
-            f"{problem.costs.size}"
-        )
+    if given.problem is not problem:
+        raise ValueError("reduced is of another problem: make it from this one")
     return given
 
 
-def _unreachable(cover: ReducedCover, work: WorkBudget) -> CountAnswer:
+def _unreachable(
+    cover: ReducedCover, work: WorkBudget, seed: int, max_sets: int | None
+) -> CountAnswer:
     """Answer a problem whose requirement exceeds the weight of all sets together."""
     everything = replace(cover, quotas=cover.totals)
     few = prune(everything, greedy(everything, NONE, work))
+    if max_sets is not None and few.size > max_sets:
+        search = most_weight if cover.simple else heaviest_of
+        few = search(cover, max_sets, work, seed=seed).selected
     proof = "all sets together cover less than is required"
     return CountAnswer(SolveStatus.INFEASIBLE, few, float("inf"), proof)

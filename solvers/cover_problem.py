@@ -13,6 +13,7 @@ its meaning with the sets on offer. r_e = 2 keeps what it covers when any set is
 several row sets are several objects on one rig.
 """
 
+import operator
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -20,10 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-# Limits of one problem, checked before anything is allocated. A problem of this many
-# entries, a fifth of them ones, takes 2 GB to solve.
+# Limits of one problem, checked before anything is allocated.
 MAX_ENTRIES = 200_000_000
 MAX_ONES = 40_000_000
+MAX_ROWS = 2_000_000
+MAX_SETS = 100_000
 # Beyond this a need can't be told from a mistake, and labels would fill the memory.
 _MAX_NEED = 1_000
 _MAX_ROW_SETS = 10_000
@@ -54,7 +56,8 @@ class CoverProblem:
 
     Raises:
         ValueError: On wrong shapes, negative or non-finite numbers, unknown sets, or a
-            matrix of more than ``MAX_ENTRIES`` entries or ``MAX_ONES`` ones.
+            matrix of more than ``MAX_ENTRIES`` entries, ``MAX_ONES`` ones, ``MAX_ROWS``
+            rows or ``MAX_SETS`` columns.
     """
 
     covers: sparse.csr_array
@@ -96,7 +99,7 @@ class CoverProblem:
             ),
             "needs": _needs(self.needs, n_e),
             "row_sets": row_sets,
-            "fixed": _fixed(self.fixed, n_s),
+            "fixed": set_names("fixed", self.fixed, n_s),
         }
         for name, value in values.items():
             if isinstance(value, np.ndarray):
@@ -129,9 +132,7 @@ class CoverProblem:
         Raises:
             ValueError: If a set is unknown.
         """
-        index = np.unique(np.asarray(selected, dtype=np.int64))
-        if not np.all((index >= 0) & (index < self.costs.size)):
-            raise ValueError(f"selected names sets outside 0 ... {self.costs.size - 1}")
+        index = set_names("selected", selected, self.costs.size)
         # A selection is a set: a name given twice counts once.
         served = np.asarray(self.covers[:, index].sum(axis=1)).ravel()
         covered = np.where(served >= self.needs, self.weights, 0.0)
@@ -160,6 +161,11 @@ def _boolean(given: object) -> sparse.csr_array:
     shape = matrix.shape  # type: ignore[union-attr]
     if len(shape) != 2:
         raise ValueError(f"covers must be a matrix, got shape {shape}")
+    if not (shape[0] <= MAX_ROWS and shape[1] <= MAX_SETS):
+        raise ValueError(
+            f"covers is {shape[0]} x {shape[1]}, more than the limit of {MAX_ROWS} "
+            f"samples and {MAX_SETS} candidates: use fewer"
+        )
     if not shape[0] * shape[1] <= MAX_ENTRIES:
         raise ValueError(
             f"covers has {shape[0]} x {shape[1]} entries, more than the limit of "
@@ -183,7 +189,7 @@ def _boolean(given: object) -> sparse.csr_array:
 
 
 def _vector(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
-    values = np.ones(n) if given is None else np.array(given, dtype=np.float64)
+    values = np.ones(n) if given is None else _numbers(name, given)
     if values.shape != (n,):
         raise ValueError(f"{name} must be ({n},), got {values.shape}")
     return values
@@ -191,7 +197,7 @@ def _vector(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
 
 def _whole(name: str, given: ArrayLike) -> NDArray[np.int64]:
     """Return integers, or refuse what isn't whole."""
-    values = np.asarray(given, dtype=np.float64)
+    values = _numbers(name, given) if np.size(given) else np.empty(np.shape(given))
     if not np.all((np.abs(values) <= 2.0**52) & (values == np.rint(values))):
         raise ValueError(f"{name} must be whole numbers")
     return values.astype(np.int64)
@@ -217,11 +223,37 @@ def _row_sets(given: ArrayLike | None, n: int) -> NDArray[np.int64]:
     return row_sets
 
 
-def _fixed(given: ArrayLike, n: int) -> NDArray[np.int64]:
-    fixed = np.unique(_whole("fixed", given))
-    if not np.all((fixed >= 0) & (fixed < n)):
-        raise ValueError(f"fixed must name sets from 0 to {n - 1}")
-    return fixed
+def set_names(name: str, given: ArrayLike, n: int) -> NDArray[np.int64]:
+    """Return the sets that are named, increasing, each once.
+
+    Raises:
+        ValueError: If they aren't whole numbers from 0 to n - 1; a mask isn't.
+    """
+    if np.asarray(given).dtype == bool:
+        raise ValueError(f"{name} must name sets by number, not by a mask")
+    names = np.unique(_whole(name, given))
+    if not np.all((names >= 0) & (names < n)):
+        raise ValueError(f"{name} must name sets from 0 to {n - 1}")
+    return names
+
+
+def whole_number(name: str, given: object) -> int:
+    """Return an integer, or refuse what isn't one."""
+    try:
+        return operator.index(given)  # type: ignore[arg-type]
+    except TypeError:
+        raise ValueError(f"{name} must be a whole number, got {given!r}") from None
+
+
+def _numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    """Return a copy in float64, or refuse what isn't real numbers."""
+    try:
+        values = np.array(given)
+        if values.dtype.kind in "biuf":
+            return values.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} must be real numbers")
 
 
 def _required(
@@ -229,7 +261,7 @@ def _required(
 ) -> NDArray[np.float64]:
     """Return the weight that each row set asks for, shape (n_g,)."""
     if given is None:
-        shares = np.asarray(share, dtype=np.float64)
+        shares = _numbers("min_coverage", share)
         if not np.all((shares > 0.0) & (shares <= 1.0)):
             raise ValueError(f"min_coverage must be in (0, 1], got {share}")
         if shares.shape not in ((), (1,), totals.shape):
@@ -238,7 +270,7 @@ def _required(
                 f"row set, got {shares.shape}"
             )
         return shares * totals
-    required = np.atleast_1d(np.array(given, dtype=np.float64))
+    required = np.atleast_1d(_numbers("required_weight", given))
     if not np.all((required >= 0.0) & np.isfinite(required)):
         raise ValueError(f"required_weight must be finite and at least 0, got {given}")
     if required.shape != totals.shape:

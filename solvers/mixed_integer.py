@@ -29,6 +29,8 @@ _UNITS_PER_NODE = 3_000.0
 _MAX_ENTRIES = 60_000
 # HiGHS' own tolerance, relative to the bound.
 TOLERANCE = 1e-6
+# Weights, in their mean, that it isn't told of.
+_LIGHT = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +41,10 @@ class IntegerAnswer:
         selected: The best selection, to be checked, or None.
         bound: HiGHS' bound on the cost from below, or on the weight from above, with
             its tolerance; None if it has none.
-        infeasible: Whether no selection meets the constraints, by its word.
     """
 
     selected: NDArray[np.int64] | None
     bound: float | None
-    infeasible: bool
 
 
 def linear_multipliers(
@@ -115,7 +115,7 @@ def _branch(
     root = _UNITS_PER_FULL_ROOT if light else _UNITS_PER_ROOT
     spare = budget.remaining / cover.entries - root
     if not spare > 0 or budget.exhausted:
-        return IntegerAnswer(None, None, infeasible=False)
+        return IntegerAnswer(None, None)
     solver = _model(cover, budget, integer=True, max_sets=max_sets, heaviest=heaviest)
     solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
     _warm_start(solver, cover, start)
@@ -137,20 +137,21 @@ def _answer(
     nodes = _UNITS_PER_NODE * max(0, int(info.mip_node_count))
     budget.spend((root + nodes) * cover.entries)
     if solver.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
-        return IntegerAnswer(None, None, infeasible=True)
+        return IntegerAnswer(None, None)
     values = np.asarray(solver.getSolution().col_value, dtype=np.float64)
     n = cover.n_sets
     found = bool(solver.getSolution().value_valid) and values.size >= n
     selected = np.flatnonzero(values[:n] > 0.5) if found else None
     bound = float(info.mip_dual_bound)
     if not np.isfinite(bound):
-        return IntegerAnswer(selected, None, infeasible=False)
+        return IntegerAnswer(selected, None)
     tolerance = TOLERANCE * max(1.0, abs(bound))
     if heaviest:
-        weight = float(cover.weights.mean()) * (tolerance - bound)
-        return IntegerAnswer(selected, weight, infeasible=False)
+        light = float(_weights(cover)[1].sum())
+        weight = float(cover.weights.mean()) * (light + tolerance - bound)
+        return IntegerAnswer(selected, weight)
     cost = _cost_unit(cover) * max(0.0, bound - tolerance)
-    return IntegerAnswer(selected, cost, infeasible=False)
+    return IntegerAnswer(selected, cost)
 
 
 def _cost_unit(cover: ReducedCover) -> float:
@@ -173,8 +174,8 @@ def _model(
 
     n_e, n_s = cover.weights.size, cover.n_sets
     # Weights of mean 1, so that the solver's tolerance is a small share of a row.
-    weights = cover.weights / cover.weights.mean()
-    needed = cover.quotas / cover.weights.mean()
+    weights, dropped = _weights(cover)
+    needed = np.maximum(0.0, cover.quotas / cover.weights.mean() - dropped)
     with_rows = heaviest or not cover.full
     link: sparse.csr_array = cover.by_row
     lower = cover.needs.astype(np.float64)
@@ -224,6 +225,20 @@ def _model(
         solver.setOptionValue(name, value)
     solver.passModel(lp)
     return solver
+
+
+def _weights(
+    cover: ReducedCover,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return weights in their mean, and what was left out of each row set.
+
+    HiGHS ignores coefficients below 1e-9; such rows count as covered, so that its bound
+    is still one.
+    """
+    weights = cover.weights / cover.weights.mean()
+    light = weights < _LIGHT
+    dropped = cover.by_row_set(np.where(light, weights, 0.0))
+    return np.where(light, 0.0, weights), dropped
 
 
 def _stack(blocks: list[list[sparse.sparray | None]]) -> sparse.csr_array:

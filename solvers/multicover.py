@@ -233,4 +233,5 @@ def _by_integers(
     answer = solve_integer(cover, selected, budget)
     selected = better(cover, selected, answer.selected)
     proved = lower if answer.bound is None else math.ceil(answer.bound - 1e-5)
-    return selected, max(lower, proved), INTEGER_PROOF
+    # A bound above a cover that was counted here is none.
+    return selected, proved if proved <= selected.size else lower, INTEGER_PROOF

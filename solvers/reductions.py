@@ -29,6 +29,7 @@ class ReducedCover:
     """A partial cover ready for search.
 
     Attributes:
+        problem: What it was made from.
         by_set: Ones where set s serves row e, shape (n_s, n_e), CSR.
         by_row: The transpose, shape (n_e, n_s), CSR.
         weights: Integer-valued weight of each row, positive, shape (n_e,).
@@ -44,6 +45,7 @@ class ReducedCover:
             -1 where it serves nothing.
     """
 
+    problem: CoverProblem
     by_set: sparse.csr_array
     by_row: sparse.csr_array
     weights: NDArray[np.float64]
@@ -156,6 +158,7 @@ def reduce_problem(
     kept, stand_in = _undominated(dense, merged, needs[live][rows.first], costs)
     by_row = sparse.csr_array(sparse.csr_array(dense[:, kept]), dtype=np.float64)
     return ReducedCover(
+        problem=problem,
         by_set=sparse.csr_array(by_row.T),
         by_row=by_row,
         weights=merged,

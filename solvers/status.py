@@ -44,7 +44,8 @@ class WorkBudget:
             raise ValueError(f"work budget is {units}, must be at least 0")
         if not time_limit >= 0:
             raise ValueError(f"time limit is {time_limit} s, must be at least 0")
-        self.units = float(units)
+        # No more than can be counted down from.
+        self.units = min(float(units), 1e18)
         self.spent = 0.0
         self._deadline = time.monotonic() + time_limit
         self._parent: WorkBudget | None = None

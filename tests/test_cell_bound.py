@@ -499,6 +499,24 @@ def test_rows_of_cells_hold_what_their_poses_serve(cap_trees, kind):
         assert not any(np.any(served & ~held[c]) for c in above)
 
 
+def test_a_root_that_cannot_be_split_is_weighed_too():
+    """Two poses are needed in the one cell there is; one is refuted by weighing it."""
+    tree = ArrayTree(np.array([-1]), pack_rows(np.ones((1, 3), dtype=bool)), 3)
+    problem = CellProblem(np.ones(3), 1.0, np.full(3, 2))
+    answer = bound_count(problem, tree, 2)
+    assert answer.status is CellStatus.PROVED
+    assert answer.lower_bound == 2
+
+
+@pytest.mark.parametrize(
+    ("weights", "required"), [(np.zeros(3), 1.0), (np.ones(3), 1e300)]
+)
+def test_what_nothing_can_serve_is_infeasible(weights, required):
+    tree = ArrayTree(np.array([-1]), pack_rows(np.ones((1, 3), dtype=bool)), 3)
+    answer = bound_count(CellProblem(weights, required), tree, 2)
+    assert answer.status is CellStatus.INFEASIBLE
+
+
 def test_no_cover_by_free_poses_beats_the_bound(cap_trees):
     rng = np.random.default_rng(11)
     for _ in range(4):

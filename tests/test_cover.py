@@ -170,10 +170,13 @@ def test_one_reduction_answers_every_question_as_its_own_would(cost):
 def test_a_reduction_is_refused_where_it_does_not_belong():
     problem = from_sets([{0, 1}, {2}], 3)
     other = reduced_problem(from_sets([{0}, {1}, {2}], 3))
-    with pytest.raises(ValueError, match="of 3 sets, not 2"):
+    with pytest.raises(ValueError, match="reduced is of another problem"):
         solve_cover(problem, reduced=other)
-    with pytest.raises(ValueError, match="of 3 sets, not 2"):
+    with pytest.raises(ValueError, match="reduced is of another problem"):
         solve_max_coverage(problem, 1, reduced=other)
+    less = dataclasses.replace(problem, required_weight=np.array([1.0]))
+    with pytest.raises(ValueError, match="reduced is of another problem"):
+        solve_cover(problem, reduced=reduced_problem(less))
     with pytest.raises(ValueError, match="costs differ"):
         reduced_problem(from_sets([{0}, {1}], 2, costs=np.array([1.0, 2.0])))
 
@@ -374,7 +377,9 @@ def test_bad_numbers_are_refused(arguments, message):
         (np.array([[1.0, np.nan]]), "boolean or hold only 0 and 1"),
         (np.array([[2]]), "boolean or hold only 0 and 1"),
         (np.ones(3, dtype=bool), "must be a matrix"),
-        (sparse.csr_array((MAX_ENTRIES, 2), dtype=bool), "more than the limit"),
+        (sparse.csr_array((MAX_ENTRIES, 2), dtype=bool), "2000000 samples"),
+        (sparse.csr_array((2, 100_001), dtype=bool), "100000 candidates"),
+        (sparse.csr_array((2_000_000, 101), dtype=bool), "the limit of 200000000"),
     ],
 )
 def test_bad_matrices_are_refused(covers, message):
@@ -421,8 +426,16 @@ def test_bad_limits_are_refused():
         solve_cover(problem, max_sets=0)
     with pytest.raises(ValueError, match="n_sets must be at least 0"):
         solve_max_coverage(problem, -1)
-    with pytest.raises(ValueError, match="warm_start must name at most 1"):
+    with pytest.raises(ValueError, match="warm_start must name sets from 0 to 0"):
         solve_max_coverage(problem, 1, warm_start=[3])
+    with pytest.raises(ValueError, match="warm_start must name at most 0"):
+        solve_max_coverage(problem, 0, warm_start=[0])
+    for number in (1.5, "1", np.inf):
+        with pytest.raises(ValueError, match="max_sets must be a whole number"):
+            solve_cover(problem, max_sets=number)
+        with pytest.raises(ValueError, match="n_sets must be a whole number"):
+            solve_max_coverage(problem, number)
+    assert solve_cover(problem, budget=np.inf).cost == 1.0
     with pytest.raises(ValueError, match="time limit is nan"):
         solve_cover(problem, time_limit=float("nan"))
 

@@ -153,6 +153,41 @@ def test_fixed_sets_are_in_and_save_what_they_serve():
         solve_max_coverage(CoverProblem(covers, fixed=[0, 3]), 1)
 
 
+def test_a_warm_start_leaves_fixed_sets_in():
+    covers = np.zeros((6, 3), dtype=bool)
+    covers[0, 0] = covers[1:4, 1] = covers[4:, 2] = True
+    problem = CoverProblem(covers, fixed=[0])
+    answer = solve_max_coverage(problem, 2, warm_start=[1, 2])
+    assert answer.selected.tolist() == [0, 1]
+    assert answer.covered_weight == answer.upper_bound == 4.0
+
+
+def test_no_more_sets_than_allowed_where_nothing_reaches_the_requirement():
+    covers = np.eye(4, dtype=bool)[:, :3]
+    for needs in (1, [1, 1, 1, 2]):
+        few = solve_cover(CoverProblem(covers, needs=needs), max_sets=1)
+        assert few.status is SolveStatus.INFEASIBLE
+        assert few.selected.size == few.covered_weight == 1
+
+
+def test_rows_too_light_for_highs_still_count():
+    """5,000 rows below its 1e-9 of the mean: without them 61 would be the least."""
+    n, k = 5000, 13
+    covers = np.zeros((n + 2, 4 + 2 * k), dtype=bool)
+    covers[0, 0] = covers[1, 1] = True
+    for p in (0, 1):
+        rows = 2 + p * 2500 + np.arange(2500)
+        covers[rows, 2 + p] = True
+        # Only to make the rows differ.
+        bits = (np.arange(1, 2501)[:, None] >> np.arange(k)) & 1
+        covers[rows, 4 + p * k : 4 + (p + 1) * k] = bits
+    weights = np.concatenate([[1.0, 1e-5], np.full(n, 1.8e-13)])
+    costs = np.concatenate([[1.0, 60.0, 1.0, 1.0], np.full(2 * k, 2.0)])
+    problem = CoverProblem(covers, weights, costs, required_weight=1 + 8.9e-10)
+    assert problem.covered_weight([0, 2, 3]) >= problem.required_weight[0]
+    assert solve_cover(problem).lower_bound <= 3.0
+
+
 def test_costs_under_a_limit_on_the_number():
     """Three cheap sets or one dear one: the number allowed decides."""
     covers = np.column_stack([np.ones(3), np.eye(3)]).astype(bool)
@@ -333,6 +368,12 @@ def test_same_answer_with_one_and_two_threads():
         ({"row_sets": [0, 1]}, r"row_sets must be \(3,\), got \(2,\)"),
         ({"row_sets": [0, -1, 0]}, "row_sets must be from 0 to 9999"),
         ({"row_sets": [0, 10_000, 0]}, "row_sets must be from 0 to 9999"),
+        ({"fixed": [True, False]}, "by number, not by a mask"),
+        ({"weights": ["a", "b", "c"]}, "weights must be real numbers"),
+        ({"weights": [1j, 1, 1]}, "weights must be real numbers"),
+        ({"weights": [10**400, 1, 1]}, "weights must be real numbers"),
+        ({"costs": [None, 1]}, "costs must be real numbers"),
+        ({"needs": {}}, "needs must be real numbers"),
         ({"fixed": [2]}, "fixed must name sets from 0 to 1"),
         ({"fixed": [-1]}, "fixed must name sets from 0 to 1"),
         ({"required_weight": [1.0, 1.0]}, r"required_weight must be \(1,\)"),
@@ -355,8 +396,14 @@ def test_bad_numbers_are_refused(arguments, message):
 
 def test_an_unknown_set_is_refused():
     problem = CoverProblem(np.ones((3, 2), dtype=bool))
-    with pytest.raises(ValueError, match=r"outside 0 \.\.\. 1"):
-        problem.covered_weight([2])
+    for unknown in ([2], [-1]):
+        with pytest.raises(ValueError, match="selected must name sets from 0 to 1"):
+            problem.covered_weight(unknown)
+    for mask in ([True, False], np.array([False, True])):
+        with pytest.raises(ValueError, match="by number, not by a mask"):
+            problem.covered_weight(mask)
+    with pytest.raises(ValueError, match="selected must be whole numbers"):
+        problem.covered_weight([0.7])
     assert problem.covered_weight([1, 1]) == 3.0
     twice = CoverProblem(np.ones((3, 2), dtype=bool), needs=2)
     assert twice.covered_weight([1, 1]) == 0.0
