@@ -58,9 +58,9 @@ def cheapest_sets(
             selected = other
         cost = float(cover.costs[selected].sum())
         # A bound above a cover that was counted here is none.
-        believed = answer.bound is not None and answer.bound <= cost * (1.0 + _SETTLED)
-        if believed and answer.bound > lower:
-            lower, proof = answer.bound, INTEGER_PROOF
+        bound = 0.0 if answer.bound is None else answer.bound
+        if lower < bound <= cost * (1.0 + _SETTLED):
+            lower, proof = bound, INTEGER_PROOF
     settled = lower >= cost * (1.0 - _SETTLED)
     status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
     proof = proof if settled else cut_short(proof, budget)

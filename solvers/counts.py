@@ -19,9 +19,9 @@ from .relaxation import count_bound, coverage_bounds, tighten
 from .status import SolveStatus, WorkBudget
 
 _LARGE_COUNT = 8
-# Moves before a bound is asked whether more are worth it, and after.
+# Moves before a bound is asked whether more are worth it; after that, for each set.
 _FIRST_MOVES = 60
-_MOVES = 1_000
+_MOVES_A_SET = 50
 # Work after which the first bounds are asked whether more search is worth it.
 _FIRST_UNITS = 4e8
 
@@ -159,7 +159,7 @@ def most_weight(
             kicks,
             target=upper - upper % cover.grain,
             seed=seed + 1,
-            max_moves=_MOVES,
+            max_moves=_FIRST_MOVES + _MOVES_A_SET * n_sets,
         )
         weight = cover.weight_of(best)
     if upper < weight + least:
@@ -247,7 +247,7 @@ def _improve(
             budget,
             target=cover.required,
             seed=seed,
-            max_moves=_MOVES,
+            max_moves=_FIRST_MOVES + _MOVES_A_SET * start.size,
         )
         if cover.weight_of(fewer) < cover.required:
             break

@@ -173,18 +173,6 @@ def reduce_problem(
     )
 
 
-def reduce_cover(
-    covers: sparse.csr_array,
-    weights: NDArray[np.float64],
-    costs: NDArray[np.float64],
-    required: float,
-) -> ReducedCover:
-    """Return an equivalent of a plain partial cover."""
-    return reduce_problem(
-        CoverProblem(covers, weights, costs, required_weight=np.array(required))
-    )
-
-
 def _quotas(
     problem: CoverProblem, exponent: int, inexact: NDArray[np.bool_]
 ) -> NDArray[np.float64]:

@@ -143,12 +143,10 @@ class Tightening:
     Attributes:
         multipliers: The best found, in [0, w], shape (n_e,).
         bound: Weight that no K sets exceed, by these multipliers.
-        primal: Fractional selection that the steps averaged to, shape (n_s,).
     """
 
     multipliers: NDArray[np.float64]
     bound: float
-    primal: NDArray[np.float64]
 
 
 def tighten(
@@ -209,7 +207,7 @@ def tighten(
             gain, mark = mark - bound, bound
             if bound - target > 20.0 * gain:
                 break
-    return Tightening(best * weights, bound, primal)
+    return Tightening(best * weights, bound)
 
 
 def _dearest(

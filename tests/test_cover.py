@@ -17,9 +17,17 @@ from scipy import sparse
 from solvers import CoverProblem, solve_cover
 from solvers.cover import reduced_problem, solve_max_coverage
 from solvers.cover_problem import MAX_ENTRIES
-from solvers.reductions import reduce_cover
+from solvers.reductions import reduce_problem
 from solvers.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.status import SolveStatus
+
+
+def reduced_cover(covers, weights, costs, required):
+    """The cover that the search would see."""
+    return reduce_problem(
+        CoverProblem(covers, weights, costs, required_weight=required)
+    )
+
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -316,7 +324,7 @@ def test_bounds_hold_for_any_multipliers(seed, scale):
     covers = rng.random((n_e, n_s)) < 0.35
     weights, costs = rng.uniform(0.1, 1.0, n_e), rng.uniform(0.5, 2.0, n_s)
     required = 0.7 * weights[covers.any(axis=1)].sum()
-    cover = reduce_cover(sparse.csr_array(covers), weights, costs, required)
+    cover = reduced_cover(sparse.csr_array(covers), weights, costs, required)
     given_ones = scale * rng.normal(size=cover.weights.size)
     weighty = coverage_bounds(cover, given_ones * cover.weights)
     fewest, least = n_s + 1, np.inf
@@ -335,7 +343,7 @@ def test_bounds_hold_for_any_multipliers(seed, scale):
 def test_reduction_keeps_the_weights_exact():
     covers, weights = visibility(500, 60, seed=9)
     doubled = np.vstack([covers, covers])
-    cover = reduce_cover(
+    cover = reduced_cover(
         sparse.csr_array(doubled), np.tile(weights, 2), np.ones(60), 1.0
     )
     assert cover.weights.size <= 500

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solvers.cover_problem import CoverProblem
 from solvers.exact_cover import best_tuple
 from solvers.mixed_integer import linear_multipliers, solve_integer
 from solvers.neighbourhood import (
@@ -14,10 +15,18 @@ from solvers.neighbourhood import (
     most_coverage,
     prune,
 )
-from solvers.reductions import reduce_cover
+from solvers.reductions import reduce_problem
 from solvers.relaxation import cost_bound, coverage_bounds, tighten
 from solvers.status import WorkBudget
 from solvers.swaps import Swaps
+
+
+def reduced_cover(covers, weights, costs, required):
+    """The cover that the search would see."""
+    return reduce_problem(
+        CoverProblem(covers, weights, costs, required_weight=required)
+    )
+
 
 NONE = np.empty(0, dtype=np.int64)
 
@@ -28,7 +37,7 @@ def random_cover(seed, *, n_e=36, n_s=12, density=0.3, share=0.9, costs=None):
     weights = rng.integers(1, 9, n_e).astype(float) if seed % 2 else rng.random(n_e)
     reachable = weights[covers.any(axis=1)].sum()
     c = np.ones(n_s) if costs is None else costs
-    return reduce_cover(sparse.csr_array(covers), weights, c, share * reachable)
+    return reduced_cover(sparse.csr_array(covers), weights, c, share * reachable)
 
 
 def plenty():
@@ -98,7 +107,7 @@ def test_sums_of_equal_weights_come_in_whole_grains():
     """A target between two sums asks for the upper one, and refutes it if it's none."""
     for seed in range(12):
         covers = np.random.default_rng(seed).random((50, 12)) < 0.3
-        cover = reduce_cover(
+        cover = reduced_cover(
             sparse.csr_array(covers), np.full(50, 0.3), np.ones(12), 1.0
         )
         assert np.all(cover.weights % cover.grain == 0.0)
@@ -127,7 +136,7 @@ def test_full_covers_branch_on_scarce_rows():
             decoy[rng.choice(np.flatnonzero(decoy))] = False
             decoy |= rng.random(120) < 0.02
             covers = np.column_stack([covers, decoy])
-    cover = reduce_cover(sparse.csr_array(covers), np.ones(120), np.ones(25), 120.0)
+    cover = reduced_cover(sparse.csr_array(covers), np.ones(120), np.ones(25), 120.0)
     ask = {"multipliers": cover.weights, "budget": plenty(), "first": True}
     five = best_tuple(cover, 5, target=cover.total, **ask)
     assert cover.weight_of(five.selected) == cover.total
@@ -173,7 +182,7 @@ def test_many_pairs_agree_with_a_dense_product(kind, monkeypatch):
         "arcs": arcs(rng),
     }[kind]
     weights = rng.uniform(0.5, 1.5, 900)
-    cover = reduce_cover(sparse.csr_array(covers), weights, np.ones(420), 1.0)
+    cover = reduced_cover(sparse.csr_array(covers), weights, np.ones(420), 1.0)
     a = cover.by_row.toarray()
     gains = cover.weights @ a
     pairs = gains[:, None] + gains - (a * cover.weights[:, None]).T @ a
@@ -360,7 +369,7 @@ def test_loss_of_a_light_row_isn_t_taken_for_a_full_cover():
     """Two light rows may be lost, a heavy one may not: one set suffices."""
     covers = np.array([[1, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
     weights = np.array([10.0, 12.0, 1.0, 1.0])
-    cover = reduce_cover(sparse.csr_array(covers), weights, np.ones(3), 22.0)
+    cover = reduced_cover(sparse.csr_array(covers), weights, np.ones(3), 22.0)
     answer = solve_integer(cover, np.arange(3), plenty())
     assert answer.selected.tolist() == [0]
     assert answer.bound == pytest.approx(1.0, abs=1e-5)

@@ -8,14 +8,23 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solvers.cover_problem import CoverProblem
 from solvers.full_cover import fewest_full
-from solvers.reductions import reduce_cover
+from solvers.reductions import reduce_problem
 from solvers.row_branching import _Tree, branch_on_rows
 from solvers.row_dominance import essential, minimal
 from solvers.row_generation import integer_cover, least_count, linear_cover
 from solvers.row_weighting import RowWeighting
 from solvers.status import SolveStatus, WorkBudget
 from solvers.symmetry import column_colours, may_be_symmetric
+
+
+def reduced_cover(covers, weights, costs, required):
+    """The cover that the search would see."""
+    return reduce_problem(
+        CoverProblem(covers, weights, costs, required_weight=required)
+    )
+
 
 SETCOVER = Path(__file__).resolve().parents[2] / "shared" / "data" / "setcover"
 PLENTY = 1e11
@@ -41,7 +50,7 @@ def fewest_by_hand(covers):
 
 def reduced(covers):
     n_e, n_s = covers.shape
-    return reduce_cover(
+    return reduced_cover(
         sparse.csr_array(covers), np.ones(n_e), np.ones(n_s), float(n_e)
     )
 
