@@ -28,6 +28,8 @@ _INTEGER_PROOF = "branch and bound (HiGHS) over critical rows"
 _BATCH = 5
 # All of so few rows are searched from the start.
 _FEW_ROWS = 400
+# Covers of so few entries have their linear program solved at once.
+_CHEAP = 200_000
 # Exchanges without a find after which rows count as critical: first, and then later.
 _FIRST_STEPS = 2_000
 _STEPS = 60_000
@@ -115,7 +117,8 @@ class _Search:
         """Search, bound, refute, and search on with what is left."""
         whole = self.budget.units
         self._rows = _spread_rows(self.covers)
-        self._improve(_FIRST_STEPS, self.budget.part(0.25 * whole))
+        if self.covers.size > _CHEAP:
+            self._improve(_FIRST_STEPS, self.budget.part(0.25 * whole))
         linear = linear_cover(self.covers, self.budget.part(0.25 * whole))
         self._raise(linear.lower_bound, _LINEAR_PROOF)
         self._rows = np.union1d(self._rows, linear.rows)
