@@ -12,7 +12,7 @@ from solvers.cover import solve_max_coverage
 from solvers.status import SolveStatus
 
 # The benchmark runs 10,000 of them.
-_INSTANCES = int(os.environ.get("RINGRIG_SMALL_COVERS", "200"))
+_INSTANCES = int(os.environ.get("RINGRIG_SMALL_COVERS", "100"))
 _PART = 50
 # Relative; what differs by less is rounding of the sums.
 SLACK = 1e-12
