@@ -13,21 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .orbital_branching import branch_on_orbits
 from .reductions import ReducedCover
 from .row_branching import branch_on_rows
 from .row_dominance import essential
-from .row_generation import integer_cover, linear_cover
+from .row_generation import linear_cover
 from .row_weighting import RowWeighting
 from .status import SolveStatus, WorkBudget
 from .symmetry import may_be_symmetric
 
 _LINEAR_PROOF = "linear relaxation by rows"
 _BRANCHING_PROOF = "branch and bound on pairs of rows"
-_INTEGER_PROOF = "branch and bound (HiGHS) over critical rows"
+_ORBITAL_PROOF = "branch and bound on orbits of sets"
 # Missed rows that are taken in at a time.
 _BATCH = 5
 # All of so few rows are searched from the start.
 _FEW_ROWS = 400
+# So many are in the linear programs of all orbital nodes.
+_MANY_ROWS = 2_000
 # Covers of so few entries have their linear program solved at once.
 _CHEAP = 200_000
 # Exchanges without a find after which rows count as critical: first, and then later.
@@ -125,8 +128,8 @@ class _Search:
         self._improve(_FIRST_STEPS, self.budget.part(0.15 * whole))
         # Alike sets are what HiGHS knows how to handle, and pairs of rows don't.
         alike = may_be_symmetric(self.covers)
-        refute = self._by_integers if alike else self._by_rows
-        # HiGHS can't go on where it was cut, so it isn't tried shortly first.
+        refute = self._by_orbits if alike else self._by_rows
+        # A tree can't go on where it was cut.
         tries = ((_FIRST_STEPS, 0.1), (_STEPS, 0.9))
         for steps, share in tries[1:] if alike else tries:
             proving = self.budget.part(share * self.budget.remaining)
@@ -216,27 +219,16 @@ class _Search:
             self._offer(columns[answer.selected])
         return answer.lower_bound >= size or answer.selected is not None
 
-    def _by_integers(self, budget: WorkBudget) -> bool:
-        """Leave the critical rows to HiGHS; return whether to go on."""
-        part = self.covers[self._rows]
-        rows, columns = essential(part, budget)
-        known = _stand_ins(part[rows][:, self._known], part[np.ix_(rows, columns)])
-        answer = integer_cover(part[np.ix_(rows, columns)], known, budget)
-        self._raise(answer.lower_bound, _INTEGER_PROOF)
-        if answer.selected is None:
-            return False
-        selected = columns[answer.selected]
-        if not self._take_in(selected):
-            self._offer(selected)
-        return True
-
-
-def _stand_ins(
-    dropped: NDArray[np.bool_], kept: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """Return for each dropped column the first kept one that covers as much."""
-    lacks = dropped.T.astype(np.float32) @ ~kept
-    return np.unique(np.argmin(lacks, axis=1)).astype(np.int64)
+    def _by_orbits(self, budget: WorkBudget) -> bool:
+        """Refute all smaller covers; return whether to go on."""
+        rows = np.arange(len(self.covers))
+        if rows.size > _MANY_ROWS:
+            rows = self._rows
+        answer = branch_on_orbits(self.covers, rows, self.size, budget)
+        self._raise(answer.lower_bound, _ORBITAL_PROOF)
+        if answer.selected is not None:
+            self._offer(answer.selected)
+        return answer.selected is not None
 
 
 def _spread_rows(covers: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -1,9 +1,10 @@
-"""Linear programs of the nodes of ``row_branching``, one HiGHS instance for all.
+"""Linear programs of the nodes of ``branching``, one HiGHS instance for all.
 
 Each starts from the optimal basis of its parent. What a node may claim is evaluated
 here from its multipliers, whatever HiGHS says of them.
 """
 
+import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -16,17 +17,36 @@ from .row_generation import needed_sets, program
 from .status import WorkBudget
 
 _UNITS_PER_ITERATION = 4.0
-_CALL_UNITS = 5e6
+_CALL_UNITS = 1.5e6
+
+
+Basis = tuple[list[Any], list[Any], list[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the covers.
+
+    Attributes:
+        allowed: Sets that may be taken, shape (n_s,).
+        taken: Those of them that are, shape (n_s,).
+        added: Further rows, of shape (n_s,): some set of each is taken.
+        symmetric: Whether symmetries of what is left are worth looking for.
+    """
+
+    allowed: NDArray[np.bool_]
+    taken: NDArray[np.bool_]
+    added: tuple[NDArray[np.bool_], ...] = ()
+    symmetric: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A part of the covers: sets that may still be taken, rows that were added."""
+    """A part of the covers with its bound and what its program left."""
 
+    part: Part
     bound: float
-    allowed: NDArray[np.bool_]
-    added: tuple[NDArray[np.bool_], ...]
-    basis: tuple[list[Any], list[Any], list[Any]]
+    basis: Basis
     primal: NDArray[np.float64]
     reduced: NDArray[np.float64]
     dual: NDArray[np.float64]
@@ -49,29 +69,29 @@ class NodeProgram:
         self._solver = program(rows, budget)
         self._solver.setOptionValue("presolve", "off")
         self._solver.setOptionValue("objective_bound", enough)
-        self._added: tuple[NDArray[np.bool_], ...] = ()
-        self._allowed = np.ones(rows.shape[1], dtype=bool)
+        whole = np.ones(rows.shape[1], dtype=bool)
+        self._whole = self._part = Part(whole, ~whole)
         self._basic = highspy.HighsBasisStatus.kBasic
         self._basis = highspy.HighsBasis()
         self._measure()
 
+    def root(self) -> Node | None:
+        """Return the whole bounded, or None where the budget ended before."""
+        return self.solve(self._whole, None)
+
     def take_in(self, rows: NDArray[np.bool_]) -> None:
         """Add rows to every node's program."""
-        self._change(self._allowed, ())
+        self._change(dataclasses.replace(self._part, added=()))
         self._add(rows)
         self.rows = np.concatenate([self.rows, rows])
         self._measure()
 
-    def solve(
-        self,
-        allowed: NDArray[np.bool_],
-        added: tuple[NDArray[np.bool_], ...],
-        basis: tuple[list[Any], list[Any], list[Any]] | None,
-    ) -> Node | None:
-        """Return the node bounded, or None where the budget ended before."""
+    def solve(self, part: Part, basis: Basis | None) -> Node | None:
+        """Return a part bounded, or None where the budget ended before."""
         if self.budget.exhausted:
             return None
-        self._change(allowed, added)
+        self._change(part)
+        added = part.added
         n_base = len(self.rows)
         if basis is not None:
             columns, base, local = basis
@@ -87,53 +107,49 @@ class NodeProgram:
         solution = self._solver.getSolution()
         dual = np.clip(np.nan_to_num(np.asarray(solution.row_dual)), 0.0, None)
         primal = np.asarray(solution.col_value, dtype=np.float64)
-        if dual.size != n_base + len(added) or primal.size != allowed.size:
-            dual, primal = np.zeros(n_base + len(added)), np.zeros(allowed.size)
+        if dual.size != n_base + len(added) or primal.size != part.taken.size:
+            dual, primal = np.zeros(n_base + len(added)), np.zeros(part.taken.size)
         reduced = 1.0 - dual[:n_base] @ self._values
         for y, row in zip(dual[n_base:], added, strict=True):
             reduced[row] -= y
-        bound = needed_sets(dual, reduced[allowed])
-        if not self._served(allowed, added):
+        bound = needed_sets(dual, reduced[part.allowed & ~part.taken])
+        bound += float(reduced[part.taken].sum())
+        if not self._served(part):
             bound = np.inf
         kept = self._solver.getBasis()
         status = list(kept.row_status)
         basis = list(kept.col_status), status[:n_base], status[n_base:]
-        return Node(bound, allowed, added, basis, primal, reduced, dual)
+        return Node(part, bound, basis, primal, reduced, dual)
 
     def _measure(self) -> None:
         self._values = self.rows.astype(np.float64)
         self._entries = float(np.count_nonzero(self.rows) + sum(self.rows.shape))
 
-    def _served(
-        self, allowed: NDArray[np.bool_], added: tuple[NDArray[np.bool_], ...]
-    ) -> bool:
+    def _served(self, part: Part) -> bool:
         """Whether the sets allowed cover every row at all."""
-        if not np.all(self._values @ allowed.astype(np.float64) > 0):
+        if not np.all(self._values @ part.allowed.astype(np.float64) > 0):
             return False
-        return all(bool(np.any(row & allowed)) for row in added)
+        return all(bool(np.any(row & part.allowed)) for row in part.added)
 
-    def _change(
-        self, allowed: NDArray[np.bool_], added: tuple[NDArray[np.bool_], ...]
-    ) -> None:
-        """Bring the program from the node solved last to another."""
-        moved = np.flatnonzero(allowed != self._allowed).astype(np.int32)
+    def _change(self, part: Part) -> None:
+        """Bring the program from the part solved last to another."""
+        old, self._part = self._part, part
+        other = (part.allowed != old.allowed) | (part.taken != old.taken)
+        moved = np.flatnonzero(other).astype(np.int32)
         if moved.size:
-            upper = allowed[moved].astype(np.float64)
-            self._solver.changeColsBounds(
-                moved.size, moved, np.zeros(moved.size), upper
-            )
-            self._allowed = allowed
+            lower = part.taken[moved].astype(np.float64)
+            upper = part.allowed[moved].astype(np.float64)
+            self._solver.changeColsBounds(moved.size, moved, lower, upper)
         common = 0
-        for old, new in zip(self._added, added, strict=False):
-            if old is not new:
+        for before, now in zip(old.added, part.added, strict=False):
+            if before is not now:
                 break
             common += 1
-        first, stop = len(self.rows) + common, len(self.rows) + len(self._added)
+        first, stop = len(self.rows) + common, len(self.rows) + len(old.added)
         if stop > first:
             stale = np.arange(first, stop, dtype=np.int32)
             self._solver.deleteRows(stale.size, stale)
-        self._add(added[common:])
-        self._added = added
+        self._add(part.added[common:])
 
     def _add(self, rows: Iterable[NDArray[np.bool_]]) -> None:
         for row in rows:

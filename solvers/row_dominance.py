@@ -13,6 +13,9 @@ from .status import WorkBudget
 
 # Passes after which what is left to find isn't worth looking for.
 _MAX_ROUNDS = 10
+# As many sets, and fewer, are compared all at once.
+_FEW = 600
+_UNITS_PER_PRODUCT = 0.05
 # What comparing two words costs, and the calls for one pivot.
 _UNITS_PER_WORD = 8.0
 _CALL_UNITS = 3e4
@@ -48,6 +51,8 @@ def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
         sets: Whether element i is in set k, shape (n_sets, n_elements).
         budget: Work; where it ends, sets that weren't compared are kept.
     """
+    if len(sets) <= _FEW:
+        return _minimal_of_few(sets, budget)
     order = np.lexsort((np.arange(len(sets)), sets.sum(axis=1)))
     words = _words(sets)[:, order]
     alive = np.ones(order.size, dtype=bool)
@@ -67,6 +72,19 @@ def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
             alive[larger] = False
             rest = rest[alive[rest]]
     return np.sort(order[alive]).astype(np.int64)
+
+
+def _minimal_of_few(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
+    """Return the same by one product of matrices, which counts what is shared."""
+    if budget.exhausted:
+        return np.arange(len(sets), dtype=np.int64)
+    # Counts below 2^24 are exact in single precision.
+    members = sets.astype(np.float32)
+    budget.spend(members.size * (1.0 + _UNITS_PER_PRODUCT * len(sets)))
+    within = members @ members.T == members.sum(axis=1)[:, None]
+    equal = within & within.T
+    goes = (within & ~equal).any(axis=0) | np.triu(equal, 1).any(axis=0)
+    return np.flatnonzero(~goes).astype(np.int64)
 
 
 def _words(sets: NDArray[np.bool_]) -> NDArray[np.uint64]:

@@ -1,9 +1,11 @@
-"""Which columns of a cover look alike, by colour refinement.
+"""Which columns of a cover a symmetry exchanges.
 
-Rows and columns start with one colour each; a row's next colour is that of its columns
-together, and the other way round, until no more colours come about. Columns of
-different colours can't be exchanged by any symmetry; where every column has its own
-colour, there is none.
+A symmetry permutes the columns so that the rows, as sets of columns, stay the same.
+Colour refinement tells columns apart that none can exchange: rows and columns start
+with one colour each; a row's next colour is that of its columns together, and the other
+way round, until no more colours come about. What it leaves alike is tried: two columns
+are singled out, colours are refined on both sides, and where every column has its own
+colour a permutation can be read off. It counts only if it maps rows to rows.
 
 References:
     McKay and Piperno, "Practical graph isomorphism, II", Journal of Symbolic
@@ -14,36 +16,166 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-_MAX_ROUNDS = 50
+from .status import WorkBudget
 
+# Refinements that one call and one pair of columns may cost.
+_MAX_REFINEMENTS = 400
+_MAX_FOR_A_PAIR = 24
+_UNITS_PER_ENTRY = 4.0
+_CALL_UNITS = 1e5
 
-def column_colours(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return a colour of each column, equal for all that some symmetry may exchange.
-
-    Args:
-        covers: Whether set s covers row e, shape (n_e, n_s).
-    """
-    rng = np.random.default_rng(0)
-    n_rows, n_sets = covers.shape
-    matrix = sparse.csr_array(covers, dtype=np.uint64)
-    turned = sparse.csr_array(matrix.T)
-    # Sums of random numbers modulo 2^64: equal for equal multisets of colours.
-    names = rng.integers(0, 2**64, size=n_rows + n_sets + 1, dtype=np.uint64)
-    columns, n_colours = np.zeros(n_sets, dtype=np.int64), min(1, n_sets)
-    for _ in range(_MAX_ROUNDS):
-        rows = np.unique(matrix @ names[columns], return_inverse=True)[1]
-        sums = turned @ names[rows]
-        pairs = np.stack([columns.astype(np.uint64), sums], axis=1)
-        columns = np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
-        columns = columns.astype(np.int64)
-        more = int(columns.max(initial=-1)) + 1
-        if more == n_colours:
-            break
-        n_colours = more
-    return columns
+Colours = NDArray[np.uint64]
 
 
 def may_be_symmetric(covers: NDArray[np.bool_]) -> bool:
     """Whether refinement finds at most half as many colours as columns."""
     colours = column_colours(covers)
-    return 2 * (int(colours.max(initial=-1)) + 1) <= colours.size
+    return 2 * np.unique(colours).size <= colours.size
+
+
+def column_colours(covers: NDArray[np.bool_]) -> Colours:
+    """Return a colour of each column, equal for all that some symmetry exchanges.
+
+    Args:
+        covers: Whether set s covers row e, shape (n_e, n_s).
+    """
+    return _Refinement(covers).refined(np.zeros(covers.shape[1], dtype=np.uint64))
+
+
+def column_orbits(
+    covers: NDArray[np.bool_], budget: WorkBudget | None = None
+) -> NDArray[np.int64]:
+    """Return for each column the first one that a symmetry carries it to.
+
+    Every symmetry used was checked; where the search for one is given up, an orbit may
+    come in several parts.
+
+    Args:
+        covers: Whether set s covers row e, shape (n_e, n_s).
+        budget: What the search is charged to.
+    """
+    refinement = _Refinement(covers)
+    first = _Orbits(covers.shape[1])
+    colours = refinement.refined(np.zeros(covers.shape[1], dtype=np.uint64))
+    rows = _row_keys(covers)
+    for colour in np.unique(colours):
+        alike = np.flatnonzero(colours == colour)
+        heads: list[int] = []
+        for column in alike.tolist():
+            if any(first.of(column) == first.of(head) for head in heads):
+                continue
+            for head in heads:
+                refinement.allowance = min(
+                    _MAX_FOR_A_PAIR, _MAX_REFINEMENTS - refinement.done
+                )
+                moved = refinement.match(
+                    refinement.single(colours, head),
+                    refinement.single(colours, column),
+                )
+                if moved is not None and _keeps(covers, moved, rows):
+                    first.join(moved)
+                    break
+            else:
+                heads.append(column)
+    if budget is not None:
+        budget.spend(refinement.units)
+    return first.all()
+
+
+class _Refinement:
+    """Colours of a cover, refined; equal on isomorphic sides."""
+
+    def __init__(self, covers: NDArray[np.bool_]) -> None:
+        self._by_row = sparse.csr_array(covers, dtype=np.uint64)
+        self._by_set = sparse.csr_array(self._by_row.T)
+        self.done = 0
+        self.allowance = _MAX_REFINEMENTS
+        self.units = 0.0
+
+    def refined(self, colours: Colours) -> Colours:
+        """Return colours that tell apart all that these do, and their neighbours."""
+        n_colours, rows = np.unique(colours).size, np.zeros(1, dtype=np.uint64)
+        entries = float(self._by_row.nnz + sum(self._by_row.shape))
+        while colours.size:
+            # Sums of mixed numbers modulo 2^64: equal for equal multisets of colours.
+            rows = _mixed(rows + _mixed(self._by_row @ _mixed(colours)))
+            colours = _mixed(colours + _mixed(self._by_set @ _mixed(rows)))
+            self.units += _UNITS_PER_ENTRY * entries + _CALL_UNITS
+            more = np.unique(colours).size
+            if more == n_colours:
+                break
+            n_colours = more
+        self.done += 1
+        self.allowance -= 1
+        return colours
+
+    def single(self, colours: Colours, column: int) -> Colours:
+        """Return the colours refined with one column told apart from all others."""
+        marked = colours.copy()
+        marked[column] = ~marked[column]
+        return self.refined(marked)
+
+    def match(self, left: Colours, right: Colours) -> NDArray[np.int64] | None:
+        """Return to which column each is carried, by colours made unique, or None."""
+        order, other = (np.argsort(side, kind="stable") for side in (left, right))
+        if not np.array_equal(left[order], right[other]):
+            return None
+        values, places, counts = np.unique(left, return_index=True, return_counts=True)
+        if values.size == left.size:
+            moved = np.empty(left.size, dtype=np.int64)
+            moved[order] = other
+            return moved
+        several = np.flatnonzero(counts > 1)
+        least = several[np.argmin(counts[several])]
+        singled = self.single(left, int(places[least]))
+        for column in np.flatnonzero(right == values[least]).tolist():
+            if self.allowance <= 0:
+                break
+            moved = self.match(singled, self.single(right, column))
+            if moved is not None:
+                return moved
+        return None
+
+
+def _mixed(values: Colours) -> Colours:
+    """Return numbers that differ where these do, and look random."""
+    values = values + np.uint64(0x9E3779B97F4A7C15)
+    values = (values ^ (values >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    values = (values ^ (values >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return values ^ (values >> np.uint64(31))
+
+
+def _row_keys(covers: NDArray[np.bool_]) -> list[bytes]:
+    return sorted(row.tobytes() for row in np.packbits(covers, axis=1))
+
+
+def _keeps(
+    covers: NDArray[np.bool_], moved: NDArray[np.int64], rows: list[bytes]
+) -> bool:
+    """Whether a permutation of the columns leaves the rows the same."""
+    carried = np.empty_like(covers)
+    carried[:, moved] = covers
+    return _row_keys(carried) == rows
+
+
+class _Orbits:
+    """Columns joined where a symmetry carries one to another."""
+
+    def __init__(self, n: int) -> None:
+        self._above = list(range(n))
+
+    def of(self, column: int) -> int:
+        """Return the first column of an orbit."""
+        while self._above[column] != column:
+            column = self._above[column]
+        return column
+
+    def join(self, moved: NDArray[np.int64]) -> None:
+        """Join each column with the one that it is carried to."""
+        for column, image in enumerate(moved.tolist()):
+            one, other = sorted((self.of(column), self.of(image)))
+            self._above[other] = one
+
+    def all(self) -> NDArray[np.int64]:
+        """Return the first column of each column's orbit, shape (n,)."""
+        return np.array([self.of(c) for c in range(len(self._above))], dtype=np.int64)

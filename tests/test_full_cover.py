@@ -11,12 +11,11 @@ from scipy import sparse
 from solvers.cover_problem import CoverProblem
 from solvers.full_cover import fewest_full
 from solvers.reductions import reduce_problem
-from solvers.row_branching import _Tree, branch_on_rows
+from solvers.row_branching import RowTree, branch_on_rows
 from solvers.row_dominance import essential, minimal
-from solvers.row_generation import integer_cover, least_count, linear_cover
+from solvers.row_generation import least_count, linear_cover
 from solvers.row_weighting import RowWeighting
 from solvers.status import SolveStatus, WorkBudget
-from solvers.symmetry import column_colours, may_be_symmetric
 
 
 def reduced_cover(covers, weights, costs, required):
@@ -237,34 +236,13 @@ def test_linear_bound_by_rows_is_that_of_all_rows():
     assert np.all(covers @ linear.primal > 1 - 1e-5)
 
 
-def test_branch_and_bound_refutes_or_finds_less():
-    for seed in range(25):
-        covers = random_rows(seed, most_rows=30)
-        best = fewest_by_hand(covers)
-        everything = np.arange(covers.shape[1])
-        found = integer_cover(covers, everything, WorkBudget(PLENTY))
-        assert found.lower_bound <= best
-        if best < everything.size:
-            assert found.selected is not None
-            assert covers[:, found.selected].any(axis=1).all()
-            assert best <= found.selected.size < everything.size
-        known = next(
-            np.array(chosen)
-            for chosen in itertools.combinations(everything, best)
-            if covers[:, chosen].any(axis=1).all()
-        )
-        settled = integer_cover(covers, known, WorkBudget(PLENTY))
-        assert settled.selected is None
-        assert settled.lower_bound == best
-
-
 def test_branching_on_pairs_of_rows_refutes_or_finds_less():
     branched = 0
     for seed in range(60):
         covers = random_rows(seed, most_rows=40, most_sets=11)
         best = fewest_by_hand(covers)
         for first in (np.arange(len(covers)), np.array([0])):
-            tree = _Tree(covers, first, best, WorkBudget(PLENTY))
+            tree = RowTree(covers, first, best, WorkBudget(PLENTY))
             refuted = tree.run()
             assert refuted.selected is None
             assert refuted.lower_bound == best, seed
@@ -311,17 +289,17 @@ def test_children_share_out_every_smaller_cover():
     for covers in (with_single_rows, *map(rows_of_three, range(15))):
         n_e, n_s = covers.shape
         best = fewest_by_hand(covers)
-        tree = _Tree(covers, np.arange(n_e), best + 1, WorkBudget(PLENTY))
-        root = tree.linear.solve(np.ones(n_s, dtype=bool), (), None)
+        tree = RowTree(covers, np.arange(n_e), best + 1, WorkBudget(PLENTY))
+        root = tree.linear.root()
         assert root is not None
-        children = tree._branch(root)
+        children = tree.branch(root)
         assert children is not None
         for chosen in map(list, itertools.combinations(range(n_s), best)):
             if covers[:, chosen].any(axis=1).all():
                 shared_out += 1
                 homes = [
-                    child.allowed[chosen].all()
-                    and all(row[chosen].any() for row in child.added)
+                    child.part.allowed[chosen].all()
+                    and all(row[chosen].any() for row in child.part.added)
                     for child in children
                 ]
                 assert sum(homes) == 1, chosen
@@ -337,28 +315,6 @@ def test_branching_settles_an_odd_hole():
         refuted = branch_on_rows(ring, np.arange(n), n // 2 + 1, WorkBudget(PLENTY))
         assert refuted.lower_bound == n // 2 + 1
         assert refuted.selected is None
-
-
-def test_colours_tell_apart_what_no_symmetry_exchanges():
-    lines = triples_of_affine_space(2)
-    assert np.unique(column_colours(lines)).size == 1
-    assert may_be_symmetric(lines)
-    # A path of four: ends and middles.
-    path = np.array([[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1]], dtype=bool)
-    colours = column_colours(path)
-    assert colours[0] == colours[3] != colours[1] == colours[2]
-    longer = np.eye(5, 6, dtype=bool) | np.eye(5, 6, k=1, dtype=bool)
-    assert np.unique(column_colours(longer)).size == 3
-    rng = np.random.default_rng(0)
-    chance = rng.random((60, 30)) < 0.3
-    assert np.unique(column_colours(chance)).size == 30
-    assert not may_be_symmetric(chance)
-    order = rng.permutation(9)
-    marked = np.concatenate([lines, np.eye(9, dtype=bool)[:1]])
-    shape = np.bincount(column_colours(marked)).tolist()
-    assert sorted(shape) == [1, 8]
-    moved = np.bincount(column_colours(marked[:, order])).tolist()
-    assert sorted(moved) == sorted(shape)
 
 
 def test_same_answer_twice_and_as_many_when_permuted():

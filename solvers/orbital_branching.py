@@ -1,0 +1,106 @@
+"""Branch and bound on full covers whose sets are alike, by orbits of sets.
+
+What is left of a node is a full cover again: the open rows over the sets that may still
+be taken. Where a symmetry of it carries set j to set i, a smaller cover with j exists
+just when one with i does. So either one set of an orbit is taken, whichever, or all of
+the orbit goes::
+
+    x_i = 1   or   x_j = 0 for all j in orbit(i)
+
+The orbit branched on is the one that most rows of few sets wait for, by
+sum_e 2^-|S_e| over the open rows e of its sets. A node is bounded as in
+``row_branching``.
+
+References:
+    Ostrowski, Linderoth, Rossi and Smriglio, "Orbital branching", Mathematical
+    Programming 126, 2011. Jeroslow and Wang, "Solving propositional satisfiability
+    problems", Annals of Mathematics and Artificial Intelligence 1, 1990.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .branching import Refutation, Tree
+from .node_program import Node, Part
+from .row_dominance import essential
+from .status import WorkBudget
+from .symmetry import column_orbits
+
+# Share of what is left that one node's dominance may spend.
+_DOMINANCE = 0.05
+
+
+def branch_on_orbits(
+    covers: NDArray[np.bool_],
+    rows: NDArray[np.int64],
+    size: int,
+    budget: WorkBudget,
+) -> Refutation:
+    """Refute that fewer than ``size`` sets cover every row, or find them.
+
+    Args:
+        covers: Whether set s covers row e, shape (n_e, n_s); every row is covered.
+        rows: Rows to start from; more join as they are missed.
+        size: Sets of a known cover.
+        budget: Work; where it ends, the least bound of what is open is returned.
+    """
+    return OrbitalTree(covers, rows, size, budget).run()
+
+
+class OrbitalTree(Tree):
+    """The tree whose nodes are split by an orbit of sets."""
+
+    def branch(self, node: Node) -> list[Node] | None:
+        """Return what is left of the node, smaller, or else split by an orbit."""
+        part = node.part
+        free = part.allowed & ~part.taken
+        allowed = part.allowed & ~(free & (node.bound + node.reduced > self.cut))
+        taken = part.taken | (free & (node.bound - node.reduced > self.cut))
+        open_rows = np.flatnonzero(~self.covers[:, taken].any(axis=1))
+        left = np.flatnonzero(allowed & ~taken)
+        self.budget.spend(float(self.covers.size + 2 * open_rows.size * left.size))
+        rest = self.covers[np.ix_(open_rows, left)]
+        if not rest.any(axis=1).all():
+            return []
+        rows, columns = essential(
+            rest, self.budget.part(_DOMINANCE * self.budget.remaining)
+        )
+        rest = rest[np.ix_(rows, columns)]
+        allowed = taken.copy()
+        allowed[left[columns]] = True
+        only = rest[rest.sum(axis=1) == 1].any(axis=0)
+        if only.any() or columns.size < left.size or np.any(taken & ~part.taken):
+            taken[left[columns[only]]] = True
+            return self._solved(node, Part(allowed, taken, symmetric=part.symmetric))
+        return self._split(node, rest, left, allowed)
+
+    def _split(
+        self,
+        node: Node,
+        rest: NDArray[np.bool_],
+        left: NDArray[np.int64],
+        allowed: NDArray[np.bool_],
+    ) -> list[Node] | None:
+        """Return both sides of the orbit that most rows of few sets wait for."""
+        part = node.part
+        orbits = np.arange(left.size)
+        if part.symmetric:
+            orbits = column_orbits(rest, self.budget)
+        symmetric = np.unique(orbits).size < left.size
+        urgent = np.exp2(-rest.sum(axis=1).astype(np.float64)) @ rest
+        score = np.round(np.bincount(orbits, urgent), 12)
+        best = int(np.argmax(score))
+        orbit = left[orbits == best]
+        taken, fewer = part.taken.copy(), allowed.copy()
+        taken[left[best]] = True
+        fewer[orbit] = False
+        return self._solved(
+            node,
+            Part(fewer, part.taken, symmetric=symmetric),
+            Part(allowed, taken, symmetric=symmetric),
+        )
+
+    def _solved(self, node: Node, *parts: Part) -> list[Node] | None:
+        """Return parts of a node bounded, or None where the budget ended before."""
+        nodes = [self.linear.solve(part, node.basis) for part in parts]
+        return None if None in nodes else [n for n in nodes if n is not None]
