@@ -8,11 +8,10 @@ or, where many sets are alike, by HiGHS (``row_generation``), and so on. A bound
 subset of the rows holds for all of them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from .answers import CountAnswer
 from .orbital_branching import branch_on_orbits
 from .reductions import ReducedCover
 from .row_branching import branch_on_rows
@@ -36,25 +35,10 @@ _CHEAP = 200_000
 # Exchanges without a find after which rows count as critical: first, and then later.
 _FIRST_STEPS = 2_000
 _STEPS = 60_000
-
-
 # Reduced costs are asked again while they leave less than this share of the sets.
 _ROUNDS = 4
 _FEWER = 0.9
 _ROUNDING = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class FullAnswer:
-    """Fewest sets that cover every row; indices of the reduced cover given.
-
-    Whoever gave the budget says what it cut.
-    """
-
-    status: SolveStatus
-    selected: NDArray[np.int64]
-    lower_bound: float
-    proof: str
 
 
 def fewest_full(
@@ -64,7 +48,7 @@ def fewest_full(
     seed: int,
     start: NDArray[np.int64],
     lower: int,
-) -> FullAnswer:
+) -> CountAnswer:
     """Find the fewest sets that cover every row, with a lower bound.
 
     Args:
@@ -76,7 +60,7 @@ def fewest_full(
 
     Returns:
         The answer; its selection is never larger than the start, its bound never below
-        ``lower``.
+        ``lower``. Whoever gave the budget says what it cut.
 
     Raises:
         ValueError: If the start leaves a row open.
@@ -95,7 +79,7 @@ def fewest_full(
     settled = search.lower >= start.size
     proof = search.proof or "bound given"
     status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-    return FullAnswer(status, start, float(min(search.lower, start.size)), proof)
+    return CountAnswer(status, start, float(min(search.lower, start.size)), proof)
 
 
 class _Search:

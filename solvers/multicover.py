@@ -4,24 +4,22 @@ From above: greedy and exchanges. From below: Lagrangian bound, exact search ove
 K-tuples, HiGHS' branch and bound. Each spends a share of one counted budget.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .answers import INTEGER_PROOF, NONE, CountAnswer, WeightAnswer, better, cut_short
+from .answers import INTEGER_PROOF, NONE, CountAnswer, WeightAnswer, cut_short
+from .count_ledger import CountLedger
 from .exact_multicover import any_tuple
 from .lagrangian import ascend
-from .mixed_integer import TOLERANCE, fits, heaviest_integer, solve_integer
+from .mixed_integer import TOLERANCE, fits, heaviest_integer
 from .multicover_swaps import exchange, worth_of
 from .neighbourhood import greedy, prune
 from .reductions import ReducedCover
-from .relaxation import count_bound, coverage_bounds, rounding, tighten
+from .relaxation import coverage_bounds, rounding, tighten
 from .status import SolveStatus, WorkBudget
-
-_LARGE_COUNT = 8
 
 
 def fewest_multicover(
@@ -42,61 +40,31 @@ def fewest_multicover(
         heaviest: Whether to look for more weight at the same count.
     """
     cover = replace(cover, costs=np.ones(cover.n_sets))
-    selected = prune(cover, greedy(cover, NONE, budget))
-    cap = cover.n_sets if max_sets is None else max_sets
-    multipliers = cover.weights / cover.needs
-    lower, proof = 1, "a positive weight needs a set"
-    sized = count_bound(cover, multipliers)
-    if sized > lower:
-        lower, proof = sized, "sum of the largest sets"
-    selected = _improve(cover, selected, lower, budget.part(0.2 * budget.units), seed)
-
+    ledger = CountLedger(cover, prune(cover, greedy(cover, NONE, budget)), max_sets)
+    _improve(ledger, budget.part(0.2 * budget.units), seed)
     ascending = budget.part(0.25 * budget.units)
-    while lower < min(selected.size, cap + 1):
-        step = ascend(cover, multipliers, ascending, target=0.0, n_sets=lower)
-        multipliers = step.multipliers
-        proved = count_bound(cover, multipliers)
-        if proved <= lower:
-            break
-        lower, proof = proved, "Lagrangian bound"
-
-    methods = [_by_tuples, _by_integers]
-    for method in methods if lower < _LARGE_COUNT else methods[::-1]:
-        if lower < min(selected.size, cap + 1):
-            selected, proved, how = method(
-                cover, selected, lower, cap, multipliers, budget
-            )
-            lower, proof = (proved, how) if proved > lower else (lower, proof)
-    return _closed(
-        cover, selected, lower, proof, budget, seed=seed, cap=cap, heaviest=heaviest
+    multipliers = ledger.by_multipliers(
+        lambda n_sets, start: (
+            ascend(cover, start, ascending, target=0.0, n_sets=n_sets).multipliers
+        )
     )
 
+    def tuples(
+        n_sets: int, part: WorkBudget
+    ) -> tuple[NDArray[np.int64] | None, str | None]:
+        search = any_tuple(cover, n_sets, multipliers, part)
+        proof = f"sets of {n_sets} by branch and bound" if search.complete else None
+        return search.selected, proof
 
-def _closed(
-    cover: ReducedCover,
-    selected: NDArray[np.int64],
-    lower: int,
-    proof: str,
-    budget: WorkBudget,
-    *,
-    seed: int,
-    cap: int,
-    heaviest: bool,
-) -> CountAnswer:
-    """Return the answer, of most weight where that is asked for."""
-    spare = budget.part(np.inf)
-    spare.units = 0.3 * budget.units
-    if selected.size > cap:
-        settled = lower > cap
-        status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
-        selected = heaviest_of(cover, cap, spare, seed=seed).selected
-    else:
-        settled = lower >= selected.size
-        status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-        if heaviest and selected.size:
-            selected = _heavier(cover, selected, spare, seed)
-    proof = proof if settled else cut_short(proof, budget)
-    return CountAnswer(status, selected, float(lower), proof)
+    def heavier(
+        n_sets: int, start: NDArray[np.int64], part: WorkBudget
+    ) -> NDArray[np.int64]:
+        if start.size:
+            return _heavier(cover, start, part, seed)
+        return heaviest_of(cover, n_sets, part, seed=seed).selected
+
+    ledger.by_exact_search(tuples, budget)
+    return ledger.closed(heavier, budget, heaviest=heaviest)
 
 
 def heaviest_of(
@@ -151,29 +119,17 @@ def _weight_bound(cover: ReducedCover, n_sets: int, budget: WorkBudget) -> float
     return float(coverage_bounds(cover, step.multipliers)[n_sets])
 
 
-def _improve(
-    cover: ReducedCover,
-    selected: NDArray[np.int64],
-    lower: int,
-    budget: WorkBudget,
-    seed: int,
-) -> NDArray[np.int64]:
-    """Return a cover of fewer sets while exchanges find one."""
-    while selected.size > max(lower, 1):
-        without = [np.delete(selected, i) for i in range(selected.size)]
-        start = max(without, key=lambda some: worth_of(cover, some))
-        fewer = exchange(
-            cover,
-            start,
-            budget,
-            seed=seed,
-            max_kicks=20 + 10 * start.size,
-            heaviest=False,
+def _improve(ledger: CountLedger, budget: WorkBudget, seed: int) -> None:
+    """Look for fewer sets by exchanges."""
+    cover = ledger.cover
+
+    def search(start: NDArray[np.int64]) -> NDArray[np.int64]:
+        kicks = 20 + 10 * start.size
+        return exchange(
+            cover, start, budget, seed=seed, max_kicks=kicks, heaviest=False
         )
-        if not cover.meets(fewer):
-            break
-        selected = prune(cover, fewer)
-    return selected
+
+    ledger.improve(lambda some: worth_of(cover, some), search)
 
 
 def _heavier(
@@ -194,44 +150,3 @@ def _heavier(
             proposals = [other, answer.selected]
             other = max(filter(cover.meets, proposals), key=cover.weight_of)
     return other
-
-
-def _by_tuples(
-    cover: ReducedCover,
-    selected: NDArray[np.int64],
-    lower: int,
-    cap: int,
-    multipliers: NDArray[np.float64],
-    budget: WorkBudget,
-) -> tuple[NDArray[np.int64], int, str]:
-    """Exhaust the tuples of as many sets as the bound, then of one more."""
-    proof = ""
-    while lower < min(selected.size, cap + 1):
-        search = any_tuple(
-            cover, lower, multipliers, budget.part(0.7 * budget.remaining)
-        )
-        if search.selected is not None:
-            selected = search.selected
-        elif search.complete:
-            lower, proof = lower + 1, f"sets of {lower} by branch and bound"
-        else:
-            break
-    return selected, lower, proof
-
-
-def _by_integers(
-    cover: ReducedCover,
-    selected: NDArray[np.int64],
-    lower: int,
-    cap: int,
-    multipliers: NDArray[np.float64],
-    budget: WorkBudget,
-) -> tuple[NDArray[np.int64], int, str]:
-    """Leave a small program to HiGHS."""
-    if not fits(cover):
-        return selected, lower, ""
-    answer = solve_integer(cover, selected, budget)
-    selected = better(cover, selected, answer.selected)
-    proved = lower if answer.bound is None else math.ceil(answer.bound - 1e-5)
-    # A bound above a cover that was counted here is none.
-    return selected, proved if proved <= selected.size else lower, INTEGER_PROOF

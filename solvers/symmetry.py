@@ -95,7 +95,7 @@ class _Refinement:
     def refined(self, colours: Colours) -> Colours:
         """Return colours that tell apart all that these do, and their neighbours."""
         n_colours, rows = np.unique(colours).size, np.zeros(1, dtype=np.uint64)
-        entries = float(self._by_row.nnz + sum(self._by_row.shape))
+        entries = float(self._by_row.nnz + self._by_row.shape[0] + colours.size)
         while colours.size:
             # Sums of mixed numbers modulo 2^64: equal for equal multisets of colours.
             rows = _mixed(rows + _mixed(self._by_row @ _mixed(colours)))
