@@ -30,6 +30,18 @@ def pack_rows(serves: NDArray[np.bool_]) -> NDArray[np.uint64]:
     return packed.view(np.uint64)
 
 
+def pack_shuffled(sets: NDArray[np.bool_]) -> NDArray[np.uint64]:
+    """Return sets as bit rows, shape (n_sets, n_words), elements in random order.
+
+    The order is the same for all, and the first words are a fair sketch of a set.
+
+    Args:
+        sets: Whether element i is in set k, shape (n_sets, n_elements).
+    """
+    order = np.random.default_rng(0).permutation(sets.shape[1])
+    return pack_rows(sets[:, order])
+
+
 def unpack_rows(rows: NDArray[np.uint64], n_rows: int) -> NDArray[np.bool_]:
     """Return the matrix, shape (n_cells, n_rows), of a few bit rows."""
     whole = np.ascontiguousarray(rows)

@@ -109,7 +109,11 @@ class CoverProblem:
     @property
     def total_weights(self) -> NDArray[np.float64]:
         """Weight of all elements of each row set, shape (n_g,)."""
-        return _sums(self.weights, self.row_sets, self.n_row_sets)
+        return self.by_row_set(self.weights)
+
+    def by_row_set(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the sums of elements' values over each row set, shape (n_g,)."""
+        return _sums(values, self.row_sets, self.n_row_sets)
 
     @property
     def n_row_sets(self) -> int:
@@ -136,7 +140,7 @@ class CoverProblem:
         # A selection is a set: a name given twice counts once.
         served = np.asarray(self.covers[:, index].sum(axis=1)).ravel()
         covered = np.where(served >= self.needs, self.weights, 0.0)
-        return _sums(covered, self.row_sets, self.n_row_sets)
+        return self.by_row_set(covered)
 
     def covered_weight(self, selected: ArrayLike) -> float:
         """Return the weight that a selection covers, all row sets together."""

@@ -218,17 +218,19 @@ def _completable(
     keep = node.needs <= np.minimum(servers, r)
     if np.all(keep):
         return node, multipliers
+    return _with_rows(node, keep), multipliers[keep]
+
+
+def _with_rows(node: ReducedCover, keep: NDArray[np.bool_]) -> ReducedCover:
+    """Return a node over some of its rows."""
     by_row = node.by_row[keep]
-    return (
-        replace(
-            node,
-            by_row=by_row,
-            by_set=by_row.T.tocsr(),
-            weights=node.weights[keep],
-            needs=node.needs[keep],
-            row_sets=node.row_sets[keep],
-        ),
-        multipliers[keep],
+    return replace(
+        node,
+        by_row=by_row,
+        by_set=by_row.T.tocsr(),
+        weights=node.weights[keep],
+        needs=node.needs[keep],
+        row_sets=node.row_sets[keep],
     )
 
 
@@ -259,14 +261,12 @@ def _taken(
     needs[node.members(s)] -= 1
     keep = needs > 0
     done = node.by_row_set(np.where(keep, 0.0, node.weights))
-    by_row = node.by_row[keep][:, rest]
+    left = _with_rows(replace(node, needs=needs), keep)
+    by_row = left.by_row[:, rest]
     child = replace(
-        node,
+        left,
         by_row=by_row,
         by_set=by_row.T.tocsr(),
-        weights=node.weights[keep],
-        needs=needs[keep],
-        row_sets=node.row_sets[keep],
         quotas=np.maximum(node.quotas - done, 0.0),
         costs=node.costs[rest],
         kept=node.kept[rest],

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .bit_rows import pack_shuffled
 from .cover_problem import CoverProblem
 
 WEIGHT_SLACK = 1e-12
@@ -149,7 +150,7 @@ def reduce_problem(
 
     already = np.asarray(problem.covers[:, problem.fixed].sum(axis=1)).ravel()
     needs = problem.needs - already
-    done = problem_sums(problem, np.where(needs <= 0, whole, 0.0))
+    done = problem.by_row_set(np.where(needs <= 0, whole, 0.0))
     servers = np.diff(problem.covers.indptr) - already
     live = (whole > 0) & (needs > 0) & (servers >= needs)
     rows = _merge_rows(problem, live, needs)
@@ -183,21 +184,12 @@ def _quotas(
         return (problem.required_weight > 0).astype(np.float64)
     # More than there is can't be had, however much more.
     asked = np.ldexp(np.minimum(problem.required_weight, 4.0 * total), exponent)
-    off = 0.5 * problem_sums(problem, inexact.astype(np.float64))
+    off = 0.5 * problem.by_row_set(inexact.astype(np.float64))
     return np.floor(asked * (1.0 - WEIGHT_SLACK) - off)
 
 
 def _exponent(total: float) -> int:
     return 51 - int(np.floor(np.log2(total))) if total > 0 else 0
-
-
-def problem_sums(
-    problem: CoverProblem, values: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return sums over each row set of a problem, shape (n_g,)."""
-    return np.bincount(
-        problem.row_sets, weights=values, minlength=problem.n_row_sets
-    ).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +249,7 @@ def _undominated(
     # A superset weighs more, so only earlier columns of this order can dominate.
     order = np.lexsort((np.arange(n_sets), costs, -gains))
     order = order[gains[order] > 0]
-    words = _column_words(dense[:, order])
+    words = pack_shuffled(dense[:, order].T)
     sketch = np.ascontiguousarray(words[:, :_SKETCH_WORDS])
     rivals_wanted = np.ones(order.size, dtype=np.int64)
     for need in np.unique(needs[needs > 1]):
@@ -281,12 +273,3 @@ def _undominated(
     stand_in = np.full(n_sets, -1, dtype=np.int64)
     stand_in[order] = np.searchsorted(kept, order[better])
     return kept, stand_in
-
-
-def _column_words(dense: NDArray[np.bool_]) -> NDArray[np.uint64]:
-    """Return columns as bit rows, shape (n_s, n_words), elements in random order."""
-    n_rows, n_sets = dense.shape
-    padded = np.zeros((n_sets, -(-max(n_rows, 1) // 64) * 64), dtype=bool)
-    # Shuffled, so that the first words are a fair sketch of the column.
-    padded[:, :n_rows] = dense[np.random.default_rng(0).permutation(n_rows)].T
-    return np.packbits(padded, axis=1).view(np.uint64)

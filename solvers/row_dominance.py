@@ -9,6 +9,7 @@ Neither changes the fewest columns. The row rule is *not* valid where rows may b
 import numpy as np
 from numpy.typing import NDArray
 
+from .bit_rows import pack_shuffled
 from .status import WorkBudget
 
 # Passes after which what is left to find isn't worth looking for.
@@ -54,7 +55,7 @@ def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
     if len(sets) <= _FEW:
         return _minimal_of_few(sets, budget)
     order = np.lexsort((np.arange(len(sets)), sets.sum(axis=1)))
-    words = _words(sets)[:, order]
+    words = np.ascontiguousarray(pack_shuffled(sets).T)[:, order]
     alive = np.ones(order.size, dtype=bool)
     # A superset is larger, so only later sets of this order can include the pivot.
     rest = np.arange(order.size)
@@ -85,12 +86,3 @@ def _minimal_of_few(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.i
     equal = within & within.T
     goes = (within & ~equal).any(axis=0) | np.triu(equal, 1).any(axis=0)
     return np.flatnonzero(~goes).astype(np.int64)
-
-
-def _words(sets: NDArray[np.bool_]) -> NDArray[np.uint64]:
-    """Return the sets' bits, shape (n_words, n_sets), elements in random order."""
-    n_sets, n_elements = sets.shape
-    padded = np.zeros((n_sets, -(-max(n_elements, 1) // 64) * 64), dtype=bool)
-    # Shuffled, so that the first words are a fair sketch of the set.
-    padded[:, :n_elements] = sets[:, np.random.default_rng(0).permutation(n_elements)]
-    return np.ascontiguousarray(np.packbits(padded, axis=1).view(np.uint64).T)
