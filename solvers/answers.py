@@ -49,4 +49,6 @@ def better(
 
 def cut_short(proof: str, budget: WorkBudget) -> str:
     """Return the sentence for a proof that didn't come to its end."""
-    return f"{proof}; search cut by the {budget.reason}"
+    if budget.out_of_time:
+        return f"{proof}; search cut by the time limit"
+    return f"{proof}; no more was proved within the work budget"

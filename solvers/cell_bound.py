@@ -17,6 +17,7 @@ from .cell_problem import CellProblem, WholeRows, whole_rows
 from .cell_store import CellStore
 from .cell_tuples import Enough, refute_tuples
 from .cells import CellTree
+from .cover_problem import whole_number
 from .status import WorkBudget
 
 DEFAULT_BUDGET = 2e10
@@ -105,7 +106,12 @@ def multiplier_bound(
     Returns:
         The number of poses that is needed at least, inf if no cell serves anything that
         counts; and the weight that K poses serve at most, in the problem's unit.
+
+    Raises:
+        ValueError: If K isn't a whole number of at least 0.
     """
+    if not whole_number("n_poses", n_poses) >= 0:
+        raise ValueError(f"n_poses must be at least 0, got {n_poses}")
     whole = whole_rows(problem)
     given = whole.multipliers(multipliers)
     price = BitSum(given)
@@ -140,10 +146,10 @@ def bound_count(
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
 
     Raises:
-        ValueError: If the tree has other rows than the problem, or a cell serves rows
-            that its parent misses.
+        ValueError: If the count isn't a whole number of at least 1, the tree has other
+            rows than the problem, or a cell serves rows that its parent misses.
     """
-    if not count >= 1:
+    if not whole_number("count", count) >= 1:
         raise ValueError(f"count must be at least 1, got {count}")
     if tree.n_rows != problem.weights.size:
         raise ValueError(

@@ -21,7 +21,7 @@ from .counts import fewest_sets, most_weight
 from .cover_problem import CoverProblem, set_names, whole_number
 from .multicover import fewest_multicover, heaviest_of
 from .neighbourhood import greedy, prune
-from .reductions import WEIGHT_SLACK, ReducedCover, reduce_problem
+from .reductions import ReducedCover, forgiven, reduce_problem
 from .status import SolveStatus, WorkBudget
 
 DEFAULT_BUDGET = 2e9
@@ -70,8 +70,7 @@ class CoverSolution:
         """
         required, totals = self.problem.required_weight, self.problem.total_weights
         missing = required - self.covered_weights
-        size = np.maximum(self.problem.total_weight, required)
-        missing[missing <= 2.0 * WEIGHT_SLACK * size] = 0.0
+        missing[missing <= forgiven(self.problem)] = 0.0
         shares = missing / np.where(totals > 0, totals, np.maximum(missing, 1e-300))
         return float(shares.max())
 

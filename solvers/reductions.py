@@ -188,6 +188,20 @@ def _quotas(
     return np.floor(asked * (1.0 - WEIGHT_SLACK) - off)
 
 
+def forgiven(problem: CoverProblem) -> NDArray[np.float64]:
+    """Return the weight that each row set may lack and count as served, shape (n_g,).
+
+    That of rounding: of the requirement, of each weight to a whole number of units, and
+    of the sums.
+    """
+    total = problem.total_weight
+    exponent = _exponent(total)
+    scaled = np.ldexp(problem.weights, exponent)
+    inexact = problem.by_row_set((np.rint(scaled) != scaled).astype(np.float64))
+    asked = np.minimum(problem.required_weight, 4.0 * total)
+    return WEIGHT_SLACK * (asked + total) + np.ldexp(inexact + 1.0, -exponent)
+
+
 def _exponent(total: float) -> int:
     return 51 - int(np.floor(np.log2(total))) if total > 0 else 0
 

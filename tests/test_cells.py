@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 from solvers import bit_rows, cell_store, cells
 from solvers.bit_rows import BitSum, pack_rows, unpack_rows
-from solvers.cell_bound import CellStatus, bound_count
+from solvers.cell_bound import CellStatus, bound_count, multiplier_bound
 from solvers.cell_multipliers import MultiplierSearch
 from solvers.cell_problem import CellProblem, whole_rows
 from solvers.cell_store import CellStore
@@ -169,6 +169,10 @@ def test_bad_questions_are_refused():
     problem, tree = CellProblem(np.ones(70), 30.0), small_tree()
     with pytest.raises(ValueError, match="count must be at least 1, got 0"):
         bound_count(problem, tree, 0)
+    with pytest.raises(ValueError, match=r"count must be a whole number, got 2\.5"):
+        bound_count(problem, tree, 2.5)
+    with pytest.raises(ValueError, match="n_poses must be at least 0, got -1"):
+        multiplier_bound(problem, tree, np.ones(70), n_poses=-1)
     with pytest.raises(ValueError, match="cells have 70 rows, the problem has 3"):
         bound_count(CellProblem(np.ones(3), 1.0), tree, 2)
     with pytest.raises(ValueError, match=r"multipliers must be \(70,\)"):

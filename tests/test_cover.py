@@ -242,6 +242,23 @@ def test_duplicate_columns_choose_the_cheap_one():
     assert solve_cover(problem).selected.tolist() == [1]
 
 
+def test_what_the_search_forgives_is_no_shortfall():
+    """Many weights that no unit divides: each may be rounded by half of one."""
+    rng = np.random.default_rng(0)
+    weights = rng.random(100_000)
+    covers = np.ones((weights.size, 2), dtype=bool)
+    covers[0] = [False, True]
+    covers[1] = [True, False]
+    weights[:2] = 0.0
+    total = float(weights.sum())
+    for missing, served in ((1e-11, True), (1e-9, False)):
+        asked = total * (1.0 + missing)
+        problem = CoverProblem(covers, weights, required_weight=asked)
+        solution = solve_cover(problem)
+        assert (solution.shortfall() == 0.0) is served
+        assert (solution.status is SolveStatus.OPTIMAL) is served
+
+
 def test_shortfall_catches_a_dropped_set():
     good = solve_cover(from_sets([{0, 1}, {2}], 3))
     spoiled = dataclasses.replace(good, selected=good.selected[:1])
