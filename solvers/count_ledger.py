@@ -6,6 +6,7 @@ offers a smaller cover or proves one set more, and says how.
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +81,7 @@ class CountLedger:
 
     def improve(
         self,
-        worth: Callable[[NDArray[np.int64]], float],
+        worth: Callable[[NDArray[np.int64]], Any],
         search: Callable[[NDArray[np.int64]], NDArray[np.int64]],
     ) -> None:
         """Take a set out and search from there, while that gives a cover."""

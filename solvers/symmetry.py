@@ -88,6 +88,7 @@ class _Refinement:
     def __init__(self, covers: NDArray[np.bool_]) -> None:
         self._by_row = sparse.csr_array(covers, dtype=np.uint64)
         self._by_set = sparse.csr_array(self._by_row.T)
+        self._entries = float(np.count_nonzero(covers) + sum(covers.shape))
         self.done = 0
         self.allowance = _MAX_REFINEMENTS
         self.units = 0.0
@@ -95,12 +96,11 @@ class _Refinement:
     def refined(self, colours: Colours) -> Colours:
         """Return colours that tell apart all that these do, and their neighbours."""
         n_colours, rows = np.unique(colours).size, np.zeros(1, dtype=np.uint64)
-        entries = float(self._by_row.nnz + self._by_row.shape[0] + colours.size)
         while colours.size:
             # Sums of mixed numbers modulo 2^64: equal for equal multisets of colours.
             rows = _mixed(rows + _mixed(self._by_row @ _mixed(colours)))
             colours = _mixed(colours + _mixed(self._by_set @ _mixed(rows)))
-            self.units += _UNITS_PER_ENTRY * entries + _CALL_UNITS
+            self.units += _UNITS_PER_ENTRY * self._entries + _CALL_UNITS
             more = np.unique(colours).size
             if more == n_colours:
                 break
