@@ -18,6 +18,7 @@ from .cell_store import CellStore
 from .cell_tuples import Enough, refute_tuples
 from .cells import CellTree
 from .cover_problem import whole_number
+from .one_thread import on_one_thread
 from .status import WorkBudget
 
 DEFAULT_BUDGET = 2e10
@@ -128,6 +129,7 @@ def multiplier_bound(
     return whole.count_bound(given, top), min(most, float(problem.weights.sum()))
 
 
+@on_one_thread
 def bound_count(
     problem: CellProblem,
     tree: CellTree,

@@ -102,10 +102,14 @@ class CountLedger:
             budget: Work.
             share: Part of what is left that each of the two may spend.
         """
-        methods = [lambda part: self._by_tuples(tuples, part), self._by_integers]
-        for method in methods if self.lower < _LARGE_COUNT else methods[::-1]:
-            if not self.settled:
-                method(budget.part(share * budget.remaining))
+        for exhaust in (True, False) if self.lower < _LARGE_COUNT else (False, True):
+            part = budget.part(share * budget.remaining)
+            if self.settled:
+                break
+            if exhaust:
+                self._by_tuples(tuples, part)
+            else:
+                self._by_integers(part)
 
     def _by_tuples(self, tuples: TupleSearch, budget: WorkBudget) -> None:
         """Exhaust the tuples of as many sets as the bound, then of one more."""

@@ -21,6 +21,7 @@ from .counts import fewest_sets, most_weight
 from .cover_problem import CoverProblem, set_names, whole_number
 from .multicover import fewest_multicover, heaviest_of
 from .neighbourhood import greedy, prune
+from .one_thread import on_one_thread
 from .reductions import ReducedCover, forgiven, reduce_problem
 from .status import SolveStatus, WorkBudget
 
@@ -101,6 +102,7 @@ class MaxCoverageSolution:
         return self.problem.covered_weight(self.selected)
 
 
+@on_one_thread
 def solve_cover(
     problem: CoverProblem,
     *,
@@ -160,6 +162,7 @@ def solve_cover(
     )
 
 
+@on_one_thread
 def solve_max_coverage(
     problem: CoverProblem,
     n_sets: int,

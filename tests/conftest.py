@@ -2,10 +2,34 @@
 
 import importlib.util
 import sys
+from collections.abc import Generator
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from threadpoolctl import threadpool_limits
+
+# Files whose few tests plan whole rigs: begun first, so that no worker ends on one alone.
+_LONGEST = ("cli", "pipeline", "ring_axes", "readme", "invariance", "flips", "interest")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep the order of the files below, where xdist would sort them by tests."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest files."""
+    places = {f"test_{name}": place for place, name in enumerate(_LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.stem, len(places)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_thread() -> Generator[None]:
+    """Leave BLAS one thread: workers that share the cores would wait for each other."""
+    with threadpool_limits(1, user_api="blas"):
+        yield
 
 
 @pytest.fixture(scope="session")
