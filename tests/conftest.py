@@ -9,7 +9,7 @@ from types import ModuleType
 import pytest
 from threadpoolctl import threadpool_limits
 
-# Files whose few tests plan whole rigs: begun first, so that no worker ends on one alone.
+# Files whose few tests plan whole rigs: begun first, so that no worker ends on one.
 _LONGEST = ("cli", "pipeline", "ring_axes", "readme", "invariance", "flips", "interest")
 
 
