@@ -39,12 +39,11 @@ def column_colours(covers: NDArray[np.bool_]) -> Colours:
     Args:
         covers: Whether set s covers row e, shape (n_e, n_s).
     """
-    return _Refinement(covers).refined(np.zeros(covers.shape[1], dtype=np.uint64))
+    refinement = _Refinement(covers, WorkBudget(np.inf))
+    return refinement.refined(np.zeros(covers.shape[1], dtype=np.uint64))
 
 
-def column_orbits(
-    covers: NDArray[np.bool_], budget: WorkBudget | None = None
-) -> NDArray[np.int64]:
+def column_orbits(covers: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
     """Return for each column the first one that a symmetry carries it to.
 
     Every symmetry used was checked; where the search for one is given up, an orbit may
@@ -52,46 +51,55 @@ def column_orbits(
 
     Args:
         covers: Whether set s covers row e, shape (n_e, n_s).
-        budget: What the search is charged to.
+        budget: Work; where it ends, columns that weren't tried stay apart.
     """
-    refinement = _Refinement(covers)
+    refinement = _Refinement(covers, budget)
     first = _Orbits(covers.shape[1])
     colours = refinement.refined(np.zeros(covers.shape[1], dtype=np.uint64))
     rows = _row_keys(covers)
     for colour in np.unique(colours):
         alike = np.flatnonzero(colours == colour)
-        heads: list[int] = []
+        # First columns of the orbits met; by insertion, so in the same order always.
+        heads: dict[int, None] = {}
         for column in alike.tolist():
-            if any(first.of(column) == first.of(head) for head in heads):
+            if refinement.given_up:
+                break
+            if first.of(column) in heads:
                 continue
             for head in heads:
-                refinement.allowance = min(
-                    _MAX_FOR_A_PAIR, _MAX_REFINEMENTS - refinement.done
-                )
-                moved = refinement.match(
-                    refinement.single(colours, head),
-                    refinement.single(colours, column),
-                )
+                moved = refinement.symmetry(colours, head, column)
                 if moved is not None and _keeps(covers, moved, rows):
                     first.join(moved)
                     break
             else:
-                heads.append(column)
-    if budget is not None:
-        budget.spend(refinement.units)
+                heads[column] = None
     return first.all()
 
 
 class _Refinement:
     """Colours of a cover, refined; equal on isomorphic sides."""
 
-    def __init__(self, covers: NDArray[np.bool_]) -> None:
+    def __init__(self, covers: NDArray[np.bool_], budget: WorkBudget) -> None:
         self._by_row = sparse.csr_array(covers, dtype=np.uint64)
         self._by_set = sparse.csr_array(self._by_row.T)
         self._entries = float(np.count_nonzero(covers) + sum(covers.shape))
-        self.done = 0
-        self.allowance = _MAX_REFINEMENTS
-        self.units = 0.0
+        self._budget = budget
+        self._left = _MAX_REFINEMENTS
+        self._left_for_pair = 0
+
+    def symmetry(
+        self, colours: Colours, one: int, other: int
+    ) -> NDArray[np.int64] | None:
+        """Return where columns may be carried if one is carried to another, or None."""
+        self._left_for_pair = _MAX_FOR_A_PAIR
+        if self.given_up:
+            return None
+        return self._match(self._single(colours, one), self._single(colours, other))
+
+    @property
+    def given_up(self) -> bool:
+        """Whether no more is tried."""
+        return self._left <= 0 or self._budget.exhausted
 
     def refined(self, colours: Colours) -> Colours:
         """Return colours that tell apart all that these do, and their neighbours."""
@@ -100,22 +108,22 @@ class _Refinement:
             # Sums of mixed numbers modulo 2^64: equal for equal multisets of colours.
             rows = _mixed(rows + _mixed(self._by_row @ _mixed(colours)))
             colours = _mixed(colours + _mixed(self._by_set @ _mixed(rows)))
-            self.units += _UNITS_PER_ENTRY * self._entries + _CALL_UNITS
+            self._budget.spend(_UNITS_PER_ENTRY * self._entries + _CALL_UNITS)
             more = np.unique(colours).size
             if more == n_colours:
                 break
             n_colours = more
-        self.done += 1
-        self.allowance -= 1
+        self._left -= 1
+        self._left_for_pair -= 1
         return colours
 
-    def single(self, colours: Colours, column: int) -> Colours:
+    def _single(self, colours: Colours, column: int) -> Colours:
         """Return the colours refined with one column told apart from all others."""
         marked = colours.copy()
         marked[column] = ~marked[column]
         return self.refined(marked)
 
-    def match(self, left: Colours, right: Colours) -> NDArray[np.int64] | None:
+    def _match(self, left: Colours, right: Colours) -> NDArray[np.int64] | None:
         """Return to which column each is carried, by colours made unique, or None."""
         order, other = (np.argsort(side, kind="stable") for side in (left, right))
         if not np.array_equal(left[order], right[other]):
@@ -127,11 +135,11 @@ class _Refinement:
             return moved
         several = np.flatnonzero(counts > 1)
         least = several[np.argmin(counts[several])]
-        singled = self.single(left, int(places[least]))
+        singled = self._single(left, int(places[least]))
         for column in np.flatnonzero(right == values[least]).tolist():
-            if self.allowance <= 0:
+            if self._left_for_pair <= 0 or self.given_up:
                 break
-            moved = self.match(singled, self.single(right, column))
+            moved = self._match(singled, self._single(right, column))
             if moved is not None:
                 return moved
         return None

@@ -101,7 +101,7 @@ def small_covers():
 def test_orbits_are_those_of_all_symmetries():
     several = 0
     for covers in small_covers():
-        orbits = column_orbits(covers)
+        orbits = column_orbits(covers, WorkBudget(PLENTY))
         assert orbits.tolist() == orbits_by_hand(covers).tolist()
         several += np.unique(orbits).size < orbits.size
     assert several > 12
@@ -111,7 +111,7 @@ def test_columns_of_one_colour_need_not_be_exchanged():
     """A ring of six and two of three: every corner has two edges of two corners."""
     covers = beside(cycle(6), cycle(3), cycle(3))
     assert np.unique(column_colours(covers)).size == 1
-    assert column_orbits(covers).tolist() == [0] * 6 + [6] * 6
+    assert column_orbits(covers, WorkBudget(PLENTY)).tolist() == [0] * 6 + [6] * 6
 
 
 def test_no_collision_of_colours_makes_an_orbit(monkeypatch):
@@ -119,14 +119,18 @@ def test_no_collision_of_colours_makes_an_orbit(monkeypatch):
     monkeypatch.setattr(symmetry, "_mixed", lambda values: values & np.uint64(3))
     for covers in small_covers():
         whole = orbits_by_hand(covers)
-        for column, first in enumerate(column_orbits(covers)):
+        for column, first in enumerate(column_orbits(covers, WorkBudget(PLENTY))):
             assert whole[column] == whole[first]
+
+
+def test_no_orbit_is_claimed_without_work():
+    assert column_orbits(cycle(9), WorkBudget(0.0)).tolist() == list(range(9))
 
 
 def test_orbits_come_in_parts_where_the_search_is_cut(monkeypatch):
     monkeypatch.setattr(symmetry, "_MAX_REFINEMENTS", 4)
     covers = cycle(9)
-    orbits = column_orbits(covers)
+    orbits = column_orbits(covers, WorkBudget(PLENTY))
     assert 1 < np.unique(orbits).size <= 9
     tree = branch_on_orbits(covers, np.arange(9), 5, WorkBudget(PLENTY))
     assert (tree.selected, tree.lower_bound) == (None, 5)
