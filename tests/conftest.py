@@ -2,9 +2,10 @@
 
 import importlib.util
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 from threadpoolctl import threadpool_limits
@@ -30,6 +31,20 @@ def _one_thread() -> Generator[None]:
     """Leave BLAS one thread: workers that share the cores would wait for each other."""
     with threadpool_limits(1, user_api="blas"):
         yield
+
+
+@pytest.fixture
+def by_threads() -> Callable[[Callable[[], Any]], list[Any]]:
+    """What a function returns with one BLAS thread, and with two."""
+
+    def run(solve: Callable[[], Any]) -> list[Any]:
+        answers = []
+        for threads in (1, 2):
+            with threadpool_limits(threads, user_api="blas"):
+                answers.append(solve())
+        return answers
+
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import linprog
-from threadpoolctl import threadpool_limits
 
 from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cell_bound import CellStatus, bound_count, multiplier_bound
@@ -557,14 +556,10 @@ def test_cells_made_when_asked_for_prove_the_same(cap_trees):
     assert one.cells_used == lazy.asked + 6 < names.size
 
 
-def test_threads_change_nothing(cap_trees):
+def test_threads_change_nothing(cap_trees, by_threads):
     tree = cap_trees.SphereTree(cap_trees.spread(200), 50 * DEG, 4)
     problem = CellProblem(np.random.default_rng(0).random(200), 80.0)
-    answers = []
-    for threads in (1, 2):
-        with threadpool_limits(threads):
-            answers.append(bound_count(problem, tree, 6, budget=1e9))
-    one, two = answers
+    one, two = by_threads(lambda: bound_count.__wrapped__(problem, tree, 6, budget=1e9))
     np.testing.assert_array_equal(one.multipliers, two.multipliers)
     for name in ("lower_bound", "status", "cells_used", "tuples_met", "proof"):
         assert getattr(one, name) == getattr(two, name)
