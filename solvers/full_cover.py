@@ -2,10 +2,10 @@
 
 Few rows decide. The search (``row_weighting``) looks for one set less over a subset of
 the rows; a find that misses rows of the whole takes some of these in, one that misses
-none is a better cover. Where it finds nothing, what is left are critical rows: a small
-program that branch and bound refutes or answers, on pairs of rows (``row_branching``)
-or, where many sets are alike, by HiGHS (``row_generation``), and so on. A bound over a
-subset of the rows holds for all of them.
+none is a better cover. Where it finds nothing, branch and bound refutes smaller covers
+or finds one: on pairs of rows (``row_branching``) or, where many sets are alike, on
+orbits of sets (``orbital_branching``). A bound over a subset of the rows holds for all
+of them.
 """
 
 import numpy as np
@@ -110,7 +110,7 @@ class _Search:
         self._raise(linear.lower_bound, _LINEAR_PROOF)
         self._rows = np.union1d(self._rows, linear.rows)
         self._improve(_FIRST_STEPS, self.budget.part(0.15 * whole))
-        # Alike sets are what HiGHS knows how to handle, and pairs of rows don't.
+        # Taking or leaving one of many alike sets leaves its twins: orbits don't.
         alike = may_be_symmetric(self.covers)
         refute = self._by_orbits if alike else self._by_rows
         # A tree can't go on where it was cut.

@@ -1,4 +1,4 @@
-"""Full covers of equal costs as programs over few of their rows.
+"""Linear relaxation of full covers of equal costs, over few of their rows.
 
 Any subset of the rows asks less, so what holds from below for a subset holds for the
 whole. The linear program takes rows in until no other is violated; its multipliers y
@@ -6,8 +6,7 @@ give, evaluated here in numpy, for any y >= 0::
 
     count >= sum_e y_e + sum_j min(0, 1 - y a_j)
 
-The integer program looks for fewer sets than known that cover the subset. One thread,
-and limits on iterations and nodes, so that the answer doesn't depend on the machine.
+One thread and limits on iterations, so that the answer doesn't depend on the machine.
 """
 
 from dataclasses import dataclass
@@ -25,10 +24,8 @@ _BATCH = 100
 _VIOLATED = 1e-6
 # Rounding of sums of multipliers.
 _ROUNDING = 1e-7
-# Units of work a nonzero of a simplex iteration, of the root with its cuts, of a node.
+# Units of work a nonzero of a simplex iteration.
 _UNITS_PER_ITERATION = 4.0
-_UNITS_PER_ROOT = 300_000.0
-_UNITS_PER_NODE = 5_000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +45,6 @@ class LinearCover:
     reduced: NDArray[np.float64]
     rows: NDArray[np.int64]
     primal: NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class IntegerCover:
-    """What branch and bound found about a full cover.
-
-    Attributes:
-        selected: A cover of fewer sets than was known, or None.
-        lower_bound: Sets that any cover needs at least, by HiGHS' dual bound less its
-            tolerance.
-    """
-
-    selected: NDArray[np.int64] | None
-    lower_bound: int
 
 
 def least_count(covers: NDArray[np.bool_], multipliers: NDArray[np.float64]) -> int:
@@ -141,52 +124,11 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
     return LinearCover(_rounded_up(needed), needed, reduced, tight, primal)
 
 
-def integer_cover(
-    covers: NDArray[np.bool_], known: NDArray[np.int64], budget: WorkBudget
-) -> IntegerCover:
-    """Look for a smaller cover than a known one, by HiGHS' branch and bound.
-
-    Args:
-        covers: Whether set s covers row e, shape (n_e, n_s).
-        known: Sets that cover every row, shape (k,).
-        budget: Work; without enough for the root, nothing is done.
-    """
-    entries = float(np.count_nonzero(covers) + sum(covers.shape))
-    spare = budget.remaining / entries - _UNITS_PER_ROOT
-    if not spare > 0 or budget.exhausted:
-        return IntegerCover(None, 0)
-    import highspy
-
-    n_sets = covers.shape[1]
-    solver = program(covers, budget, integer=True)
-    start = highspy.HighsSolution()
-    start.col_value = np.isin(np.arange(n_sets), known).astype(float).tolist()
-    solver.setSolution(start)
-    solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
-    # One set less ends it: the rows that it misses are taken in first.
-    solver.setOptionValue("objective_target", known.size - 0.5)
-    run_highs(solver)
-    info = solver.getInfo()
-    nodes = _UNITS_PER_NODE * max(0, int(info.mip_node_count))
-    budget.spend((_UNITS_PER_ROOT + nodes) * entries)
-    values = np.asarray(solver.getSolution().col_value, dtype=np.float64)
-    selected = np.flatnonzero(values > 0.5) if values.size == n_sets else None
-    if selected is not None and not (
-        selected.size < known.size and covers[:, selected].any(axis=1).all()
-    ):
-        selected = None
-    bound = float(info.mip_dual_bound)
-    lower = int(np.ceil(bound - 1e-5)) if np.isfinite(bound) else 0
-    return IntegerCover(selected, max(0, min(lower, known.size)))
-
-
 def _seconds(budget: WorkBudget) -> float:
     return float(max(0.01, min(budget.time_left, 1e9)))
 
 
-def program(
-    covers: NDArray[np.bool_], budget: WorkBudget, *, integer: bool = False
-) -> Any:  # noqa: ANN401
+def program(covers: NDArray[np.bool_], budget: WorkBudget) -> Any:  # noqa: ANN401
     """Return a HiGHS instance that holds min sum x, A x >= 1, 0 <= x <= 1."""
     import highspy
 
@@ -201,19 +143,12 @@ def program(
     lp.a_matrix_.start_ = matrix.indptr.astype(np.int32)
     lp.a_matrix_.index_ = matrix.indices.astype(np.int32)
     lp.a_matrix_.value_ = matrix.data.astype(np.float64)
-    if integer:
-        lp.integrality_ = [highspy.HighsVarType.kInteger] * n_sets
     solver = highspy.Highs()
     for name, value in (
         ("output_flag", False),
         ("threads", 1),
         ("parallel", "off"),
         ("random_seed", 0),
-        ("mip_rel_gap", 0.0),
-        # Counts are whole numbers.
-        ("mip_abs_gap", 0.999),
-        # Covers come from elsewhere; here only the bound is wanted.
-        ("mip_heuristic_effort", 0.0),
         ("time_limit", _seconds(budget)),
     ):
         solver.setOptionValue(name, value)
