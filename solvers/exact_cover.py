@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from .reductions import ReducedCover
 from .relaxation import rounding, tighten
@@ -141,9 +140,8 @@ class _Search:
         if candidates.size == 0 or r == 0:
             self.offer(chosen, covered)
             return covered
-        rows = self.cover.by_set[candidates]
-        gains = np.asarray(rows @ open_weights)
-        self.budget.spend(3.0 * rows.nnz + 8.0 * open_weights.size + _CALL_UNITS)
+        gains = self._sums(candidates, open_weights)
+        self.budget.spend(8.0 * open_weights.size + _CALL_UNITS)
         r = min(r, candidates.size)
         if r == 1:
             best = int(np.argmax(gains))
@@ -151,7 +149,7 @@ class _Search:
             return covered + float(gains[best])
 
         bound, prices, multipliers = self._bound(
-            rows, open_weights, multipliers, gains, covered, r
+            candidates, open_weights, multipliers, gains, covered, r
         )
         if bound < self.target:
             return 0.0
@@ -161,16 +159,17 @@ class _Search:
         keep = self._may_help(gains, covered, 0.0, r) & self._may_help(
             prices, covered, float(np.sum(open_weights - multipliers)), r
         )
-        candidates, gains, rows = candidates[keep], gains[keep], rows[keep]
+        candidates, gains = candidates[keep], gains[keep]
         if candidates.size == 0:
             return 0.0
-        firsts = self._must_take(rows, open_weights)
+        firsts = self._must_take(candidates, open_weights)
         if not np.any(firsts):
             return 0.0
         if r == 2:
             return self._pairs(
                 candidates, open_weights, gains, firsts, covered, chosen, bound
             )
+        rows = self.cover.by_set[candidates]
         step = tighten(
             rows,
             open_weights,
@@ -187,8 +186,17 @@ class _Search:
             candidates, open_weights, step.multipliers, prices, firsts, r, chosen
         )
 
+    def _sums(
+        self, candidates: NDArray[np.int64], values: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return each candidate's sum of values over the rows that it serves."""
+        by_set = self.cover.by_set
+        self.budget.spend(float(by_set.nnz))
+        # Taking candidates out first costs more than the sums of all.
+        return np.asarray(by_set @ values)[candidates]
+
     def _must_take(
-        self, rows: sparse.csr_array, open_weights: NDArray[np.float64]
+        self, candidates: NDArray[np.int64], open_weights: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
         """Return which columns one must be taken from: those of the scarcest row.
 
@@ -197,11 +205,14 @@ class _Search:
         """
         indispensable = np.flatnonzero(open_weights > self._total - self.target)
         if indispensable.size == 0:
-            return np.ones(rows.indptr.size - 1, dtype=bool)
-        servers = np.asarray(rows.sum(axis=0)).ravel()[indispensable]
-        self.budget.spend(float(rows.nnz))
+            return np.ones(candidates.size, dtype=bool)
+        may_serve = np.zeros(self.cover.n_sets)
+        may_serve[candidates] = 1.0
+        by_row = self.cover.by_row
+        servers = np.asarray(by_row @ may_serve)[indispensable]
+        self.budget.spend(float(by_row.nnz))
         row = int(indispensable[int(np.argmin(servers))])
-        return np.asarray(rows @ _unit(open_weights.size, row)) > 0
+        return self.dense[candidates, row]
 
     def _may_help(
         self, values: NDArray[np.float64], covered: float, rest: float, r: int
@@ -212,7 +223,7 @@ class _Search:
 
     def _bound(
         self,
-        rows: sparse.csr_array,
+        candidates: NDArray[np.int64],
         open_weights: NDArray[np.float64],
         multipliers: NDArray[np.float64],
         gains: NDArray[np.float64],
@@ -221,7 +232,7 @@ class _Search:
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
         """Return the better of the gain and the multiplier bound, and its prices."""
         multipliers = np.minimum(multipliers, open_weights)
-        prices = np.asarray(rows @ multipliers)
+        prices = self._sums(candidates, multipliers)
         rest = float(np.sum(open_weights - multipliers))
         by_gain = covered + float(np.sort(gains)[::-1][:r].sum())
         by_price = covered + rest + float(np.sort(prices)[::-1][:r].sum())
@@ -349,9 +360,3 @@ class _Search:
         i, j = np.unravel_index(int(np.argmin(left)), left.shape)
         value = float(left[i, j])
         return int(i), int(j), value if value <= allowed else None
-
-
-def _unit(n: int, i: int) -> NDArray[np.float64]:
-    vector = np.zeros(n)
-    vector[i] = 1.0
-    return vector

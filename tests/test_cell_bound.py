@@ -518,7 +518,7 @@ def test_what_nothing_can_serve_is_infeasible(weights, required):
 
 def test_no_cover_by_free_poses_beats_the_bound(cap_trees):
     rng = np.random.default_rng(11)
-    for _ in range(4):
+    for _ in range(2):
         points = rng.normal(size=(150, 3)) * rng.uniform(0.3, 1.0, 3)
         points /= np.linalg.norm(points, axis=1, keepdims=True)
         weights, radius = rng.random(150), rng.uniform(25, 45) * DEG

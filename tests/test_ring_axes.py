@@ -40,9 +40,9 @@ def stages(scene):
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
     eye = np.eye(4)
     template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
-    projectors = plan_projectors(made, template, 600, ring_offset=(tilt, -np.pi / 2))
+    projectors = plan_projectors(made, template, 300, ring_offset=(tilt, -np.pi / 2))
     camera = PlannedCamera("", eye, rig.camera_device())
-    cover = plan_cameras(made, projectors.projectors, camera, 400)
+    cover = plan_cameras(made, projectors.projectors, camera, 240)
     cameras = camera_stage(made, cover)
     return made, projectors, cameras, tilt
 
