@@ -136,6 +136,8 @@ def solve_cover(
         raise ValueError(f"max_sets must be at least 1, got {max_sets}")
     if max_sets is not None and not max_sets >= fixed.size:
         raise ValueError(f"max_sets is {max_sets}, but {fixed.size} sets are fixed")
+    if not whole_number("seed", seed) >= 0:
+        raise ValueError(f"seed must be at least 0, got {seed}")
     work = WorkBudget(budget, time_limit=time_limit)
     cover = _or_reduce(problem, reduced)
     work.spend(cover.entries)
@@ -153,13 +155,12 @@ def solve_cover(
         answer = replace(answer, lower_bound=answer.lower_bound * unit)
     else:
         answer = cheapest_sets(cover, work, seed=seed, max_sets=free)
-    return CoverSolution(
-        problem,
-        answer.status,
-        np.union1d(fixed, cover.kept[answer.selected]),
-        answer.lower_bound + float(problem.costs[fixed].sum()),
-        answer.proof,
-    )
+    selected = np.union1d(fixed, cover.kept[answer.selected])
+    lower = answer.lower_bound + float(problem.costs[fixed].sum())
+    cost = float(problem.costs[selected].sum())
+    # Both are sums of costs, in another order.
+    lower = cost if cost < lower <= cost * (1.0 + 1e-12) else lower
+    return CoverSolution(problem, answer.status, selected, lower, answer.proof)
 
 
 @on_one_thread
@@ -194,6 +195,8 @@ def solve_max_coverage(
     if start.size > n_sets:
         raise ValueError(f"warm_start must name at most {n_sets} sets of the problem")
     free = n_sets - fixed.size
+    if not whole_number("seed", seed) >= 0:
+        raise ValueError(f"seed must be at least 0, got {seed}")
     work = WorkBudget(budget, time_limit=time_limit)
     cover = _or_reduce(problem, reduced, costs=np.ones(problem.costs.size))
     work.spend(cover.entries)

@@ -15,7 +15,7 @@ from .answers import CountAnswer
 from .orbital_branching import branch_on_orbits
 from .reductions import ReducedCover
 from .row_branching import branch_on_rows
-from .row_dominance import essential
+from .row_dominance import essential, separate
 from .row_generation import linear_cover
 from .row_weighting import RowWeighting
 from .status import SolveStatus, WorkBudget
@@ -71,15 +71,44 @@ def fewest_full(
         raise ValueError(f"start of {start.size} sets must cover every row")
     budget.spend(float(served.size))
     rows, columns = essential(served, budget.part(0.12 * budget.units))
-    search = _Search(served[np.ix_(rows, columns)], budget, seed, start.size)
-    search.lower = lower
-    search.run()
-    if search.best is not None:
-        start = np.sort(columns[search.best])
-    settled = search.lower >= start.size
-    proof = search.proof or "bound given"
-    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-    return CountAnswer(status, start, float(min(search.lower, start.size)), proof)
+    left = served[np.ix_(rows, columns)]
+    parts = separate(left)
+    if len(parts) > 1:
+        best, bound, proof = _of_parts(left, parts, budget, seed)
+    else:
+        search = _Search(left, budget, seed, start.size)
+        search.lower = lower
+        search.run()
+        best, bound, proof = search.best, search.lower, search.proof
+    if best is not None and best.size < start.size:
+        start = np.sort(columns[best])
+    if bound <= lower:
+        bound, proof = lower, "bound given"
+    status = SolveStatus.OPTIMAL if bound >= start.size else SolveStatus.FEASIBLE
+    return CountAnswer(status, start, float(min(bound, start.size)), proof)
+
+
+def _of_parts(
+    covers: NDArray[np.bool_],
+    parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]],
+    budget: WorkBudget,
+    seed: int,
+) -> tuple[NDArray[np.int64], int, str]:
+    """Return cover, bound and proof of parts that share no set, the smallest first."""
+    parts = sorted(parts, key=lambda part: part[0].size * part[1].size)
+    sizes = np.array([rows.size * columns.size for rows, columns in parts])
+    ahead = np.cumsum(sizes[::-1])[::-1]
+    chosen, lower, proofs = [], 0, set[str]()
+    for (rows, columns), share in zip(parts, sizes / ahead, strict=True):
+        part = budget.part(share * budget.remaining)
+        search = _Search(covers[np.ix_(rows, columns)], part, seed, columns.size + 1)
+        search.lower = 1
+        search.run()
+        if search.best is not None:
+            chosen.append(columns[search.best])
+        lower += search.lower
+        proofs.add(search.proof or "a row needs a set")
+    return np.concatenate(chosen), lower, f"separate parts: {', '.join(sorted(proofs))}"
 
 
 class _Search:
@@ -111,7 +140,9 @@ class _Search:
         self._rows = np.union1d(self._rows, linear.rows)
         self._improve(_FIRST_STEPS, self.budget.part(0.15 * whole))
         # Taking or leaving one of many alike sets leaves its twins: orbits don't.
-        alike = may_be_symmetric(self.covers)
+        if self.settled:
+            return
+        alike = may_be_symmetric(self.covers, self.budget.part(0.05 * whole))
         refute = self._by_orbits if alike else self._by_rows
         # A tree can't go on where it was cut.
         tries = ((_FIRST_STEPS, 0.1), (_STEPS, 0.9))
@@ -227,11 +258,14 @@ def _spread_rows(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 def _greedy(covers: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
     """Return sets that cover every row, the one of most open rows first, increasing."""
-    left = covers
+    left = np.ones(len(covers), dtype=bool)
+    counts = covers.sum(axis=0)
+    budget.spend(2.0 * covers.size)
     chosen: list[int] = []
-    while len(left):
-        best = int(np.argmax(left.sum(axis=0)))
-        budget.spend(2.0 * left.size)
+    while left.any():
+        best = int(np.argmax(counts))
         chosen.append(best)
-        left = left[~left[:, best]]
+        served = left & covers[:, best]
+        counts -= covers[served].sum(axis=0)
+        left &= ~served
     return np.sort(np.array(chosen, dtype=np.int64))

@@ -155,10 +155,10 @@ def _answer(
 
 
 def _cost_unit(cover: ReducedCover) -> float:
-    """Return what costs are divided by: 1 unless they are far from it."""
+    """Return what costs are divided by: 1 unless small, or far above it."""
     mean = float(cover.costs.mean()) if cover.n_sets else 1.0
     # A power of two, so that whole costs stay whole in some unit.
-    return 1.0 if 1e-3 < mean < 1e5 else float(2.0 ** np.round(np.log2(mean)))
+    return 1.0 if 1.0 <= mean < 1e5 else float(2.0 ** np.round(np.log2(mean)))
 
 
 def _model(

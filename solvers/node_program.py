@@ -17,8 +17,9 @@ from .row_generation import needed_sets, program
 from .status import WorkBudget
 
 _UNITS_PER_ITERATION = 4.0
-_CALL_UNITS = 1.5e6
-
+# A call, and each row and column that its basis is handed over for.
+_CALL_UNITS = 3e5
+_BASIS_UNITS = 1e3
 
 Basis = tuple[list[Any], list[Any], list[Any]]
 
@@ -104,6 +105,7 @@ class NodeProgram:
         run_highs(self._solver)
         steps = float(self._solver.getInfo().simplex_iteration_count)
         self.budget.spend(_UNITS_PER_ITERATION * self._entries * steps + _CALL_UNITS)
+        self.budget.spend(_BASIS_UNITS * (n_base + part.allowed.size))
         solution = self._solver.getSolution()
         dual = np.clip(np.nan_to_num(np.asarray(solution.row_dual)), 0.0, None)
         primal = np.asarray(solution.col_value, dtype=np.float64)

@@ -8,6 +8,8 @@ Neither changes the fewest columns. The row rule is *not* valid where rows may b
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from .bit_rows import pack_shuffled
 from .status import WorkBudget
@@ -43,6 +45,24 @@ def essential(
         if unchanged or budget.exhausted:
             break
     return rows, columns
+
+
+def separate(
+    covers: NDArray[np.bool_],
+) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Return the rows and columns of each part that shares none with the others.
+
+    Args:
+        covers: Whether column s covers row e, shape (n_e, n_s); every row is covered.
+    """
+    links = sparse.csr_array(covers)
+    both = sparse.block_array([[None, links], [links.T, None]])
+    labels = connected_components(both, directed=False)[1]
+    rows, columns = labels[: len(covers)], labels[len(covers) :]
+    return [
+        (np.flatnonzero(rows == i), np.flatnonzero(columns == i))
+        for i in np.unique(rows)
+    ]
 
 
 def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:

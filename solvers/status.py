@@ -40,6 +40,7 @@ class WorkBudget:
     """
 
     def __init__(self, units: float, *, time_limit: float = float("inf")) -> None:
+        units, time_limit = _amount("budget", units), _amount("time limit", time_limit)
         if not units >= 0:
             raise ValueError(f"work budget is {units}, must be at least 0")
         if not time_limit >= 0:
@@ -87,6 +88,13 @@ class WorkBudget:
     def reason(self) -> str:
         """What ended the work, for people."""
         return "time limit" if self.out_of_time else "work budget"
+
+
+def _amount(name: str, given: object) -> float:
+    try:
+        return float(given)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be a number, got {given!r}") from None
 
 
 @contextmanager

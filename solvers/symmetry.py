@@ -27,19 +27,23 @@ _CALL_UNITS = 1e5
 Colours = NDArray[np.uint64]
 
 
-def may_be_symmetric(covers: NDArray[np.bool_]) -> bool:
-    """Whether refinement finds at most half as many colours as columns."""
-    colours = column_colours(covers)
-    return 2 * np.unique(colours).size <= colours.size
+def may_be_symmetric(covers: NDArray[np.bool_], budget: WorkBudget) -> bool:
+    """Whether refinement finds at most half as many colours as columns.
+
+    Not where the budget ends before.
+    """
+    colours = column_colours(covers, budget)
+    return not budget.exhausted and 2 * np.unique(colours).size <= colours.size
 
 
-def column_colours(covers: NDArray[np.bool_]) -> Colours:
+def column_colours(covers: NDArray[np.bool_], budget: WorkBudget) -> Colours:
     """Return a colour of each column, equal for all that some symmetry exchanges.
 
     Args:
         covers: Whether set s covers row e, shape (n_e, n_s).
+        budget: Work; where it ends, colours are coarser.
     """
-    refinement = _Refinement(covers, WorkBudget(np.inf))
+    refinement = _Refinement(covers, budget)
     return refinement.refined(np.zeros(covers.shape[1], dtype=np.uint64))
 
 
@@ -104,7 +108,7 @@ class _Refinement:
     def refined(self, colours: Colours) -> Colours:
         """Return colours that tell apart all that these do, and their neighbours."""
         n_colours, rows = np.unique(colours).size, np.zeros(1, dtype=np.uint64)
-        while colours.size:
+        while colours.size and not self._budget.exhausted:
             # Sums of mixed numbers modulo 2^64: equal for equal multisets of colours.
             rows = _mixed(rows + _mixed(self._by_row @ _mixed(colours)))
             colours = _mixed(colours + _mixed(self._by_set @ _mixed(rows)))

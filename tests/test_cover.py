@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from solvers import CoverProblem, solve_cover
+from solvers import CoverProblem, reductions, solve_cover
 from solvers.cover import reduced_problem, solve_max_coverage
 from solvers.cover_problem import MAX_ENTRIES
 from solvers.reductions import reduce_problem
@@ -251,6 +251,48 @@ def test_what_the_search_forgives_is_no_shortfall():
         solution = solve_cover(problem)
         assert (solution.shortfall() == 0.0) is served
         assert (solution.status is SolveStatus.OPTIMAL) is served
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1.0, 1e6])
+def test_costs_of_any_size_are_settled(scale):
+    ring = np.eye(5, dtype=bool) | np.roll(np.eye(5, dtype=bool), 1, axis=1)
+    costs = scale * np.array([2.0, 2.1, 2.2, 2.3, 2.4])
+    solution = solve_cover(CoverProblem(ring, costs=costs))
+    assert solution.status is SolveStatus.OPTIMAL
+    assert solution.cost == pytest.approx(6.4 * scale)
+    assert solution.lower_bound == pytest.approx(6.4 * scale)
+
+
+def test_a_bound_is_not_above_the_cost_by_rounding():
+    """Six times 0.1 is more than six tenths added up."""
+    solution = solve_cover(CoverProblem(np.eye(6, dtype=bool), costs=np.full(6, 0.1)))
+    assert solution.status is SolveStatus.OPTIMAL
+    assert solution.lower_bound == solution.cost
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"seed": 1.5}, r"seed must be a whole number, got 1\.5"),
+        ({"seed": -1}, "seed must be at least 0, got -1"),
+        ({"budget": "much"}, "budget must be a number, got 'much'"),
+        ({"time_limit": None}, "time limit must be a number, got None"),
+    ],
+)
+def test_options_that_are_no_numbers_are_refused(options, words):
+    problem = CoverProblem(np.eye(2, dtype=bool))
+    with pytest.raises(ValueError, match=words):
+        solve_cover(problem, **options)
+    with pytest.raises(ValueError, match=words):
+        solve_max_coverage(problem, 1, **options)
+
+
+def test_many_columns_are_not_all_compared(monkeypatch):
+    monkeypatch.setattr(reductions, "_MOST_COMPARED", 50)
+    covers = np.eye(40, dtype=bool)[:, np.repeat(np.arange(40), 3)]
+    solution = solve_cover(CoverProblem(covers))
+    assert solution.status is SolveStatus.OPTIMAL
+    assert solution.cost == 40
 
 
 def test_shortfall_catches_a_dropped_set():

@@ -12,7 +12,7 @@ from solvers.cover_problem import CoverProblem
 from solvers.full_cover import fewest_full
 from solvers.reductions import reduce_problem
 from solvers.row_branching import RowTree, branch_on_rows
-from solvers.row_dominance import essential, minimal
+from solvers.row_dominance import essential, minimal, separate
 from solvers.row_generation import least_count, linear_cover
 from solvers.row_weighting import RowWeighting
 from solvers.status import SolveStatus, WorkBudget
@@ -211,6 +211,36 @@ def test_minimal_sets_are_those_that_include_no_other():
         goes = (includes & ~equal) | (equal & earlier)
         kept = np.flatnonzero(~goes.any(axis=1))
         assert minimal(sets, WorkBudget(PLENTY)).tolist() == kept.tolist()
+
+
+def test_separate_parts_are_solved_apart():
+    """Rings of five, each of which needs three: together out of a tree's reach."""
+    ring = np.eye(5, dtype=bool) | np.roll(np.eye(5, dtype=bool), 1, axis=1)
+    rng = np.random.default_rng(4)
+    covers = np.kron(np.eye(12, dtype=bool), ring)
+    covers = covers[rng.permutation(60)][:, rng.permutation(60)]
+    answer = solve(covers, 2e9)
+    assert answer.status is SolveStatus.OPTIMAL
+    assert answer.selected.size == answer.lower_bound == 36
+    assert answer.proof.startswith("separate parts: ")
+    for budget in (0.0, 1e6, 3e7):
+        cut = solve(covers, budget)
+        assert cut.lower_bound <= 36 <= cut.selected.size
+
+
+def test_parts_share_neither_rows_nor_columns():
+    for seed in range(30):
+        covers = random_rows(seed, most_rows=30, most_sets=25)
+        parts = separate(covers)
+        rows, columns = (np.concatenate([p[i] for p in parts]) for i in (0, 1))
+        assert sorted(rows) == list(range(len(covers)))
+        used = np.flatnonzero(covers.any(axis=0))
+        assert set(used) <= set(columns)
+        assert np.unique(columns).size == columns.size
+        for some, sets in parts:
+            assert not covers[some][:, np.setdiff1d(used, sets)].any()
+            apart = separate(covers[np.ix_(some, sets)])
+            assert len(apart) == 1
 
 
 def test_counts_by_any_multipliers_are_bounds():

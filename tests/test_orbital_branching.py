@@ -110,7 +110,7 @@ def test_orbits_are_those_of_all_symmetries():
 def test_columns_of_one_colour_need_not_be_exchanged():
     """A ring of six and two of three: every corner has two edges of two corners."""
     covers = beside(cycle(6), cycle(3), cycle(3))
-    assert np.unique(column_colours(covers)).size == 1
+    assert np.unique(column_colours(covers, WorkBudget(PLENTY))).size == 1
     assert column_orbits(covers, WorkBudget(PLENTY)).tolist() == [0] * 6 + [6] * 6
 
 
@@ -211,23 +211,27 @@ def test_the_engine_proves_a_symmetric_cover_by_orbits():
     assert solution.proof == "branch and bound on orbits of sets"
 
 
+def colours_of(covers):
+    return column_colours(covers, WorkBudget(PLENTY))
+
+
 def test_colours_tell_apart_what_no_symmetry_exchanges():
     lines = AFFINE_PLANE
-    assert np.unique(column_colours(lines)).size == 1
-    assert may_be_symmetric(lines)
+    assert np.unique(colours_of(lines)).size == 1
+    assert may_be_symmetric(lines, WorkBudget(PLENTY))
     # A path of four: ends and middles.
     path = np.array([[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1]], dtype=bool)
-    colours = column_colours(path)
+    colours = colours_of(path)
     assert colours[0] == colours[3] != colours[1] == colours[2]
     longer = np.eye(5, 6, dtype=bool) | np.eye(5, 6, k=1, dtype=bool)
-    assert np.unique(column_colours(longer)).size == 3
+    assert np.unique(colours_of(longer)).size == 3
     rng = np.random.default_rng(0)
     chance = rng.random((60, 30)) < 0.3
-    assert np.unique(column_colours(chance)).size == 30
-    assert not may_be_symmetric(chance)
+    assert np.unique(colours_of(chance)).size == 30
+    assert not may_be_symmetric(chance, WorkBudget(PLENTY))
     order = rng.permutation(9)
     marked = np.concatenate([lines, np.eye(9, dtype=bool)[:1]])
-    shape = np.unique(column_colours(marked), return_counts=True)[1]
+    shape = np.unique(colours_of(marked), return_counts=True)[1]
     assert sorted(shape) == [1, 8]
-    moved = np.unique(column_colours(marked[:, order]), return_counts=True)[1]
+    moved = np.unique(colours_of(marked[:, order]), return_counts=True)[1]
     assert sorted(moved) == sorted(shape)
