@@ -73,10 +73,13 @@ def main() -> int:
     headings = [f"{peer}{' reduced' * reduced}" for peer, reduced in asked]
     columns = [*COLUMNS, *(["peers' limit [s]", *headings] if asked else [])]
     most = f", at most {given.peer_most:g} s" if given.peer_most < math.inf else ""
+    peers = (
+        f" Peers: {given.factor:g} times our wall time, at least "
+        f"{given.peer_least:g} s{most}."
+    )
     print(
         f"{machine_line()}\n\nOurs: time limit {given.time_limit:g} s, work budget "
-        f"{given.budget:.0e} units. Peers: {given.factor:g} times our wall time, at "
-        f"least {given.peer_least:g} s{most}.\n\n"
+        f"{given.budget:.0e} units.{peers if asked else ''}\n\n"
         f"| {' | '.join(columns)} |\n|{len(columns) * '---|'}",
         flush=True,
     )
