@@ -32,9 +32,13 @@ _FEW_ROWS = 400
 _MANY_ROWS = 2_000
 # Covers of so few entries have their linear program solved at once.
 _CHEAP = 200_000
-# Exchanges without a find after which rows count as critical: first, and then later.
+# Exchanges without a find after which rows count as critical: first (also of a cover
+# that isn't cheap), and then later.
 _FIRST_STEPS = 2_000
+_LARGE_STEPS = 10_000
 _STEPS = 60_000
+# Sets between bound and cover beyond which the tree gets half of what is left.
+_FAR = 2
 # Reduced costs are asked again while they leave less than this share of the sets.
 _ROUNDS = 4
 _FEWER = 0.9
@@ -134,7 +138,7 @@ class _Search:
         whole = self.budget.units
         self._rows = _spread_rows(self.covers)
         if self.covers.size > _CHEAP:
-            self._improve(_FIRST_STEPS, self.budget.part(0.25 * whole))
+            self._improve(_LARGE_STEPS, self.budget.part(0.3 * whole))
         linear = linear_cover(self.covers, self.budget.part(0.25 * whole))
         self._raise(linear.lower_bound, _LINEAR_PROOF)
         self._rows = np.union1d(self._rows, linear.rows)
@@ -147,6 +151,8 @@ class _Search:
         # A tree can't go on where it was cut.
         tries = ((_FIRST_STEPS, 0.1), (_STEPS, 0.9))
         for steps, share in tries[1:] if alike else tries:
+            # Far from a proof the search has more to gain.
+            share = min(share, 0.5) if self.size - self.lower > _FAR else share
             proving = self.budget.part(share * self.budget.remaining)
             while not self.settled and refute(proving):
                 self._improve(steps, proving)
