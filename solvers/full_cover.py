@@ -143,9 +143,9 @@ class _Search:
         self._raise(linear.lower_bound, _LINEAR_PROOF)
         self._rows = np.union1d(self._rows, linear.rows)
         self._improve(_FIRST_STEPS, self.budget.part(0.15 * whole))
-        # Taking or leaving one of many alike sets leaves its twins: orbits don't.
         if self.settled:
             return
+        # Taking or leaving one of many alike sets leaves its twins: orbits don't.
         alike = may_be_symmetric(self.covers, self.budget.part(0.05 * whole))
         refute = self._by_orbits if alike else self._by_rows
         # A tree can't go on where it was cut.
