@@ -41,6 +41,12 @@ class Refutation:
 class Tree(ABC):
     """Search for fewer than ``size`` sets that cover every row.
 
+    Args:
+        covers: Whether set s covers row e, shape (n_e, n_s); every row is covered.
+        rows: Rows to start from; more join as they are missed.
+        size: Sets of a known cover.
+        budget: Work; where it ends, the least bound of what is open is returned.
+
     Attributes:
         covers: Whether set s covers row e, shape (n_e, n_s); every row is covered.
         cut: A node goes where its bound exceeds this.
@@ -73,7 +79,10 @@ class Tree(ABC):
         """
 
     def run(self) -> Refutation:
-        """Search best bound first, deepest first among equal ones."""
+        """Refute all smaller covers, or find one.
+
+        Best bound first, deepest first among equal ones.
+        """
         root = self.linear.root()
         if root is None:
             return Refutation(None, 0)

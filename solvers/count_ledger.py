@@ -20,8 +20,6 @@ from .status import SolveStatus, WorkBudget
 
 # Tuples are for counts below it; branch and bound on rows and cuts for larger ones.
 _LARGE_COUNT = 8
-
-
 # K sets that meet the requirements or None; what exhausted all K-tuples, or None.
 TupleSearch = Callable[[int, WorkBudget], tuple[NDArray[np.int64] | None, str | None]]
 # K sets of much weight, from a cover of as many or from nothing.

@@ -241,12 +241,15 @@ def set_names(name: str, given: ArrayLike, n: int) -> NDArray[np.int64]:
     return names
 
 
-def whole_number(name: str, given: object) -> int:
-    """Return an integer, or refuse what isn't one."""
+def whole_number(name: str, given: object, *, least: int) -> int:
+    """Return an integer of at least so much, or refuse what isn't one."""
     try:
-        return operator.index(given)  # type: ignore[arg-type]
+        value = operator.index(given)  # type: ignore[arg-type]
     except TypeError:
         raise ValueError(f"{name} must be a whole number, got {given!r}") from None
+    if value < least:
+        raise ValueError(f"{name} must be at least {least}, got {given}")
+    return value
 
 
 def _numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:

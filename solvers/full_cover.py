@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .answers import CountAnswer
-from .orbital_branching import branch_on_orbits
+from .orbital_branching import OrbitalTree
 from .reductions import ReducedCover
-from .row_branching import branch_on_rows
+from .row_branching import RowTree
 from .row_dominance import essential, separate
 from .row_generation import linear_cover
 from .row_weighting import RowWeighting
@@ -234,7 +234,7 @@ class _Search:
             rows, fewer = essential(left, budget.part(0.2 * budget.remaining))
             part, columns = left[np.ix_(rows, fewer)], columns[kept][fewer]
         linear = linear_cover(part, budget)
-        answer = branch_on_rows(part, linear.rows, size, budget)
+        answer = RowTree(part, linear.rows, size, budget).run()
         self._raise(answer.lower_bound, _BRANCHING_PROOF)
         if answer.selected is not None:
             self._offer(columns[answer.selected])
@@ -245,7 +245,7 @@ class _Search:
         rows = np.arange(len(self.covers))
         if rows.size > _MANY_ROWS:
             rows = self._rows
-        answer = branch_on_orbits(self.covers, rows, self.size, budget)
+        answer = OrbitalTree(self.covers, rows, self.size, budget).run()
         self._raise(answer.lower_bound, _ORBITAL_PROOF)
         if answer.selected is not None:
             self._offer(answer.selected)

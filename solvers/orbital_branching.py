@@ -20,31 +20,13 @@ References:
 import numpy as np
 from numpy.typing import NDArray
 
-from .branching import Refutation, Tree
+from .branching import Tree
 from .node_program import Node, Part
 from .row_dominance import essential
-from .status import WorkBudget
 from .symmetry import column_orbits
 
 # Share of what is left that one node's dominance may spend.
 _DOMINANCE = 0.05
-
-
-def branch_on_orbits(
-    covers: NDArray[np.bool_],
-    rows: NDArray[np.int64],
-    size: int,
-    budget: WorkBudget,
-) -> Refutation:
-    """Refute that fewer than ``size`` sets cover every row, or find them.
-
-    Args:
-        covers: Whether set s covers row e, shape (n_e, n_s); every row is covered.
-        rows: Rows to start from; more join as they are missed.
-        size: Sets of a known cover.
-        budget: Work; where it ends, the least bound of what is open is returned.
-    """
-    return OrbitalTree(covers, rows, size, budget).run()
 
 
 class OrbitalTree(Tree):

@@ -21,30 +21,12 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from .branching import INTEGRAL, Refutation, Tree
+from .branching import INTEGRAL, Tree
 from .node_program import Node
-from .status import WorkBudget
 
 # Pairs whose two sides are bounded before one is branched on.
 _TRIED = 3
 _PAIRS = 400
-
-
-def branch_on_rows(
-    covers: NDArray[np.bool_],
-    rows: NDArray[np.int64],
-    size: int,
-    budget: WorkBudget,
-) -> Refutation:
-    """Refute that fewer than ``size`` sets cover every row, or find them.
-
-    Args:
-        covers: Whether set s covers row e, shape (n_e, n_s); every row is covered.
-        rows: Rows to start from; more join as they are missed.
-        size: Sets of a known cover.
-        budget: Work; where it ends, the least bound of what is open is returned.
-    """
-    return RowTree(covers, rows, size, budget).run()
 
 
 class RowTree(Tree):

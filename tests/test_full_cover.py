@@ -11,7 +11,7 @@ from scipy import sparse
 from solvers.cover_problem import CoverProblem
 from solvers.full_cover import fewest_full
 from solvers.reductions import reduce_problem
-from solvers.row_branching import RowTree, branch_on_rows
+from solvers.row_branching import RowTree
 from solvers.row_dominance import essential, minimal, separate
 from solvers.row_generation import least_count, linear_cover
 from solvers.row_weighting import RowWeighting
@@ -277,12 +277,12 @@ def test_branching_on_pairs_of_rows_refutes_or_finds_less():
             assert refuted.selected is None
             assert refuted.lower_bound == best, seed
             branched += tree.made > 2
-        found = branch_on_rows(covers, first, best + 1, WorkBudget(PLENTY))
+        found = RowTree(covers, first, best + 1, WorkBudget(PLENTY)).run()
         assert found.selected is not None
         assert found.selected.size == best
         assert covers[:, found.selected].any(axis=1).all()
         for budget in (0.0, 3e6, 1e7):
-            cut = branch_on_rows(covers, first, best, WorkBudget(budget))
+            cut = RowTree(covers, first, best, WorkBudget(budget)).run()
             assert cut.lower_bound <= best, seed
     assert branched > 10
 
@@ -296,9 +296,9 @@ def test_branching_finds_what_relaxations_hide():
             row[rng.choice(13, size=3, replace=False)] = True
         best = fewest_by_hand(covers)
         every = np.arange(40)
-        refuted = branch_on_rows(covers, every, best, WorkBudget(PLENTY))
+        refuted = RowTree(covers, every, best, WorkBudget(PLENTY)).run()
         assert (refuted.selected, refuted.lower_bound) == (None, best)
-        found = branch_on_rows(covers, every, best + 1, WorkBudget(PLENTY))
+        found = RowTree(covers, every, best + 1, WorkBudget(PLENTY)).run()
         assert found.selected is not None, seed
         assert found.selected.size == best
 
@@ -342,7 +342,7 @@ def test_branching_settles_an_odd_hole():
         ring = np.eye(n, dtype=bool) | np.eye(n, k=1, dtype=bool)
         ring[-1, 0] = True
         assert linear_cover(ring, WorkBudget(PLENTY)).primal.sum() == n / 2
-        refuted = branch_on_rows(ring, np.arange(n), n // 2 + 1, WorkBudget(PLENTY))
+        refuted = RowTree(ring, np.arange(n), n // 2 + 1, WorkBudget(PLENTY)).run()
         assert refuted.lower_bound == n // 2 + 1
         assert refuted.selected is None
 

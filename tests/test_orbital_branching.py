@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solvers import CoverProblem, SolveStatus, solve_cover, symmetry
-from solvers.orbital_branching import OrbitalTree, branch_on_orbits
+from solvers.orbital_branching import OrbitalTree
 from solvers.row_branching import RowTree
 from solvers.status import WorkBudget
 from solvers.symmetry import column_colours, column_orbits, may_be_symmetric
@@ -132,7 +132,7 @@ def test_orbits_come_in_parts_where_the_search_is_cut(monkeypatch):
     covers = cycle(9)
     orbits = column_orbits(covers, WorkBudget(PLENTY))
     assert 1 < np.unique(orbits).size <= 9
-    tree = branch_on_orbits(covers, np.arange(9), 5, WorkBudget(PLENTY))
+    tree = OrbitalTree(covers, np.arange(9), 5, WorkBudget(PLENTY)).run()
     assert (tree.selected, tree.lower_bound) == (None, 5)
 
 
@@ -147,12 +147,12 @@ def test_branching_on_orbits_refutes_or_finds_less(first):
             refuted = tree.run()
             assert (refuted.selected, refuted.lower_bound) == (None, best), seed
             branched += tree.made > 1
-            found = branch_on_orbits(covers, rows, best + 1, WorkBudget(PLENTY))
+            found = OrbitalTree(covers, rows, best + 1, WorkBudget(PLENTY)).run()
             assert found.selected is not None
             assert found.selected.size == best
             assert covers[:, found.selected].any(axis=1).all()
         for budget in (0.0, 1e6, 5e6):
-            cut = branch_on_orbits(covers, rows, best, WorkBudget(budget))
+            cut = OrbitalTree(covers, rows, best, WorkBudget(budget)).run()
             assert cut.lower_bound <= best, seed
     assert branched >= 4
 
