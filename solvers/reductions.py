@@ -146,10 +146,8 @@ def reduce_problem(
         costs: Costs to count with instead of the problem's, positive, shape (n_s,).
     """
     costs = problem.costs if costs is None else costs
-    exponent = _exponent(problem.total_weight)
-    scaled = np.ldexp(problem.weights, exponent)
-    whole = np.rint(scaled)
-    quotas = _quotas(problem, exponent, whole != scaled)
+    exponent, whole, inexact = _whole_weights(problem)
+    quotas = _quotas(problem, exponent, inexact)
 
     already = np.asarray(problem.covers[:, problem.fixed].sum(axis=1)).ravel()
     needs = problem.needs - already
@@ -178,7 +176,7 @@ def reduce_problem(
 
 
 def _quotas(
-    problem: CoverProblem, exponent: int, inexact: NDArray[np.bool_]
+    problem: CoverProblem, exponent: int, inexact: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the whole weight that each row set must reach, rounded in its favour."""
     total = problem.total_weight
@@ -187,8 +185,7 @@ def _quotas(
         return (problem.required_weight > 0).astype(np.float64)
     # More than there is can't be had, however much more.
     asked = np.ldexp(np.minimum(problem.required_weight, 4.0 * total), exponent)
-    off = 0.5 * problem.by_row_set(inexact.astype(np.float64))
-    return np.floor(asked * (1.0 - WEIGHT_SLACK) - off)
+    return np.floor(asked * (1.0 - WEIGHT_SLACK) - 0.5 * inexact)
 
 
 def forgiven(problem: CoverProblem) -> NDArray[np.float64]:
@@ -198,15 +195,23 @@ def forgiven(problem: CoverProblem) -> NDArray[np.float64]:
     of the sums.
     """
     total = problem.total_weight
-    exponent = _exponent(total)
-    scaled = np.ldexp(problem.weights, exponent)
-    inexact = problem.by_row_set((np.rint(scaled) != scaled).astype(np.float64))
+    exponent, _, inexact = _whole_weights(problem)
     asked = np.minimum(problem.required_weight, 4.0 * total)
     return WEIGHT_SLACK * (asked + total) + np.ldexp(inexact + 1.0, -exponent)
 
 
-def _exponent(total: float) -> int:
-    return 51 - int(np.floor(np.log2(total))) if total > 0 else 0
+def _whole_weights(
+    problem: CoverProblem,
+) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
+    """Return the exponent of the unit, the weights in it, and how many were rounded.
+
+    The last in each row set, shape (n_g,).
+    """
+    total = problem.total_weight
+    exponent = 51 - int(np.floor(np.log2(total))) if total > 0 else 0
+    scaled = np.ldexp(problem.weights, exponent)
+    whole = np.rint(scaled)
+    return exponent, whole, problem.by_row_set((whole != scaled).astype(np.float64))
 
 
 @dataclass(frozen=True, eq=False)
