@@ -127,21 +127,20 @@ class _Search:
         self.size = size
         self.lower = 0
         self.proof = ""
-        self._seed = seed
         self._known = _greedy(covers, budget)
         self._rows = np.empty(0, dtype=np.int64)
-        self._weights = np.ones(len(covers))
+        self._search = RowWeighting(covers[:0], self._known, seed=seed)
         self._offer(self._known)
 
     def run(self) -> None:
         """Search, bound, refute, and search on with what is left."""
         whole = self.budget.units
-        self._rows = _spread_rows(self.covers)
+        self._search_over(_spread_rows(self.covers))
         if self.covers.size > _CHEAP:
             self._improve(_LARGE_STEPS, self.budget.part(0.3 * whole))
         linear = linear_cover(self.covers, self.budget.part(0.25 * whole))
         self._raise(linear.lower_bound, _LINEAR_PROOF)
-        self._rows = np.union1d(self._rows, linear.rows)
+        self._search_over(linear.rows)
         self._improve(_FIRST_STEPS, self.budget.part(0.15 * whole))
         if self.settled:
             return
@@ -192,30 +191,27 @@ class _Search:
                 taken.append(int(row))
             if len(taken) == _BATCH:
                 break
-        self._rows = np.union1d(self._rows, np.array(taken, dtype=np.int64))
+        self._search_over(np.array(taken, dtype=np.int64))
         return missed.size > 0
+
+    def _search_over(self, rows: NDArray[np.int64]) -> None:
+        """Take rows into the search, those that are new to it."""
+        new = np.setdiff1d(rows, self._rows)
+        self._rows = np.concatenate([self._rows, new])
+        self._search.add_rows(self.covers[new], np.ones(new.size))
+        self.budget.spend(4.0 * new.size * self.covers.shape[1])
 
     def _improve(self, max_steps: int, budget: WorkBudget) -> None:
         """Look for smaller covers until the rows taken in resist."""
-        selected = self._known
+        search = self._search
+        search.select(self._known)
         while not self.settled and not budget.exhausted:
-            self._seed += 1
-            search = RowWeighting(
-                self.covers[self._rows],
-                selected,
-                seed=self._seed,
-                weights=self._weights[self._rows],
-            )
-            budget.spend(4.0 * search.covers.size)
             while search.chosen.size >= self.size:
                 search.drop()
-            found = search.search(max_steps, budget)
-            self._weights[self._rows] = search.weights
-            if not found:
+            if not search.search(max_steps, budget):
                 break
-            selected = search.chosen
-            if not self._take_in(selected):
-                self._offer(np.sort(selected))
+            if not self._take_in(search.chosen):
+                self._offer(np.sort(search.chosen))
 
     def _by_rows(self, budget: WorkBudget) -> bool:
         """Refute covers of as many sets as the bound; return whether to go on."""
@@ -244,7 +240,7 @@ class _Search:
         """Refute all smaller covers; return whether to go on."""
         rows = np.arange(len(self.covers))
         if rows.size > _MANY_ROWS:
-            rows = self._rows
+            rows = np.sort(self._rows)
         answer = OrbitalTree(self.covers, rows, self.size, budget).run()
         self._raise(answer.lower_bound, _ORBITAL_PROOF)
         if answer.selected is not None:

@@ -16,7 +16,6 @@ References:
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from .status import WorkBudget
 
@@ -30,10 +29,9 @@ _DRAWS = 4096
 
 
 class RowWeighting:
-    """Search for a selection that covers every row.
+    """Search for a selection that covers every row, of rows that may become more.
 
     Attributes:
-        covers: Whether set s covers row e, shape (n_e, n_s).
         chosen: Selected sets, shape (k,).
         weights: Integer-valued weight of each row, at least 1, shape (n_e,).
         open_rows: Rows that no selected set covers, increasing.
@@ -47,26 +45,50 @@ class RowWeighting:
         seed: int,
         weights: NDArray[np.float64] | None = None,
     ) -> None:
-        n_rows, n_sets = covers.shape
-        self.covers = covers
-        self.weights = np.ones(n_rows) if weights is None else weights.copy()
-        self._dense = covers.astype(np.float64)
-        self._rows = _members(covers.T)
-        self._sets = _members(covers)
+        n_sets = covers.shape[1]
         self._rng = np.random.default_rng(seed)
         self._step = 0
         # When a set last came or went, and when the number over a row last changed.
         self._moved = np.zeros(n_sets)
         self._left = np.full(n_sets, -1.0)
-        self._changed = np.zeros(n_rows)
-        self.select(chosen)
+        self.weights = np.empty(0)
+        self._changed = np.empty(0)
+        self._dense = np.empty((0, n_sets))
+        self._rows = [np.empty(0, dtype=np.int64)] * n_sets
+        self._sets: list[NDArray[np.int64]] = []
+        self.chosen = np.array(chosen, dtype=np.int64)
+        self.add_rows(covers, np.ones(len(covers)) if weights is None else weights)
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows."""
+        return len(self._sets)
+
+    def add_rows(self, covers: NDArray[np.bool_], weights: NDArray[np.float64]) -> None:
+        """Take in rows, shape (n, n_s), with their weights, shape (n,)."""
+        before, after = self.n_rows, self.n_rows + len(covers)
+        if after > len(self._dense):
+            # Room for as many again: rows come few at a time.
+            grown = np.empty((2 * after, covers.shape[1]))
+            grown[:before] = self._dense[:before]
+            self._dense = grown
+        self._dense[before:after] = covers
+        self._sets += [np.flatnonzero(row) for row in covers]
+        for s in np.flatnonzero(covers.any(axis=0)):
+            rows = before + np.flatnonzero(covers[:, s])
+            self._rows[s] = np.concatenate([self._rows[s], rows])
+        self.weights = np.concatenate([self.weights, weights])
+        self._changed = np.concatenate(
+            [self._changed, np.full(len(covers), self._step)]
+        )
+        self.select(self.chosen)
 
     def select(self, chosen: NDArray[np.int64]) -> None:
         """Replace the selection; the weights stay."""
         self.chosen = np.array(chosen, dtype=np.int64)
-        self._counts = np.zeros(len(self.covers), dtype=np.int64)
+        self._counts = np.zeros(self.n_rows, dtype=np.int64)
         # Sum of the positions of the sets over a row: its owner, where there's one.
-        self._owners = np.zeros(len(self.covers), dtype=np.int64)
+        self._owners = np.zeros(self.n_rows, dtype=np.int64)
         for position, s in enumerate(self.chosen):
             self._counts[self._rows[s]] += 1
             self._owners[self._rows[s]] += position
@@ -96,8 +118,10 @@ class RowWeighting:
             if self.open_rows.size == 0 or chosen.size == 0:
                 break
             if i % 64 == 0:
-                if budget.exhausted or self._step >= _AGES - 64:
+                if budget.exhausted:
                     break
+                if self._step >= _AGES - 64:
+                    self._forget_ages()
                 budget.spend(64 * cost)
             draw = i % _DRAWS
             if draw == 0 and i:
@@ -134,13 +158,13 @@ class RowWeighting:
             weights[self.open_rows] += 1.0
         return self.open_rows.size == 0
 
+    def _forget_ages(self) -> None:
+        """Count steps from 0 again."""
+        self._step = 0
+        self._moved[:] = self._changed[:] = 0.0
+        self._left[:] = -1.0
+
     def _relax_weights(self) -> None:
         """Halve the weights before sums of them times an age are inexact."""
         if self.weights.sum() > _MAX_TOTAL:
             np.maximum(np.floor(0.5 * self.weights), 1.0, out=self.weights)
-
-
-def _members(rows: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Return the columns of the ones of each row."""
-    ones = sparse.csr_array(rows)
-    return np.split(ones.indices.astype(np.int64), ones.indptr[1:-1])

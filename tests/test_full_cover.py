@@ -173,6 +173,37 @@ def test_search_keeps_its_book():
             assert total - left == worst
 
 
+def test_rows_taken_in_later_count_as_if_they_had_been_there():
+    for seed in range(20):
+        covers = random_rows(seed, most_rows=40, most_sets=25)
+        rng = np.random.default_rng(seed)
+        chosen = rng.permutation(covers.shape[1])[:3]
+        weights = rng.integers(1, 9, len(covers)).astype(float)
+        whole = RowWeighting(covers, chosen, seed=seed, weights=weights)
+        grown = RowWeighting(covers[:0], chosen, seed=seed)
+        for part in np.array_split(np.arange(len(covers)), 4):
+            grown.add_rows(covers[part], weights[part])
+        for _ in range(30):
+            assert grown.search(1, WorkBudget(PLENTY)) == whole.search(
+                1, WorkBudget(PLENTY)
+            )
+            assert grown.chosen.tolist() == whole.chosen.tolist()
+            assert grown.open_rows.tolist() == whole.open_rows.tolist()
+            assert grown.losses().tolist() == whole.losses().tolist()
+
+
+def test_ages_that_run_out_begin_again(monkeypatch):
+    monkeypatch.setattr("solvers.row_weighting._AGES", 300.0)
+    covers = random_rows(3, most_rows=60, most_sets=30)
+    fewest = fewest_by_hand(covers)
+    for seed in range(5):
+        search = RowWeighting(covers, np.arange(fewest), seed=seed)
+        assert search.search(20_000, WorkBudget(PLENTY))
+        assert np.unique(search.chosen).size == fewest
+    too_few = RowWeighting(covers, np.arange(fewest - 1), seed=0)
+    assert not too_few.search(2_000, WorkBudget(PLENTY))
+
+
 def test_only_rows_that_stay_open_grow_heavier():
     """Five of ten disjoint rows can be covered: each step leaves five open."""
     search = RowWeighting(np.eye(10, dtype=bool), np.arange(5), seed=1)
