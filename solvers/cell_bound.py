@@ -17,7 +17,7 @@ from .cell_problem import CellProblem, WholeRows, whole_rows
 from .cell_store import CellStore
 from .cell_tuples import Enough, refute_tuples
 from .cells import CellTree
-from .cover_problem import whole_number
+from .given_numbers import whole_number
 from .one_thread import on_one_thread
 from .status import WorkBudget
 

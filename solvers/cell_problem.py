@@ -25,6 +25,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .given_numbers import real_numbers
+
 # Of rows; the tables of row weights take 256 bytes a row.
 MAX_ROWS = 1_000_000
 # The required weight is lowered by this share, as in covers over candidates.
@@ -57,13 +59,13 @@ class CellProblem:
     row_sets: NDArray[np.int64] = field(default=None)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        weights = np.array(self.weights, dtype=np.float64)
+        weights = real_numbers("weights", self.weights)
         if weights.ndim != 1 or not 1 <= weights.size <= MAX_ROWS:
             raise ValueError(
                 f"weights must be a vector of 1 to {MAX_ROWS} rows, got shape "
                 f"{weights.shape}"
             )
-        required = np.array(self.required_weight, dtype=np.float64).reshape(-1)
+        required = real_numbers("required_weight", self.required_weight).reshape(-1)
         _non_negative("weights", weights)
         _non_negative("required_weight", required)
         needs = _counts("needs", self.needs, weights.size, 1)
@@ -120,7 +122,7 @@ class WholeRows:
         Integers of a small enough sum stay as they are.
         """
         cost = np.maximum(self.needs, 1).astype(np.float64)
-        values = np.clip(np.nan_to_num(np.asarray(given, dtype=np.float64)), 0.0, None)
+        values = np.clip(np.nan_to_num(real_numbers("multipliers", given)), 0.0, None)
         if values.shape != self.weights.shape:
             raise ValueError(
                 f"multipliers must be {self.weights.shape}, got {values.shape}"

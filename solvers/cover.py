@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from .answers import NONE, CountAnswer
 from .cheapest import cheapest_sets
 from .counts import fewest_sets, most_weight
-from .cover_problem import CoverProblem, set_names, whole_number
+from .cover_problem import CoverProblem
+from .given_numbers import set_names, whole_number
 from .multicover import fewest_multicover, heaviest_of
 from .neighbourhood import greedy, prune
 from .one_thread import on_one_thread
@@ -240,7 +241,7 @@ def _or_reduce(
     if given is None:
         return reduce_problem(problem, costs=costs)
     if given.problem is not problem:
-        raise ValueError("reduced is of another problem: make it from this one")
+        raise ValueError("reduced must be made from this problem")
     return given
 
 

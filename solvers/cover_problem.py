@@ -13,13 +13,14 @@ its meaning with the sets on offer. r_e = 2 keeps what it covers when any set is
 several row sets are several objects on one rig.
 """
 
-import operator
 from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+
+from .given_numbers import real_numbers, set_names, whole_numbers
 
 # Limits of one problem, checked before anything is allocated.
 MAX_ENTRIES = 200_000_000
@@ -193,22 +194,14 @@ def _boolean(given: object) -> sparse.csr_array:
 
 
 def _vector(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
-    values = np.ones(n) if given is None else _numbers(name, given)
+    values = np.ones(n) if given is None else real_numbers(name, given)
     if values.shape != (n,):
         raise ValueError(f"{name} must be ({n},), got {values.shape}")
     return values
 
 
-def _whole(name: str, given: ArrayLike) -> NDArray[np.int64]:
-    """Return integers, or refuse what isn't whole."""
-    values = _numbers(name, given) if np.size(given) else np.empty(np.shape(given))
-    if not np.all((np.abs(values) <= 2.0**52) & (values == np.rint(values))):
-        raise ValueError(f"{name} must be whole numbers")
-    return values.astype(np.int64)
-
-
 def _needs(given: ArrayLike, n: int) -> NDArray[np.int64]:
-    needs = _whole("needs", given)
+    needs = whole_numbers("needs", given)
     if needs.shape not in ((), (n,)):
         raise ValueError(f"needs must be one number or ({n},), got {needs.shape}")
     if not np.all((needs >= 1) & (needs <= _MAX_NEED)):
@@ -218,7 +211,9 @@ def _needs(given: ArrayLike, n: int) -> NDArray[np.int64]:
 
 def _row_sets(given: ArrayLike | None, n: int) -> NDArray[np.int64]:
     row_sets = (
-        np.zeros(n, dtype=np.int64) if given is None else _whole("row_sets", given)
+        np.zeros(n, dtype=np.int64)
+        if given is None
+        else whole_numbers("row_sets", given)
     )
     if row_sets.shape != (n,):
         raise ValueError(f"row_sets must be ({n},), got {row_sets.shape}")
@@ -227,48 +222,12 @@ def _row_sets(given: ArrayLike | None, n: int) -> NDArray[np.int64]:
     return row_sets
 
 
-def set_names(name: str, given: ArrayLike, n: int) -> NDArray[np.int64]:
-    """Return the sets that are named, increasing, each once.
-
-    Raises:
-        ValueError: If they aren't whole numbers from 0 to n - 1; a mask isn't.
-    """
-    if np.asarray(given).dtype == bool:
-        raise ValueError(f"{name} must name sets by number, not by a mask")
-    names = np.unique(_whole(name, given))
-    if not np.all((names >= 0) & (names < n)):
-        raise ValueError(f"{name} must name sets from 0 to {n - 1}")
-    return names
-
-
-def whole_number(name: str, given: object, *, least: int) -> int:
-    """Return an integer of at least so much, or refuse what isn't one."""
-    try:
-        value = operator.index(given)  # type: ignore[arg-type]
-    except TypeError:
-        raise ValueError(f"{name} must be a whole number, got {given!r}") from None
-    if value < least:
-        raise ValueError(f"{name} must be at least {least}, got {given}")
-    return value
-
-
-def _numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
-    """Return a copy in float64, or refuse what isn't real numbers."""
-    try:
-        values = np.array(given)
-        if values.dtype.kind in "biuf":
-            return values.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise ValueError(f"{name} must be real numbers")
-
-
 def _required(
     given: ArrayLike | None, share: ArrayLike, totals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the weight that each row set asks for, shape (n_g,)."""
     if given is None:
-        shares = _numbers("min_coverage", share)
+        shares = real_numbers("min_coverage", share)
         if not np.all((shares > 0.0) & (shares <= 1.0)):
             raise ValueError(f"min_coverage must be in (0, 1], got {share}")
         if shares.shape not in ((), (1,), totals.shape):
@@ -277,7 +236,7 @@ def _required(
                 f"row set, got {shares.shape}"
             )
         return shares * totals
-    required = np.atleast_1d(_numbers("required_weight", given))
+    required = np.atleast_1d(real_numbers("required_weight", given))
     if not np.all((required >= 0.0) & np.isfinite(required)):
         raise ValueError(f"required_weight must be finite and at least 0, got {given}")
     if required.shape != totals.shape:

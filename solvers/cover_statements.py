@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from .given_numbers import real_numbers
 from .status import SolveStatus
 
 # About five seconds of simplex; cvxpy takes 1.2 GB for twenty times as many.
@@ -124,7 +125,7 @@ def state_cover_relaxation(
     a, w, r = _elements(covers, weights, needs)
     n_e, n_s = cast("tuple[int, int]", a.shape)
     c = _numbers("costs", costs, n_s)
-    wanted = np.atleast_1d(np.array(required, dtype=np.float64))
+    wanted = np.atleast_1d(real_numbers("required", required))
     if wanted.ndim != 1 or not np.all((wanted >= 0.0) & np.isfinite(wanted)):
         raise ValueError(f"required must be numbers, at least 0, got {required}")
     group = _integers("row_sets", row_sets, n_e, default=0)
@@ -247,7 +248,7 @@ def _elements(
 
 
 def _numbers(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
-    values = np.ones(n) if given is None else np.array(given, dtype=np.float64)
+    values = np.ones(n) if given is None else real_numbers(name, given)
     if values.shape != (n,):
         raise ValueError(f"{name} must be ({n},), got {values.shape}")
     with np.errstate(over="ignore"):

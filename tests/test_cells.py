@@ -152,6 +152,9 @@ def test_a_bad_tree_is_refused(change, words):
         ({"weights": [1e308, 1e308]}, "of a finite sum"),
         ({"weights": np.ones((2, 2))}, "vector of 1 to"),
         ({"weights": []}, "vector of 1 to"),
+        ({"weights": [1j, 1.0]}, "weights must be real numbers"),
+        ({"weights": [10**400, 1]}, "weights must be real numbers"),
+        ({"required_weight": "much"}, "required_weight must be real numbers"),
         ({"required_weight": np.nan}, "required_weight must be finite"),
         ({"required_weight": -1.0}, "required_weight must be finite"),
         ({"needs": [1, -1]}, "needs must be at least 0"),
@@ -177,6 +180,9 @@ def test_bad_questions_are_refused():
         bound_count(CellProblem(np.ones(3), 1.0), tree, 2)
     with pytest.raises(ValueError, match=r"multipliers must be \(70,\)"):
         whole_rows(problem).multipliers(np.ones(3))
+    for given in (np.full(70, 1j), [10**400] * 70, [[1], [1, 2]]):
+        with pytest.raises(ValueError, match="multipliers must be real numbers"):
+            multiplier_bound(problem, tree, given, n_poses=2)
 
 
 class Unordered(Lying):

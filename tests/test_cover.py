@@ -172,12 +172,12 @@ def test_one_reduction_answers_every_question_as_its_own_would(cost):
 def test_a_reduction_is_refused_where_it_does_not_belong():
     problem = from_sets([{0, 1}, {2}], 3)
     other = reduced_problem(from_sets([{0}, {1}, {2}], 3))
-    with pytest.raises(ValueError, match="reduced is of another problem"):
+    with pytest.raises(ValueError, match="reduced must be made from this problem"):
         solve_cover(problem, reduced=other)
-    with pytest.raises(ValueError, match="reduced is of another problem"):
+    with pytest.raises(ValueError, match="reduced must be made from this problem"):
         solve_max_coverage(problem, 1, reduced=other)
     less = dataclasses.replace(problem, required_weight=np.array([1.0]))
-    with pytest.raises(ValueError, match="reduced is of another problem"):
+    with pytest.raises(ValueError, match="reduced must be made from this problem"):
         solve_cover(problem, reduced=reduced_problem(less))
     with pytest.raises(ValueError, match="costs differ"):
         reduced_problem(from_sets([{0}, {1}], 2, costs=np.array([1.0, 2.0])))
