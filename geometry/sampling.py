@@ -41,12 +41,12 @@ def sample_surface(
     seed: int,
     within: NDArray[np.bool_] | None = None,
 ) -> SurfaceSamples:
-    """Return n samples by systematic sampling along the cumulated area.
+    """Return n samples by stratified sampling along the cumulated area.
 
-    One random offset, then equal steps of area over the faces in their order; inside a
-    face, barycentric coordinates are uniform. Systematic sampling spreads the samples
-    more evenly than independent draws, and each face's expected number of samples is
-    proportional to its area.
+    One random place in each of n equal parts of the area, faces in their order; inside
+    a face, barycentric coordinates are uniform. That spreads the samples more evenly
+    than independent draws, and each face's expected number of samples is proportional
+    to its area. (Equal steps would fall on few columns of a mesh that comes in rows.)
 
     Args:
         mesh: The surface.
@@ -67,7 +67,7 @@ def sample_surface(
     if not total > 0.0:
         raise ValueError("the faces to sample have no area")
     rng = np.random.default_rng(seed)
-    ticks = (np.arange(n) + rng.random()) * (total / n)
+    ticks = (np.arange(n) + rng.random(n)) * (total / n)
     faces = np.searchsorted(cumulated, ticks, side="right")
     faces = np.minimum(faces, int(np.flatnonzero(areas)[-1]))
     u, v = rng.random(n), rng.random(n)
