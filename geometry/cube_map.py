@@ -1,0 +1,158 @@
+"""Directions in cells: the six faces of a cube, each cut at equal angles.
+
+Face k looks along world axis k // 2, towards minus where k is odd. On it, (x, y, 1) is
+the direction whose gnomonic coordinates x and y lie in [-1, 1]; cell (row j, column i)
+of n x n holds 4/pi atan x in [-1 + 2i/n, -1 + 2(i + 1)/n], and y likewise. Great
+circles are straight there, so that cells are convex on the sphere and halving n
+joins cells four by four.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+# Rows: the world axes that a face's x, y and z run along.
+_AXES = np.array([[1, 2, 0], [1, 2, 0], [2, 0, 1], [2, 0, 1], [0, 1, 2], [0, 1, 2]])
+_SIGNS = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+_FACES = 6
+# What rounding may move a direction by, in radians.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class CubeMap:
+    """Six times n x n cells of directions; cell (k n + j) n + i.
+
+    Attributes:
+        n: Cells along an edge of a face, at least 1.
+    """
+
+    n: int
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return _FACES * self.n * self.n
+
+    @cached_property
+    def lines(self) -> NDArray[np.float64]:
+        """Gnomonic coordinates of the lines between cells, shape (n + 1,)."""
+        return np.tan(np.linspace(-0.25 * np.pi, 0.25 * np.pi, self.n + 1))
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """Unit directions of the corners of cells, shape (6, n + 1, n + 1, 3)."""
+        return self._directions(self.lines)
+
+    @cached_property
+    def centres(self) -> NDArray[np.float64]:
+        """Unit directions of the middles of cells, shape (size, 3)."""
+        angles = np.linspace(-0.25 * np.pi, 0.25 * np.pi, 2 * self.n + 1)[1::2]
+        return self._directions(np.tan(angles)).reshape(-1, 3)
+
+    @cached_property
+    def radii(self) -> NDArray[np.float64]:
+        """Largest angle from the middle of each cell to its corners, shape (size,)."""
+        n = self.n
+        middle = self.centres.reshape(_FACES, n, n, 3)
+        radii = np.zeros((_FACES, n, n))
+        for j in (0, 1):
+            for i in (0, 1):
+                corner = self.corners[:, j : j + n, i : i + n]
+                radii = np.maximum(radii, angle_between(middle, corner))
+        return radii.reshape(-1) + _ROUNDING
+
+    @property
+    def clearance(self) -> float:
+        """Angle within which no direction leaves its cell and `neighbours` of it.
+
+        Two lines a step apart meet at the face's poles; on a face they are nearest to
+        each other at its edges, 45 degrees from there::
+
+            sin w = sin(pi / 2n) cos 45
+        """
+        return float(np.arcsin(np.sin(0.5 * np.pi / self.n) * np.sqrt(0.5))) - _ROUNDING
+
+    @cached_property
+    def neighbours(self) -> NDArray[np.int64]:
+        """Cells around each cell, itself among them, shape (size, k); may repeat.
+
+        On a face these are the eight around it. At the border of a face, all whose
+        circles about them come within `clearance` of the cell's.
+        """
+        n = self.n
+        _, j, i = np.unravel_index(np.arange(self.size), (_FACES, n, n))
+        inner = (i > 0) & (i < n - 1) & (j > 0) & (j < n - 1)
+        border = np.flatnonzero(~inner)
+        reach = self.radii[border] + self.radii.max() + self.clearance
+        chords = 2.0 * np.sin(0.5 * np.minimum(reach, np.pi)) + _ROUNDING
+        near = KDTree(self.centres).query_ball_point(self.centres[border], chords)
+        kept = [
+            np.array(found)[
+                angle_between(self.centres[found], self.centres[cell])
+                <= self.radii[found] + self.radii[cell] + self.clearance + _ROUNDING
+            ]
+            for cell, found in zip(border, near, strict=True)
+        ]
+        width = max(9, *(found.size for found in kept))
+        around = np.repeat(np.arange(self.size)[:, None], width, axis=1)
+        for row, found in zip(border, kept, strict=True):
+            around[row, : found.size] = found
+        steps = [(b, a) for b in (-1, 0, 1) for a in (-1, 0, 1)]
+        for column, (b, a) in enumerate(steps):
+            around[inner, column] += b * n + a
+        return around
+
+    def locate(self, directions: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the cell that each direction lies in, shape (m,).
+
+        Args:
+            directions: Not zero, of any length, shape (m, 3).
+        """
+        axis = np.argmax(np.abs(directions), axis=1)
+        along = np.take_along_axis(directions, axis[:, None], axis=1)[:, 0]
+        face = 2 * axis + (along < 0)
+        across = np.take_along_axis(directions, _AXES[face][:, :2], axis=1)
+        steps = (np.arctan(across / np.abs(along)[:, None]) * (4.0 / np.pi) + 1.0) / 2.0
+        index = np.clip((steps * self.n).astype(np.int64), 0, self.n - 1)
+        return (face * self.n + index[:, 1]) * self.n + index[:, 0]
+
+    def halved(self, marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which cells of the map of n/2 hold a marked cell of this one.
+
+        Args:
+            marks: Of the cells, shape (m, size).
+        """
+        n = self.n // 2
+        split = marks.reshape(-1, _FACES, n, 2, n, 2)
+        return split.any(axis=(3, 5)).reshape(len(marks), -1)
+
+    def _directions(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+        n = steps.size
+        found = np.empty((_FACES, n, n, 3))
+        x, y = steps[None, :], steps[:, None]
+        length = np.sqrt(1.0 + x * x + y * y)
+        for face in range(_FACES):
+            for own, value in zip(_AXES[face], (x, y, _SIGNS[face]), strict=True):
+                found[face, :, :, own] = value / length
+        return found
+
+
+def face_coordinates(
+    vectors: NDArray[np.float64], face: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return x, y, z of vectors in the frame of a face: direction (x/z, y/z, 1)."""
+    own = _AXES[face]
+    z = _SIGNS[face] * vectors[..., own[2]]
+    return vectors[..., own[0]], vectors[..., own[1]], z
+
+
+def angle_between(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the angle between unit vectors, accurate for small ones too."""
+    chord = np.linalg.norm(a - b, axis=-1)
+    return 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))

@@ -1,0 +1,165 @@
+"""Which cells of a cube map the segments between two directions pass through."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cube_map import CubeMap, face_coordinates
+
+_FACES = 6
+# Gnomonic coordinates are exact to this; whatever comes as near as this is met.
+_MARGIN = 1e-7
+# Cells that are listed at a time.
+_MOST_CELLS = 1 << 21
+
+
+def mark_segments(
+    cube: CubeMap,
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    owners: NDArray[np.int64],
+    marks: NDArray[np.bool_],
+) -> None:
+    """Mark every cell that a segment, seen from the origin, passes through.
+
+    A few cells that it misses by less than rounding are marked too, none is left out. A
+    segment through the origin itself is seen as its two ends.
+
+    Args:
+        cube: The map.
+        starts: Where segments begin, shape (m, 3).
+        ends: Where they end, shape (m, 3).
+        owners: Row of the marks that each belongs to, shape (m,).
+        marks: What is marked, in place, shape (n_owners, cube.size).
+    """
+    flat = marks.reshape(-1)
+    for face in range(_FACES):
+        first, second, met = _clipped(starts, ends, face)
+        if not met.size:
+            continue
+        begin = (owners[met] * _FACES + face) * cube.n * cube.n
+        for part, column, low, high in _by_column(cube, first, second):
+            _mark(cube, flat, begin[part] + column, low, high)
+
+
+def _clipped(
+    starts: NDArray[np.float64], ends: NDArray[np.float64], face: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return gnomonic ends, (m', 2), of the parts of segments on a face, and whose.
+
+    A part lies on the face where |x| <= z and |y| <= z: four half spaces.
+    """
+    met = _may_meet(starts, ends, face)
+    a = np.stack(face_coordinates(starts[met], face))
+    b = np.stack(face_coordinates(ends[met], face))
+    low, high = np.zeros(met.size), np.ones(met.size)
+    for axis in (0, 1):
+        for sign in (1.0, -1.0):
+            # A little of the neighbouring face is kept, against rounding.
+            inside = (1.0 + _MARGIN) * a[2] + sign * a[axis]
+            change = (1.0 + _MARGIN) * b[2] + sign * b[axis] - inside
+            with np.errstate(divide="ignore", invalid="ignore"):
+                cut = -inside / change
+            low = np.where(change > 0, np.maximum(low, cut), low)
+            high = np.where(change < 0, np.minimum(high, cut), high)
+            high = np.where((change == 0) & (inside < 0), -1.0, high)
+    kept = np.flatnonzero(low <= high + _MARGIN)
+    a, b, met = a[:, kept], b[:, kept], met[kept]
+    ends_met = []
+    for t in (low[kept], high[kept]):
+        point = a + t * (b - a)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends_met.append((point[:2] / point[2]).T)
+    first, second = ends_met
+    # Where a segment passes through the origin one end has no direction.
+    bad = ~np.isfinite(first).all(axis=1)
+    first[bad] = second[bad]
+    bad = ~np.isfinite(second).all(axis=1)
+    second[bad] = first[bad]
+    seen = np.isfinite(first).all(axis=1)
+    first = np.clip(first[seen], -1.0, 1.0)
+    return first, np.clip(second[seen], -1.0, 1.0), met[seen]
+
+
+def _may_meet(
+    starts: NDArray[np.float64], ends: NDArray[np.float64], face: int
+) -> NDArray[np.int64]:
+    """Return the segments that don't lie in one of a face's four outer half spaces."""
+    outside = np.zeros(len(starts), dtype=bool)
+    a, b = face_coordinates(starts, face), face_coordinates(ends, face)
+    az, bz = (1.0 + 2.0 * _MARGIN) * a[2], (1.0 + 2.0 * _MARGIN) * b[2]
+    for axis in (0, 1):
+        outside |= (az < a[axis]) & (bz < b[axis])
+        outside |= (az < -a[axis]) & (bz < -b[axis])
+    return np.flatnonzero(~outside)
+
+
+def _by_column(
+    cube: CubeMap, first: NDArray[np.float64], second: NDArray[np.float64]
+) -> Iterator[tuple[NDArray[np.int64], ...]]:
+    """Yield segment, column, and the first and last row met there, some at a time."""
+    low, high = np.minimum(first, second), np.maximum(first, second)
+    begin, end = _index(cube, low[:, 0] - _MARGIN), _index(cube, high[:, 0] + _MARGIN)
+    step = second - first
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = step[:, 1] / step[:, 0]
+    counts = end - begin + 1
+    for some in _parts(counts):
+        segment, nth = _spread(counts[some])
+        segment += some.start
+        column = begin[segment] + nth
+        reached = []
+        for x in (cube.lines[column] - _MARGIN, cube.lines[column + 1] + _MARGIN):
+            with np.errstate(invalid="ignore"):
+                y = first[segment, 1] + (x - first[segment, 0]) * slope[segment]
+            reached.append(np.clip(y, low[segment, 1], high[segment, 1]))
+        # Upright segments have no slope: they meet all their rows.
+        upright = ~(np.abs(step[segment, 0]) > _MARGIN)
+        bottom = np.where(upright, low[segment, 1], np.minimum(*reached))
+        top = np.where(upright, high[segment, 1], np.maximum(*reached))
+        yield (
+            segment,
+            column,
+            _index(cube, bottom - _MARGIN),
+            _index(cube, top + _MARGIN),
+        )
+
+
+def _mark(
+    cube: CubeMap,
+    flat: NDArray[np.bool_],
+    begin: NDArray[np.int64],
+    low: NDArray[np.int64],
+    high: NDArray[np.int64],
+) -> None:
+    """Mark rows low to high of columns that begin at a place."""
+    counts = high - low + 1
+    for some in _parts(counts):
+        which, nth = _spread(counts[some])
+        which += some.start
+        flat[begin[which] + (low[which] + nth) * cube.n] = True
+
+
+def _index(cube: CubeMap, steps: NDArray[np.float64]) -> NDArray[np.int64]:
+    found = np.searchsorted(cube.lines, steps, side="right") - 1
+    return np.clip(found, 0, cube.n - 1)
+
+
+def _spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return which thing each of its parts belongs to, and its number among them."""
+    which = np.repeat(np.arange(counts.size), counts)
+    nth = np.arange(which.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    return which, nth
+
+
+def _parts(counts: NDArray[np.int64]) -> Iterator[slice]:
+    """Return slices of things that have at most so many parts, or are one thing."""
+    ends = np.cumsum(counts)
+    begin = 0
+    while begin < counts.size:
+        before = ends[begin - 1] if begin else 0
+        stop = int(np.searchsorted(ends, before + _MOST_CELLS, side="right"))
+        stop = max(stop, begin + 1)
+        yield slice(begin, stop)
+        begin = stop

@@ -1,0 +1,179 @@
+"""Directions from which a sample may be lit, as cells of a cube map: a superset.
+
+A cell stays open unless no direction in it passes: each is beyond the incidence limit,
+too near to the line of the steep direction, or blocked. With u the direction from the
+sample to the device, N and T1 as in eq. (2)::
+
+    N . u >= cos(theta_max),    |T1 . u| <= cos(tau_min),    nothing in between
+
+Whether something is in between changes only across silhouettes (`silhouettes`). They
+are marked on the map; of the other cells, those that hang together are all blocked or
+all free, and one ray says which. A cell isn't closed because the ray to its middle is
+blocked.
+
+The mesh must be nearer than the device in every direction asked about.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from .cube_map import CubeMap
+from .cube_segments import mark_segments
+from .silhouettes import Silhouettes
+from .visibility import Visibility
+
+# Cosines are exact to this.
+_ROUNDING = 1e-9
+_IN_PLANE = np.zeros((3, 3, 3), dtype=bool)
+_IN_PLANE[1] = [[False, True, False], [True, True, True], [False, True, False]]
+
+
+@dataclass(frozen=True)
+class DirectionLimits:
+    """Limits on the direction from a sample to a device.
+
+    Attributes:
+        max_incidence: Largest angle to the normal [rad], below pi/2.
+        min_tangent_angle: Least angle to the line of the steep direction [rad].
+    """
+
+    max_incidence: float
+    min_tangent_angle: float
+
+
+class OpenDirections:
+    """Makes the maps of samples on one mesh.
+
+    Args:
+        visibility: The occluder; its rays are those that the planner believes.
+        limits: Of incidence and tangent angle.
+        cube: The map.
+        occlusion: Whether blocked cells are closed.
+    """
+
+    def __init__(
+        self,
+        visibility: Visibility,
+        limits: DirectionLimits,
+        cube: CubeMap,
+        *,
+        occlusion: bool = True,
+    ) -> None:
+        self._visibility, self._limits, self._cube = visibility, limits, cube
+        # Cells that reach beyond the limit belong to it as a whole.
+        reach = limits.max_incidence + 2.0 * float(cube.radii.max())
+        self._cone = min(reach, 0.5 * np.pi)
+        self._edges = Silhouettes(visibility.caster.mesh) if occlusion else None
+
+    def maps(
+        self,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        steep: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Return which cells are open to each sample, shape (n, cube.size).
+
+        Args:
+            points: On the mesh in [m], at most `POINTS`, shape (n, 3).
+            normals: Unit normals of their faces, same shape.
+            steep: Unit T1, or zero where it doesn't bind, same shape.
+        """
+        cells = self._within_incidence(normals)
+        cells &= ~self._along_steep(steep)
+        if self._edges is not None:
+            cells &= ~self._blocked(self._edges, points, normals, cells)
+        return cells
+
+    def _within_incidence(self, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return the cells that the cap about each normal meets."""
+        cube, limit = self._cube, self._limits.max_incidence
+        cosine = normals @ cube.centres.T
+        within = cosine >= np.cos(limit)
+        near = ~within & (cosine >= np.cos(np.minimum(limit + cube.radii, np.pi)))
+        row, cell = np.nonzero(near)
+        meets = _arcs_come_within(cube, normals[row], cell, np.cos(limit) - _ROUNDING)
+        within[row[meets], cell[meets]] = True
+        within[np.arange(len(normals)), cube.locate(normals)] = True
+        return within
+
+    def _along_steep(self, steep: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return the cells that lie in a cap about +T1 or -T1 as a whole."""
+        cube, n = self._cube, self._cube.n
+        cosine = (steep @ cube.corners.reshape(-1, 3).T).reshape(-1, 6, n + 1, n + 1)
+        least = np.cos(self._limits.min_tangent_angle) + _ROUNDING
+        whole = np.zeros((len(steep), 6, n, n), dtype=bool)
+        for inside in (cosine > least, cosine < -least):
+            whole |= (
+                inside[:, :, :-1, :-1]
+                & inside[:, :, :-1, 1:]
+                & inside[:, :, 1:, :-1]
+                & inside[:, :, 1:, 1:]
+            )
+        return whole.reshape(len(steep), -1)
+
+    def _blocked(
+        self,
+        edges: Silhouettes,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        cells: NDArray[np.bool_],
+    ) -> NDArray[np.bool_]:
+        """Return the cells that are blocked as a whole; only those given are asked."""
+        cube = self._cube
+        touched = np.zeros(cells.shape, dtype=bool)
+        owners, begin, end = edges.seen_from(points, normals, self._cone)
+        mark_segments(cube, begin, end, owners, touched)
+        plain = (cells & ~touched).reshape(-1, cube.n, cube.n)
+        labels = np.empty(plain.shape, dtype=np.int32)
+        n_parts = int(ndimage.label(plain, structure=_IN_PLANE, output=labels))  # type: ignore[arg-type]
+        labels = labels.reshape(cells.shape)
+        place = np.flatnonzero(labels.ravel())
+        first = np.empty(n_parts + 1, dtype=np.int64)
+        first[labels.ravel()[place[::-1]]] = place[::-1]
+        row, cell = np.divmod(first[1:], cube.size)
+        answer = np.zeros(n_parts + 1, dtype=bool)
+        answer[1:] = self._meets(points[row], normals[row], cube.centres[cell])
+        return answer[labels]
+
+    def _meets(
+        self,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        directions: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Return whether rays from samples outwards meet the mesh."""
+        caster, slack = self._visibility.caster, self._visibility.slack
+        rise = np.einsum("ij,ij->i", normals, directions)
+        # The planner's rays end where they are `slack` above the sample's face.
+        up = rise > 0.0
+        start = points + directions * (slack / np.where(up, rise, 1.0))[:, None]
+        reach = np.full(len(points), 4.0 * caster.reach / caster.scale)
+        return up & caster.occluded(start, directions, reach)
+
+
+def _arcs_come_within(
+    cube: CubeMap,
+    axes: NDArray[np.float64],
+    cells: NDArray[np.int64],
+    cosine: float,
+) -> NDArray[np.bool_]:
+    """Return whether the border of each cell comes within an angle of its axis."""
+    face, rest = np.divmod(cells, cube.n * cube.n)
+    j, i = np.divmod(rest, cube.n)
+    corners = [
+        cube.corners[face, j + b, i + a] for b, a in ((0, 0), (0, 1), (1, 1), (1, 0))
+    ]
+    near = np.zeros(cells.size, dtype=bool)
+    for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
+        pole = np.cross(start, end)
+        pole /= np.linalg.norm(pole, axis=1)[:, None]
+        off = np.einsum("ij,ij->i", pole, axes)
+        # The nearest point of the great circle lies between the ends.
+        between = np.einsum("ij,ij->i", np.cross(pole, start), axes) > 0.0
+        between &= np.einsum("ij,ij->i", np.cross(end, pole), axes) > 0.0
+        best = np.where(between, np.sqrt(np.maximum(1.0 - off * off, 0.0)), -1.0)
+        near |= np.maximum(best, np.einsum("ij,ij->i", start, axes)) >= cosine
+    return near

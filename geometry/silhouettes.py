@@ -1,0 +1,138 @@
+"""Edges across which it may change whether a point sees out.
+
+From a point p, the directions in which a surface stands in the way are bounded by
+silhouettes: edges whose two faces p sees from different sides, and edges of one face or
+of more than two. Anywhere else a surface goes on. For p and face f with normal N_f
+through x_f::
+
+    h_f(p) = N_f . (p - x_f),    edge of f, g is a silhouette iff h_f h_g <= 0
+
+(with the sign turned where f and g run along the edge in the same sense). What is too
+near to 0 to call counts as a silhouette. That holds for any part of the faces, too: its
+silhouettes are found in the same way, and edges at which it ends are among them.
+
+A bit for each of 64 points, so that edges are compared for all of them at once.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh import TriangleMesh
+from .topology import face_pairs
+
+# Points that are asked about at once.
+POINTS = 64
+# Height, as a share of the mesh's size, within which a side can't be told.
+_UNSURE = 1e-9
+# What rounding may turn a direction by.
+_ANGLE = 1e-6
+_NONE = np.uint64(0)
+
+
+class Silhouettes:
+    """The edges of a mesh, ready to be compared.
+
+    Args:
+        mesh: What stands in the way.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        edges = mesh.edges
+        pairs, shared = face_pairs(edges)
+        self._middle = mesh.bounds.mean(axis=0)
+        self._vertices = mesh.vertices - self._middle
+        self._single_ends = edges.ends[edges.n_faces != 2]
+        self._pairs, self._ends = pairs, edges.ends[shared]
+        forwards = [_runs_along(mesh.faces[f], self._ends) for f in pairs.T]
+        self._turned = np.where(forwards[0] == forwards[1], ~_NONE, _NONE)
+        anchors = np.einsum(
+            "ij,ij->i", mesh.face_normals, mesh.corners[:, 0] - self._middle
+        )
+        self._planes = np.column_stack([mesh.face_normals, anchors])
+        size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+        self._unsure = _UNSURE * size
+
+    def seen_from(
+        self,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        half_angle: float,
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the silhouettes that may cross a cone above each point.
+
+        Args:
+            points: On the mesh in [m], at most `POINTS`, shape (n, 3).
+            normals: Unit axes of the cones, same shape.
+            half_angle: Their half opening [rad], at most pi / 2.
+
+        Returns:
+            The point that each belongs to, (m,), and the edge's ends relative to it in
+            [m], shape (m, 3) each.
+        """
+        local = points - self._middle
+        own = np.einsum("ij,ij->i", normals, local)
+        (above,) = _packed(self._vertices @ normals.T - own, [0.0])
+        heights = self._planes @ np.column_stack([local, -np.ones(len(local))]).T
+        over, under = _packed(heights, [self._unsure, -self._unsure])
+        # Above the upper mark: over both; between the marks: not sure.
+        unsure = over ^ under
+        f, g = self._pairs.T
+        words = (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g]
+        words &= above[self._ends[:, 0]] | above[self._ends[:, 1]]
+        alone = above[self._single_ends[:, 0]] | above[self._single_ends[:, 1]]
+        owners, edges = _unpacked(words, len(points))
+        more, singles = _unpacked(alone, len(points))
+        ends = np.concatenate([self._ends[edges], self._single_ends[singles]])
+        owners = np.concatenate([owners, more])
+        begin, end = (self._vertices[ends[:, k]] - local[owners] for k in (0, 1))
+        near = _may_cross(begin, end, normals[owners], half_angle)
+        return owners[near], begin[near], end[near]
+
+
+def _may_cross(
+    begin: NDArray[np.float64],
+    end: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    half_angle: float,
+) -> NDArray[np.bool_]:
+    """Return which segments the ball about their middle lets into a cone."""
+    middle = begin + end
+    distance = np.linalg.norm(middle, axis=1)
+    size = np.linalg.norm(end - begin, axis=1)
+    around = size >= distance
+    apart = np.where(around, 1.0, distance)
+    cosine = np.einsum("ij,ij->i", middle, axes) / apart
+    spread = np.arcsin(np.where(around, 0.0, size) / apart)
+    off = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return around | (off - spread <= half_angle + _ANGLE)
+
+
+def _packed(
+    values: NDArray[np.float64], levels: list[float]
+) -> list[NDArray[np.uint64]]:
+    """Return words that say where a row is over each level: column i in bit i."""
+    found = []
+    for level in levels:
+        whole = np.zeros((len(values), 8), dtype=np.uint8)
+        bits = np.packbits(values > level, axis=1, bitorder="little")
+        whole[:, : bits.shape[1]] = bits
+        found.append(whole.view(np.uint64)[:, 0])
+    return found
+
+
+def _unpacked(
+    words: NDArray[np.uint64], n: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows and columns of the bits that are set."""
+    some = np.flatnonzero(words)
+    bits = np.unpackbits(
+        words[some].view(np.uint8).reshape(-1, 8), axis=1, count=n, bitorder="little"
+    )
+    column, row = np.nonzero(bits)
+    return row, some[column]
+
+
+def _runs_along(faces: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return whether each face runs along its edge from the first end to the second."""
+    after = faces[:, [1, 2, 0]]
+    return np.any((faces == ends[:, :1]) & (after == ends[:, 1:]), axis=1)
