@@ -111,6 +111,30 @@ def projector_candidates(
     return _projectors(template, poses, ring_offset)
 
 
+def projectors_towards(
+    template: PlannedProjector,
+    workspace: Workspace,
+    directions: NDArray[np.float64],
+    *,
+    ring_offset: tuple[float, float],
+) -> tuple[PlannedProjector, ...]:
+    """Return candidates in given directions from the centre, those that are admissible.
+
+    Args:
+        template: Optics, light and rings; its poses are replaced.
+        workspace: Where devices may stand.
+        directions: Unit vectors, shape (n, 3).
+        ring_offset: As for `projector_candidates`.
+    """
+    near, far = workspace.projector_radius_m
+    radius, device = 0.5 * (near + far), template.device
+    kept = directions[_stands(directions, radius, workspace)]
+    rolls = rolls_for(device, workspace.object_radius_m, radius)
+    positions = np.array(workspace.centre) + radius * kept
+    poses = _aimed(positions, device, workspace, rolls)
+    return _projectors(template, poses, ring_offset)
+
+
 def projectors_around(
     chosen: Sequence[PlannedProjector],
     workspace: Workspace,

@@ -237,10 +237,6 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     _check_target(options)
-    if options["prove"]:
-        raise click.UsageError(
-            "--prove isn't built yet: bounds over all poses come later"
-        )
     if options["pattern"] != "rings":
         raise click.UsageError(
             f"--pattern {options['pattern']} isn't built yet: use rings"

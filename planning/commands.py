@@ -64,6 +64,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 seed=options["seed"],
                 threads=options["threads"] or _cores(),
                 check=not options["no_check"],
+                prove=options["prove"],
                 time_limit=_left(options["time_limit"], begin),
                 progress=report,
                 command=("plan", *command),

@@ -26,6 +26,7 @@ class Order:
         threads: Worker threads.
         command: Words of the command line, for the record.
         interest: The user's own target; None: the dominant regions by curvature.
+        prove: Whether more work is spent on the bounds over all poses.
     """
 
     mesh: TriangleMesh
@@ -35,6 +36,7 @@ class Order:
     threads: int
     command: tuple[str, ...]
     interest: Interest | None = None
+    prove: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from geometry.selected_regions import regions_of_faces
 from .assemble import falls_short, write_plan
 from .camera_stage import place_cameras, spread
 from .cameras import CameraStage
+from .continuous import DEFAULT, PROVE, prove_fewest
 from .cost import cost_entry
 from .draft import Draft, Order
 from .errors import (
@@ -60,6 +61,7 @@ def plan_rig(
     seed: int = 0,
     threads: int = 2,
     check: bool = True,
+    prove: bool = False,
     time_limit: float | None = None,
     progress: Report | None = None,
     command: Sequence[str] = (),
@@ -84,6 +86,7 @@ def plan_rig(
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it.
         check: Whether the plan is audited and reconstructed from pixels.
+        prove: Whether more work is spent on the bounds over all poses.
         time_limit: Wall time in [s] that cuts the run; the plan is then `truncated`.
         progress: Receives a line when a stage begins.
         command: Words of the command line, for the record.
@@ -120,6 +123,7 @@ def plan_rig(
         threads,
         tuple(command),
         None if interest is None else interest.on_parts(parent),
+        prove,
     )
     clock = Stopwatch(progress, time_limit=time_limit)
     if len(cut.faces) > len(surface.faces):
@@ -182,6 +186,16 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
             f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
             f"{stage.certificate['candidates']['lower_bound']} are needed"
         )
+    with clock.stage("bounds", "bounds over all poses of the workspace"):
+        stage = prove_fewest(
+            scene,
+            stage,
+            template,
+            PROVE if order.prove else DEFAULT,
+            ring_offset=(tilt, _FIRST_AZIMUTH),
+        )
+        proof = stage.certificate["continuous"]
+        clock.say(f"  projectors: at least {proof['lower_bound']}, {proof['proof']}")
     projectors, cameras = _placed(order, scene, stage, tilt, clock)
     return Draft(
         order,

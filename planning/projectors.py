@@ -32,6 +32,7 @@ class ProjectorStage:
         projectors: The fewest, or the best that are allowed.
         reference: The reference set, which is the candidate set.
         rows: Samples that the cover was solved on.
+        stages: First failing limit of each row and candidate.
         by_count: Best candidates for each number of devices, for the marginal table.
         certificate: As in the plan file.
     """
@@ -39,6 +40,7 @@ class ProjectorStage:
     projectors: tuple[PlannedProjector, ...]
     reference: tuple[PlannedProjector, ...]
     rows: Target
+    stages: NDArray[np.int8]
     by_count: dict[int, tuple[PlannedProjector, ...]]
     certificate: dict[str, Any]
 
@@ -98,6 +100,21 @@ def plan_projectors(
         rows = merged(rows, fresh)
         stages = np.concatenate([stages, fresh_stages])
     return _stage(scene, candidates, rows, stages, selection)
+
+
+def with_more(
+    scene: Scene, stage: ProjectorStage, more: tuple[PlannedProjector, ...]
+) -> ProjectorStage:
+    """Return the stage with more candidates where they need fewer projectors.
+
+    Else it is returned as it was: more candidates alone are no better plan.
+    """
+    lit = lit_stages(scene, more, stage.rows)
+    stages = np.concatenate([stage.stages, lit], axis=1)
+    selection = _fewest(scene, stages)
+    if selection.needed >= stage.certificate["needed"]["count"]:
+        return stage
+    return _stage(scene, stage.reference + more, stage.rows, stages, selection)
 
 
 def _fewest(scene: Scene, stages: NDArray[np.int8]) -> Selection:
@@ -197,6 +214,7 @@ def _stage(
         tuple(candidates[i] for i in selection.chosen),
         candidates,
         rows,
+        stages,
         {
             number: tuple(candidates[i] for i in chosen)
             for number, chosen in others.by_count.items()

@@ -78,7 +78,7 @@ def select_fewest(
         max_count: Candidates allowed; None for no limit.
         seed: Of the heuristics.
     """
-    required = int(np.ceil(share * int(covers.any(axis=1).sum()) - 1e-9))
+    required = required_rows(np.any(covers, axis=1), share)
     problem = _problem(covers, required)
     reduced = reduced_problem(problem)
     solution = solve_cover(problem, seed=seed, heaviest=False, reduced=reduced)
@@ -105,6 +105,11 @@ def select_fewest(
         rows,
         int(np.floor(best.upper_bound + 1e-6)),
     )
+
+
+def required_rows(reached: NDArray[np.bool_], share: float) -> int:
+    """Return how many rows a share of those that any candidate serves is."""
+    return int(np.ceil(share * int(reached.sum()) - 1e-9))
 
 
 def marginals(

@@ -172,10 +172,10 @@ def _proofs(plan: RigPlan) -> str:
     proofs = plan.document["certificates"]
     lines = [
         _proof("projector", proofs["projectors"], asked.dominant_coverage, "light"),
+        _continuous(plan, proofs["projectors"]),
         _proof("camera", proofs["cameras"], asked.coverage, "measure")
         + " (given these projectors)",
-        f"         {_regions(plan)}; nothing is proved "
-        f"over poses beside the candidates",
+        f"         {_regions(plan)}",
     ]
     return "\n" + "\n".join(lines)
 
@@ -199,6 +199,21 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
         )
     least = candidates["lower_bound"]
     return f"BOUND    {count} {name}; at least {least} are needed {scope}"
+
+
+def _continuous(plan: RigPlan, proof: dict[str, Any]) -> str:
+    """Return what was proved over all poses of the workspace, in a line."""
+    bound = proof["continuous"]
+    parallel = plan.projectors[0].light == "parallel"
+    poses = "direction" if parallel else "position and aim"
+    scope = f"over every {poses} in the workspace, for these samples"
+    if bound is None:
+        return f"         nothing is proved {scope}"
+    blind = "" if bound["occlusion"] else ", shadows left out"
+    least = bound["lower_bound"]
+    if least >= proof["needed"]["count"]:
+        return f"PROVED   fewer are too few {scope}{blind}"
+    return f"BOUND    at least {least} are needed {scope}{blind}"
 
 
 def _coverage(plan: RigPlan) -> str:

@@ -210,6 +210,10 @@ FALSE = {
         _at("certificates", "cameras", "continuous", {"lower_bound": 4}),
         "cameras.continuous.lower_bound: 4 exceeds",
     ),
+    "continuous beyond candidates": (
+        _at("certificates", "projectors", "continuous", {"lower_bound": 2}),
+        "2 is claimed over all poses, but only 1 over the candidates",
+    ),
     "optimal": (
         _at("certificates", "projectors", "status", "optimal"),
         "2 devices stand against a bound of 1",

@@ -150,7 +150,6 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
         (["--mesh", "FACE", "--max-projectors", 0], 2, "not in the range"),
         (["--mesh", "FACE"], 2, "--max-projectors"),
         (["--mesh", "FACE", "--max-projectors", 3, "--nope"], 2, "--nope"),
-        (["--mesh", "FACE", "--max-projectors", 3, "--prove"], 2, "isn't built yet"),
         (
             ["--mesh", "FACE", "--max-projectors", 3, "--pattern", "dense"],
             2,

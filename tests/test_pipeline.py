@@ -86,7 +86,13 @@ def test_counts_bounds_and_candidates_are_stated(plan):
         assert proof["count"] == len(plan.document[kind])
         assert 1 <= proof["candidates"]["lower_bound"] <= proof["count"]
         assert proof["candidates"]["n_candidates"] >= least
-        assert proof["continuous"] is None
+        continuous = proof["continuous"]
+        if kind == "projectors":
+            assert 1 <= continuous["lower_bound"] <= proof["candidates"]["lower_bound"]
+            assert continuous["status"] in ("proved", "survived", "cut")
+            assert continuous["n_reached"] <= continuous["n_samples"]
+        else:
+            assert continuous is None
         met = proof["candidates"]["lower_bound"] == proof["count"]
         assert proof["status"] == ("optimal" if met else "feasible")
 

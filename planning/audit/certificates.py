@@ -52,6 +52,7 @@ def audit_certificates(
         slack = estimator.tolerance(area & own.samples.in_target, estimator.target_m2)
         _audit_candidates(key, claims, len(poses[kind]), ledger)
         _audit_needed(key, claims, len(covers), ledger)
+        _audit_continuous(key, claims, ledger)
         _audit_best_area(key, claims, reachable, estimator.target_m2, ledger)
         _audit_one_fewer(key, claims, len(covers), slack, ledger)
         ledger.number(
@@ -136,6 +137,22 @@ def _audit_needed(key: str, claims: dict[str, Any], count: int, ledger: Ledger) 
         f"{key}.needed.lower_bound",
         f"{bound:g} exceeds the count of {number:g}",
     )
+
+
+def _audit_continuous(key: str, claims: dict[str, Any], ledger: Ledger) -> None:
+    """What holds for all poses holds for the candidates among them."""
+    table, needed = claims.get("continuous"), claims.get("needed")
+    if not (isinstance(table, dict) and isinstance(needed, dict)):
+        return
+    everywhere = as_number(table.get("lower_bound"))
+    here = as_number(needed.get("lower_bound"))
+    if everywhere is not None and here is not None:
+        ledger.holds(
+            everywhere <= here,
+            f"{key}.continuous.lower_bound",
+            f"{everywhere:g} is claimed over all poses, but only {here:g} over the "
+            f"candidates, which are some of them",
+        )
 
 
 def _audit_best_area(

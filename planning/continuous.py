@@ -1,0 +1,261 @@
+"""The bound over all poses: how many projectors it takes, wherever they may stand.
+
+Rows are the samples that the cover over candidates reaches, frozen as a set, and how
+many of them must be lit. Cells hold every pose of the workspace, each with a superset
+of what any of its poses lights; a cover over supersets can't need more. Where fewer
+projectors than were found can't be refuted, the cells that are left say where to look.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.cube_map import CubeMap
+from geometry.devices import ParallelModel
+from geometry.open_directions import DirectionLimits, OpenDirections
+from geometry.silhouettes import POINTS
+from geometry.widened_maps import WidenedMaps
+from solvers.bit_rows import words_for
+from solvers.cell_bound import CellBound, CellStatus, bound_count
+from solvers.cell_problem import CellProblem
+
+from .candidates import projectors_around, projectors_towards
+from .direction_cells import DirectionTree
+from .lighting import LIT, Target
+from .plan import PlannedProjector
+from .position_cells import PositionTree
+from .projectors import ProjectorStage, with_more
+from .requirements import Workspace
+from .scene import Scene
+from .selection import required_rows
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is spent on the bound.
+
+    Attributes:
+        finest: Cells are parts of a cube map of 2^finest cells an edge.
+        budget: Counted work of the search.
+        shadows: Pairs of sample and face above which shadows are left out.
+    """
+
+    finest: int
+    budget: float
+    shadows: float
+
+
+DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8)
+PROVE = Effort(finest=7, budget=6e10, shadows=np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class ContinuousBound:
+    """What was proved over all poses of the workspace.
+
+    Attributes:
+        found: Answer of the search over cells.
+        shadows: Whether occlusion took part.
+        directions: Unit directions from the centre of the workspace, or towards the
+            light, of cells in which one projector fewer may be enough, shape (k, 3).
+        n_samples: Samples of the target from which the rows are.
+        row_area_m2: Area that a sample stands for.
+    """
+
+    found: CellBound
+    shadows: bool
+    directions: NDArray[np.float64]
+    n_samples: int
+    row_area_m2: float
+
+    def entry(self) -> dict[str, Any]:
+        """Return the plan's `continuous` of a certificate."""
+        found = self.found
+        most = found.most_weight
+        if found.status is CellStatus.PROVED:
+            # Fewer fall short of what is required, by a sample at least.
+            most = min(most, float(found.problem.required_weight[0]) - 1.0)
+        return {
+            "lower_bound": int(found.lower_bound),
+            "status": found.status.name.lower(),
+            "proof": found.proof,
+            "occlusion": self.shadows,
+            "n_samples": self.n_samples,
+            "n_reached": len(found.problem.weights),
+            "n_cells": found.cells_used,
+            "one_fewer_upper_bound_m2": most * self.row_area_m2,
+        }
+
+
+def prove_fewest(
+    scene: Scene,
+    stage: ProjectorStage,
+    template: PlannedProjector,
+    effort: Effort,
+    *,
+    ring_offset: tuple[float, float],
+) -> ProjectorStage:
+    """Return the stage with the bound over all poses in its certificate.
+
+    Where the bound leaves room for fewer projectors, candidates are offered there, and
+    the cover is solved again.
+
+    Args:
+        scene: Surface and requirements.
+        stage: Projectors from the cover.
+        template: A projector; its pose doesn't count.
+        effort: What to spend on a bound.
+        ring_offset: Of candidates, as `projector_candidates` takes it.
+    """
+    workspace, n_lattice = scene.requirements.workspace, len(stage.reference)
+    while True:
+        bound = _bound_of(scene, stage, template, effort)
+        found = projectors_towards(
+            template, workspace, bound.directions, ring_offset=ring_offset
+        )
+        found += projectors_around(found, workspace, n_lattice, ring_offset=ring_offset)
+        better = with_more(scene, stage, found) if found else stage
+        if better is stage:
+            return replace(stage, certificate=_joined(stage.certificate, bound.entry()))
+        stage = better
+
+
+def _joined(certificate: dict[str, Any], bound: dict[str, Any]) -> dict[str, Any]:
+    """Return a certificate with a bound over all poses: it holds for some of them."""
+    needed, candidates = certificate["needed"], certificate["candidates"]
+    joined = certificate | {"continuous": bound}
+    least = bound["lower_bound"]
+    if least <= needed["lower_bound"]:
+        return joined
+    count = certificate["count"]
+    joined["needed"] = needed | {"lower_bound": least}
+    joined["candidates"] = candidates | {
+        "lower_bound": min(least, count),
+        "proof": f"over all poses: {bound['proof']}",
+    }
+    if certificate["status"] == "feasible" and least >= count:
+        joined["status"] = "optimal"
+    return joined
+
+
+def _bound_of(
+    scene: Scene, stage: ProjectorStage, template: PlannedProjector, effort: Effort
+) -> ContinuousBound:
+    reached = np.any(stage.stages == LIT, axis=1)
+    share = scene.requirements.dominant_coverage
+    return bound_projectors(
+        scene,
+        template,
+        stage.rows.take(reached),
+        required_rows(reached, share),
+        stage.certificate["needed"]["count"],
+        effort,
+        n_samples=len(stage.rows),
+    )
+
+
+def bound_projectors(
+    scene: Scene,
+    template: PlannedProjector,
+    rows: Target,
+    required: int,
+    count: int,
+    effort: Effort,
+    *,
+    n_samples: int,
+) -> ContinuousBound:
+    """Bound the projectors over every pose of the workspace.
+
+    Field of view, beam and rings are left out: the bound holds for any of them.
+
+    Args:
+        scene: Surface and requirements.
+        template: A projector; its optics and light count, not its pose.
+        rows: Samples that some candidate lights.
+        required: How many of them must be lit.
+        count: Projectors that are enough.
+        effort: What to spend.
+        n_samples: Samples of the target, reached or not, for the record.
+    """
+    reach = _mesh_reach(scene)
+    shadows = bool(len(rows) * len(scene.mesh.faces) <= effort.shadows)
+    cube = CubeMap(1 << effort.finest)
+    workspace, device = scene.requirements.workspace, template.device
+    near = workspace.projector_radius_m[0]
+    tree: DirectionTree | PositionTree
+    if isinstance(device, ParallelModel):
+        # How far off a device's own axis what it lights may be.
+        width = float(np.hypot(*device.half_panel))
+        aside = reach + min(width, device.beam_radius or np.inf)
+        depth = np.sqrt(max(0.0, near**2 - aside**2))
+        shadows = shadows and bool(depth >= reach)
+        opened = _open_rows(scene, rows, cube, shadows=shadows)
+        opened[~_within(cube, workspace, aside)] = 0
+        tree = DirectionTree.over(opened, len(rows))
+    else:
+        shadows = shadows and bool(near >= reach)
+        opened = _open_rows(scene, rows, cube, shadows=shadows)
+        tree = PositionTree(
+            workspace,
+            device.range_m,
+            rows.samples.points,
+            WidenedMaps(opened, cube),
+            finest=effort.finest,
+        )
+    problem = CellProblem(np.ones(len(rows)), np.array([float(required)]))
+    found = bound_count(problem, tree, count, budget=effort.budget)
+    left = np.empty((0, 3))
+    if found.status is CellStatus.SURVIVED and found.survivor is not None:
+        left = tree.directions(np.unique(found.survivor))
+    return ContinuousBound(found, shadows, left, n_samples, rows.samples.weight)
+
+
+def _mesh_reach(scene: Scene) -> float:
+    """Return the distance of the farthest vertex from the middle of the workspace."""
+    mesh, centre = scene.mesh, np.array(scene.requirements.workspace.centre)
+    return float(np.linalg.norm(mesh.corners.reshape(-1, 3) - centre, axis=1).max())
+
+
+def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.bool_]:
+    """Return the cells from which parallel light may come at all, shape (size,).
+
+    A device at Q is off the direction u of its light, as the centre C sees it, by
+    asin(aside / |Q - C|) at most.
+    """
+    near, far = workspace.projector_radius_m
+    slack = cube.radii + float(np.arcsin(min(1.0, aside / near))) + 1e-9
+    along = np.arccos(np.clip(cube.centres @ np.array(workspace.axis), -1.0, 1.0))
+    kept = along <= workspace.half_angle + slack
+    if workspace.floor_m is not None:
+        lowest = workspace.floor_m / (far if workspace.floor_m > 0 else near)
+        above = np.arccos(np.clip(cube.centres @ np.array(workspace.up), -1.0, 1.0))
+        kept &= above <= np.arccos(np.clip(lowest, -1.0, 1.0)) + slack
+    return kept
+
+
+def _open_rows(
+    scene: Scene, rows: Target, cube: CubeMap, *, shadows: bool
+) -> NDArray[np.uint64]:
+    """Return for each cell the samples to which it is open, as bit rows."""
+    limits = scene.requirements.projector
+    maps = OpenDirections(
+        scene.visibility,
+        DirectionLimits(limits.max_incidence, limits.min_tangent_angle),
+        cube,
+        occlusion=shadows,
+    )
+    found = np.zeros((cube.size, words_for(len(rows))), dtype=np.uint64)
+    bytes_of = found.view(np.uint8).reshape(cube.size, -1, 8)
+    points, normals = rows.samples.points, rows.samples.normals
+
+    def fill(part: slice) -> None:
+        scene.pulse()
+        marks = maps.maps(points[part], normals[part], rows.steep[part])
+        packed = np.packbits(marks, axis=0)
+        bytes_of[:, part.start // POINTS, : len(packed)] = packed.T
+
+    parts = [slice(b, b + POINTS) for b in range(0, len(rows), POINTS)]
+    scene.visibility.caster.share(fill, parts)
+    return found

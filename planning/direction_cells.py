@@ -1,0 +1,89 @@
+"""Cells of directions for parallel light: a tree that `solvers.bound_count` asks.
+
+A projector of parallel light lights what its one direction allows, wherever else its
+beam stands. So the space of its poses is the sphere of directions u = -L, cut into the
+cells of a cube map; a cell's row holds each sample to which it is open
+(`geometry.open_directions`). Beam, panel and range are left out: that only adds
+samples, and what is proved holds for beams of any width.
+
+The workspace leaves out directions. A device at Q that lights a sample at P by a beam
+of half width h stands at Q - C = t u + (P - C) + o, |o| <= h, about the centre C. With
+e = |P - C| + h, at a distance of at least r::
+
+    angle(Q - C, u) <= asin(e / r)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.cube_map import CubeMap
+from solvers.cells import CellBatch
+
+_FACES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionTree:
+    """A quadtree of directions on each face of a cube.
+
+    Attributes:
+        levels: Bit rows of the cells of cube maps of 1, 2, 4, ... cells an edge.
+        n_rows: Number of samples.
+    """
+
+    levels: tuple[NDArray[np.uint64], ...]
+    n_rows: int
+
+    @classmethod
+    def over(cls, leaves: NDArray[np.uint64], n_rows: int) -> "DirectionTree":
+        """Return the tree over the cells of the finest map."""
+        levels = [leaves]
+        while len(levels[-1]) > _FACES:
+            n = round((len(levels[-1]) // _FACES) ** 0.5) // 2
+            split = levels[-1].reshape(_FACES, n, 2, n, 2, -1)
+            joined = np.bitwise_or.reduce(split, axis=(2, 4))
+            levels.append(joined.reshape(_FACES * n * n, -1))
+        return cls(tuple(levels[::-1]), n_rows)
+
+    def roots(self) -> CellBatch:
+        """Return the six faces."""
+        cells = np.arange(_FACES)
+        return CellBatch(cells, np.full(_FACES, -1), self.levels[0])
+
+    def children(self, cells: NDArray[np.int64], /) -> CellBatch:
+        """Return the four parts of each cell."""
+        level, cell = self.place(cells)
+        split = level < len(self.levels) - 1
+        parents = np.repeat(np.flatnonzero(split), 4)
+        level, cell = level[parents], cell[parents]
+        n = 1 << level
+        face, rest = np.divmod(cell, n * n)
+        j, i = np.divmod(rest, n)
+        b, a = np.divmod(np.arange(parents.size) % 4, 2)
+        own = (face * 2 * n + 2 * j + b) * 2 * n + 2 * i + a
+        rows = np.empty((parents.size, self.levels[0].shape[1]), dtype=np.uint64)
+        for finer in np.unique(level):
+            some = level == finer
+            rows[some] = self.levels[finer + 1][own[some]]
+        return CellBatch(_first(level + 1) + own, parents, rows)
+
+    def directions(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the middle of each cell, shape (n, 3)."""
+        level, cell = self.place(cells)
+        pairs = zip(level, cell, strict=True)
+        return np.array([CubeMap(1 << int(k)).centres[c] for k, c in pairs])
+
+    def place(
+        self, cells: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the level of cells named, and their number on the map of 2^level."""
+        starts = _first(np.arange(len(self.levels)))
+        level = np.searchsorted(starts, cells, side="right") - 1
+        return level, cells - starts[level]
+
+
+def _first(level: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the name of the first cell of a level: 6 (1 + 4 + ...) cells precede."""
+    return 2 * (4**level - 1)
