@@ -22,6 +22,7 @@ from scipy import ndimage
 
 from .cube_map import CubeMap
 from .cube_segments import mark_segments
+from .rays import CHUNK, equal_parts
 from .silhouettes import Silhouettes
 from .visibility import Visibility
 
@@ -150,8 +151,13 @@ class OpenDirections:
         # The planner's rays end where they are `slack` above the sample's face.
         up = rise > 0.0
         start = points + directions * (slack / np.where(up, rise, 1.0))[:, None]
-        reach = np.full(len(points), 4.0 * caster.reach / caster.scale)
-        return up & caster.occluded(start, directions, reach)
+        local, along = caster.local(start), directions.astype(np.float32)
+        reach = np.full(len(points), 4.0 * caster.reach, dtype=np.float32)
+        met = np.zeros(len(points), dtype=bool)
+        # In the caller's own thread: maps are made in several.
+        for part in equal_parts(len(points), CHUNK):
+            met[part] = caster.blocked_local(local[part], along[part], reach[part])
+        return up & met
 
 
 def _arcs_come_within(

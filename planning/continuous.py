@@ -40,14 +40,16 @@ class Effort:
         finest: Cells are parts of a cube map of 2^finest cells an edge.
         budget: Counted work of the search.
         shadows: Pairs of sample and face above which shadows are left out.
+        most_samples: Samples of the target at most; None: all that the cover has.
     """
 
     finest: int
     budget: float
     shadows: float
+    most_samples: int | None = None
 
 
-DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8)
+DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8, most_samples=2000)
 PROVE = Effort(finest=7, budget=6e10, shadows=np.inf)
 
 
@@ -127,7 +129,8 @@ def _joined(certificate: dict[str, Any], bound: dict[str, Any]) -> dict[str, Any
     needed, candidates = certificate["needed"], certificate["candidates"]
     joined = certificate | {"continuous": bound}
     least = bound["lower_bound"]
-    if least <= needed["lower_bound"]:
+    other_samples = bound["n_samples"] != certificate["n_samples"]
+    if other_samples or least <= needed["lower_bound"]:
         return joined
     count = certificate["count"]
     joined["needed"] = needed | {"lower_bound": least}
@@ -143,16 +146,18 @@ def _joined(certificate: dict[str, Any], bound: dict[str, Any]) -> dict[str, Any
 def _bound_of(
     scene: Scene, stage: ProjectorStage, template: PlannedProjector, effort: Effort
 ) -> ContinuousBound:
-    reached = np.any(stage.stages == LIT, axis=1)
-    share = scene.requirements.dominant_coverage
+    # The first samples are a draw of their own; the others came where it overfitted.
+    n = min(len(stage.rows), effort.most_samples or len(stage.rows))
+    reached = np.any(stage.stages[:n] == LIT, axis=1)
     return bound_projectors(
         scene,
         template,
-        stage.rows.take(reached),
-        required_rows(reached, share),
+        stage.rows.take(np.flatnonzero(reached)),
+        required_rows(reached, scene.requirements.dominant_coverage),
         stage.certificate["needed"]["count"],
         effort,
-        n_samples=len(stage.rows),
+        n_samples=n,
+        row_area_m2=stage.rows.samples.weight * len(stage.rows) / n,
     )
 
 
@@ -165,6 +170,7 @@ def bound_projectors(
     effort: Effort,
     *,
     n_samples: int,
+    row_area_m2: float,
 ) -> ContinuousBound:
     """Bound the projectors over every pose of the workspace.
 
@@ -178,6 +184,7 @@ def bound_projectors(
         count: Projectors that are enough.
         effort: What to spend.
         n_samples: Samples of the target, reached or not, for the record.
+        row_area_m2: Area that each stands for.
     """
     reach = _mesh_reach(scene)
     shadows = bool(len(rows) * len(scene.mesh.faces) <= effort.shadows)
@@ -209,7 +216,7 @@ def bound_projectors(
     left = np.empty((0, 3))
     if found.status is CellStatus.SURVIVED and found.survivor is not None:
         left = tree.directions(np.unique(found.survivor))
-    return ContinuousBound(found, shadows, left, n_samples, rows.samples.weight)
+    return ContinuousBound(found, shadows, left, n_samples, row_area_m2)
 
 
 def _mesh_reach(scene: Scene) -> float:

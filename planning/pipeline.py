@@ -2,18 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from geometry.bearing import bearing
-from geometry.curvature import CurvatureField, principal_curvatures
 from geometry.mesh import TriangleMesh
 from geometry.refinement import cut_for_curvature
-from geometry.regions import DominantRegions, dominant_regions
-from geometry.selected_regions import regions_of_faces
 
 from .assemble import falls_short, write_plan
 from .camera_stage import place_cameras, spread
@@ -29,12 +24,11 @@ from .errors import (
 )
 from .interest import Select, Weight, interest_of
 from .plan import PlannedCamera, PlannedProjector, RigPlan
+from .prepare import first_projectors, prepared
 from .progress import Report, Stopwatch
 from .projector_poses import widen_margins
-from .projectors import ProjectorStage, plan_projectors
-from .requirements import Requirements
+from .projectors import ProjectorStage
 from .rig import Rig
-from .rings import outer_radius, ring_gap, uniform_radii
 from .scene import Scene
 from .selection import larger
 from .shortfall import shortfalls
@@ -157,70 +151,27 @@ def _plan(order: Order, clock: Stopwatch, *, check: bool) -> RigPlan:
 
 def _first_draft(order: Order, clock: Stopwatch) -> Draft:
     """Sections III and VI: regions, projectors, cameras; each the fewest."""
-    mesh, rig = order.mesh, order.rig
-    with clock.stage("regions", "curvature and dominant regions"):
-        field = principal_curvatures(mesh)
-        regions = _regions(order, field)
-        clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
-    requirements, radii, tilt = _resolve(order)
-    scene = Scene(
-        mesh,
-        regions.face_region,
-        _steep(regions, order.asked["target"]),
-        requirements,
-        order.seed,
-        order.threads,
-        clock.check,
-    )
-    with clock.stage("projectors", "projectors: candidates and cover"):
-        template = PlannedProjector(
-            "", rig.light, np.eye(4), np.eye(4), rig.projector_device(), radii
-        )
-        stage = plan_projectors(
-            scene,
-            template,
-            max(rig.n_candidate_projectors, rig.n_reference_projectors),
-            ring_offset=(tilt, _FIRST_AZIMUTH),
-        )
-        clock.say(
-            f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
-            f"{stage.certificate['candidates']['lower_bound']} are needed"
-        )
+    ready = prepared(order, clock)
+    stage = first_projectors(ready, clock)
     with clock.stage("bounds", "bounds over all poses of the workspace"):
+        effort = PROVE if order.prove else DEFAULT
         stage = prove_fewest(
-            scene,
-            stage,
-            template,
-            PROVE if order.prove else DEFAULT,
-            ring_offset=(tilt, _FIRST_AZIMUTH),
+            ready.scene, stage, ready.template, effort, ring_offset=ready.ring_offset
         )
         proof = stage.certificate["continuous"]
         clock.say(f"  projectors: at least {proof['lower_bound']}, {proof['proof']}")
-    projectors, cameras = _placed(order, scene, stage, tilt, clock)
+    projectors, cameras = _placed(order, ready.scene, stage, ready.tilt, clock)
     return Draft(
         order,
-        scene,
-        regions,
-        field.radius,
-        tilt,
+        ready.scene,
+        ready.regions,
+        ready.curvature_radius_m,
+        ready.tilt,
         stage,
         projectors,
         cameras,
         cameras.cameras,
     )
-
-
-def _regions(order: Order, field: CurvatureField) -> DominantRegions:
-    """The user's selection, or else the most curved surface."""
-    if order.interest is not None:
-        return regions_of_faces(order.mesh, field, order.interest.chosen)
-    regions = dominant_regions(order.mesh, field)
-    if order.asked["target"] == "dominant" and not len(regions):
-        raise InputError(
-            "no dominant region: the surface is flat where its curvature can be "
-            "trusted; use --target surface, or choose faces with --select"
-        )
-    return regions
 
 
 def _placed(
@@ -300,40 +251,6 @@ def _interrupted(
     return plan
 
 
-def _resolve(order: Order) -> tuple[Requirements, Any, float]:
-    """Return the requirements, the ring radii, and the tilt or shift of ring axes."""
-    mesh, rig = order.mesh, order.rig
-    requirements = rig.requirements(
-        mesh.centre, mesh.radius, **order.asked, tau_m=rig.standoff_m
-    )
-    projector, camera = rig.projector_device(), rig.camera_device()
-    parallel = rig.light == "parallel"
-    tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
-    workspace = requirements.workspace
-    gap = rig.ring_gap_m or ring_gap(
-        projector, camera, requirements.triangulation, rig.standoff_m
-    )
-    outer = outer_radius(
-        projector,
-        tilt,
-        mesh.radius,
-        workspace.projector_radius_m[0],
-        rig.outer_ring_radius(),
-    )
-    radii = uniform_radii(outer, gap if parallel else gap / rig.standoff_m)
-    workspace = replace(
-        workspace,
-        reference_ring_radius=float(radii[-1]),
-        bearing=_direction(bearing(mesh, np.array(workspace.axis))),
-    )
-    return replace(requirements, workspace=workspace), radii, tilt
-
-
-def _direction(vector: NDArray[np.float64]) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z
-
-
 def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:
     """Audit the written plan and reconstruct it from pixels, with foreign code."""
     with clock.stage("check", "check: audit, then reconstruction from pixels"):
@@ -365,10 +282,3 @@ def _single(mesh: TriangleMesh | Sequence[TriangleMesh]) -> TriangleMesh:
             f"{len(mesh)} meshes: one rig for several isn't built yet, give one"
         )
     return mesh[0]
-
-
-def _steep(regions: DominantRegions, target: str) -> NDArray[np.float64]:
-    """T1 of each face of the target; zero elsewhere, where it binds nothing."""
-    if target == "surface":
-        return regions.steep
-    return np.where((regions.face_region >= 0)[:, None], regions.steep, 0.0)

@@ -51,6 +51,7 @@ def plan_projectors(
     n_candidates: int,
     *,
     ring_offset: tuple[float, float],
+    rounds: int = _ROUNDS,
 ) -> ProjectorStage:
     """Choose the fewest projectors that light the required share of the target.
 
@@ -64,6 +65,7 @@ def plan_projectors(
         template: Optics and rings of the projector.
         n_candidates: Poses offered.
         ring_offset: Tilt and azimuth of the ring axis until the cameras are known.
+        rounds: Covers at most, each with more rows.
 
     Raises:
         InfeasibleLimitsError: If no candidate lights any sample.
@@ -95,7 +97,7 @@ def plan_projectors(
         lit = fresh_stages == lighting.LIT
         covered = lit[:, selection.chosen].any(axis=1).sum()
         confirmed = covered >= required.dominant_coverage * lit.any(axis=1).sum()
-        if confirmed or selection.status == "infeasible" or attempt == _ROUNDS:
+        if confirmed or selection.status == "infeasible" or attempt == rounds:
             break
         rows = merged(rows, fresh)
         stages = np.concatenate([stages, fresh_stages])

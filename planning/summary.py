@@ -206,9 +206,9 @@ def _continuous(plan: RigPlan, proof: dict[str, Any]) -> str:
     bound = proof["continuous"]
     parallel = plan.projectors[0].light == "parallel"
     poses = "direction" if parallel else "position and aim"
-    scope = f"over every {poses} in the workspace, for these samples"
     if bound is None:
-        return f"         nothing is proved {scope}"
+        return f"         nothing is proved over every {poses} in the workspace"
+    scope = f"over every {poses} in the workspace, for {bound['n_samples']} samples"
     blind = "" if bound["occlusion"] else ", shadows left out"
     least = bound["lower_bound"]
     if least >= proof["needed"]["count"]:

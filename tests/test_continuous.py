@@ -20,6 +20,7 @@ from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cell_bound import CellStatus
 
 QUICK = Effort(finest=6, budget=1e9, shadows=np.inf)
+SAID = {"n_samples": 300, "row_area_m2": 1e-6}
 RADII = np.array([0.1, 0.45])
 
 
@@ -134,7 +135,7 @@ def test_no_pose_lights_what_its_cells_lack(name, light, tangent_deg):
         SHAPES[name], light, tangent_deg=tangent_deg, steep=(0.3, 0.2, 1.0)
     )
     rows = scene.target_samples(300, 5)
-    found = bound_projectors(scene, template, rows, 250, 9, QUICK, n_samples=300)
+    found = bound_projectors(scene, template, rows, 250, 9, QUICK, **SAID)
     assert found.shadows
     tree = found.found.tree
     workspace = scene.requirements.workspace
@@ -165,7 +166,7 @@ def test_a_cell_with_a_sample_too_few_is_caught():
     """The attack above sees a superset that isn't one."""
     scene, template = stage_for(SHAPES["ring"], "parallel")
     rows = scene.target_samples(300, 5)
-    found = bound_projectors(scene, template, rows, 250, 9, QUICK, n_samples=300)
+    found = bound_projectors(scene, template, rows, 250, 9, QUICK, **SAID)
     tree = found.found.tree
     towards = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
     lit = lit_by_hand(
@@ -186,7 +187,7 @@ def test_cells_hold_the_cone_and_what_is_over_the_floor(light):
     options = {"axis": tuple(axis), "half_angle": 0.9, "floor_m": 0.3}
     scene, template = stage_for(mesh, light, **options)
     rows = scene.target_samples(200, 5)
-    found = bound_projectors(scene, template, rows, 100, 3, QUICK, n_samples=200)
+    found = bound_projectors(scene, template, rows, 100, 3, QUICK, **SAID)
     tree, workspace = found.found.tree, scene.requirements.workspace
     near, far = workspace.projector_radius_m
     rng = np.random.default_rng(2)
@@ -296,7 +297,7 @@ def test_cells_that_are_left_are_where_the_better_cover_is():
     """Two poses light a cube; a cover of three is improved where the cells point."""
     scene, template = stage_for(box((0.1, 0.1, 0.1), divisions=4), "parallel")
     rows = scene.target_samples(600, 3)
-    found = bound_projectors(scene, template, rows, 600, 3, DEFAULT, n_samples=600)
+    found = bound_projectors(scene, template, rows, 600, 3, DEFAULT, **SAID)
     assert found.found.lower_bound == 2
     corners = np.abs(found.directions)
     np.testing.assert_allclose(corners, 3**-0.5, atol=0.15)

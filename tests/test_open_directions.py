@@ -98,6 +98,31 @@ def test_a_ball_hides_nothing_of_itself():
         assert not maps[row, best < np.cos(limit + np.deg2rad(0.3))].any()
 
 
+def test_maps_are_made_in_several_threads_at_once():
+    """Rays of a map don't wait for the threads that make maps."""
+    mesh = torus(0.1, 0.06, around=80, about_tube=60)
+    cube = CubeMap(48)
+    rough = TriangleMesh(
+        mesh.vertices * np.random.default_rng(0).uniform(0.9, 1.1, mesh.vertices.shape),
+        mesh.faces,
+    )
+    visibility = Visibility(rough, threads=2)
+    samples = sample_surface(rough, 6 * POINTS, seed=1)
+    makes = OpenDirections(visibility, FREE, cube)
+    found: dict[int, np.ndarray] = {}
+
+    def make(part: slice) -> None:
+        points, normals = samples.points[part], samples.normals[part]
+        found[part.start] = makes.maps(points, normals, np.zeros((POINTS, 3)))
+
+    parts = [slice(b, b + POINTS) for b in range(0, 6 * POINTS, POINTS)]
+    visibility.caster.share(make, parts)
+    assert len(found) == 6
+    first = found[0].copy()
+    make(parts[0])
+    assert (found[0] == first).all()
+
+
 def test_under_a_roof_only_the_gap_is_open():
     """A plate 30 mm over another: a sample sees past its edge, and not through it."""
     roof = shifted(grid(0.2, 0.2, divisions=(1, 1)), (0, 0, 0.03))

@@ -140,12 +140,13 @@ def _audit_needed(key: str, claims: dict[str, Any], count: int, ledger: Ledger) 
 
 
 def _audit_continuous(key: str, claims: dict[str, Any], ledger: Ledger) -> None:
-    """What holds for all poses holds for the candidates among them."""
+    """What holds for all poses holds for the candidates too, on equal samples."""
     table, needed = claims.get("continuous"), claims.get("needed")
     if not (isinstance(table, dict) and isinstance(needed, dict)):
         return
+    same = table.get("n_samples", claims.get("n_samples")) == claims.get("n_samples")
     everywhere = as_number(table.get("lower_bound"))
-    here = as_number(needed.get("lower_bound"))
+    here = as_number(needed.get("lower_bound" if same else "count"))
     if everywhere is not None and here is not None:
         ledger.holds(
             everywhere <= here,
