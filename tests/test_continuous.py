@@ -54,7 +54,8 @@ def bounded(mesh, light, share, count, effort=QUICK, n=800, **options):
     scene, template = stage_for(mesh, light, **options)
     rows = scene.target_samples(n, 3)
     required = int(np.ceil(share * n - 1e-9))
-    return bound_projectors(scene, template, rows, required, count, effort, n_samples=n)
+    said = {"n_samples": n, "row_area_m2": rows.samples.weight}
+    return bound_projectors(scene, template, rows, required, count, effort, **said)
 
 
 SHAPES = {
