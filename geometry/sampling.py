@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from .mesh import TriangleMesh
 
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSamples:
@@ -43,10 +45,11 @@ def sample_surface(
 ) -> SurfaceSamples:
     """Return n samples by stratified sampling along the cumulated area.
 
-    One random place in each of n equal parts of the area, faces in their order; inside
-    a face, barycentric coordinates are uniform. That spreads the samples more evenly
-    than independent draws, and each face's expected number of samples is proportional
-    to its area. (Equal steps would fall on few columns of a mesh that comes in rows.)
+    One place in each of n equal parts of the area, faces in their order; it moves on
+    from part to part by the golden ratio, from a random start. Inside a face,
+    barycentric coordinates are uniform. That spreads the samples more evenly than
+    independent draws, and each face's expected number of samples is proportional to
+    its area. (Equal steps would fall on few columns of a mesh that comes in rows.)
 
     Args:
         mesh: The surface.
@@ -67,7 +70,8 @@ def sample_surface(
     if not total > 0.0:
         raise ValueError("the faces to sample have no area")
     rng = np.random.default_rng(seed)
-    ticks = (np.arange(n) + rng.random(n)) * (total / n)
+    steps = np.arange(n)
+    ticks = (steps + (rng.random() + steps * _GOLDEN) % 1.0) * (total / n)
     faces = np.searchsorted(cumulated, ticks, side="right")
     faces = np.minimum(faces, int(np.flatnonzero(areas)[-1]))
     u, v = rng.random(n), rng.random(n)

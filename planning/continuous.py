@@ -17,11 +17,11 @@ from geometry.devices import ParallelModel
 from geometry.open_directions import DirectionLimits, OpenDirections
 from geometry.silhouettes import POINTS
 from geometry.widened_maps import WidenedMaps
-from solvers.bit_rows import words_for
+from solvers.bit_rows import BitSum, words_for
 from solvers.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cell_problem import CellProblem
 
-from .candidates import projectors_around, projectors_towards
+from .candidates import projectors_towards
 from .direction_cells import DirectionTree
 from .lighting import LIT, Target
 from .plan import PlannedProjector
@@ -48,6 +48,9 @@ class Effort:
     shadows: float
     most_samples: int | None = None
 
+
+# Poses offered where the bound leaves room for fewer.
+_OFFERED = 150
 
 DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8, most_samples=2000)
 PROVE = Effort(finest=7, budget=6e10, shadows=np.inf)
@@ -111,13 +114,12 @@ def prove_fewest(
         effort: What to spend on a bound.
         ring_offset: Of candidates, as `projector_candidates` takes it.
     """
-    workspace, n_lattice = scene.requirements.workspace, len(stage.reference)
+    workspace = scene.requirements.workspace
     while True:
         bound = _bound_of(scene, stage, template, effort)
         found = projectors_towards(
             template, workspace, bound.directions, ring_offset=ring_offset
         )
-        found += projectors_around(found, workspace, n_lattice, ring_offset=ring_offset)
         better = with_more(scene, stage, found) if found else stage
         if better is stage:
             return replace(stage, certificate=_joined(stage.certificate, bound.entry()))
@@ -213,10 +215,24 @@ def bound_projectors(
         )
     problem = CellProblem(np.ones(len(rows)), np.array([float(required)]))
     found = bound_count(problem, tree, count, budget=effort.budget)
-    left = np.empty((0, 3))
-    if found.status is CellStatus.SURVIVED and found.survivor is not None:
-        left = tree.directions(np.unique(found.survivor))
+    open_question = found.status in (CellStatus.SURVIVED, CellStatus.CUT)
+    left = _promising(found, tree) if open_question else np.empty((0, 3))
     return ContinuousBound(found, shadows, left, n_samples, row_area_m2)
+
+
+def _promising(
+    found: CellBound, tree: DirectionTree | PositionTree
+) -> NDArray[np.float64]:
+    """Return directions in which a projector would save most, by the multipliers.
+
+    Cells that weren't refuted come first.
+    """
+    names, rows = tree.spread_cells()
+    prices = BitSum(found.multipliers)(rows)
+    dear = names[np.argsort(-prices, kind="stable")[:_OFFERED]]
+    if found.survivor is not None:
+        dear = np.concatenate([np.unique(found.survivor), dear])
+    return tree.directions(dear)
 
 
 def _mesh_reach(scene: Scene) -> float:

@@ -22,6 +22,8 @@ from geometry.cube_map import CubeMap
 from solvers.cells import CellBatch
 
 _FACES = 6
+# Cells of 2.8 degrees, 6,144 of them.
+_SPREAD = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,12 @@ class DirectionTree:
             some = level == finer
             rows[some] = self.levels[finer + 1][own[some]]
         return CellBatch(_first(level + 1) + own, parents, rows)
+
+    def spread_cells(self) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
+        """Return cells of one size that hold every direction, and their rows."""
+        level = min(_SPREAD, len(self.levels) - 1)
+        rows = self.levels[level]
+        return _first(np.array(level)) + np.arange(len(rows)), rows
 
     def directions(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the middle of each cell, shape (n, 3)."""

@@ -109,6 +109,12 @@ class PositionTree:
         names = np.concatenate([np.empty(0, dtype=np.int64), *parts])
         return CellBatch(names, parents, self._rows.values[names])
 
+    def spread_cells(self) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
+        """Return the cells made so far that aren't split, and their rows."""
+        split = [name for name, parts in self._made.items() if parts.size]
+        names = np.setdiff1d(np.arange(self._level.size), split)
+        return names, self._rows.values[names]
+
     def directions(self, names: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the direction of the middle of cells from the centre, shape (n, 3)."""
         cells = self.cells(names)
