@@ -189,6 +189,9 @@ def bound_projectors(
         row_area_m2: Area that each stands for.
     """
     reach = _mesh_reach(scene)
+    if count <= 1:
+        # What is required takes one, with shadows or without: no cell is looked at.
+        effort = replace(effort, finest=0, shadows=0.0)
     shadows = bool(len(rows) * len(scene.mesh.faces) <= effort.shadows)
     cube = CubeMap(1 << effort.finest)
     workspace, device = scene.requirements.workspace, template.device
@@ -217,7 +220,8 @@ def bound_projectors(
     found = bound_count(problem, tree, count, budget=effort.budget)
     open_question = found.status in (CellStatus.SURVIVED, CellStatus.CUT)
     left = _promising(found, tree) if open_question else np.empty((0, 3))
-    return ContinuousBound(found, shadows, left, n_samples, row_area_m2)
+    told = shadows or count <= 1
+    return ContinuousBound(found, told, left, n_samples, row_area_m2)
 
 
 def _promising(

@@ -329,7 +329,7 @@ def test_the_plan_says_who_chose_the_target(plan: RigPlan) -> None:
     assert plan.requirements.target == "dominant"
     text = summary(plan, [], ())
     assert "target (your selection)" in text
-    assert f"1 region of your selection by ply:painted: {n_faces} faces;" in text
+    assert f"1 region of your selection by ply:painted: {n_faces} faces" in text
     assert "dominant" not in text
 
 
@@ -393,7 +393,7 @@ def test_a_weight_on_the_command_line_ends_in_a_verified_plan(
     selection = document["surface"]["selection"]
     n_faces = selection["n_faces"]
     assert n_faces > 32
-    assert f"1 region of your highest weight by weight.txt: {n_faces} faces;" in out
+    assert f"1 region of your highest weight by weight.txt: {n_faces} faces" in out
     assert (selection["kind"], selection["source"]) == ("vertex_weight", "weight.txt")
     digest = hashlib.sha256((folder / "weight.txt").read_bytes()).hexdigest()
     assert selection["sha256"] == digest
