@@ -41,19 +41,19 @@ class Effort:
         budget: Counted work of the search.
         shadows: Pairs of sample and face above which shadows are left out.
         most_samples: Samples of the target at most; None: all that the cover has.
+        offers: Poses offered, beside cells that can't be refuted, where the bound
+            leaves room for fewer projectors.
     """
 
     finest: int
     budget: float
     shadows: float
     most_samples: int | None = None
+    offers: int = 0
 
-
-# Poses offered where the bound leaves room for fewer.
-_OFFERED = 150
 
 DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8, most_samples=2000)
-PROVE = Effort(finest=7, budget=6e10, shadows=np.inf)
+PROVE = Effort(finest=7, budget=6e10, shadows=np.inf, offers=150)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,24 +219,26 @@ def bound_projectors(
     problem = CellProblem(np.ones(len(rows)), np.array([float(required)]))
     found = bound_count(problem, tree, count, budget=effort.budget)
     open_question = found.status in (CellStatus.SURVIVED, CellStatus.CUT)
-    left = _promising(found, tree) if open_question else np.empty((0, 3))
+    left = np.empty((0, 3))
+    if open_question:
+        left = _promising(found, tree, effort.offers)
     told = shadows or count <= 1
     return ContinuousBound(found, told, left, n_samples, row_area_m2)
 
 
 def _promising(
-    found: CellBound, tree: DirectionTree | PositionTree
+    found: CellBound, tree: DirectionTree | PositionTree, n: int
 ) -> NDArray[np.float64]:
-    """Return directions in which a projector would save most, by the multipliers.
+    """Return the directions of cells that weren't refuted, and of n more.
 
-    Cells that weren't refuted come first.
+    In these a projector would save most, by the multipliers.
     """
     names, rows = tree.spread_cells()
     prices = BitSum(found.multipliers)(rows)
-    dear = names[np.argsort(-prices, kind="stable")[:_OFFERED]]
+    dear = names[np.argsort(-prices, kind="stable")[:n]]
     if found.survivor is not None:
         dear = np.concatenate([np.unique(found.survivor), dear])
-    return tree.directions(dear)
+    return tree.directions(dear) if dear.size else np.empty((0, 3))
 
 
 def _mesh_reach(scene: Scene) -> float:
