@@ -28,6 +28,9 @@ from .visibility import Visibility
 
 # Cosines are exact to this.
 _ROUNDING = 1e-9
+# A sample to which another face comes nearer than this, in slacks of its rays, or whose
+# own face is as narrow, is taken to be free: what is near it counts for some rays only.
+_SLACKS = 16.0
 _IN_PLANE = np.zeros((3, 3, 3), dtype=bool)
 _IN_PLANE[1] = [[False, True, False], [True, True, True], [False, True, False]]
 
@@ -67,6 +70,11 @@ class OpenDirections:
         # Cells that reach beyond the limit belong to it as a whole.
         reach = limits.max_incidence + 2.0 * float(cube.radii.max())
         self._cone = min(reach, 0.5 * np.pi)
+        mesh = visibility.caster.mesh
+        sides = mesh.corners - mesh.corners[:, [1, 2, 0]]
+        longest = np.linalg.norm(sides, axis=2).max(axis=1)
+        width = 2.0 * mesh.face_areas / np.where(longest > 0, longest, 1.0)
+        self._narrow = width <= _SLACKS * visibility.slack
         self._edges = Silhouettes(visibility.caster.mesh) if occlusion else None
 
     def maps(
@@ -74,6 +82,7 @@ class OpenDirections:
         points: NDArray[np.float64],
         normals: NDArray[np.float64],
         steep: NDArray[np.float64],
+        faces: NDArray[np.int64],
     ) -> NDArray[np.bool_]:
         """Return which cells are open to each sample, shape (n, cube.size).
 
@@ -81,11 +90,17 @@ class OpenDirections:
             points: On the mesh in [m], at most `POINTS`, shape (n, 3).
             normals: Unit normals of their faces, same shape.
             steep: Unit T1, or zero where it doesn't bind, same shape.
+            faces: Face of each, shape (n,).
         """
         cells = self._within_incidence(normals)
         cells &= ~self._along_steep(steep)
         if self._edges is not None:
-            cells &= ~self._blocked(self._edges, points, normals, cells)
+            blocked = self._blocked(self._edges, points, normals, cells)
+            # Rays leave out what is within the slack of a sample, as the planner's do.
+            reach = _SLACKS * self._visibility.slack
+            doubtful = self._edges.touched(points, faces, reach, self._cone)
+            doubtful |= self._narrow[faces]
+            cells &= ~blocked | doubtful[:, None]
         return cells
 
     def _within_incidence(self, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -127,6 +142,10 @@ class OpenDirections:
         touched = np.zeros(cells.shape, dtype=bool)
         owners, begin, end = edges.seen_from(points, normals, self._cone)
         mark_segments(cube, begin, end, owners, touched)
+        if self._cone >= 0.5 * np.pi:
+            # Silhouettes below the horizon weren't asked for: nothing hangs together
+            # across it.
+            touched |= normals @ cube.centres.T <= np.sin(cube.radii)
         plain = (cells & ~touched).reshape(-1, cube.n, cube.n)
         labels = np.empty(plain.shape, dtype=np.int32)
         n_parts = int(ndimage.label(plain, structure=_IN_PLANE, output=labels))  # type: ignore[arg-type]

@@ -49,6 +49,14 @@ class Silhouettes:
             "ij,ij->i", mesh.face_normals, mesh.corners[:, 0] - self._middle
         )
         self._planes = np.column_stack([mesh.face_normals, anchors])
+        self._faces = mesh.faces
+        # Both orders of two faces that agree on their outside.
+        f, g = pairs[self._turned == _NONE].T
+        n = len(mesh.faces)
+        self._smooth = np.sort(np.concatenate([f * n + g, g * n + f, [-1]]))
+        self._centroids = mesh.face_centroids - self._middle
+        spokes = mesh.corners - mesh.face_centroids[:, None]
+        self._radii = np.linalg.norm(spokes, axis=2).max(axis=1)
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         self._unsure = _UNSURE * size
 
@@ -87,6 +95,67 @@ class Silhouettes:
         begin, end = (self._vertices[ends[:, k]] - local[owners] for k in (0, 1))
         near = _may_cross(begin, end, normals[owners], half_angle)
         return owners[near], begin[near], end[near]
+
+    def touched(
+        self,
+        points: NDArray[np.float64],
+        faces: NDArray[np.int64],
+        reach: float,
+        half_angle: float,
+    ) -> NDArray[np.bool_]:
+        """Return to which points something comes near that may rise into a cone, (n,).
+
+        Every face but their own may, except one that goes on from it across an edge and
+        rises by less than the cone leaves.
+
+        Args:
+            points: On the mesh in [m], at most `POINTS`, shape (n, 3).
+            faces: The face that each lies on, shape (n,).
+            reach: How near, in [m].
+            half_angle: Half opening of the cone about the face's normal [rad].
+        """
+        local = points - self._middle
+        heights = self._planes @ np.column_stack([local, -np.ones(len(local))]).T
+        over, under = _packed(heights, [reach, -reach])
+        owner, face = _unpacked(under & ~over, len(points))
+        other = face != faces[owner]
+        face, owner = face[other], owner[other]
+        # In the plane of a face, a circle about it leaves few to be looked at.
+        away = np.linalg.norm(self._centroids[face] - local[owner], axis=1)
+        close = away <= self._radii[face] + reach
+        face, owner = face[close], owner[close]
+        near = _distances(local[owner], self._vertices[self._faces[face]]) <= reach
+        face, owner = face[near], owner[near]
+        own = faces[owner]
+        normals = self._planes[:, :3]
+        even = np.einsum("ij,ij->i", normals[face], normals[own]) >= np.sin(half_angle)
+        key = face * len(self._faces) + own
+        place = np.searchsorted(self._smooth, key, side="right") - 1
+        even &= self._smooth[place] == key
+        found = np.zeros(len(points), dtype=bool)
+        found[owner[~even]] = True
+        return found
+
+
+def _distances(
+    points: NDArray[np.float64], corners: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the distance of each point from its triangle, shape (n,)."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    normals /= np.where(length > 0, length, 1.0)[:, None]
+    height = np.einsum("ij,ij->i", points - corners[:, 0], normals)
+    over = length > 0
+    best = np.full(len(points), np.inf)
+    for k in range(3):
+        start, end = corners[:, k], corners[:, (k + 1) % 3]
+        along, off = end - start, points - start
+        square = np.einsum("ij,ij->i", along, along)
+        share = np.einsum("ij,ij->i", off, along) / np.where(square > 0, square, 1.0)
+        foot = np.clip(share, 0.0, 1.0)[:, None] * along
+        best = np.minimum(best, np.linalg.norm(off - foot, axis=1))
+        over &= np.einsum("ij,ij->i", np.cross(along, off), normals) >= 0.0
+    return np.where(over, np.minimum(best, np.abs(height)), best)
 
 
 def _may_cross(

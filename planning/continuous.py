@@ -281,7 +281,9 @@ def _open_rows(
 
     def fill(part: slice) -> None:
         scene.pulse()
-        marks = maps.maps(points[part], normals[part], rows.steep[part])
+        marks = maps.maps(
+            points[part], normals[part], rows.steep[part], rows.samples.faces[part]
+        )
         packed = np.packbits(marks, axis=0)
         bytes_of[:, part.start // POINTS, : len(packed)] = packed.T
 

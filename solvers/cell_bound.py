@@ -111,7 +111,7 @@ def multiplier_bound(
     Raises:
         ValueError: If K isn't a whole number of at least 0.
     """
-    whole_number("n_poses", n_poses, least=0)
+    n_poses = whole_number("n_poses", n_poses, least=0)
     whole = whole_rows(problem)
     given = whole.multipliers(multipliers)
     price = BitSum(given)
@@ -150,7 +150,7 @@ def bound_count(
         ValueError: If the count isn't a whole number of at least 1, the tree has other
             rows than the problem, or a cell serves rows that its parent misses.
     """
-    whole_number("count", count, least=1)
+    count = whole_number("count", count, least=1)
     if tree.n_rows != problem.weights.size:
         raise ValueError(
             f"the tree's cells have {tree.n_rows} rows, the problem has "

@@ -134,10 +134,10 @@ def solve_cover(
     """
     fixed = problem.fixed
     if max_sets is not None:
-        whole_number("max_sets", max_sets, least=1)
+        max_sets = whole_number("max_sets", max_sets, least=1)
         if not max_sets >= fixed.size:
             raise ValueError(f"max_sets is {max_sets}, but {fixed.size} sets are fixed")
-    whole_number("seed", seed, least=0)
+    seed = whole_number("seed", seed, least=0)
     work = WorkBudget(budget, time_limit=time_limit)
     cover = _or_reduce(problem, reduced)
     work.spend(cover.entries)
@@ -186,7 +186,7 @@ def solve_max_coverage(
         reduced: This problem's `reduced_problem`, where it is at hand.
     """
     fixed = problem.fixed
-    whole_number("n_sets", n_sets, least=0)
+    n_sets = whole_number("n_sets", n_sets, least=0)
     if not n_sets >= fixed.size:
         raise ValueError(f"n_sets is {n_sets}, but {fixed.size} sets are fixed")
     given = () if warm_start is None else warm_start
@@ -194,7 +194,7 @@ def solve_max_coverage(
     if start.size > n_sets:
         raise ValueError(f"warm_start must name at most {n_sets} sets of the problem")
     free = n_sets - fixed.size
-    whole_number("seed", seed, least=0)
+    seed = whole_number("seed", seed, least=0)
     work = WorkBudget(budget, time_limit=time_limit)
     cover = _or_reduce(problem, reduced, costs=np.ones(problem.costs.size))
     work.spend(cover.entries)

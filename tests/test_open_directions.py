@@ -28,7 +28,11 @@ def maps_of(mesh, cube, *, limits=FREE, n=POINTS, steep=None, occlusion=True, se
     samples = sample_surface(mesh, n, seed=seed)
     steep = np.zeros((n, 3)) if steep is None else steep
     makes = OpenDirections(visibility, limits, cube, occlusion=occlusion)
-    return samples, visibility, makes.maps(samples.points, samples.normals, steep)
+    return (
+        samples,
+        visibility,
+        makes.maps(samples.points, samples.normals, steep, samples.faces),
+    )
 
 
 def is_free(samples, visibility, row, asked):
@@ -113,7 +117,8 @@ def test_maps_are_made_in_several_threads_at_once():
 
     def make(part: slice) -> None:
         points, normals = samples.points[part], samples.normals[part]
-        found[part.start] = makes.maps(points, normals, np.zeros((POINTS, 3)))
+        zero, faces = np.zeros((POINTS, 3)), samples.faces[part]
+        found[part.start] = makes.maps(points, normals, zero, faces)
 
     parts = [slice(b, b + POINTS) for b in range(0, 6 * POINTS, POINTS)]
     visibility.caster.share(make, parts)
@@ -131,7 +136,7 @@ def test_under_a_roof_only_the_gap_is_open():
     visibility = Visibility(mesh)
     point, normal = np.array([[0.03, 0.01, 0.0]]), np.array([[0.0, 0.0, 1.0]])
     makes = OpenDirections(visibility, DirectionLimits(np.deg2rad(89.0), 0.0), cube)
-    cells = makes.maps(point, normal, np.zeros((1, 3)))[0]
+    cells = makes.maps(point, normal, np.zeros((1, 3)), np.array([0]))[0]
     up = cube.centres[:, 2] > 0.02
     hit = point + cube.centres * (0.03 / np.where(up, cube.centres[:, 2], 1.0))[:, None]
     off = np.abs(hit[:, :2]).max(axis=1) - 0.1
@@ -139,6 +144,43 @@ def test_under_a_roof_only_the_gap_is_open():
     doubt = 0.03 * np.deg2rad(3.0) / np.maximum(cube.centres[:, 2], 0.02) ** 2
     assert not cells[up & (off < -doubt)].any()
     assert cells[up & (off > doubt) & (cube.centres[:, 2] > 0.05)].all()
+
+
+@pytest.mark.parametrize("slacks", [0.0, 0.1, 0.5, 1.0, 2.0, 5.0, 12.0, 40.0])
+def test_beside_a_wall_nothing_is_closed_that_the_planner_sees(slacks):
+    """Nearer to a crease than the rays' slack, the wall counts for some rays only."""
+    corners = [(-1, 0, 0), (1, 0, 0), (1, -1, 0), (-1, -1, 0), (1, 0, 1), (-1, 0, 1)]
+    faces = [(0, 2, 1), (0, 3, 2), (0, 1, 4), (0, 4, 5)]
+    mesh = TriangleMesh(0.1 * np.array(corners, dtype=float), np.array(faces))
+    visibility, cube = Visibility(mesh), CubeMap(32)
+    point = np.array([[0.013, -slacks * visibility.slack, 0.0]])
+    up = np.array([[0.0, 0.0, 1.0]])
+    makes = OpenDirections(visibility, FREE, cube)
+    cells = makes.maps(point, up, np.zeros((1, 3)), np.array([0]))[0]
+    asked = directions(4_000)
+    asked = asked[asked[:, 2] >= np.cos(FREE.max_incidence)]
+    far = point + asked
+    free = [not visibility.blocked(o, point, up)[0] for o in far]
+    assert cells[cube.locate(asked[free])].all()
+    if slacks == 40.0:
+        assert not cells[cube.locate(asked[asked[:, 1] > 0.3])].any()
+
+
+def test_samples_of_slivers_are_taken_to_be_free():
+    plate = grid(0.2, 0.2, divisions=(2, 2))
+    roof = shifted(grid(0.2, 0.2, divisions=(1, 1)), (0, 0, 0.03))
+    thin = np.array([[-0.05, 0, 0.01], [0.05, 0, 0.01], [0, 1e-6, 0.01]])
+    mesh = joined(plate, roof, TriangleMesh(thin, np.array([[0, 1, 2]])))
+    visibility, cube = Visibility(mesh), CubeMap(16)
+    last = np.array([len(mesh.faces) - 1])
+    makes = OpenDirections(visibility, FREE, cube)
+    point, up = mesh.face_centroids[last], np.array([[0.0, 0.0, 1.0]])
+    cells = makes.maps(point, up, np.zeros((1, 3)), last)[0]
+    within = cube.centres[:, 2] >= np.cos(FREE.max_incidence)
+    assert cells[within].all()
+    # Off the sliver the roof closes what is above.
+    cells = makes.maps(mesh.face_centroids[:1], up, np.zeros((1, 3)), np.array([0]))[0]
+    assert not cells[cube.centres[:, 2] > 0.9].any()
 
 
 @pytest.mark.parametrize("angle", [0.0, 20.0, 40.0, 70.0])
