@@ -9,6 +9,7 @@ joins cells four by four.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from scipy.spatial import KDTree
 # Rows: the world axes that a face's x, y and z run along.
 _AXES = np.array([[1, 2, 0], [1, 2, 0], [2, 0, 1], [2, 0, 1], [0, 1, 2], [0, 1, 2]])
 _SIGNS = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-_FACES = 6
+FACES = 6
 # What rounding may move a direction by, in radians.
 _ROUNDING = 1e-9
 
@@ -35,7 +36,7 @@ class CubeMap:
     @property
     def size(self) -> int:
         """Number of cells."""
-        return _FACES * self.n * self.n
+        return FACES * self.n * self.n
 
     @cached_property
     def lines(self) -> NDArray[np.float64]:
@@ -57,8 +58,8 @@ class CubeMap:
     def radii(self) -> NDArray[np.float64]:
         """Largest angle from the middle of each cell to its corners, shape (size,)."""
         n = self.n
-        middle = self.centres.reshape(_FACES, n, n, 3)
-        radii = np.zeros((_FACES, n, n))
+        middle = self.centres.reshape(FACES, n, n, 3)
+        radii = np.zeros((FACES, n, n))
         for j in (0, 1):
             for i in (0, 1):
                 corner = self.corners[:, j : j + n, i : i + n]
@@ -84,7 +85,7 @@ class CubeMap:
         circles about them come within `clearance` of the cell's.
         """
         n = self.n
-        _, j, i = np.unravel_index(np.arange(self.size), (_FACES, n, n))
+        _, j, i = np.unravel_index(np.arange(self.size), (FACES, n, n))
         inner = (i > 0) & (i < n - 1) & (j > 0) & (j < n - 1)
         border = np.flatnonzero(~inner)
         reach = self.radii[border] + self.radii.max() + self.clearance
@@ -120,25 +121,48 @@ class CubeMap:
         index = np.clip((steps * self.n).astype(np.int64), 0, self.n - 1)
         return (face * self.n + index[:, 1]) * self.n + index[:, 0]
 
-    def halved(self, marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return which cells of the map of n/2 hold a marked cell of this one.
+    def halved(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Return for each cell of the map of n/2 the rows of its four cells, joined.
 
         Args:
-            marks: Of the cells, shape (m, size).
+            rows: Bits or booleans of each cell, shape (size, k).
         """
         n = self.n // 2
-        split = marks.reshape(-1, _FACES, n, 2, n, 2)
-        return split.any(axis=(3, 5)).reshape(len(marks), -1)
+        across = np.bitwise_or.reduce(rows.reshape(FACES, n, 2, n, 2, -1), axis=4)
+        return np.bitwise_or.reduce(across, axis=2).reshape(FACES * n * n, -1)
 
     def _directions(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
         n = steps.size
-        found = np.empty((_FACES, n, n, 3))
+        found = np.empty((FACES, n, n, 3))
         x, y = steps[None, :], steps[:, None]
         length = np.sqrt(1.0 + x * x + y * y)
-        for face in range(_FACES):
+        for face in range(FACES):
             for own, value in zip(_AXES[face], (x, y, _SIGNS[face]), strict=True):
                 found[face, :, :, own] = value / length
         return found
+
+
+def quarters(level: NDArray[np.int64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the four parts of cells on the map of the next level, shape (m, 4).
+
+    Args:
+        level: Cell k is one of the map of 2^level cells an edge, shape (m,).
+        cells: Numbers of the cells, shape (m,).
+    """
+    n = 1 << level
+    face, rest = np.divmod(cells, n * n)
+    j, i = np.divmod(rest, n)
+    low = (face * 2 * n + 2 * j) * 2 * n + 2 * i
+    return low[:, None] + np.stack([0 * n, 0 * n + 1, 2 * n, 2 * n + 1], axis=1)
+
+
+def middles(level: NDArray[np.int64], cells: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the unit direction of the middle of cells, shape (m, 3)."""
+    found = np.empty((cells.size, 3))
+    for own in np.unique(level):
+        some = level == own
+        found[some] = CubeMap(1 << int(own)).centres[cells[some]]
+    return found
 
 
 def face_coordinates(

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from .cube_map import CubeMap, face_coordinates
+from .cube_map import FACES, CubeMap, face_coordinates
 
-_FACES = 6
 # Gnomonic coordinates are exact to this; whatever comes as near as this is met.
 _MARGIN = 1e-7
 # Cells that are listed at a time.
@@ -34,11 +33,11 @@ def mark_segments(
         marks: What is marked, in place, shape (n_owners, cube.size).
     """
     flat = marks.reshape(-1)
-    for face in range(_FACES):
+    for face in range(FACES):
         first, second, met = _clipped(starts, ends, face)
         if not met.size:
             continue
-        begin = (owners[met] * _FACES + face) * cube.n * cube.n
+        begin = (owners[met] * FACES + face) * cube.n * cube.n
         for part, column, low, high in _by_column(cube, first, second):
             _mark(cube, flat, begin[part] + column, low, high)
 

@@ -71,11 +71,11 @@ class OpenDirections:
         reach = limits.max_incidence + 2.0 * float(cube.radii.max())
         self._cone = min(reach, 0.5 * np.pi)
         mesh = visibility.caster.mesh
+        self._edges = Silhouettes(mesh) if occlusion else None
         sides = mesh.corners - mesh.corners[:, [1, 2, 0]]
         longest = np.linalg.norm(sides, axis=2).max(axis=1)
         width = 2.0 * mesh.face_areas / np.where(longest > 0, longest, 1.0)
         self._narrow = width <= _SLACKS * visibility.slack
-        self._edges = Silhouettes(visibility.caster.mesh) if occlusion else None
 
     def maps(
         self,
@@ -95,10 +95,12 @@ class OpenDirections:
         cells = self._within_incidence(normals)
         cells &= ~self._along_steep(steep)
         if self._edges is not None:
-            blocked = self._blocked(self._edges, points, normals, cells)
+            heights = self._edges.heights(points)
+            crossing = self._edges.seen_from(points, normals, heights, self._cone)
+            blocked = self._blocked(crossing, points, normals, cells)
             # Rays leave out what is within the slack of a sample, as the planner's do.
             reach = _SLACKS * self._visibility.slack
-            doubtful = self._edges.touched(points, faces, reach, self._cone)
+            doubtful = self._edges.touched(points, faces, heights, reach, self._cone)
             doubtful |= self._narrow[faces]
             cells &= ~blocked | doubtful[:, None]
         return cells
@@ -132,7 +134,7 @@ class OpenDirections:
 
     def _blocked(
         self,
-        edges: Silhouettes,
+        silhouettes: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]],
         points: NDArray[np.float64],
         normals: NDArray[np.float64],
         cells: NDArray[np.bool_],
@@ -140,7 +142,7 @@ class OpenDirections:
         """Return the cells that are blocked as a whole; only those given are asked."""
         cube = self._cube
         touched = np.zeros(cells.shape, dtype=bool)
-        owners, begin, end = edges.seen_from(points, normals, self._cone)
+        owners, begin, end = silhouettes
         mark_segments(cube, begin, end, owners, touched)
         if self._cone >= 0.5 * np.pi:
             # Silhouettes below the horizon weren't asked for: nothing hangs together

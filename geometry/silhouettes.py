@@ -8,8 +8,7 @@ through x_f::
     h_f(p) = N_f . (p - x_f),    edge of f, g is a silhouette iff h_f h_g <= 0
 
 (with the sign turned where f and g run along the edge in the same sense). What is too
-near to 0 to call counts as a silhouette. That holds for any part of the faces, too: its
-silhouettes are found in the same way, and edges at which it ends are among them.
+near to 0 to call counts as a silhouette.
 
 A bit for each of 64 points, so that edges are compared for all of them at once.
 """
@@ -60,10 +59,16 @@ class Silhouettes:
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         self._unsure = _UNSURE * size
 
+    def heights(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return h_f(p) of each face (row) and point (column) in [m]."""
+        local = points - self._middle
+        return self._planes @ np.column_stack([local, -np.ones(len(local))]).T
+
     def seen_from(
         self,
         points: NDArray[np.float64],
         normals: NDArray[np.float64],
+        heights: NDArray[np.float64],
         half_angle: float,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Return the silhouettes that may cross a cone above each point.
@@ -71,6 +76,7 @@ class Silhouettes:
         Args:
             points: On the mesh in [m], at most `POINTS`, shape (n, 3).
             normals: Unit axes of the cones, same shape.
+            heights: What `heights` says of the points.
             half_angle: Their half opening [rad], at most pi / 2.
 
         Returns:
@@ -80,7 +86,6 @@ class Silhouettes:
         local = points - self._middle
         own = np.einsum("ij,ij->i", normals, local)
         (above,) = _packed(self._vertices @ normals.T - own, [0.0])
-        heights = self._planes @ np.column_stack([local, -np.ones(len(local))]).T
         over, under = _packed(heights, [self._unsure, -self._unsure])
         # Above the upper mark: over both; between the marks: not sure.
         unsure = over ^ under
@@ -100,6 +105,7 @@ class Silhouettes:
         self,
         points: NDArray[np.float64],
         faces: NDArray[np.int64],
+        heights: NDArray[np.float64],
         reach: float,
         half_angle: float,
     ) -> NDArray[np.bool_]:
@@ -111,11 +117,11 @@ class Silhouettes:
         Args:
             points: On the mesh in [m], at most `POINTS`, shape (n, 3).
             faces: The face that each lies on, shape (n,).
+            heights: What `heights` says of the points.
             reach: How near, in [m].
             half_angle: Half opening of the cone about the face's normal [rad].
         """
         local = points - self._middle
-        heights = self._planes @ np.column_stack([local, -np.ones(len(local))]).T
         over, under = _packed(heights, [reach, -reach])
         owner, face = _unpacked(under & ~over, len(points))
         other = face != faces[owner]

@@ -54,7 +54,7 @@ class WidenedMaps:
                     self._maps.append(WidenedMap(cube, k * cube.clearance, own))
             if cube.n <= 2:
                 break
-            rows, cube, rounds = _halved(rows, cube), CubeMap(cube.n // 2), _COARSER
+            rows, cube, rounds = cube.halved(rows), CubeMap(cube.n // 2), _COARSER
         self._angles = np.array([m.angle for m in self._maps])
 
     def open(
@@ -88,11 +88,3 @@ def _widened(rows: NDArray[np.uint64], cube: CubeMap) -> NDArray[np.uint64]:
     for column in cube.neighbours.T:
         np.bitwise_or(wide, rows[column], out=wide)
     return wide
-
-
-def _halved(rows: NDArray[np.uint64], cube: CubeMap) -> NDArray[np.uint64]:
-    n = cube.n // 2
-    split = rows.reshape(6, n, 2, n, 2, -1)
-    return np.bitwise_or.reduce(np.bitwise_or.reduce(split, axis=4), axis=2).reshape(
-        6 * n * n, -1
-    )

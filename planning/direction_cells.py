@@ -18,10 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cube_map import CubeMap
+from geometry.cube_map import FACES, CubeMap, middles, quarters
 from solvers.cells import CellBatch
 
-_FACES = 6
 # Cells of 2.8 degrees, 6,144 of them.
 _SPREAD = 5
 
@@ -42,29 +41,23 @@ class DirectionTree:
     def over(cls, leaves: NDArray[np.uint64], n_rows: int) -> "DirectionTree":
         """Return the tree over the cells of the finest map."""
         levels = [leaves]
-        while len(levels[-1]) > _FACES:
-            n = round((len(levels[-1]) // _FACES) ** 0.5) // 2
-            split = levels[-1].reshape(_FACES, n, 2, n, 2, -1)
-            joined = np.bitwise_or.reduce(split, axis=(2, 4))
-            levels.append(joined.reshape(_FACES * n * n, -1))
+        while len(levels[-1]) > FACES:
+            n = round((len(levels[-1]) // FACES) ** 0.5)
+            levels.append(CubeMap(n).halved(levels[-1]))
         return cls(tuple(levels[::-1]), n_rows)
 
     def roots(self) -> CellBatch:
         """Return the six faces."""
-        cells = np.arange(_FACES)
-        return CellBatch(cells, np.full(_FACES, -1), self.levels[0])
+        cells = np.arange(FACES)
+        return CellBatch(cells, np.full(FACES, -1), self.levels[0])
 
     def children(self, cells: NDArray[np.int64], /) -> CellBatch:
         """Return the four parts of each cell."""
         level, cell = self.place(cells)
         split = level < len(self.levels) - 1
         parents = np.repeat(np.flatnonzero(split), 4)
-        level, cell = level[parents], cell[parents]
-        n = 1 << level
-        face, rest = np.divmod(cell, n * n)
-        j, i = np.divmod(rest, n)
-        b, a = np.divmod(np.arange(parents.size) % 4, 2)
-        own = (face * 2 * n + 2 * j + b) * 2 * n + 2 * i + a
+        own = quarters(level[split], cell[split]).ravel()
+        level = level[parents]
         rows = np.empty((parents.size, self.levels[0].shape[1]), dtype=np.uint64)
         for finer in np.unique(level):
             some = level == finer
@@ -79,9 +72,7 @@ class DirectionTree:
 
     def directions(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the middle of each cell, shape (n, 3)."""
-        level, cell = self.place(cells)
-        pairs = zip(level, cell, strict=True)
-        return np.array([CubeMap(1 << int(k)).centres[c] for k, c in pairs])
+        return middles(*self.place(cells))
 
     def place(
         self, cells: NDArray[np.int64]

@@ -18,14 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cube_map import CubeMap, angle_between
+from geometry.cube_map import FACES, CubeMap, angle_between, middles, quarters
 from geometry.widened_maps import WidenedMaps
 from solvers.bit_rows import GrowingArray, words_for
 from solvers.cells import CellBatch
 
 from .requirements import Workspace
 
-_FACES = 6
 _ROUNDING = 1e-9
 
 
@@ -86,18 +85,18 @@ class PositionTree:
         self._rows = GrowingArray(np.empty((0, words_for(self.n_rows)), np.uint64))
         low, high = workspace.projector_radius_m
         cells = ShellCells(
-            np.zeros(_FACES, dtype=np.int64),
-            np.arange(_FACES),
-            np.full(_FACES, low),
-            np.full(_FACES, high),
+            np.zeros(FACES, dtype=np.int64),
+            np.arange(FACES),
+            np.full(FACES, low),
+            np.full(FACES, high),
         )
-        every = np.ones((_FACES, self.n_rows), dtype=bool)
+        every = np.ones((FACES, self.n_rows), dtype=bool)
         self._roots = self._append(cells, every)
 
     def roots(self) -> CellBatch:
         """Return the six faces, over all radii."""
         rows = self._rows.values[self._roots]
-        return CellBatch(self._roots, np.full(_FACES, -1), rows)
+        return CellBatch(self._roots, np.full(FACES, -1), rows)
 
     def children(self, cells: NDArray[np.int64], /) -> CellBatch:
         """Return the four parts of each cell, or its inner and outer half."""
@@ -118,8 +117,7 @@ class PositionTree:
     def directions(self, names: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the direction of the middle of cells from the centre, shape (n, 3)."""
         cells = self.cells(names)
-        pairs = zip(cells.level, cells.cell, strict=True)
-        return np.array([self._cubes[k].centres[c] for k, c in pairs])
+        return middles(cells.level, cells.cell)
 
     def cells(self, names: NDArray[np.int64]) -> ShellCells:
         """Return where cells are, by their names."""
@@ -225,15 +223,9 @@ def _spread(
 
 
 def _quartered(cells: ShellCells) -> ShellCells:
-    n = 1 << cells.level
-    face, rest = np.divmod(cells.cell, n * n)
-    j, i = np.divmod(rest, n)
-    four = np.repeat(np.arange(cells.cell.size), 4)
-    b, a = np.divmod(np.arange(four.size) % 4, 2)
-    n, face, j, i = n[four], face[four], j[four], i[four]
-    cell = (face * 2 * n + 2 * j + b) * 2 * n + 2 * i + a
-    taken = cells.take(four)
-    return ShellCells(taken.level + 1, cell, taken.low_m, taken.high_m)
+    four = cells.take(np.repeat(np.arange(cells.cell.size), 4))
+    parts = quarters(cells.level, cells.cell).ravel()
+    return ShellCells(four.level + 1, parts, four.low_m, four.high_m)
 
 
 def _halved(cells: ShellCells) -> ShellCells:

@@ -54,10 +54,10 @@ def test_no_direction_leaves_the_neighbours_within_the_clearance(n):
 def test_halving_joins_four_cells(n):
     cube, coarse = CubeMap(n), CubeMap(n // 2)
     for cell in range(cube.size):
-        marks = np.zeros((1, cube.size), dtype=bool)
-        marks[0, cell] = True
+        marks = np.zeros((cube.size, 1), dtype=bool)
+        marks[cell] = True
         wanted = coarse.locate(cube.centres[cell][None])
-        assert np.flatnonzero(cube.halved(marks)[0]).tolist() == wanted.tolist()
+        assert np.flatnonzero(cube.halved(marks)).tolist() == wanted.tolist()
 
 
 @pytest.mark.parametrize("n", [1, 4, 16, 64])
