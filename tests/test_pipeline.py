@@ -125,14 +125,20 @@ def test_summary_names_devices_counts_and_denominators(plan):
         assert words in text
 
 
-def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(head, tmp_path):
+def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     path = tmp_path / "frontal.toml"
     path.write_text(
         'base = "default"\nname = "frontal"\n[workspace]\nshape = "cone"\n'
         "axis = [0.0, -1.0, 0.0]\nhalf_angle_deg = 10.0\n"
     )
     with pytest.raises(RequirementError, match="can be lit from anywhere") as caught:
-        plan_rig(head, load_rig(path), max_projectors=3, check=False)
+        plan_rig(
+            box((0.1, 0.1, 0.1), divisions=4),
+            load_rig(path),
+            max_projectors=3,
+            target="surface",
+            check=False,
+        )
     plan, lines = caught.value.plan, caught.value.shortfalls
     areas = plan.coverage["target"]
     share = areas["reachable_by_projectors_m2"] / areas["area_m2"]
@@ -148,9 +154,11 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(head, tmp_pa
     assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
 
 
-def test_too_few_projectors_say_how_many_are_needed(head):
+def test_too_few_projectors_say_how_many_are_needed():
+    cube = box((0.1, 0.1, 0.1), divisions=4)
+    options = {"max_projectors": 1, "target": "surface", "coverage": 0.8}
     with pytest.raises(RequirementError, match="--max-projectors") as caught:
-        plan_rig(head, load_rig("default"), max_projectors=1, check=False)
+        plan_rig(cube, load_rig("default"), check=False, **options)
     proof = caught.value.plan.document["certificates"]["projectors"]
     assert (proof["count"], proof["status"]) == (1, "infeasible")
     assert proof["needed"]["count"] >= proof["needed"]["lower_bound"] >= 2
