@@ -1,6 +1,11 @@
 """The whole way from mesh to checked plan, on the sample head."""
 
+import io
 import json
+import re
+import shutil
+from contextlib import redirect_stdout
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +22,8 @@ from planning.errors import (
 from planning.sample_head import sample_head
 from planning.summary import summary
 
+README = Path(__file__).resolve().parents[1] / "README.md"
+
 
 @pytest.fixture(scope="module")
 def head():
@@ -24,8 +31,20 @@ def head():
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])
-def plan(request, head):
-    return plan_rig(head, load_rig("default", light=request.param), max_projectors=4)
+def plan(request, head, tmp_path_factory):
+    """In diverging light it is the plan that the README's library code makes."""
+    if request.param == "parallel":
+        return plan_rig(head, load_rig("default", light="parallel"), max_projectors=4)
+    (code,) = re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.S)
+    folder = tmp_path_factory.mktemp("readme")
+    shutil.copy(README.with_name("face.obj"), folder)
+    names, said = {}, io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(said):
+        patch.chdir(folder)
+        exec(code, names)
+    assert "True ()" in said.getvalue()
+    assert (folder / "face-plan" / "plan.json").exists()
+    return names["plan"]
 
 
 @pytest.fixture(scope="module")
