@@ -141,6 +141,7 @@ def projectors_around(
     n_lattice: int,
     *,
     ring_offset: tuple[float, float],
+    scale: float = 1.0,
 ) -> tuple[PlannedProjector, ...]:
     """Return candidates between those of a lattice, close around chosen ones.
 
@@ -153,6 +154,7 @@ def projectors_around(
         workspace: Where devices may stand.
         n_lattice: Poses of the lattice.
         ring_offset: As for `projector_candidates`.
+        scale: How far out, as a share of the lattice's spacing.
     """
     if not chosen:
         return ()
@@ -162,14 +164,15 @@ def projectors_around(
     rolls = rolls_for(device, workspace.object_radius_m, radius)
     n_positions = max(1, n_lattice // len(rolls))
     # Each position of the lattice has this much of the solid angle.
-    spacing = np.sqrt(2 * np.pi * (1 - np.cos(workspace.half_angle)) / n_positions)
+    solid_angle = 2 * np.pi * (1 - np.cos(workspace.half_angle))
+    reach = scale * float(np.sqrt(solid_angle / n_positions))
     found: list[NDArray[np.float64]] = []
     for projector in chosen:
         outwards = projector.world_from_device[:3, 3] - centre
         outwards = outwards / np.linalg.norm(outwards)
         level = np.cross(np.array(workspace.up), outwards)
         start = level if np.linalg.norm(level) > _LEVEL else None
-        cap = fibonacci_cap(_AROUND, outwards, float(spacing), start=start)
+        cap = fibonacci_cap(_AROUND, outwards, reach, start=start)
         found.append(centre + radius * cap[_stands(cap, radius, workspace)])
     positions = np.concatenate(found)
     poses = _aimed(positions, device, workspace, rolls)

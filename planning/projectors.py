@@ -13,6 +13,7 @@ from . import lighting
 from .candidates import projector_candidates, projectors_around
 from .errors import InfeasibleLimitsError
 from .lighting import Target
+from .one_fewer import Offer, one_fewer
 from .plan import PlannedProjector
 from .scene import Scene
 from .selection import Selection, certificate, marginals, select_fewest
@@ -80,10 +81,11 @@ def plan_projectors(
         raise InfeasibleLimitsError(_nothing_lit(stages, len(candidates)))
     selection = _fewest(scene, stages)
     # The best of a lattice lies beside the best there is.
+    n_lattice = len(candidates)
     around = projectors_around(
         [candidates[i] for i in selection.chosen],
         required.workspace,
-        len(candidates),
+        n_lattice,
         ring_offset=ring_offset,
     )
     stages = np.concatenate([stages, lit_stages(scene, around, rows)], axis=1)
@@ -91,7 +93,9 @@ def plan_projectors(
     attempt = 0
     while True:
         attempt += 1
-        selection = _fewest(scene, stages)
+        offer = Offer(candidates, stages)
+        offer, selection = _fewer(scene, rows, offer, n_lattice, ring_offset)
+        candidates, stages = offer.projectors, offer.stages
         fresh = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh_stages = lit_stages(scene, candidates, fresh)
         lit = fresh_stages == lighting.LIT
@@ -102,6 +106,36 @@ def plan_projectors(
         rows = merged(rows, fresh)
         stages = np.concatenate([stages, fresh_stages])
     return _stage(scene, candidates, rows, stages, selection)
+
+
+def _fewer(
+    scene: Scene,
+    rows: Target,
+    offer: Offer,
+    n_lattice: int,
+    ring_offset: tuple[float, float],
+) -> tuple[Offer, Selection]:
+    """Return the fewest of the poses, others offered as long as they save one."""
+    selection = _fewest(scene, offer.stages)
+    lattice = offer.take(np.arange(n_lattice))
+    while selection.needed > 1:
+        moved = one_fewer(
+            scene,
+            lattice,
+            selection.needed - 1,
+            stages_of=lambda projectors: lit_stages(scene, projectors, rows),
+            ring_offset=ring_offset,
+        )
+        if moved is None:
+            break
+        offer = offer.joined(moved)
+        n_candidates, n_moved = len(offer.projectors), len(moved.projectors)
+        known = np.arange(n_candidates - n_moved, n_candidates)
+        again = _fewest(scene, offer.stages, known)
+        if again.needed >= selection.needed:
+            break
+        selection = again
+    return offer, selection
 
 
 def with_more(
@@ -119,13 +153,16 @@ def with_more(
     return _stage(scene, stage.reference + more, stage.rows, stages, selection)
 
 
-def _fewest(scene: Scene, stages: NDArray[np.int8]) -> Selection:
+def _fewest(
+    scene: Scene, stages: NDArray[np.int8], known: NDArray[np.int64] | None = None
+) -> Selection:
     required = scene.requirements
     return select_fewest(
         stages == lighting.LIT,
         required.dominant_coverage,
         max_count=required.max_projectors,
         seed=scene.seed,
+        known=known,
     )
 
 

@@ -66,7 +66,12 @@ class Marginals:
 
 
 def select_fewest(
-    covers: NDArray[np.bool_], share: float, *, max_count: int | None, seed: int
+    covers: NDArray[np.bool_],
+    share: float,
+    *,
+    max_count: int | None,
+    seed: int,
+    known: NDArray[np.int64] | None = None,
 ) -> Selection:
     """Return the fewest candidates that cover a share of what all of them cover.
 
@@ -77,18 +82,22 @@ def select_fewest(
         share: Of the rows that any candidate serves, in (0, 1].
         max_count: Candidates allowed; None for no limit.
         seed: Of the heuristics.
+        known: Candidates that may cover as much with fewer than the search finds.
     """
     required = required_rows(np.any(covers, axis=1), share)
-    problem = _problem(covers, required)
+    problem = cover_problem(covers, required)
     reduced = reduced_problem(problem)
     solution = solve_cover(problem, seed=seed, heaviest=False, reduced=reduced)
-    needed = len(solution.selected)
+    smallest = solution.selected
+    if known is not None and len(known) < len(smallest):
+        smallest = known if _rows(covers, known) >= required else smallest
+    needed = len(smallest)
     lower_bound = int(np.ceil(solution.lower_bound - 1e-9))
     allowed = needed if max_count is None else min(needed, max_count)
     best = solve_max_coverage(
         problem,
         allowed,
-        warm_start=solution.selected if allowed == needed else None,
+        warm_start=smallest if allowed == needed else None,
         seed=seed,
         reduced=reduced,
     )
@@ -97,7 +106,7 @@ def select_fewest(
     status = SolveStatus.OPTIMAL if lower_bound >= needed else SolveStatus.FEASIBLE
     return Selection(
         best.selected,
-        solution.selected,
+        smallest,
         min(lower_bound, needed),
         status.name.lower() if met else "infeasible",
         solution.proof,
@@ -123,7 +132,7 @@ def marginals(
         seed: Of the heuristics.
         more: Counts beyond the one taken for which the best is wanted.
     """
-    problem = _problem(covers, selection.required)
+    problem = cover_problem(covers, selection.required)
     reduced = reduced_problem(problem)
     taken = len(selection.chosen)
     bound = 0.0
@@ -151,8 +160,8 @@ def marginals(
     return Marginals(by_count, one_fewer, _greedy_count(covers, selection.required))
 
 
-def _problem(covers: NDArray[np.bool_], required: int) -> CoverProblem:
-    """The program over the rows that some candidate serves."""
+def cover_problem(covers: NDArray[np.bool_], required: int) -> CoverProblem:
+    """State the cover over the rows that some candidate serves."""
     reachable = covers[covers.any(axis=1)]
     return CoverProblem(
         sparse.csr_array(reachable), required_weight=np.array([required])
