@@ -1,5 +1,6 @@
 """The pose program of section III: each projector moves to the largest margins."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +14,14 @@ from solvers.pose_program import PoseProgram, pose_margins, pose_slack, solve_po
 from . import lighting
 from .lighting import Target
 from .plan import PlannedProjector
-from .projectors import ProjectorStage, lit_stages, margins_of
+from .projectors import ProjectorStage, lit_margins, lit_stages
 from .scene import Scene
+from .selection import required_rows
+from .share_margin import enough_lit, margin_at_share
 
-_SWEEPS = 2
+_SWEEPS = 6
+# Gains below this aren't worth a move [rad].
+_GAIN = 1e-4
 _STEPS = (1.0, 0.5, 0.25)
 # A pixel of the image border stays free, so that rounding the pose loses nothing.
 _PIXEL_MARGIN = 1.0
@@ -24,32 +29,80 @@ _MAX_MOVE_M = 0.3
 
 
 def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector, ...]:
-    """Return the projectors at the poses where their served samples have most margin.
+    """Return the projectors at the poses where what counts is lit with most margin.
 
-    Each projector in turn solves the pose program over the samples that it serves.
-    Occlusion isn't part of that program, so rays decide after every move: the whole way
-    is tried, then half, then a quarter, and a move that loses a sample isn't taken.
+    What counts are the samples that have the margin at the required share
+    (`share_margin`). Each projector in turn solves the pose program over those of them
+    that it serves. Occlusion isn't part of that program, so rays decide after every
+    move: the whole way is tried, then half, then a quarter, and a move that lowers the
+    margin at the share isn't taken, nor one that leaves too few samples lit.
 
     Args:
         scene: Surface and requirements.
         stage: Projectors from the cover, and its rows.
     """
     rows = stage.rows
-    projectors = list(stage.projectors)
-    lit = lit_stages(scene, projectors, rows) == lighting.LIT
+    state = _Lit(scene, rows, list(stage.projectors))
+    lit = int(np.isfinite(state.margin).any(axis=1).sum())
+    reached = np.any(stage.stages == lighting.LIT, axis=1)
+    required = required_rows(reached, scene.requirements.dominant_coverage)
+    # With too few devices, what they light is what counts.
+    required = min(required, lit)
+    if required == 0:
+        return stage.projectors
     for _ in range(_SWEEPS):
-        moved = False
-        for p, projector in enumerate(projectors):
-            served = lighting.served_by(lit, margins_of(scene, projectors, rows)) == p
-            if not served.any():
-                continue
-            better = _improved(scene, projector, rows, served, lit, p)
-            if better is not None:
-                projectors[p], lit[:, p] = better
-                moved = True
-        if not moved:
+        moved = [
+            _improve(state, p, required, lit) for p in range(len(state.projectors))
+        ]
+        if not any(moved):
             break
-    return tuple(projectors)
+    return tuple(state.projectors)
+
+
+class _Lit:
+    """Projectors as they stand, and the margin of what each lights."""
+
+    def __init__(
+        self, scene: Scene, rows: Target, projectors: list[PlannedProjector]
+    ) -> None:
+        self.scene, self.rows, self.projectors = scene, rows, projectors
+        self.margin = self.margins(projectors)
+
+    def margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
+        """Margin of each row and projector in [rad], -inf where unlit."""
+        lit = lit_stages(self.scene, projectors, self.rows) == lighting.LIT
+        return lit_margins(self.scene, projectors, self.rows, lit)
+
+
+def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
+    """Move one projector to where what it serves of the share has more margin."""
+    level = margin_at_share(state.margin, required)
+    best = state.margin.max(axis=1)
+    served = (best >= level) & (np.argmax(state.margin, axis=1) == p)
+    if not served.any():
+        return False
+    projector = state.projectors[p]
+    program = pose_program(state.scene, projector, state.rows.take(served))
+    solution = solve_pose(program)
+    if not solution.moved:
+        return False
+    before = float(pose_margins(program, projector.world_from_device).min())
+    for step in _STEPS:
+        pose = _part_of_the_way(
+            projector.world_from_device, solution.world_from_device, step
+        )
+        # On a straight way between two poses the shell may be left in between.
+        inside = float(pose_slack(program, pose).min()) >= 0.0
+        if not (inside and float(pose_margins(program, pose).min()) > before + _GAIN):
+            continue
+        offered = moved_to(projector, pose)
+        margin = state.margin.copy()
+        margin[:, p] = state.margins([offered])[:, 0]
+        kept = margin_at_share(margin, required) >= level
+        if kept and enough_lit(margin, required, lit_before):
+            state.projectors[p], state.margin = offered, margin
+            return True
+    return False
 
 
 def pose_program(
@@ -88,36 +141,6 @@ def pose_program(
         else workspace.floor_m + float(up @ centre),
         max_move_m=_MAX_MOVE_M,
     )
-
-
-def _improved(
-    scene: Scene,
-    projector: PlannedProjector,
-    rows: Target,
-    served: NDArray[np.bool_],
-    lit: NDArray[np.bool_],
-    p: int,
-) -> tuple[PlannedProjector, NDArray[np.bool_]] | None:
-    """A pose with more margin that loses no sample, and what it lights; or None."""
-    program = pose_program(scene, projector, rows.take(served))
-    solution = solve_pose(program)
-    if not solution.moved:
-        return None
-    before = float(pose_margins(program, projector.world_from_device).min())
-    others = np.delete(lit, p, axis=1).any(axis=1)
-    for step in _STEPS:
-        pose = _part_of_the_way(
-            projector.world_from_device, solution.world_from_device, step
-        )
-        # On a straight way between two poses the shell may be left in between.
-        inside = float(pose_slack(program, pose).min()) >= 0.0
-        if not (inside and float(pose_margins(program, pose).min()) > before):
-            continue
-        offered = moved_to(projector, pose)
-        lights = lit_stages(scene, [offered], rows)[:, 0] == lighting.LIT
-        if np.all((lights | others)[lit.any(axis=1)]):
-            return offered, lights
-    return None
 
 
 def moved_to(

@@ -1,7 +1,7 @@
 """Section III of the paper: the fewest projectors that light the dominant regions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from .one_fewer import Offer, one_fewer
 from .plan import PlannedProjector
 from .scene import Scene
 from .selection import Selection, certificate, marginals, select_fewest
+from .share_margin import widest_selection
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
@@ -105,7 +106,27 @@ def plan_projectors(
             break
         rows = merged(rows, fresh)
         stages = np.concatenate([stages, fresh_stages])
+    if confirmed and selection.status != "infeasible":
+        wider = _with_widest_margin(scene, candidates, rows, stages, selection)
+        covered = lit[:, wider.chosen].any(axis=1).sum()
+        if covered >= required.dominant_coverage * lit.any(axis=1).sum():
+            selection = wider
     return _stage(scene, candidates, rows, stages, selection)
+
+
+def _with_widest_margin(
+    scene: Scene,
+    candidates: tuple[PlannedProjector, ...],
+    rows: Target,
+    stages: NDArray[np.int8],
+    selection: Selection,
+) -> Selection:
+    """Return the selection with as many candidates of larger margin, if there are."""
+    margin = lit_margins(scene, candidates, rows, stages == lighting.LIT)
+    chosen = widest_selection(
+        margin, selection.chosen, selection.required, seed=scene.seed
+    )
+    return replace(selection, chosen=chosen)
 
 
 def _fewer(
@@ -213,6 +234,20 @@ def margins_of(
     for column, projector in enumerate(projectors):
         light = lighting.light_on(projector, target)
         margin[:, column] = lighting.margins(light, limits)
+    return margin
+
+
+def lit_margins(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    target: Target,
+    lit: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Return what `margins_of` does, -inf where a projector doesn't light a sample."""
+    margin = np.full(lit.shape, -np.inf)
+    for column, projector in enumerate(projectors):
+        own = np.flatnonzero(lit[:, column])
+        margin[own, column] = margins_of(scene, [projector], target.take(own))[:, 0]
     return margin
 
 
