@@ -25,6 +25,7 @@ from .spread_problem import (
     at_poses,
     spread_problem,
 )
+from .zone_limits import stands
 
 _Array = NDArray[np.float64]
 Measure = Callable[[_Array], NDArray[np.bool_]]
@@ -241,7 +242,11 @@ class _Search:
         )
 
     def _between(self, centres: _Array, share: _Array) -> _Array:
-        """Centres part of the way, on arcs about the workspace's centre."""
+        """Centres part of the way, on arcs about the centre or straight on a plane."""
+        if self.limits.workspace.mounting:
+            # An arc would leave the plane.
+            now = self.poses[:, :3, 3]
+            return now + share[:, None] * (centres - now)
         middle = np.array(self.limits.workspace.centre)
         start, end = self.poses[:, :3, 3] - middle, centres - middle
         r0, r1 = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
@@ -271,6 +276,7 @@ class _Search:
             )
         if space.floor_m is not None:
             inside &= offset @ np.array(space.up) >= space.floor_m - 1e-9
+        inside &= stands(space, offset)
         return bool(np.all(inside))
 
     def _by_baseline(self) -> list[int]:

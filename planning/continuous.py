@@ -30,6 +30,7 @@ from .projectors import ProjectorStage, with_more
 from .requirements import Workspace
 from .scene import Scene
 from .selection import required_rows
+from .zone_limits import may_hold
 
 
 @dataclass(frozen=True)
@@ -261,7 +262,7 @@ def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.boo
         lowest = workspace.floor_m / (far if workspace.floor_m > 0 else near)
         above = np.arccos(np.clip(cube.centres @ np.array(workspace.up), -1.0, 1.0))
         kept &= above <= np.arccos(np.clip(lowest, -1.0, 1.0)) + slack
-    return kept
+    return kept & may_hold(workspace, cube.centres, slack, near, far)
 
 
 def _open_rows(

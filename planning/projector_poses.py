@@ -14,7 +14,10 @@ from . import lighting
 from .lighting import Target
 from .plan import PlannedProjector
 from .projectors import ProjectorStage, lit_stages, margins_of
+from .requirements import Workspace
 from .scene import Scene
+from .zone_limits import half_spaces
+from .zone_positions import is_zoned
 
 _SWEEPS = 2
 _STEPS = (1.0, 0.5, 0.25)
@@ -87,7 +90,19 @@ def pose_program(
         if workspace.floor_m is None
         else workspace.floor_m + float(up @ centre),
         max_move_m=_MAX_MOVE_M,
+        half_spaces=_held_in(workspace, projector.world_from_device[:3, 3]),
     )
+
+
+def _held_in(
+    workspace: Workspace, position: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Rows (n, d) of the convex part of the zones about a position, n.Q >= d."""
+    if not is_zoned(workspace):
+        return None
+    centre = np.array(workspace.centre)
+    normals, offsets = half_spaces(workspace, position - centre)
+    return np.column_stack([normals, offsets + normals @ centre])
 
 
 def _improved(

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal, Self, TypeVar
 
+from .zones import Box, read_zones
+
 _T = TypeVar("_T")
 
 
@@ -85,11 +87,12 @@ class CheckLimits:
 
 @dataclass(frozen=True)
 class Workspace:
-    """Where devices may stand: a shell about the object, or a cone cut from it.
+    """Where devices may stand: a shell about the object, or what zones leave of it.
 
     A position Q is admissible iff |Q - centre| lies in the device's radius range, the
-    angle between Q - centre and `axis` is at most `half_angle`, and
-    (Q - centre) . up >= floor_m where a floor is given.
+    angle between Q - centre and `axis` is at most `half_angle`, (Q - centre) . up >=
+    floor_m where a floor is given, Q is in `box` and on one of `mounting` where they
+    are given, and inside none of `keep_out`.
 
     Attributes:
         centre: Centre of the smallest ball that holds the object's main bodies, in the
@@ -107,6 +110,9 @@ class Workspace:
             R (diverging) or its radius in [m] (parallel).
         bearing: Unit vector across `axis`, turning with the object, from which the
             lattice of offered poses starts; None: a world axis decides.
+        box: Room that holds every device; None: no room.
+        keep_out: Volumes in which no optical centre stands.
+        mounting: Planes on which optical centres lie; none: anywhere.
     """
 
     centre: tuple[float, float, float]
@@ -121,6 +127,9 @@ class Workspace:
     n_reference_cameras: int
     reference_ring_radius: float
     bearing: tuple[float, float, float] | None = None
+    box: Box | None = None
+    keep_out: tuple[Box, ...] = ()
+    mounting: tuple[Box, ...] = ()
 
     def inset(self, by_m: float) -> "Workspace":
         """Return the workspace shrunk on all sides.
@@ -140,6 +149,9 @@ class Workspace:
             if self.half_angle >= pi
             else max(0.0, self.half_angle - by_m / least),
             floor_m=None if self.floor_m is None else self.floor_m + by_m,
+            box=None if self.box is None else self.box.grown(-by_m),
+            keep_out=tuple(zone.grown(by_m) for zone in self.keep_out),
+            mounting=tuple(plane.grown(-by_m) for plane in self.mounting),
         )
 
 
@@ -173,9 +185,11 @@ class Requirements:
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
         document = asdict(self)
+        # Zones that aren't given have no key.
         document["workspace"] = {
-            key: list(value) if isinstance(value, tuple) else value
+            key: _listed(value)
             for key, value in document["workspace"].items()
+            if value or key not in ("box", "keep_out", "mounting")
         }
         return document
 
@@ -190,7 +204,7 @@ class Requirements:
         workspace = {
             key: tuple(value) if isinstance(value, list) else value
             for key, value in document["workspace"].items()
-        }
+        } | read_zones(document["workspace"])
         plain = {
             key: document[key]
             for key in (
@@ -211,6 +225,15 @@ class Requirements:
             check=_read(CheckLimits, document["check"]),
             workspace=_read(Workspace, workspace),
         )
+
+
+def _listed(value: object) -> object:
+    """Return a value with lists for tuples, as JSON gives it back."""
+    if isinstance(value, dict):
+        return {key: _listed(part) for key, part in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_listed(part) for part in value]
+    return value
 
 
 def _read(kind: type[_T], table: dict[str, Any]) -> _T:

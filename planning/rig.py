@@ -276,7 +276,7 @@ class Rig:
                 "gap_m": self.ring_gap_m,
                 "outer_radius": self.outer_ring_radius(),
             },
-            "workspace": table.workspace.model_dump(mode="json"),
+            "workspace": table.workspace.to_document(),
             "limits": table.limits.model_dump(mode="json"),
             "requirements": table.requirements.model_dump(mode="json"),
             "check": table.check.model_dump(mode="json"),

@@ -76,7 +76,8 @@ def _number(devices: Sequence[object], name: str) -> str:
 
 
 def _where(workspace: Workspace) -> str:
-    if workspace.half_angle >= np.pi and workspace.floor_m is None:
+    zones = zone_phrases(workspace)
+    if workspace.half_angle >= np.pi and workspace.floor_m is None and not zones:
         return "the whole shell about it (no floor)"
     parts: list[str] = []
     if workspace.half_angle < np.pi:
@@ -87,7 +88,21 @@ def _where(workspace: Workspace) -> str:
         )
     if workspace.floor_m is not None:
         parts.append(f"at least {1e3 * workspace.floor_m:.0f} mm above its centre")
-    return f"the shell about it, {', '.join(parts)}"
+    return f"the shell about it, {', '.join(parts + zones)}"
+
+
+def zone_phrases(workspace: Workspace) -> list[str]:
+    """Return what a box, keep-out volumes and mounting planes leave, a phrase each."""
+    found: list[str] = []
+    if workspace.box is not None:
+        size = " x ".join(f"{2e3 * half:.0f}" for half in workspace.box.half_m)
+        found.append(f"in a box of {size} mm")
+    if workspace.mounting:
+        names = [plane.name for plane in workspace.mounting]
+        found.append(f"on {' or '.join(names)}")
+    if workspace.keep_out:
+        found.append(f"not in {' or '.join(zone.name for zone in workspace.keep_out)}")
+    return found
 
 
 def _unit(mesh: dict[str, Any]) -> str:

@@ -227,6 +227,10 @@ def _state_workspace(
         stated.add(offset @ ca.DM(shell.axis) - np.cos(shell.half_angle) * distance)
     if shell.floor is not None:
         stated.add(offset @ ca.DM(shell.up), shell.floor)
+    held = problem.half_spaces
+    if held is not None and len(held.camera):
+        along = _dot(_rows(offset, held.camera), ca.DM(held.normals))
+        stated.add(along - ca.DM(held.offsets))
     # Squared, since the distance from the start has no derivative at the start.
     stated.add(
         ca.sum2((centres - ca.SX(problem.centres)) ** 2), 0.0, problem.max_step**2

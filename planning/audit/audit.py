@@ -25,6 +25,7 @@ from .samples import AuditSamples, draw_samples
 from .serving import audit_margins
 from .tables import audit_marginal, audit_rest
 from .verdict import unmet_requirements
+from .zones import audit_zones
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,7 @@ def audit_plan(
     estimator = _estimator(plan, samples, ledger)
     audit_devices(plan, ledger)
     audit_workspace(plan, ledger)
+    audit_zones(plan, ledger)
     audit_areas(own, reach, estimator, ledger)
     audit_causes(own, reach, estimator, ledger)
     audit_inside(plan, own, reach, shadow, ledger, seed=seed)

@@ -10,6 +10,7 @@ from planning.plan import PlannedCamera, PlannedProjector, RigPlan
 from planning.requirements import Workspace
 
 from .ledger import Ledger
+from .zones import zone_excess
 
 _ROUNDING = 1e-6
 # Positions are written to 0.01 mm, so one on the border may lie outside by as much.
@@ -90,7 +91,7 @@ def outside_by(
     """Return how far positions (n, 3) lie outside the workspace, <= 0 inside, (n,) [m].
 
     The largest of the amounts by which |Q - c| misses its range, Q stands behind the
-    cone (times |Q - c|) and Q stands below the floor.
+    cone (times |Q - c|), below the floor, and where its zones don't let it.
     """
     offset = positions - np.array(space.centre)
     distance = np.linalg.norm(offset, axis=1)
@@ -101,6 +102,7 @@ def outside_by(
     excess = [shell[0] - distance, distance - shell[1], beyond]
     if space.floor_m is not None:
         excess.append(space.floor_m - offset @ np.array(space.up))
+    excess += zone_excess(offset, space)
     return np.max(excess, axis=0)
 
 
