@@ -131,6 +131,7 @@ class _Search:
         self.rolls = _rolls(self.poses, self.aims, np.array(limits.workspace.up))
         self.pairs = self._neighbours(self.measured)
         self._groups = self._count_groups(self.measured)
+        self._free = np.array([not camera.existing for camera in cameras])
 
     def run(self, required: float) -> CameraSpread:
         before = self._smallest(self.poses)
@@ -138,6 +139,8 @@ class _Search:
         reach = _REACH * self.limits.workspace.camera_radius_m[1]
         least = _MIN_REACH * self.limits.workspace.camera_radius_m[1]
         while self.pairs and self.spent < self._budget and reach >= least:
+            if not self._free.any():
+                break
             taken, proposed = self._improve(reach)
             if not taken:
                 reach = _SHRINK * min(reach, proposed)
@@ -199,6 +202,7 @@ class _Search:
                 )
             ]
         )
+        poses[~self._free] = self.poses[~self._free]
         measured = self._evaluate(poses)
         lost = np.flatnonzero(self.measured.any(axis=1) & ~measured.any(axis=1))
         if not self._weight(measured) >= self._floor:
@@ -265,6 +269,7 @@ class _Search:
 
     def _admissible(self, centres: _Array) -> bool:
         space = self.limits.workspace
+        centres = centres[self._free]
         offset = centres - np.array(space.centre)
         distance = np.linalg.norm(offset, axis=1)
         low, high = space.camera_radius_m

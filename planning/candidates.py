@@ -214,6 +214,7 @@ def _projectors(
             template,
             world_from_device=pose,
             world_from_ring=ring_frame(pose, template.device, *ring_offset),
+            existing="",
         )
         for pose in poses
     )

@@ -43,6 +43,8 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     for _ in range(_SWEEPS):
         moved = False
         for p, projector in enumerate(projectors):
+            if projector.existing:
+                continue
             served = lighting.served_by(lit, margins_of(scene, projectors, rows)) == p
             if not served.any():
                 continue

@@ -12,6 +12,7 @@ from geometry.visibility_matrix import visibility_matrix
 from . import lighting
 from .candidates import projector_candidates, projectors_around
 from .errors import InfeasibleLimitsError
+from .existing import existing_projectors, movable
 from .lighting import Target
 from .plan import PlannedProjector
 from .scene import Scene
@@ -71,7 +72,9 @@ def plan_projectors(
         InfeasibleLimitsError: If no candidate lights any sample.
     """
     required = scene.requirements
-    candidates = projector_candidates(
+    # Those that stand already come first, and are in every cover.
+    candidates = existing_projectors(required, template, ring_offset)
+    candidates += projector_candidates(
         template, required.workspace, n_candidates, ring_offset=ring_offset
     )
     rows = scene.target_samples(_ROWS, _STREAM)
@@ -81,7 +84,7 @@ def plan_projectors(
     selection = _fewest(scene, stages)
     # The best of a lattice lies beside the best there is.
     around = projectors_around(
-        [candidates[i] for i in selection.chosen],
+        movable([candidates[i] for i in selection.chosen]),
         required.workspace,
         len(candidates),
         ring_offset=ring_offset,
@@ -126,7 +129,12 @@ def _fewest(scene: Scene, stages: NDArray[np.int8]) -> Selection:
         required.dominant_coverage,
         max_count=required.max_projectors,
         seed=scene.seed,
+        given=_n_given(scene),
     )
+
+
+def _n_given(scene: Scene) -> int:
+    return len(scene.requirements.existing_of("projector"))
 
 
 def lit_stages(
@@ -199,13 +207,15 @@ def _stage(
     stages: NDArray[np.int8],
     selection: Selection,
 ) -> ProjectorStage:
-    others = marginals(stages == lighting.LIT, selection, seed=scene.seed)
+    lit, given = stages == lighting.LIT, _n_given(scene)
+    others = marginals(lit, selection, seed=scene.seed, given=given)
     proof = certificate(
         selection,
         others,
         n_rows=len(rows),
         row_area_m2=rows.samples.weight,
         n_candidates=len(candidates),
+        given=given,
     )
     proof["excluded_pairs"] = {
         cause: int((stages == index).sum())

@@ -156,6 +156,21 @@ class Workspace:
 
 
 @dataclass(frozen=True)
+class Existing:
+    """A device that stands already and stays where it is.
+
+    Attributes:
+        name: As in the rig file.
+        kind: `projector` or `camera`.
+        world_from_device: Its pose, rows of a 4 x 4 matrix [m].
+    """
+
+    name: str
+    kind: str
+    world_from_device: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
 class Requirements:
     """All that is asked of a plan.
 
@@ -167,6 +182,7 @@ class Requirements:
         min_reachable: Area reachable by projectors / target area.
         target: `dominant` regions, or the whole `surface`.
         pattern: `rings`; `dense` and `none` come later.
+        existing: Devices that stand already and are part of every plan.
     """
 
     max_projectors: int
@@ -181,6 +197,11 @@ class Requirements:
     triangulation: TriangulationLimits
     check: CheckLimits
     workspace: Workspace
+    existing: tuple[Existing, ...] = ()
+
+    def existing_of(self, kind: str) -> tuple[Existing, ...]:
+        """Return the existing devices that are a `projector` or a `camera`."""
+        return tuple(device for device in self.existing if device.kind == kind)
 
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
@@ -191,7 +212,8 @@ class Requirements:
             for key, value in document["workspace"].items()
             if value or key not in ("box", "keep_out", "mounting")
         }
-        return document
+        existing = document.pop("existing")
+        return document | ({"existing": _listed(existing)} if existing else {})
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Self:
@@ -224,7 +246,15 @@ class Requirements:
             triangulation=_read(TriangulationLimits, document["triangulation"]),
             check=_read(CheckLimits, document["check"]),
             workspace=_read(Workspace, workspace),
+            existing=tuple(_existing(e) for e in document.get("existing", ())),
         )
+
+
+def _existing(table: dict[str, Any]) -> Existing:
+    rows = tuple(tuple(float(x) for x in row) for row in table["world_from_device"])
+    if [len(row) for row in rows] != [4] * 4:
+        raise ValueError("existing: world_from_device must be 4 x 4")
+    return Existing(str(table["name"]), str(table["kind"]), rows)
 
 
 def _listed(value: object) -> object:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from .existing_models import ExistingTable
 from .table_types import (
     Acute,
     Limit,
@@ -253,3 +254,12 @@ class RigTable(Table):
     limits: LimitsTable = LimitsTable()
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
+    existing: list[ExistingTable] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _check_existing(self) -> Self:
+        names = [device.name for device in self.existing]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"existing names {name!r} twice; name them apart")
+        return self

@@ -66,7 +66,12 @@ class Marginals:
 
 
 def select_fewest(
-    covers: NDArray[np.bool_], share: float, *, max_count: int | None, seed: int
+    covers: NDArray[np.bool_],
+    share: float,
+    *,
+    max_count: int | None,
+    seed: int,
+    given: int = 0,
 ) -> Selection:
     """Return the fewest candidates that cover a share of what all of them cover.
 
@@ -77,9 +82,10 @@ def select_fewest(
         share: Of the rows that any candidate serves, in (0, 1].
         max_count: Candidates allowed; None for no limit.
         seed: Of the heuristics.
+        given: First candidates that are taken whatever they cover.
     """
     required = required_rows(np.any(covers, axis=1), share)
-    problem = _problem(covers, required)
+    problem = _problem(covers, required, given)
     reduced = reduced_problem(problem)
     solution = solve_cover(problem, seed=seed, heaviest=False, reduced=reduced)
     needed = len(solution.selected)
@@ -113,7 +119,12 @@ def required_rows(reached: NDArray[np.bool_], share: float) -> int:
 
 
 def marginals(
-    covers: NDArray[np.bool_], selection: Selection, *, seed: int, more: int = MORE
+    covers: NDArray[np.bool_],
+    selection: Selection,
+    *,
+    seed: int,
+    more: int = MORE,
+    given: int = 0,
 ) -> Marginals:
     """Return the best candidates for every other count, for the table in the plan.
 
@@ -122,14 +133,15 @@ def marginals(
         selection: As it is kept.
         seed: Of the heuristics.
         more: Counts beyond the one taken for which the best is wanted.
+        given: As in `select_fewest`; fewer than these aren't looked at.
     """
-    problem = _problem(covers, selection.required)
+    problem = _problem(covers, selection.required, given)
     reduced = reduced_problem(problem)
     taken = len(selection.chosen)
     bound = 0.0
     by_count: dict[int, NDArray[np.int64]] = {}
     best = np.empty(0, dtype=np.int64)
-    for count in range(1, min(taken + more, covers.shape[1]) + 1):
+    for count in range(max(1, given), min(taken + more, covers.shape[1]) + 1):
         if count == taken:
             best = selection.chosen
         else:
@@ -148,14 +160,17 @@ def marginals(
     if selection.lower_bound >= taken:
         # Where fewer are proved too few, they fall short of what is required.
         one_fewer = min(one_fewer, selection.required - 1)
-    return Marginals(by_count, one_fewer, _greedy_count(covers, selection.required))
+    greedy = _greedy_count(covers, selection.required, given)
+    return Marginals(by_count, one_fewer, greedy)
 
 
-def _problem(covers: NDArray[np.bool_], required: int) -> CoverProblem:
+def _problem(covers: NDArray[np.bool_], required: int, given: int) -> CoverProblem:
     """The program over the rows that some candidate serves."""
     reachable = covers[covers.any(axis=1)]
     return CoverProblem(
-        sparse.csr_array(reachable), required_weight=np.array([required])
+        sparse.csr_array(reachable),
+        required_weight=np.array([required]),
+        fixed=np.arange(given),
     )
 
 
@@ -163,10 +178,10 @@ def _rows(covers: NDArray[np.bool_], chosen: NDArray[np.int64]) -> int:
     return int(covers[:, chosen].any(axis=1).sum())
 
 
-def _greedy_count(covers: NDArray[np.bool_], required: int) -> int:
+def _greedy_count(covers: NDArray[np.bool_], required: int, given: int) -> int:
     """How many candidates it takes when each adds the most rows, lower index first."""
-    left = np.ones(len(covers), dtype=bool)
-    count = 0
+    left = ~covers[:, :given].any(axis=1)
+    count = given
     while len(covers) - left.sum() < required:
         left &= ~covers[:, int(np.argmax(covers[left].sum(axis=0)))]
         count += 1
@@ -180,8 +195,12 @@ def certificate(
     n_rows: int,
     row_area_m2: float,
     n_candidates: int,
+    given: int = 0,
 ) -> dict[str, Any]:
-    """Return the plan's certificate: what was proved, and over what."""
+    """Return the plan's certificate: what was proved, and over what.
+
+    With devices given, its bounds count them, and speak of covers that hold them.
+    """
     count = len(selection.chosen)
     bounded = min(selection.lower_bound, count)
     return {
@@ -201,7 +220,10 @@ def certificate(
             "value_m2": selection.best_rows * row_area_m2,
             "upper_bound_m2": selection.best_rows_bound * row_area_m2,
         },
-        "one_fewer": {"upper_bound_m2": others.one_fewer_bound * row_area_m2},
+        "one_fewer": {"upper_bound_m2": others.one_fewer_bound * row_area_m2}
+        if count > given
+        else None,
+        **({"given": given} if given else {}),
     }
 
 

@@ -148,18 +148,23 @@ def spread_problem(
         range_m=cameras[0].device.range_m,
         min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
         max_step=max_step,
-        half_spaces=_held_in(limits.workspace, centres),
+        half_spaces=_held_in(limits.workspace, cameras),
+        fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
     )
 
 
-def _held_in(workspace: Workspace, centres: _Array) -> HalfSpaces | None:
-    """The convex part of the zones about each camera."""
-    if not is_zoned(workspace):
+def _held_in(
+    workspace: Workspace, cameras: Sequence[PlannedCamera]
+) -> HalfSpaces | None:
+    """The convex part of the zones about each camera that may move."""
+    free = [c for c, camera in enumerate(cameras) if not camera.existing]
+    if not (is_zoned(workspace) and free):
         return None
+    centres = np.stack([cameras[c].world_from_device[:3, 3] for c in free])
     offsets = centres - np.array(workspace.centre)
     parts = [half_spaces(workspace, offset) for offset in offsets]
     return HalfSpaces(
-        np.repeat(np.arange(len(parts)), [len(normals) for normals, _ in parts]),
+        np.repeat(free, [len(normals) for normals, _ in parts]),
         np.concatenate([normals for normals, _ in parts]),
         np.concatenate([least for _, least in parts]),
     )

@@ -133,6 +133,7 @@ def _devices(plan: RigPlan) -> str:
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {azimuth:12.1f} "
             f"{elevation:10.1f}   {roll:12.1f}   {distance:10.1f}"
+            + (f"   existing: {device.existing}" if device.existing else "")
         )
     k = int(np.argmax(np.abs(up)))
     lines.append(
@@ -200,7 +201,7 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
     count = proof["count"]
     scope = (
         f"to {verb} {100 * share:g} % of what the {candidates['n_candidates']} "
-        f"candidate poses reach of {proof['n_samples']} samples"
+        f"candidate poses reach of {proof['n_samples']} samples{_given(proof)}"
     )
     name = f"{kind}s"
     if needed["count"] > count:
@@ -216,6 +217,10 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
     return f"BOUND    {count} {name}; at least {least} are needed {scope}"
 
 
+def _given(proof: dict[str, Any]) -> str:
+    return f", given {proof['given']} existing" if "given" in proof else ""
+
+
 def _continuous(plan: RigPlan, proof: dict[str, Any]) -> str:
     """Return what was proved over all poses of the workspace, in a line."""
     bound = proof["continuous"]
@@ -223,7 +228,10 @@ def _continuous(plan: RigPlan, proof: dict[str, Any]) -> str:
     poses = "direction" if parallel else "position and aim"
     if bound is None:
         return f"         nothing is proved over every {poses} in the workspace"
-    scope = f"over every {poses} in the workspace, for {bound['n_samples']} samples"
+    scope = (
+        f"over every {poses} in the workspace, for {bound['n_samples']} samples"
+        f"{_given(proof)}"
+    )
     blind = "" if bound["occlusion"] else ", shadows left out"
     least = bound["lower_bound"]
     if least >= proof["needed"]["count"]:

@@ -108,6 +108,7 @@ class BaselineProblem:
         min_conditioning: e, least |r.m| of kept points.
         max_step: Farthest that a centre may move in [m].
         half_spaces: What else holds the centres; None: nothing.
+        fixed: Cameras that stay where they are, wherever that is, shape (f,).
     """
 
     centres: _Array
@@ -121,6 +122,7 @@ class BaselineProblem:
     min_conditioning: float
     max_step: float
     half_spaces: HalfSpaces | None = None
+    fixed: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         k = len(self.centres)
@@ -133,6 +135,7 @@ class BaselineProblem:
         indices = [self.pairs, self.seams.cameras, self.kept.camera]
         if self.half_spaces is not None:
             indices.append(self.half_spaces.camera)
+        indices.append(np.array(self.fixed, dtype=np.int64))
         if not all(np.all((i >= 0) & (i < k)) for i in indices):
             raise ValueError(f"camera indices must lie in 0 to {k - 1}")
         if not 0.0 < self.max_step < np.inf:

@@ -324,3 +324,13 @@ def test_a_half_space_holds_its_camera_alone():
     assert solution.centres[0, 1] == pytest.approx(free[0, 1], abs=0.02)
     with pytest.raises(ValueError, match="camera indices"):
         replace(start, half_spaces=replace(held, camera=np.array([2])))
+
+
+def test_a_camera_that_stands_already_stays_wherever_it_is():
+    start = _problem([1.7 * _on_ring(-0.1), _on_ring(0.1)], max_step=0.6)
+    solution = solve_baseline(replace(start, fixed=(0,)))
+    assert np.array_equal(solution.centres[0], 1.7 * _on_ring(-0.1))
+    assert np.linalg.norm(solution.centres[1]) == pytest.approx(RING)
+    assert np.linalg.norm(solution.centres[1] - _on_ring(0.1)) > 0.5
+    with pytest.raises(ValueError, match="camera indices"):
+        replace(start, fixed=(2,))

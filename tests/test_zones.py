@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from geometry.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
 from geometry.primitives import box as plate_of
 from planning import load_rig, plan_rig
@@ -339,6 +340,7 @@ def planned(tmp_path_factory):
         "n_candidate_cameras = 400\nn_reference_cameras = 400\n"
     )
     plate = plate_of((0.1, 0.1, 0.01), divisions=4)
+    plate = TriangleMesh(plate.vertices + CENTRE, plate.faces)
     try:
         return plan_rig(
             plate, load_rig(path), max_projectors=2, target="surface", check=False

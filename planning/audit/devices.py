@@ -9,6 +9,7 @@ from geometry.devices import ParallelModel
 from planning.plan import PlannedCamera, PlannedProjector, RigPlan
 from planning.requirements import Workspace
 
+from .existing import planned_only
 from .ledger import Ledger
 from .zones import zone_excess
 
@@ -81,7 +82,8 @@ def audit_workspace(plan: RigPlan, ledger: Ledger) -> None:
             f"{key}.n_reference_{kind}",
             f"{stated} reference poses are claimed, surface.npz holds {len(poses)}",
         )
-        _audit_reference(poses, kind, shell, space, ledger)
+        movable = planned_only(poses, kind, plan)
+        _audit_reference(movable, kind, shell, space, ledger)
     _audit_reference_rings(plan, ledger)
 
 
@@ -112,6 +114,9 @@ def _audit_position(
     space: Workspace,
     ledger: Ledger,
 ) -> None:
+    if device.existing:
+        # It stands where it stands: `audit_existing` checks that it does.
+        return
     position = device.world_from_device[:3, 3]
     excess = float(outside_by(position[None], shell, space)[0])
     ledger.holds(
