@@ -104,7 +104,7 @@ def _laid(planes: tuple[Box, ...], n: int) -> list[_Array]:
     counts = np.ceil(n * areas / areas.sum()).astype(np.int64)
     places: list[_Array] = []
     for plane, count in zip(planes, counts, strict=True):
-        share = (0.5 + np.outer(np.arange(count), _STEPS)) % 1.0
+        share = (0.5 + np.arange(count)[:, None] * _STEPS) % 1.0
         local = (2.0 * share - 1.0) * np.array(plane.half_m)
         places.append(np.array(plane.centre_m) + local @ np.array(plane.axes))
     return places
