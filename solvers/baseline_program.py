@@ -27,8 +27,8 @@ theta - iota_2 or b_2 - beta_2, what camera 2 has left, stay >= 0. Where both me
 incidence limit this reads phi <= 2 theta + delta, and so for the field. What is past a
 limit at the start may stay there but gets no worse.
 
-The program is smooth and not convex; IPOPT gives a local optimum from exact gradients
-and a quasi-Newton Hessian. What coverage really does is for the caller's rays to say.
+The program is smooth and not convex; IPOPT gives a local optimum from exact
+derivatives. What coverage really does is for the caller's rays to say.
 
 Source: Lee and Krim, 2014, eqs. (9)-(10); `formulation.md` section 6.
 """
@@ -163,9 +163,6 @@ def _run_ipopt(
             "ipopt.mumps_pivot_order": _AMD,
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
-            # The exact Hessian takes longer to build than the whole solution without it,
-            # and no optimum is better for it.
-            "ipopt.hessian_approximation": "limited-memory",
             "ipopt.max_iter": _MAX_ITERATIONS,
             "ipopt.tol": 1e-7,
             "ipopt.acceptable_iter": 0,

@@ -313,11 +313,11 @@ def test_max_coverage_counts_rows_only_when_served_often_enough():
 
 def test_permuted_rows_and_columns_need_as_many():
     rng = np.random.default_rng(0)
-    problem = random_cover(5, n_e=80, n_s=30, share=0.8)
+    problem = random_cover(5, n_e=60, n_s=24, share=0.8)
     best = solve_cover(problem, heaviest=False)
     assert best.status is SolveStatus.OPTIMAL
     for _ in range(2):
-        rows, columns = rng.permutation(80), rng.permutation(30)
+        rows, columns = rng.permutation(60), rng.permutation(24)
         moved = CoverProblem(
             problem.covers.toarray()[rows][:, columns],
             problem.weights[rows],
@@ -336,7 +336,7 @@ def test_same_answer_with_one_and_two_threads(by_threads):
     def answers():
         found = []
         for seed in (1, 4):
-            problem = random_cover(seed, n_e=150, n_s=40, share=0.8)
+            problem = random_cover(seed, n_e=100, n_s=30, share=0.8)
             s = solve_cover.__wrapped__(problem, budget=1e8)
             found.append((s.selected.tolist(), s.lower_bound, s.proof))
         return found

@@ -70,7 +70,7 @@ def winding(mesh, inside):
     return angles.sum() / (4 * np.pi), angles.min()
 
 
-@pytest.mark.parametrize("n_faces", [500, 2_000, 24_000, 60_000])
+@pytest.mark.parametrize("n_faces", [500, 2_000, 24_000])
 def test_mesh_is_sound_at_every_resolution(n_faces):
     mesh = sample_head(n_faces=n_faces)
     assert n_faces <= len(mesh.faces) <= n_faces + 41 * np.sqrt(n_faces / 20)
@@ -116,7 +116,7 @@ def test_an_open_neck_has_one_level_border():
 
 
 def test_resolutions_agree_on_the_surface(head):
-    fine = sample_head(n_faces=150_000)
+    fine = sample_head(n_faces=100_000)
     assert volume(head) == pytest.approx(volume(fine), rel=2e-3)
     x = np.linspace(-55, 55, 23)
     assert np.abs(profile(head, x, 45.0) - profile(fine, x, 45.0)).max() < 0.2
@@ -183,27 +183,27 @@ def test_ears_are_the_widest_part_and_hollow(head, side):
 
 def test_parameters_move_what_they_name():
     base = HeadShape()
-    plain = sample_head(base, n_faces=8_000)
+    plain = sample_head(base, n_faces=4_000)
     size = np.ptp(plain.bounds, axis=0) * 1e3
     tip = -1e3 * plain.bounds[0, 1]
-    longer = sample_head(HeadShape(nose_projection=24.0), n_faces=8_000)
+    longer = sample_head(HeadShape(nose_projection=24.0), n_faces=4_000)
     assert -1e3 * longer.bounds[0, 1] - tip == pytest.approx(5.0, abs=0.5)
-    taller = sample_head(HeadShape(crown_height=123.0), n_faces=8_000)
+    taller = sample_head(HeadShape(crown_height=123.0), n_faces=4_000)
     assert 1e3 * (taller.bounds - plain.bounds)[1, 2] == pytest.approx(10.0, abs=0.5)
-    necked = sample_head(HeadShape(neck_length=32.0), n_faces=8_000)
+    necked = sample_head(HeadShape(neck_length=32.0), n_faces=4_000)
     assert 1e3 * (plain.bounds - necked.bounds)[0, 2] == pytest.approx(10.0, abs=0.5)
-    eared = sample_head(HeadShape(ear_standoff=22.0), n_faces=8_000)
+    eared = sample_head(HeadShape(ear_standoff=22.0), n_faces=4_000)
     assert np.ptp(eared.bounds, axis=0)[0] * 1e3 > size[0] + 6
-    twice = sample_head(HeadShape(scale=2.0), n_faces=8_000)
+    twice = sample_head(HeadShape(scale=2.0), n_faces=4_000)
     assert twice.vertices == pytest.approx(2.0 * plain.vertices)
     assert np.array_equal(twice.faces, plain.faces)
 
 
 def test_every_parameter_matters():
-    plain = sample_head(n_faces=2_000)
+    plain = sample_head(n_faces=800)
     for field in fields(HeadShape):
         near = float(field.default) * 1.05 + 0.5
-        other = sample_head(HeadShape(**{field.name: near}), n_faces=2_000)
+        other = sample_head(HeadShape(**{field.name: near}), n_faces=800)
         moved = np.linalg.norm(other.vertices - plain.vertices, axis=1).max()
         assert moved > 1e-4, field.name
 
