@@ -25,6 +25,7 @@ from .spread_problem import (
     at_poses,
     spread_problem,
 )
+from .zone_limits import stands
 
 _Array = NDArray[np.float64]
 Measure = Callable[[_Array], NDArray[np.bool_]]
@@ -130,6 +131,7 @@ class _Search:
         self.rolls = _rolls(self.poses, self.aims, np.array(limits.workspace.up))
         self.pairs = self._neighbours(self.measured)
         self._groups = self._count_groups(self.measured)
+        self._free = np.array([not camera.existing for camera in cameras])
 
     def run(self, required: float) -> CameraSpread:
         before = self._smallest(self.poses)
@@ -137,6 +139,8 @@ class _Search:
         reach = _REACH * self.limits.workspace.camera_radius_m[1]
         least = _MIN_REACH * self.limits.workspace.camera_radius_m[1]
         while self.pairs and self.spent < self._budget and reach >= least:
+            if not self._free.any():
+                break
             taken, proposed = self._improve(reach)
             if not taken:
                 reach = _SHRINK * min(reach, proposed)
@@ -198,6 +202,7 @@ class _Search:
                 )
             ]
         )
+        poses[~self._free] = self.poses[~self._free]
         measured = self._evaluate(poses)
         lost = np.flatnonzero(self.measured.any(axis=1) & ~measured.any(axis=1))
         if not self._weight(measured) >= self._floor:
@@ -241,7 +246,11 @@ class _Search:
         )
 
     def _between(self, centres: _Array, share: _Array) -> _Array:
-        """Centres part of the way, on arcs about the workspace's centre."""
+        """Centres part of the way, on arcs about the centre or straight on a plane."""
+        if self.limits.workspace.mounting:
+            # An arc would leave the plane.
+            now = self.poses[:, :3, 3]
+            return now + share[:, None] * (centres - now)
         middle = np.array(self.limits.workspace.centre)
         start, end = self.poses[:, :3, 3] - middle, centres - middle
         r0, r1 = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
@@ -260,6 +269,7 @@ class _Search:
 
     def _admissible(self, centres: _Array) -> bool:
         space = self.limits.workspace
+        centres = centres[self._free]
         offset = centres - np.array(space.centre)
         distance = np.linalg.norm(offset, axis=1)
         low, high = space.camera_radius_m
@@ -271,6 +281,7 @@ class _Search:
             )
         if space.floor_m is not None:
             inside &= offset @ np.array(space.up) >= space.floor_m - 1e-9
+        inside &= stands(space, offset)
         return bool(np.all(inside))
 
     def _by_baseline(self) -> list[int]:

@@ -12,6 +12,7 @@ from geometry.visibility_matrix import visibility_matrix
 from . import lighting, measurability
 from .candidates import camera_candidates
 from .errors import InfeasibleLimitsError
+from .existing import existing_cameras
 from .lighting import Light, Target
 from .measurability import Rings
 from .plan import PlannedCamera, PlannedProjector
@@ -133,7 +134,9 @@ def plan_cameras(
         InfeasibleLimitsError: If no candidate measures any lit sample.
     """
     required = scene.requirements
-    candidates = camera_candidates(template, required.workspace, n_candidates)
+    # Those that stand already come first, and are in every cover.
+    candidates = existing_cameras(required, template)
+    candidates += camera_candidates(template, required.workspace, n_candidates)
     target = scene.target_samples(_ROWS, _STREAM)
     rows = lit_samples(scene, projectors, target)
     measured = measured_by(scene, candidates, rows)
@@ -143,7 +146,11 @@ def plan_cameras(
     while True:
         attempt += 1
         selection = select_fewest(
-            measured, required.coverage, max_count=required.max_cameras, seed=scene.seed
+            measured,
+            required.coverage,
+            max_count=required.max_cameras,
+            seed=scene.seed,
+            given=_n_given(scene),
         )
         fresh_target = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh = lit_samples(scene, projectors, fresh_target)
@@ -160,7 +167,8 @@ def plan_cameras(
 
 def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     """Return what the stage found, with the best cameras for every other count."""
-    others = marginals(cover.measured, cover.selection, seed=scene.seed)
+    given = _n_given(scene)
+    others = marginals(cover.measured, cover.selection, seed=scene.seed, given=given)
     target = cover.rows.target
     return CameraStage(
         cover.cameras,
@@ -176,8 +184,13 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
             n_rows=len(target),
             row_area_m2=target.samples.weight,
             n_candidates=len(cover.candidates),
+            given=given,
         ),
     )
+
+
+def _n_given(scene: Scene) -> int:
+    return len(scene.requirements.existing_of("camera"))
 
 
 def _measurable(

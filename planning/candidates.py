@@ -13,6 +13,8 @@ from .errors import InfeasibleLimitsError
 from .plan import PlannedCamera, PlannedProjector
 from .requirements import Workspace
 from .rings import ring_frame
+from .zone_conflicts import no_position
+from .zone_positions import along_rays, filled, is_zoned
 
 _QUARTER = float(np.pi / 2)
 # A floor may leave a sliver of the cone; finer lattices than this aren't tried for it.
@@ -29,7 +31,8 @@ def shell_positions(
     """Return at least n admissible positions in the middle of the shell, (m, 3).
 
     Where a floor cuts the cone, the lattice is refined until n positions are left, so
-    that a small workspace is searched as densely as a large one is.
+    that a small workspace is searched as densely as a large one is. Where zones cut it,
+    positions are as near to the middle as they may, or on the mounting planes.
 
     Args:
         workspace: The shell or cone.
@@ -39,11 +42,16 @@ def shell_positions(
     radius = 0.5 * (radius_m[0] + radius_m[1])
     centre = np.array(workspace.centre)
     start = None if workspace.bearing is None else np.array(workspace.bearing)
+
+    def lattice(k: int) -> NDArray[np.float64]:
+        axis = np.array(workspace.axis)
+        return fibonacci_cap(k, axis, workspace.half_angle, start=start)
+
+    if is_zoned(workspace):
+        return centre + filled(workspace, radius_m, n, lattice)
     offered = n
     while True:
-        directions = fibonacci_cap(
-            offered, np.array(workspace.axis), workspace.half_angle, start=start
-        )
+        directions = lattice(offered)
         kept = directions[_stands(directions, radius, workspace)]
         if len(kept) >= n or not len(kept) or offered > _MOST_OFFERED * n:
             return centre + radius * kept
@@ -128,9 +136,8 @@ def projectors_towards(
     """
     near, far = workspace.projector_radius_m
     radius, device = 0.5 * (near + far), template.device
-    kept = directions[_stands(directions, radius, workspace)]
     rolls = rolls_for(device, workspace.object_radius_m, radius)
-    positions = np.array(workspace.centre) + radius * kept
+    positions = np.array(workspace.centre) + _offsets(directions, workspace)
     poses = _aimed(positions, device, workspace, rolls)
     return _projectors(template, poses, ring_offset)
 
@@ -173,10 +180,21 @@ def projectors_around(
         level = np.cross(np.array(workspace.up), outwards)
         start = level if np.linalg.norm(level) > _LEVEL else None
         cap = fibonacci_cap(_AROUND, outwards, reach, start=start)
-        found.append(centre + radius * cap[_stands(cap, radius, workspace)])
+        found.append(centre + _offsets(cap, workspace))
     positions = np.concatenate(found)
     poses = _aimed(positions, device, workspace, rolls)
     return _projectors(chosen[0], poses, ring_offset)
+
+
+def _offsets(
+    directions: NDArray[np.float64], workspace: Workspace
+) -> NDArray[np.float64]:
+    """Admissible positions of projectors in given directions, from the centre."""
+    if is_zoned(workspace):
+        return along_rays(workspace, workspace.projector_radius_m, directions)
+    near, far = workspace.projector_radius_m
+    radius = 0.5 * (near + far)
+    return radius * directions[_stands(directions, radius, workspace)]
 
 
 def _stands(
@@ -199,6 +217,7 @@ def _projectors(
             template,
             world_from_device=pose,
             world_from_ring=ring_frame(pose, template.device, *ring_offset),
+            existing="",
         )
         for pose in poses
     )
@@ -222,10 +241,7 @@ def _poses(
     rolls = rolls_for(device, workspace.object_radius_m, distance)
     positions = shell_positions(workspace, radius_m, -(-n // len(rolls)))
     if not len(positions):
-        raise InfeasibleLimitsError(
-            "the workspace holds no position: its floor, cone and shell exclude each "
-            "other; lower the floor or widen the cone"
-        )
+        raise InfeasibleLimitsError(no_position(workspace, radius_m))
     return _aimed(positions, device, workspace, rolls)
 
 

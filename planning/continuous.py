@@ -23,6 +23,7 @@ from solvers.cell_problem import CellProblem
 
 from .candidates import projectors_towards
 from .direction_cells import DirectionTree
+from .given_bound import enough, given_on
 from .lighting import LIT, Target
 from .plan import PlannedProjector
 from .position_cells import PositionTree
@@ -30,6 +31,7 @@ from .projectors import ProjectorStage, with_more
 from .requirements import Workspace
 from .scene import Scene
 from .selection import required_rows
+from .zone_limits import may_hold
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class ContinuousBound:
             light, of cells in which one projector fewer may be enough, shape (k, 3).
         n_samples: Samples of the target from which the rows are.
         row_area_m2: Area that a sample stands for.
+        given: Projectors that stand already.
+        n_free: Rows that they light, which the search over cells left out.
     """
 
     found: CellBound
@@ -74,6 +78,8 @@ class ContinuousBound:
     directions: NDArray[np.float64]
     n_samples: int
     row_area_m2: float
+    given: int = 0
+    n_free: int = 0
 
     def entry(self) -> dict[str, Any]:
         """Return the plan's `continuous` of a certificate."""
@@ -83,14 +89,14 @@ class ContinuousBound:
             # Fewer fall short of what is required, by a sample at least.
             most = min(most, float(found.problem.required_weight[0]) - 1.0)
         return {
-            "lower_bound": int(found.lower_bound),
+            "lower_bound": int(found.lower_bound) + self.given,
             "status": found.status.name.lower(),
             "proof": found.proof,
             "occlusion": self.shadows,
             "n_samples": self.n_samples,
-            "n_reached": len(found.problem.weights),
+            "n_reached": len(found.problem.weights) + self.n_free,
             "n_cells": found.cells_used,
-            "one_fewer_upper_bound_m2": most * self.row_area_m2,
+            "one_fewer_upper_bound_m2": (most + self.n_free) * self.row_area_m2,
         }
 
 
@@ -115,7 +121,7 @@ def prove_fewest(
         ring_offset: Of candidates, as `projector_candidates` takes it.
     """
     workspace = scene.requirements.workspace
-    while True:
+    while stage.certificate["needed"]["count"] > stage.certificate.get("given", 0):
         bound = _bound_of(scene, stage, template, effort)
         found = projectors_towards(
             template, workspace, bound.directions, ring_offset=ring_offset
@@ -124,6 +130,8 @@ def prove_fewest(
         if better is stage:
             return replace(stage, certificate=_joined(stage.certificate, bound.entry()))
         stage = better
+    entry = enough(stage.certificate, np.any(stage.stages == LIT, axis=1))
+    return replace(stage, certificate=stage.certificate | {"continuous": entry})
 
 
 def _joined(certificate: dict[str, Any], bound: dict[str, Any]) -> dict[str, Any]:
@@ -151,16 +159,20 @@ def _bound_of(
     # The first samples are a draw of their own; the others came where it overfitted.
     n = min(len(stage.rows), effort.most_samples or len(stage.rows))
     reached = np.any(stage.stages[:n] == LIT, axis=1)
-    return bound_projectors(
+    given = given_on(scene, template, stage.rows.take(np.arange(n)))
+    free = reached & given.lit
+    required = required_rows(reached, scene.requirements.dominant_coverage)
+    found = bound_projectors(
         scene,
         template,
-        stage.rows.take(np.flatnonzero(reached)),
-        required_rows(reached, scene.requirements.dominant_coverage),
-        stage.certificate["needed"]["count"],
+        stage.rows.take(np.flatnonzero(reached & ~free)),
+        max(required - int(free.sum()), 0),
+        stage.certificate["needed"]["count"] - given.count,
         effort,
         n_samples=n,
         row_area_m2=stage.rows.samples.weight * len(stage.rows) / n,
     )
+    return replace(found, given=given.count, n_free=int(free.sum()))
 
 
 def bound_projectors(
@@ -261,7 +273,7 @@ def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.boo
         lowest = workspace.floor_m / (far if workspace.floor_m > 0 else near)
         above = np.arccos(np.clip(cube.centres @ np.array(workspace.up), -1.0, 1.0))
         kept &= above <= np.arccos(np.clip(lowest, -1.0, 1.0)) + slack
-    return kept
+    return kept & may_hold(workspace, cube.centres, slack, near, far)
 
 
 def _open_rows(

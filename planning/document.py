@@ -14,16 +14,7 @@ from geometry.mesh import TriangleMesh
 from .claims import Claims
 from .interest import Interest
 from .plan import PlannedCamera, PlannedProjector
-
-_POSITION_DECIMALS = 5
-_DECIMALS = 12
-
-
-def rounded_pose(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a pose as it will be written: positions to 0.01 mm."""
-    result = np.round(pose, _DECIMALS)
-    result[:3, 3] = np.round(pose[:3, 3], _POSITION_DECIMALS)
-    return result + 0.0
+from .rounding import DECIMALS, rounded_pose
 
 
 def rounded_projector(projector: PlannedProjector, name: str) -> PlannedProjector:
@@ -35,8 +26,8 @@ def rounded_projector(projector: PlannedProjector, name: str) -> PlannedProjecto
         projector,
         id=name,
         world_from_device=device,
-        world_from_ring=np.round(ring, _DECIMALS) + 0.0,
-        ring_radii=np.round(projector.ring_radii, _DECIMALS),
+        world_from_ring=np.round(ring, DECIMALS) + 0.0,
+        ring_radii=np.round(projector.ring_radii, DECIMALS),
     )
 
 
@@ -60,6 +51,7 @@ def projector_entries(
             "ring_radii": projector.ring_radii.tolist(),
             "min_margin_rad": claims.min_margin_rad[index],
             "lit_area_m2": claims.lit_area_m2[index],
+            **_existing(projector),
         }
         for index, projector in enumerate(projectors)
     ]
@@ -79,6 +71,7 @@ def camera_entries(
             "range_m": list(camera.device.range_m),
             "seen_area_m2": claims.seen_area_m2[index],
             "sole_area_m2": claims.sole_area_m2[index],
+            **_existing(camera),
         }
         for index, camera in enumerate(cameras)
     ]
@@ -137,6 +130,11 @@ def coverage_entry(claims: Claims) -> dict[str, Any]:
         "unreachable_by_cause": claims.unreachable_by_cause,
         "unreachable_inside_m2": claims.unreachable_inside_m2,
     }
+
+
+def _existing(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:
+    """Mark a device that stands already; nothing where it is planned."""
+    return {"existing": True, "name": device.existing} if device.existing else {}
 
 
 def _optics(device: PinholeModel | ParallelModel) -> dict[str, Any]:

@@ -61,9 +61,10 @@ def one_fewer(
     n_projectors: int,
     *,
     stages_of: Callable[[tuple[PlannedProjector, ...]], NDArray[np.int8]],
+    given: int,
     ring_offset: tuple[float, float],
 ) -> Offer | None:
-    """Return so many poses that light what is required; None if none were found.
+    """Return poses that light what is required, with those given; None if none do.
 
     Args:
         scene: Surface and requirements.
@@ -71,6 +72,7 @@ def one_fewer(
             belong to them: they lead astray.
         n_projectors: One fewer than are known to be enough; at least 1.
         stages_of: The stages of other poses.
+        given: First poses of the lattice that are taken whatever they light, and stay.
         ring_offset: As for `projector_candidates`.
     """
     begun: list[list[int]] = []
@@ -78,9 +80,11 @@ def one_fewer(
         offer, best, short = lattice, _NONE, np.inf
         for attempt, scale in enumerate((*_SCALES, None)):
             seed = scene.seed + start * (len(_SCALES) + 1) + attempt
-            best, missing, required = _most_lit(scene, offer, n_projectors, best, seed)
+            best, missing, required = _most_lit(
+                scene, offer, n_projectors, given, best, seed
+            )
             if missing <= 0:
-                return offer.take(best)
+                return offer.take(best[best >= given])
             if attempt == 0:
                 if best.tolist() in begun:
                     break
@@ -89,7 +93,7 @@ def one_fewer(
             if scale is None or missing > min(_SHORT * required, _GAINS * gain):
                 break
             between = projectors_around(
-                offer.take(best).projectors,
+                offer.take(best[best >= given]).projectors,
                 scene.requirements.workspace,
                 len(lattice.projectors),
                 ring_offset=ring_offset,
@@ -101,13 +105,18 @@ def one_fewer(
 
 
 def _most_lit(
-    scene: Scene, offer: Offer, n_projectors: int, start: NDArray[np.int64], seed: int
+    scene: Scene,
+    offer: Offer,
+    n_projectors: int,
+    given: int,
+    start: NDArray[np.int64],
+    seed: int,
 ) -> tuple[NDArray[np.int64], int, int]:
     """Return the poses that light most, what they miss, and what is required."""
     lit = offer.stages == lighting.LIT
     required = required_rows(lit.any(axis=1), scene.requirements.dominant_coverage)
     best = solve_max_coverage(
-        cover_problem(lit, required),
+        cover_problem(lit, required, given),
         n_projectors,
         warm_start=start,
         seed=seed,

@@ -57,6 +57,7 @@ class PlannedProjector:
         device: Its optics.
         ring_radii: Tangents R = x/z (diverging) or radii in [m] (parallel) of the ring
             edges, increasing, shape (n_rings,).
+        existing: Name of the device that stands already; empty: it is planned.
     """
 
     id: str
@@ -65,6 +66,7 @@ class PlannedProjector:
     world_from_ring: NDArray[np.float64]
     device: PinholeModel | ParallelModel
     ring_radii: NDArray[np.float64]
+    existing: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +77,13 @@ class PlannedCamera:
         id: Name, `C1` and so on.
         world_from_device: Pose, shape (4, 4) [m].
         device: Its optics.
+        existing: Name of the device that stands already; empty: it is planned.
     """
 
     id: str
     world_from_device: NDArray[np.float64]
     device: PinholeModel
+    existing: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +223,7 @@ def _projector(entry: dict[str, Any]) -> PlannedProjector:
         _pose(entry, "world_from_ring"),
         device,
         radii,
+        _existing(entry),
     )
 
 
@@ -232,4 +237,9 @@ def _camera(entry: dict[str, Any]) -> PlannedCamera:
         (low, high),
         (k1, k2, p1, p2, k3),
     )
-    return PlannedCamera(entry["id"], _pose(entry, "world_from_device"), device)
+    pose = _pose(entry, "world_from_device")
+    return PlannedCamera(entry["id"], pose, device, _existing(entry))
+
+
+def _existing(entry: dict[str, Any]) -> str:
+    return str(entry["name"]) if entry.get("existing") else ""

@@ -24,6 +24,7 @@ from solvers.bit_rows import GrowingArray, words_for
 from solvers.cells import CellBatch
 
 from .requirements import Workspace
+from .zone_limits import may_hold
 
 _ROUNDING = 1e-9
 
@@ -189,11 +190,13 @@ class PositionTree:
         low: float,
         high: float,
     ) -> bool:
-        """Return whether a cell holds a position in the cone and over the floor."""
+        """Return whether a cell may hold a position that all limits allow."""
         space = self._workspace
         axis, up = np.array(space.axis), np.array(space.up)
         least = max(0.0, float(angle_between(outwards, axis)) - angle)
         if not least <= space.half_angle + _ROUNDING:
+            return False
+        if not may_hold(space, outwards[None], angle, low, high)[0]:
             return False
         if space.floor_m is None:
             return True

@@ -15,9 +15,12 @@ from . import lighting
 from .lighting import Target
 from .plan import PlannedProjector
 from .projectors import ProjectorStage, lit_margins, lit_stages
+from .requirements import Workspace
 from .scene import Scene
 from .selection import required_rows
 from .share_margin import enough_lit, margin_at_share
+from .zone_limits import half_spaces
+from .zone_positions import is_zoned
 
 _SWEEPS = 6
 # Gains below this aren't worth a move [rad].
@@ -52,7 +55,9 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
         return stage.projectors
     for _ in range(_SWEEPS):
         moved = [
-            _improve(state, p, required, lit) for p in range(len(state.projectors))
+            _improve(state, p, required, lit)
+            for p, projector in enumerate(state.projectors)
+            if not projector.existing
         ]
         if not any(moved):
             break
@@ -140,7 +145,19 @@ def pose_program(
         if workspace.floor_m is None
         else workspace.floor_m + float(up @ centre),
         max_move_m=_MAX_MOVE_M,
+        half_spaces=_held_in(workspace, projector.world_from_device[:3, 3]),
     )
+
+
+def _held_in(
+    workspace: Workspace, position: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Rows (n, d) of the convex part of the zones about a position, n.Q >= d."""
+    if not is_zoned(workspace):
+        return None
+    centre = np.array(workspace.centre)
+    normals, offsets = half_spaces(workspace, position - centre)
+    return np.column_stack([normals, offsets + normals @ centre])
 
 
 def moved_to(

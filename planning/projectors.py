@@ -12,6 +12,7 @@ from geometry.visibility_matrix import visibility_matrix
 from . import lighting
 from .candidates import projector_candidates, projectors_around
 from .errors import InfeasibleLimitsError
+from .existing import existing_projectors, movable
 from .lighting import Target
 from .one_fewer import Offer, one_fewer
 from .plan import PlannedProjector
@@ -73,7 +74,9 @@ def plan_projectors(
         InfeasibleLimitsError: If no candidate lights any sample.
     """
     required = scene.requirements
-    candidates = projector_candidates(
+    # Those that stand already come first, and are in every cover.
+    candidates = existing_projectors(required, template, ring_offset)
+    candidates += projector_candidates(
         template, required.workspace, n_candidates, ring_offset=ring_offset
     )
     rows = scene.target_samples(_ROWS, _STREAM)
@@ -84,7 +87,7 @@ def plan_projectors(
     # The best of a lattice lies beside the best there is.
     n_lattice = len(candidates)
     around = projectors_around(
-        [candidates[i] for i in selection.chosen],
+        movable([candidates[i] for i in selection.chosen]),
         required.workspace,
         n_lattice,
         ring_offset=ring_offset,
@@ -124,7 +127,11 @@ def _with_widest_margin(
     """Return the selection with as many candidates of larger margin, if there are."""
     margin = lit_margins(scene, candidates, rows, stages == lighting.LIT)
     chosen = widest_selection(
-        margin, selection.chosen, selection.required, seed=scene.seed
+        margin,
+        selection.chosen,
+        selection.required,
+        seed=scene.seed,
+        given=_n_given(scene),
     )
     return replace(selection, chosen=chosen)
 
@@ -139,12 +146,14 @@ def _fewer(
     """Return the fewest of the poses, others offered as long as they save one."""
     selection = _fewest(scene, offer.stages)
     lattice = offer.take(np.arange(n_lattice))
-    while selection.needed > 1:
+    given = _n_given(scene)
+    while selection.needed > given + 1:
         moved = one_fewer(
             scene,
             lattice,
             selection.needed - 1,
             stages_of=lambda projectors: lit_stages(scene, projectors, rows),
+            given=given,
             ring_offset=ring_offset,
         )
         if moved is None:
@@ -152,6 +161,7 @@ def _fewer(
         offer = offer.joined(moved)
         n_candidates, n_moved = len(offer.projectors), len(moved.projectors)
         known = np.arange(n_candidates - n_moved, n_candidates)
+        known = np.concatenate([np.arange(given), known])
         again = _fewest(scene, offer.stages, known)
         if again.needed >= selection.needed:
             break
@@ -184,7 +194,12 @@ def _fewest(
         max_count=required.max_projectors,
         seed=scene.seed,
         known=known,
+        given=_n_given(scene),
     )
+
+
+def _n_given(scene: Scene) -> int:
+    return len(scene.requirements.existing_of("projector"))
 
 
 def lit_stages(
@@ -271,13 +286,15 @@ def _stage(
     stages: NDArray[np.int8],
     selection: Selection,
 ) -> ProjectorStage:
-    others = marginals(stages == lighting.LIT, selection, seed=scene.seed)
+    lit, given = stages == lighting.LIT, _n_given(scene)
+    others = marginals(lit, selection, seed=scene.seed, given=given)
     proof = certificate(
         selection,
         others,
         n_rows=len(rows),
         row_area_m2=rows.samples.weight,
         n_candidates=len(candidates),
+        given=given,
     )
     proof["excluded_pairs"] = {
         cause: int((stages == index).sum())

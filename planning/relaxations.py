@@ -47,8 +47,15 @@ def reachability_relaxations(
         for change, offered in offers.items()
     }
     workspace = scene.requirements.workspace
-    if workspace.half_angle < np.pi or workspace.floor_m is not None:
-        whole = replace(workspace, half_angle=float(np.pi), floor_m=None)
+    whole = replace(
+        workspace,
+        half_angle=float(np.pi),
+        floor_m=None,
+        box=None,
+        keep_out=(),
+        mounting=(),
+    )
+    if whole != workspace:
         anywhere = projector_candidates(
             reference[0], whole, len(reference), ring_offset=ring_offset
         )

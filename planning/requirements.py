@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal, Self, TypeVar
 
+from .zones import Box, read_zones
+
 _T = TypeVar("_T")
 
 
@@ -85,11 +87,12 @@ class CheckLimits:
 
 @dataclass(frozen=True)
 class Workspace:
-    """Where devices may stand: a shell about the object, or a cone cut from it.
+    """Where devices may stand: a shell about the object, or what zones leave of it.
 
     A position Q is admissible iff |Q - centre| lies in the device's radius range, the
-    angle between Q - centre and `axis` is at most `half_angle`, and
-    (Q - centre) . up >= floor_m where a floor is given.
+    angle between Q - centre and `axis` is at most `half_angle`, (Q - centre) . up >=
+    floor_m where a floor is given, Q is in `box` and on one of `mounting` where they
+    are given, and inside none of `keep_out`.
 
     Attributes:
         centre: Centre of the smallest ball that holds the object's main bodies, in the
@@ -107,6 +110,9 @@ class Workspace:
             R (diverging) or its radius in [m] (parallel).
         bearing: Unit vector across `axis`, turning with the object, from which the
             lattice of offered poses starts; None: a world axis decides.
+        box: Room that holds every device; None: no room.
+        keep_out: Volumes in which no optical centre stands.
+        mounting: Planes on which optical centres lie; none: anywhere.
     """
 
     centre: tuple[float, float, float]
@@ -121,6 +127,9 @@ class Workspace:
     n_reference_cameras: int
     reference_ring_radius: float
     bearing: tuple[float, float, float] | None = None
+    box: Box | None = None
+    keep_out: tuple[Box, ...] = ()
+    mounting: tuple[Box, ...] = ()
 
     def inset(self, by_m: float) -> "Workspace":
         """Return the workspace shrunk on all sides.
@@ -140,7 +149,25 @@ class Workspace:
             if self.half_angle >= pi
             else max(0.0, self.half_angle - by_m / least),
             floor_m=None if self.floor_m is None else self.floor_m + by_m,
+            box=None if self.box is None else self.box.grown(-by_m),
+            keep_out=tuple(zone.grown(by_m) for zone in self.keep_out),
+            mounting=tuple(plane.grown(-by_m) for plane in self.mounting),
         )
+
+
+@dataclass(frozen=True)
+class Existing:
+    """A device that stands already and stays where it is.
+
+    Attributes:
+        name: As in the rig file.
+        kind: `projector` or `camera`.
+        world_from_device: Its pose, rows of a 4 x 4 matrix [m].
+    """
+
+    name: str
+    kind: str
+    world_from_device: tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -155,6 +182,7 @@ class Requirements:
         min_reachable: Area reachable by projectors / target area.
         target: `dominant` regions, or the whole `surface`.
         pattern: `rings`; `dense` and `none` come later.
+        existing: Devices that stand already and are part of every plan.
     """
 
     max_projectors: int
@@ -169,15 +197,23 @@ class Requirements:
     triangulation: TriangulationLimits
     check: CheckLimits
     workspace: Workspace
+    existing: tuple[Existing, ...] = ()
+
+    def existing_of(self, kind: str) -> tuple[Existing, ...]:
+        """Return the existing devices that are a `projector` or a `camera`."""
+        return tuple(device for device in self.existing if device.kind == kind)
 
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
         document = asdict(self)
+        # Zones that aren't given have no key.
         document["workspace"] = {
-            key: list(value) if isinstance(value, tuple) else value
+            key: _listed(value)
             for key, value in document["workspace"].items()
+            if value or key not in ("box", "keep_out", "mounting")
         }
-        return document
+        existing = document.pop("existing")
+        return document | ({"existing": _listed(existing)} if existing else {})
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Self:
@@ -190,7 +226,7 @@ class Requirements:
         workspace = {
             key: tuple(value) if isinstance(value, list) else value
             for key, value in document["workspace"].items()
-        }
+        } | read_zones(document["workspace"])
         plain = {
             key: document[key]
             for key in (
@@ -210,7 +246,24 @@ class Requirements:
             triangulation=_read(TriangulationLimits, document["triangulation"]),
             check=_read(CheckLimits, document["check"]),
             workspace=_read(Workspace, workspace),
+            existing=tuple(_existing(e) for e in document.get("existing", ())),
         )
+
+
+def _existing(table: dict[str, Any]) -> Existing:
+    rows = tuple(tuple(float(x) for x in row) for row in table["world_from_device"])
+    if [len(row) for row in rows] != [4] * 4:
+        raise ValueError("existing: world_from_device must be 4 x 4")
+    return Existing(str(table["name"]), str(table["kind"]), rows)
+
+
+def _listed(value: object) -> object:
+    """Return a value with lists for tuples, as JSON gives it back."""
+    if isinstance(value, dict):
+        return {key: _listed(part) for key, part in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_listed(part) for part in value]
+    return value
 
 
 def _read(kind: type[_T], table: dict[str, Any]) -> _T:

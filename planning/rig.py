@@ -6,7 +6,7 @@ pixels, metres and radians and the requirements that a plan is held to.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -18,6 +18,7 @@ from geometry.devices import ParallelModel, PinholeModel
 
 from . import optics
 from .errors import InfeasibleLimitsError, RigError
+from .existing import build_existing, check_existing
 from .requirements import Requirements
 from .rig_devices import (
     parallel_device,
@@ -235,9 +236,10 @@ class Rig:
 
         Raises:
             InputError: If an argument isn't usable.
-            InfeasibleLimitsError: If no position in the workspace is admissible.
+            InfeasibleLimitsError: If no position in the workspace is admissible, or
+                more devices stand already than are allowed.
         """
-        return build_requirements(
+        required = build_requirements(
             self.table,
             self.outer_ring_radius(),
             mesh_centre,
@@ -253,6 +255,12 @@ class Rig:
             accuracy_mm=accuracy_mm,
             up=up,
         )
+        projector, camera = self.projector_device(), self.camera_device()
+        tables = self.table.existing
+        existing = build_existing(tables, required.workspace, projector, camera)
+        required = replace(required, existing=existing)
+        check_existing(required)
+        return required
 
     def to_document(self) -> dict[str, Any]:
         """Return the resolved rig for `plan.json`: plain values, metres, radians.
@@ -276,12 +284,18 @@ class Rig:
                 "gap_m": self.ring_gap_m,
                 "outer_radius": self.outer_ring_radius(),
             },
-            "workspace": table.workspace.model_dump(mode="json"),
+            "workspace": table.workspace.to_document(),
             "limits": table.limits.model_dump(mode="json"),
             "requirements": table.requirements.model_dump(mode="json"),
             "check": table.check.model_dump(mode="json"),
             "notes": list(self.notes()),
+            **self._existing_document(),
         }
+
+    def _existing_document(self) -> dict[str, Any]:
+        """Return the existing devices as written; no key where there are none."""
+        tables = [t.model_dump(mode="json") for t in self.table.existing]
+        return {"existing": tables} if tables else {}
 
     @cached_property
     def _camera(self) -> PinholeModel:

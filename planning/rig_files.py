@@ -218,14 +218,15 @@ def _nearest_key(loc: tuple[int | str, ...]) -> str:
     """Say which key of the same table may have been meant."""
     model: type[BaseModel] = RigTable
     for part in loc[:-1]:
-        model = _table_of(model, str(part))
+        if isinstance(part, str):  # a number is a place in a list of tables
+            model = _table_of(model, part)
     known = list(model.model_fields)
     close = difflib.get_close_matches(str(loc[-1]), known, n=1)
     return f"did you mean {close[0]}?" if close else f"keys here: {', '.join(known)}"
 
 
 def _table_of(model: type[BaseModel], key: str) -> type[BaseModel]:
-    """Return the table type that a field holds, bare or beside None."""
+    """Return the table type that a field holds, bare, beside None or in a list."""
     annotation: Any = model.model_fields[key].annotation
     options = getattr(annotation, "__args__", (annotation,))
     return next(

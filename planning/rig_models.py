@@ -6,35 +6,25 @@ say what was written; `planning.rig` turns them into devices and requirements.
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-Positive = Annotated[float, Field(gt=0.0)]
-Share = Annotated[float, Field(gt=0.0, le=1.0)]
-Acute = Annotated[float, Field(gt=0.0, lt=90.0)]
-Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-PositivePair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+from .existing_models import ExistingTable
+from .table_types import (
+    Acute,
+    Limit,
+    Name,
+    Pair,
+    Positive,
+    PositivePair,
+    Share,
+    Table,
+)
+from .workspace_models import WorkspaceTable
+
 Resolution = Annotated[
     list[Annotated[int, Field(ge=2)]], Field(min_length=2, max_length=2)
 ]
 Five = Annotated[list[float], Field(min_length=5, max_length=5)]
-Axis = Annotated[list[float], Field(min_length=3, max_length=3)]
-UpName = Literal["x", "y", "z", "-x", "-y", "-z"]
-
-
-def _off_is_none(value: object) -> object:
-    return None if value == "off" else value
-
-
-# TOML has no null: a limit that isn't to bind is written "off".
-Limit = Annotated[Positive | None, BeforeValidator(_off_is_none)]
-
-
-class Table(BaseModel):
-    """A TOML table: nothing unknown, nothing converted, nothing infinite."""
-
-    model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False
-    )
 
 
 class FocusTable(Table):
@@ -54,8 +44,8 @@ class FocusTable(Table):
 class SourcedTable(Table):
     """A device whose figures name their sources."""
 
-    name: Annotated[str, Field(min_length=1)]
-    sources: dict[str, Annotated[str, Field(min_length=1)]] = {}
+    name: Name
+    sources: dict[str, Name] = Field(default={})
 
     def figures(self) -> tuple[str, ...]:
         """Return the dotted names of the figures that were written."""
@@ -92,7 +82,7 @@ class PinholeTable(SourcedTable):
     throw_ratio: Positive | None = None
     principal_point_px: Pair | None = None
     vertical_offset_percent: float | None = None
-    distortion: Five = [0.0, 0.0, 0.0, 0.0, 0.0]
+    distortion: Five = Field(default=[0.0, 0.0, 0.0, 0.0, 0.0])
     pixel_um: Positive | None = None
     range_mm: PositivePair | None = None
     focus: FocusTable | None = None
@@ -192,28 +182,6 @@ class RingsTable(Table):
     gap_mm: Positive | None = None
 
 
-class WorkspaceTable(Table):
-    """Which part of the shell of positions is admissible, `[workspace]`."""
-
-    shape: Literal["shell", "cone"] = "shell"
-    axis: Axis | None = None
-    half_angle_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = None
-    floor_mm: float | None = None
-    up: UpName = "z"
-
-    @model_validator(mode="after")
-    def _check_cone(self) -> Self:
-        both = self.axis is not None and self.half_angle_deg is not None
-        neither = self.axis is None and self.half_angle_deg is None
-        if self.shape == "cone" and not both:
-            raise ValueError("shape = 'cone' needs axis and half_angle_deg")
-        if self.shape == "shell" and not neither:
-            raise ValueError("axis and half_angle_deg need shape = 'cone'")
-        if self.axis is not None and not any(self.axis):
-            raise ValueError(f"axis = {self.axis} must not be zero")
-        return self
-
-
 class LimitsTable(Table):
     """When a point counts as lit, seen and measurable, `[limits]`."""
 
@@ -274,7 +242,7 @@ class CheckTable(Table):
 class RigTable(Table):
     """A whole rig file."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     description: str = ""
     light: Literal["diverging", "parallel"] = "diverging"
     camera: PinholeTable
@@ -286,3 +254,12 @@ class RigTable(Table):
     limits: LimitsTable = LimitsTable()
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
+    existing: list[ExistingTable] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _check_existing(self) -> Self:
+        names = [device.name for device in self.existing]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"existing names {name!r} twice; name them apart")
+        return self

@@ -17,6 +17,8 @@ from .requirements import (
     Workspace,
 )
 from .rig_models import CheckTable, LimitsTable, RigTable
+from .zone_conflicts import check_zones
+from .zone_tables import build_zones
 
 Pattern = Literal["rings", "dense", "none"]
 Target = Literal["dominant", "surface"]
@@ -98,7 +100,8 @@ def build_workspace(
 
     Raises:
         InputError: If an argument isn't usable.
-        InfeasibleLimitsError: If the floor lies above every admissible position.
+        InfeasibleLimitsError: If the floor lies above every admissible position, or the
+            box or every mounting plane lies outside the shell.
     """
     _check_positive("object_radius_m", object_radius_m)
     placement, spec = table.placement, table.workspace
@@ -120,8 +123,10 @@ def build_workspace(
         n_reference_projectors=placement.n_reference_projectors,
         n_reference_cameras=placement.n_reference_cameras,
         reference_ring_radius=reference_ring_radius,
+        **build_zones(spec, up_vector),
     )
     _check_floor(workspace)
+    check_zones(workspace)
     return workspace
 
 

@@ -72,6 +72,7 @@ def select_fewest(
     max_count: int | None,
     seed: int,
     known: NDArray[np.int64] | None = None,
+    given: int = 0,
 ) -> Selection:
     """Return the fewest candidates that cover a share of what all of them cover.
 
@@ -83,9 +84,10 @@ def select_fewest(
         max_count: Candidates allowed; None for no limit.
         seed: Of the heuristics.
         known: Candidates that may cover as much with fewer than the search finds.
+        given: First candidates that are taken whatever they cover.
     """
     required = required_rows(np.any(covers, axis=1), share)
-    problem = cover_problem(covers, required)
+    problem = cover_problem(covers, required, given)
     reduced = reduced_problem(problem)
     solution = solve_cover(problem, seed=seed, heaviest=False, reduced=reduced)
     smallest = solution.selected
@@ -122,7 +124,12 @@ def required_rows(reached: NDArray[np.bool_], share: float) -> int:
 
 
 def marginals(
-    covers: NDArray[np.bool_], selection: Selection, *, seed: int, more: int = MORE
+    covers: NDArray[np.bool_],
+    selection: Selection,
+    *,
+    seed: int,
+    more: int = MORE,
+    given: int = 0,
 ) -> Marginals:
     """Return the best candidates for every other count, for the table in the plan.
 
@@ -131,14 +138,15 @@ def marginals(
         selection: As it is kept.
         seed: Of the heuristics.
         more: Counts beyond the one taken for which the best is wanted.
+        given: As in `select_fewest`; fewer than these aren't looked at.
     """
-    problem = cover_problem(covers, selection.required)
+    problem = cover_problem(covers, selection.required, given)
     reduced = reduced_problem(problem)
     taken = len(selection.chosen)
     bound = 0.0
     by_count: dict[int, NDArray[np.int64]] = {}
     best = np.empty(0, dtype=np.int64)
-    for count in range(1, min(taken + more, covers.shape[1]) + 1):
+    for count in range(max(1, given), min(taken + more, covers.shape[1]) + 1):
         if count == taken:
             best = selection.chosen
         else:
@@ -157,14 +165,25 @@ def marginals(
     if selection.lower_bound >= taken:
         # Where fewer are proved too few, they fall short of what is required.
         one_fewer = min(one_fewer, selection.required - 1)
-    return Marginals(by_count, one_fewer, _greedy_count(covers, selection.required))
+    greedy = _greedy_count(covers, selection.required, given)
+    return Marginals(by_count, one_fewer, greedy)
 
 
-def cover_problem(covers: NDArray[np.bool_], required: int) -> CoverProblem:
-    """State the cover over the rows that some candidate serves."""
+def cover_problem(
+    covers: NDArray[np.bool_], required: int, given: int = 0
+) -> CoverProblem:
+    """State the cover over the rows that some candidate serves.
+
+    Args:
+        covers: Whether a candidate (column) serves a sample (row), shape (n, m).
+        required: Rows that must be covered.
+        given: First candidates that are taken whatever they cover.
+    """
     reachable = covers[covers.any(axis=1)]
     return CoverProblem(
-        sparse.csr_array(reachable), required_weight=np.array([required])
+        sparse.csr_array(reachable),
+        required_weight=np.array([required]),
+        fixed=np.arange(given),
     )
 
 
@@ -172,10 +191,10 @@ def _rows(covers: NDArray[np.bool_], chosen: NDArray[np.int64]) -> int:
     return int(covers[:, chosen].any(axis=1).sum())
 
 
-def _greedy_count(covers: NDArray[np.bool_], required: int) -> int:
+def _greedy_count(covers: NDArray[np.bool_], required: int, given: int) -> int:
     """How many candidates it takes when each adds the most rows, lower index first."""
-    left = np.ones(len(covers), dtype=bool)
-    count = 0
+    left = ~covers[:, :given].any(axis=1)
+    count = given
     while len(covers) - left.sum() < required:
         left &= ~covers[:, int(np.argmax(covers[left].sum(axis=0)))]
         count += 1
@@ -189,8 +208,12 @@ def certificate(
     n_rows: int,
     row_area_m2: float,
     n_candidates: int,
+    given: int = 0,
 ) -> dict[str, Any]:
-    """Return the plan's certificate: what was proved, and over what."""
+    """Return the plan's certificate: what was proved, and over what.
+
+    With devices given, its bounds count them, and speak of covers that hold them.
+    """
     count = len(selection.chosen)
     bounded = min(selection.lower_bound, count)
     return {
@@ -210,7 +233,10 @@ def certificate(
             "value_m2": selection.best_rows * row_area_m2,
             "upper_bound_m2": selection.best_rows_bound * row_area_m2,
         },
-        "one_fewer": {"upper_bound_m2": others.one_fewer_bound * row_area_m2},
+        "one_fewer": {"upper_bound_m2": others.one_fewer_bound * row_area_m2}
+        if count > given
+        else None,
+        **({"given": given} if given else {}),
     }
 
 

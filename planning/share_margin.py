@@ -59,6 +59,7 @@ def widest_selection(
     required: int,
     *,
     seed: int,
+    given: int = 0,
 ) -> NDArray[np.int64]:
     """Return as many candidates as chosen, with the largest margin at the share found.
 
@@ -69,13 +70,14 @@ def widest_selection(
         chosen: Candidates that light what is required.
         required: Samples that count.
         seed: Of the search.
+        given: First candidates that are taken whatever they light.
     """
     lit_before = int(np.isfinite(margin[:, chosen]).any(axis=1).sum())
     best, low = chosen, margin_at_share(margin[:, chosen], required)
     high = margin_at_share(margin, required)
     while high - low > _STEP_RAD:
         level = 0.5 * (low + high)
-        problem = cover_problem(margin >= level, required)
+        problem = cover_problem(margin >= level, required, given)
         offered = solve_max_coverage(
             problem, len(chosen), warm_start=best, seed=seed, budget=_BUDGET
         ).selected

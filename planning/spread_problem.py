@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from solvers.baseline_problem import (
     BaselineProblem,
+    HalfSpaces,
     KeptPoints,
     SeamPoints,
     Shell,
@@ -21,6 +22,8 @@ from .baselines import check_seam, half_field
 from .plan import PlannedCamera
 from .requirements import Workspace
 from .seams import Adjacency, find_seam
+from .zone_limits import half_spaces
+from .zone_positions import is_zoned
 
 _Array = NDArray[np.float64]
 
@@ -145,6 +148,25 @@ def spread_problem(
         range_m=cameras[0].device.range_m,
         min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
         max_step=max_step,
+        half_spaces=_held_in(limits.workspace, cameras),
+        fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
+    )
+
+
+def _held_in(
+    workspace: Workspace, cameras: Sequence[PlannedCamera]
+) -> HalfSpaces | None:
+    """The convex part of the zones about each camera that may move."""
+    free = [c for c, camera in enumerate(cameras) if not camera.existing]
+    if not (is_zoned(workspace) and free):
+        return None
+    centres = np.stack([cameras[c].world_from_device[:3, 3] for c in free])
+    offsets = centres - np.array(workspace.centre)
+    parts = [half_spaces(workspace, offset) for offset in offsets]
+    return HalfSpaces(
+        np.repeat(free, [len(normals) for normals, _ in parts]),
+        np.concatenate([normals for normals, _ in parts]),
+        np.concatenate([least for _, least in parts]),
     )
 
 

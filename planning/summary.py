@@ -76,7 +76,8 @@ def _number(devices: Sequence[object], name: str) -> str:
 
 
 def _where(workspace: Workspace) -> str:
-    if workspace.half_angle >= np.pi and workspace.floor_m is None:
+    zones = zone_phrases(workspace)
+    if workspace.half_angle >= np.pi and workspace.floor_m is None and not zones:
         return "the whole shell about it (no floor)"
     parts: list[str] = []
     if workspace.half_angle < np.pi:
@@ -87,7 +88,21 @@ def _where(workspace: Workspace) -> str:
         )
     if workspace.floor_m is not None:
         parts.append(f"at least {1e3 * workspace.floor_m:.0f} mm above its centre")
-    return f"the shell about it, {', '.join(parts)}"
+    return f"the shell about it, {', '.join(parts + zones)}"
+
+
+def zone_phrases(workspace: Workspace) -> list[str]:
+    """Return what a box, keep-out volumes and mounting planes leave, a phrase each."""
+    found: list[str] = []
+    if workspace.box is not None:
+        size = " x ".join(f"{2e3 * half:.0f}" for half in workspace.box.half_m)
+        found.append(f"in a box of {size} mm")
+    if workspace.mounting:
+        names = [plane.name for plane in workspace.mounting]
+        found.append(f"on {' or '.join(names)}")
+    if workspace.keep_out:
+        found.append(f"not in {' or '.join(zone.name for zone in workspace.keep_out)}")
+    return found
 
 
 def _unit(mesh: dict[str, Any]) -> str:
@@ -118,6 +133,7 @@ def _devices(plan: RigPlan) -> str:
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {azimuth:12.1f} "
             f"{elevation:10.1f}   {roll:12.1f}   {distance:10.1f}"
+            + (f"   existing: {device.existing}" if device.existing else "")
         )
     k = int(np.argmax(np.abs(up)))
     lines.append(
@@ -185,7 +201,7 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
     count = proof["count"]
     scope = (
         f"to {verb} {100 * share:g} % of what the {candidates['n_candidates']} "
-        f"candidate poses reach of {proof['n_samples']} samples"
+        f"candidate poses reach of {proof['n_samples']} samples{_given(proof)}"
     )
     name = f"{kind}s"
     if needed["count"] > count:
@@ -201,6 +217,10 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
     return f"BOUND    {count} {name}; at least {least} are needed {scope}"
 
 
+def _given(proof: dict[str, Any]) -> str:
+    return f", given {proof['given']} existing" if "given" in proof else ""
+
+
 def _continuous(plan: RigPlan, proof: dict[str, Any]) -> str:
     """Return what was proved over all poses of the workspace, in a line."""
     bound = proof["continuous"]
@@ -208,7 +228,10 @@ def _continuous(plan: RigPlan, proof: dict[str, Any]) -> str:
     poses = "direction" if parallel else "position and aim"
     if bound is None:
         return f"         nothing is proved over every {poses} in the workspace"
-    scope = f"over every {poses} in the workspace, for {bound['n_samples']} samples"
+    scope = (
+        f"over every {poses} in the workspace, for {bound['n_samples']} samples"
+        f"{_given(proof)}"
+    )
     blind = "" if bound["occlusion"] else ", shadows left out"
     least = bound["lower_bound"]
     if least >= proof["needed"]["count"]:

@@ -33,6 +33,21 @@ class Shell:
 
 
 @dataclass(frozen=True, eq=False)
+class HalfSpaces:
+    """Half-spaces that hold camera centres, n.(O_c - centre) >= d; one row each.
+
+    Attributes:
+        camera: Index of the camera, shape (h,).
+        normals: Unit normals n, shape (h, 3).
+        offsets: d in [m], shape (h,).
+    """
+
+    camera: NDArray[np.int64]
+    normals: _Array
+    offsets: _Array
+
+
+@dataclass(frozen=True, eq=False)
 class SeamPoints:
     """Points E where the parts of two cameras meet; every array has one row a point.
 
@@ -92,6 +107,8 @@ class BaselineProblem:
         range_m: Least and largest |O - P| of kept points in [m].
         min_conditioning: e, least |r.m| of kept points.
         max_step: Farthest that a centre may move in [m].
+        half_spaces: What else holds the centres; None: nothing.
+        fixed: Cameras that stay where they are, wherever that is, shape (f,).
     """
 
     centres: _Array
@@ -104,6 +121,8 @@ class BaselineProblem:
     range_m: tuple[float, float]
     min_conditioning: float
     max_step: float
+    half_spaces: HalfSpaces | None = None
+    fixed: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         k = len(self.centres)
@@ -113,7 +132,10 @@ class BaselineProblem:
             raise ValueError(
                 f"pairs must be (p, 2) with p >= 1, got {self.pairs.shape}"
             )
-        indices = (self.pairs, self.seams.cameras, self.kept.camera)
+        indices = [self.pairs, self.seams.cameras, self.kept.camera]
+        if self.half_spaces is not None:
+            indices.append(self.half_spaces.camera)
+        indices.append(np.array(self.fixed, dtype=np.int64))
         if not all(np.all((i >= 0) & (i < k)) for i in indices):
             raise ValueError(f"camera indices must lie in 0 to {k - 1}")
         if not 0.0 < self.max_step < np.inf:

@@ -174,6 +174,7 @@ def _run_ipopt(
     # The step's ball holds these bounds too; they keep iterates from running away.
     reach = np.full(len(program.start) - 1, 1.1 * problem.max_step)
     longest = 2.0 * (np.abs(program.start[:-1]).max() + reach[0])
+    reach.reshape(-1, 3)[list(problem.fixed)] = 0.0
     with interruptible():
         answer = solver(
             x0=program.start,
@@ -214,7 +215,10 @@ def _state_workspace(
 ) -> None:
     shell = problem.shell
     k = len(problem.centres)
-    offset = centres - _repeated(shell.centre, k)
+    every = centres - _repeated(shell.centre, k)
+    # What stays may stand anywhere: the workspace holds the others.
+    free = np.setdiff1d(np.arange(k), problem.fixed)
+    offset = _rows(every, free) if problem.fixed else every
     distance = _norm(offset)
     low, high = shell.radius
     # A shell thinner than this is a sphere, and an equation suits IPOPT better.
@@ -224,6 +228,10 @@ def _state_workspace(
         stated.add(offset @ ca.DM(shell.axis) - np.cos(shell.half_angle) * distance)
     if shell.floor is not None:
         stated.add(offset @ ca.DM(shell.up), shell.floor)
+    held = problem.half_spaces
+    if held is not None and len(held.camera):
+        along = _dot(_rows(every, held.camera), ca.DM(held.normals))
+        stated.add(along - ca.DM(held.offsets))
     # Squared, since the distance from the start has no derivative at the start.
     stated.add(
         ca.sum2((centres - ca.SX(problem.centres)) ** 2), 0.0, problem.max_step**2

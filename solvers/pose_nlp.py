@@ -27,6 +27,8 @@ _N_SCALARS = 44
 # Turns stay below 90 degrees.
 _MAX_GIBBS = 0.577
 _SLOTS = (16, 32, 64, 128, 256, 512)
+# Half-spaces come in steps of this, so that few programs are built.
+_PLANES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +56,19 @@ class PoseNlp:
     g: Any
 
 
-def build_pose_nlp(light: Light, n: int) -> PoseNlp:
+def build_pose_nlp(light: Light, n: int, n_planes: int = 0) -> PoseNlp:
     """State the program for n samples.
 
     Args:
         light: Kind of light.
         n: Number of samples.
+        n_planes: Number of half-spaces.
 
     Returns:
         x = (q, s, t); p as :func:`pose_parameters` packs it.
     """
     x = ca.MX.sym("x", 7)
-    p = ca.MX.sym("p", 9 * n + _N_SCALARS)
+    p = ca.MX.sym("p", 9 * n + _N_SCALARS + 4 * n_planes)
     q, s, t = x[0:3], x[3:6], x[6]
     points = ca.reshape(p[: 3 * n], n, 3)
     normals = ca.reshape(p[3 * n : 6 * n], n, 3)
@@ -120,6 +123,9 @@ def build_pose_nlp(light: Light, n: int) -> PoseNlp:
         ca.dot(c[36:39], offset) - c[39] * ca.sqrt(radius),
         ca.dot(c[40:43], q) - c[43],
     )
+    if n_planes:
+        planes = ca.reshape(c[_N_SCALARS:], n_planes, 4)
+        g = ca.vertcat(g, planes[:, :3] @ q - planes[:, 3])
     f = -t + RIDGE * (ca.sumsqr(q) + ca.sumsqr(s))
     return PoseNlp(x, p, f, g)
 
@@ -159,7 +165,8 @@ def pose_parameters(
     bent = np.where(np.any(steep != 0.0, axis=1), 0.0, -np.inf)
     bounded = program.half_angle < np.pi
     floored = program.up is not None and np.isfinite(program.floor)
-    last = [True, True, bounded, floored]
+    planes, held = _half_spaces(program, size)
+    last = [True, True, bounded, floored, *held]
     lower = np.concatenate(
         [
             np.zeros(n),
@@ -170,7 +177,25 @@ def pose_parameters(
         ]
     )
     columns = [a.ravel(order="F") for a in (points, program.normals[index], steep)]
-    return np.nan_to_num(np.concatenate([*columns, scalars]), posinf=0, neginf=0), lower
+    packed = np.concatenate([*columns, scalars, planes.ravel(order="F")])
+    return np.nan_to_num(packed, posinf=0, neginf=0), lower
+
+
+def _half_spaces(
+    program: PoseProgram, size: float
+) -> tuple[NDArray[np.float64], list[bool]]:
+    """Return rows (n, d) for q instead of Q, and which of them apply."""
+    given = program.planes
+    planes = np.zeros((n_planes_of(program), 4))
+    planes[: len(given), :3] = given[:, :3]
+    start = program.world_from_device[:3, 3]
+    planes[: len(given), 3] = (given[:, 3] - given[:, :3] @ start) / size
+    return planes, [k < len(given) for k in range(len(planes))]
+
+
+def n_planes_of(program: PoseProgram) -> int:
+    """Return how many half-spaces the program is built with."""
+    return -(-len(program.planes) // _PLANES) * _PLANES
 
 
 def _device_limits(
@@ -221,7 +246,7 @@ def run_ipopt(
     slots = next((m for m in _SLOTS if m >= active.size), active.size)
     index = np.resize(active, slots)
     p, lower = pose_parameters(program, index)
-    solver = _solver(program.light, slots, max_iterations)
+    solver = _solver(program.light, slots, max_iterations, n_planes_of(program))
     size = _size(program)
     x0 = variables_of(program, start)
     reach = program.max_move_m / size
@@ -267,9 +292,9 @@ def variables_of(
 
 
 @lru_cache(maxsize=16)
-def _solver(light: Light, slots: int, max_iterations: int) -> Any:  # noqa: ANN401
+def _solver(light: Light, slots: int, max_iterations: int, n_planes: int) -> Any:  # noqa: ANN401
     """Return the compiled program; the linear solver is MUMPS, the only safe one."""
-    nlp = build_pose_nlp(light, slots)
+    nlp = build_pose_nlp(light, slots, n_planes)
     options = {
         "print_time": False,
         "show_eval_warnings": False,

@@ -8,7 +8,7 @@ X = R^T (P - Q), light L = (P - Q)/|P - Q| (diverging) or R e_z (parallel)::
                 |T.L| <= cos(min_tangent_angle + t)        where T != 0
                 X in the frustum or the panel, inside the last ring, in range
                 lo <= |Q - centre| <= hi,  axis.(Q - centre) >= |Q - centre| cos(half)
-                up.Q >= floor
+                up.Q >= floor,  n.Q >= d for each half-space (n, d)
 
 over Q, R and t: smooth and not convex, so an optimum is local. ``pose_nlp`` states it
 in CasADi; this module solves it over an active set and checks the answer in numpy, with
@@ -58,6 +58,8 @@ class PoseProgram:
         up: Unit vector away from the floor, shape (3,).
         floor: Least up.Q in [m].
         max_move_m: Largest change of each coordinate of Q in [m].
+        half_spaces: Rows (n, d), unit n and d in [m], of half-spaces n.Q >= d that hold
+            Q, shape (k, 4); None: none.
 
     Raises:
         ValueError: If an array has the wrong shape, a number isn't finite, or a limit
@@ -86,6 +88,7 @@ class PoseProgram:
     up: NDArray[np.float64] | None = None
     floor: float = -np.inf
     max_move_m: float = np.inf
+    half_spaces: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.points)
@@ -111,6 +114,15 @@ class PoseProgram:
                 raise ValueError("diverging light needs camera_matrix and resolution")
         elif self.half_panel_m is None:
             raise ValueError("parallel light needs half_panel_m")
+        planes = self.planes
+        if planes.ndim != 2 or planes.shape[1] != 4 or not np.all(np.isfinite(planes)):
+            raise ValueError(f"half_spaces must be finite, (k, 4), is {planes.shape}")
+
+    @property
+    def planes(self) -> NDArray[np.float64]:
+        """Rows (n, d) of the half-spaces, shape (k, 4); k = 0 without any."""
+        given = np.empty((0, 4)) if self.half_spaces is None else self.half_spaces
+        return np.asarray(given, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +243,9 @@ def _workspace_slack(program: PoseProgram, position: NDArray[np.float64]) -> flo
         slack = min(slack, program.half_angle - float(angle))
     if program.up is not None and np.isfinite(program.floor):
         slack = min(slack, float(program.up @ position) - program.floor)
+    planes = program.planes
+    if len(planes):
+        slack = min(slack, float(np.min(planes[:, :3] @ position - planes[:, 3])))
     return slack
 
 

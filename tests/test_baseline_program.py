@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from planning.coverage_triangle import round_body_limit, seam_angles
 from solvers.baseline_problem import (
     BaselineProblem,
+    HalfSpaces,
     KeptPoints,
     SeamPoints,
     Shell,
@@ -310,3 +311,26 @@ def test_a_failed_solve_is_an_answer_without_a_point():
 def test_guards(changes, message):
     with pytest.raises(ValueError, match=message):
         _problem([_on_ring(0.0), _on_ring(0.5)], **changes)
+
+
+def test_a_half_space_holds_its_camera_alone():
+    """Two cameras on a ring slide apart; camera 1 may go only to y = 0.3."""
+    held = HalfSpaces(np.array([1]), np.array([[0.0, -1.0, 0.0]]), np.array([-0.3]))
+    start = _problem([_on_ring(-0.1), _on_ring(0.1)], max_step=0.6)
+    free = solve_baseline(start).centres
+    solution = solve_baseline(replace(start, half_spaces=held))
+    assert free[1, 1] > 0.5
+    assert solution.centres[1, 1] == pytest.approx(0.3, abs=1e-4)
+    assert solution.centres[0, 1] == pytest.approx(free[0, 1], abs=0.02)
+    with pytest.raises(ValueError, match="camera indices"):
+        replace(start, half_spaces=replace(held, camera=np.array([2])))
+
+
+def test_a_camera_that_stands_already_stays_wherever_it_is():
+    start = _problem([1.7 * _on_ring(-0.1), _on_ring(0.1)], max_step=0.6)
+    solution = solve_baseline(replace(start, fixed=(0,)))
+    assert np.array_equal(solution.centres[0], 1.7 * _on_ring(-0.1))
+    assert np.linalg.norm(solution.centres[1]) == pytest.approx(RING)
+    assert np.linalg.norm(solution.centres[1] - _on_ring(0.1)) > 0.5
+    with pytest.raises(ValueError, match="camera indices"):
+        replace(start, fixed=(2,))

@@ -1,5 +1,6 @@
 """Cameras slide apart only as far as what they measure allows."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,6 +26,7 @@ from planning.spread_problem import (
     SpreadLimits,
     best_rings,
 )
+from planning.zones import Box
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0
@@ -193,7 +195,8 @@ def test_three_cameras_raise_their_smallest_baseline():
     ball = _front(np.radians(80.0))
     cameras = _cameras(_at(-0.7, 0.1), _at(0.1, -0.3), _at(0.5, 0.4))
     spread = ball.spread(cameras)
-    assert spread.smallest_after_m > 1.1 * spread.smallest_before_m
+    # As far as shell and plane go; without them in the program it ends at 0.8 m.
+    assert spread.smallest_after_m > 1.3
     assert _weight(ball, spread.cameras) >= _weight(ball, cameras)
 
 
@@ -320,3 +323,43 @@ def test_one_camera_or_strangers_have_no_baseline():
     apart = sides.spread(_cameras(_at(0.0), _at(np.pi)))
     assert apart.smallest_before_m is None
     assert apart.n_accepted == 0
+
+
+def test_what_stands_already_stays_and_zones_hold_the_others():
+    """Three cameras before a ball; the left one is given, a volume bars the right."""
+    ball = _front(np.radians(70.0))
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    bar = Box("bar", (0.8, 0.8, 0.0), (1.0, 0.42, 1.0), axes)  # y from 0.38 to 1.22
+    space = _workspace(camera_radius_m=(0.95, 1.05), keep_out=(bar,))
+    cameras = _cameras(_at(-0.35), _at(0.3))
+    cameras[0] = replace(cameras[0], existing="old")
+    free = ball.spread(cameras, limits=SpreadLimits(THETA, 0.1, _workspace()))
+    assert free.cameras[1].world_from_device[1, 3] > 0.39
+    spread = ball.spread(cameras, limits=SpreadLimits(THETA, 0.1, space))
+    assert spread.n_accepted > 0
+    for found in (free, spread):
+        moved, old = (s[0].world_from_device for s in (found.cameras, cameras))
+        assert np.array_equal(moved, old)
+    barred = spread.cameras[1].world_from_device[:3, 3]
+    assert 0.3 < barred[1] <= 0.38 + 1e-6
+
+
+def test_mounted_cameras_slide_along_their_plane():
+    """The proposals themselves keep to it: a plane of 1 mm is never hit by chance."""
+    ball = _front(np.radians(70.0))
+    # Slanted, so that sliding straight apart would leave it.
+    cosine, sine = np.cos(0.4), np.sin(0.4)
+    axes = ((-sine, cosine, 0.0), (0.0, 0.0, 1.0), (cosine, sine, 0.0))
+    plane = Box("wall", (1.05, 0.0, 0.0), (1.0, 0.2, 0.0005), axes)
+    places = np.array(plane.centre_m) + np.outer([-0.25, 0.3], axes[0])
+    space = _workspace(camera_radius_m=(0.95, 1.25), mounting=(plane,))
+    poses = look_at(places, np.zeros(3), UP)
+    cameras = [PlannedCamera(f"C{i}", pose, DEVICE) for i, pose in enumerate(poses, 1)]
+    spread = ball.spread(cameras, limits=SpreadLimits(THETA, 0.1, space))
+    # As far as shell and plane go; without them in the program it ends at 0.8 m.
+    assert spread.smallest_after_m > 1.3
+    for camera in spread.cameras:
+        position = camera.world_from_device[:3, 3]
+        off = (position - plane.centre_m) @ np.array(axes[2])
+        assert abs(off) <= 0.0005 + 1e-6
+        assert abs(position[2]) <= 0.2 + 1e-6

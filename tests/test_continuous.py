@@ -16,6 +16,7 @@ from planning.lighting import Target
 from planning.plan import PlannedProjector
 from planning.rig import load_rig
 from planning.scene import Scene
+from planning.zones import Box
 from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cell_bound import CellStatus
 
@@ -224,6 +225,64 @@ def test_cells_hold_the_cone_and_what_is_over_the_floor(light):
         kept = np.array([holder(tree, below)(c) for c in batch.cells])
         cells, held = batch.cells[kept].tolist(), batch.rows[kept]
     assert not unpack_rows(held, 200).any()
+
+
+@pytest.mark.parametrize("light", ["parallel", "diverging"])
+def test_rooms_planes_and_keep_out_volumes_empty_cells_and_only_theirs(light):
+    """Above and below a ring, but for a volume above; a mounting plane on either side.
+
+    Every position that is left stays in a cell with all that it lights.
+    """
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    options = {
+        "box": Box("room", (0.0, 0.0, 0.0), (2.0, 0.4, 2.0), axes),
+        "mounting": (
+            Box("over", (0.0, 0.0, 1.05), (2.0, 2.0, 0.05), axes),
+            Box("beside", (1.05, 0.0, 0.0), (0.05, 2.0, 0.3), axes),
+        ),
+        "keep_out": (Box("lamp", (0.4, 0.0, 1.0), (0.35, 1.0, 0.5), axes),),
+    }
+    scene, template = stage_for(SHAPES["ring"], light, **options)
+    rows = scene.target_samples(200, 5)
+    found = bound_projectors(scene, template, rows, 100, 3, QUICK, **SAID)
+    tree, workspace = found.found.tree, scene.requirements.workspace
+    near, far = workspace.projector_radius_m
+    rng = np.random.default_rng(2)
+    tried = lit_at_all = 0
+    while tried < 25:
+        plane = options["mounting"][tried % 2]
+        offset = np.array(plane.centre_m) + rng.uniform(-1, 1, 3) * plane.half_m
+        blocked = abs(offset[0] - 0.4) < 0.35 and abs(offset[2] - 1.0) < 0.5
+        if blocked or abs(offset[1]) > 0.4 or not near < np.linalg.norm(offset) < far:
+            continue
+        tried += 1
+        if light == "parallel":
+            aim = 0.35 * scene.mesh.radius * rng.normal(size=3)
+            towards = (offset - aim) / np.linalg.norm(offset - aim)
+            every = np.broadcast_to(towards, rows.samples.points.shape)
+            lit = lit_by_hand(scene, rows, every, np.inf)
+            inside = direction_holder(tree, towards)
+        else:
+            to_device = np.array(workspace.centre) + offset - rows.samples.points
+            reach = np.linalg.norm(to_device, axis=1)
+            lit = lit_by_hand(scene, rows, to_device / reach[:, None], reach)
+            inside = position_holder(tree, offset)
+        assert misses(tree, 3, inside, lit) == 0
+        lit_at_all += int(lit.sum())
+    assert lit_at_all > 25 * 20
+    # Nothing is mounted below, nor in front of the room.
+    middle = 0.5 * (near + far)
+    for towards in ((0.02, 0.01, -1.0), (0.01, -1.0, 0.02)):
+        gone = middle * np.array(towards)
+        held = (direction_holder if light == "parallel" else position_holder)(
+            tree, gone / np.linalg.norm(gone) if light == "parallel" else gone
+        )
+        cells = [c for c in tree.roots().cells if held(c)]
+        for _ in range(4):
+            batch = tree.children(np.array(cells))
+            kept = np.array([held(c) for c in batch.cells])
+            cells, bits = batch.cells[kept].tolist(), batch.rows[kept]
+        assert not unpack_rows(bits, 200).any()
 
 
 @pytest.mark.parametrize(

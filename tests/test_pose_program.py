@@ -330,3 +330,37 @@ def test_bad_programs_are_refused(changes, message):
     program = program_of(np.zeros((1, 3)), [0.0, -1.0, 0.0], at=[0.0, -1.0, 0.0])
     with pytest.raises(ValueError, match=message):
         dataclasses.replace(program, **changes)
+
+
+@pytest.mark.parametrize("n_planes", [1, 9])
+@pytest.mark.parametrize("light", ["diverging", "parallel"])
+def test_half_spaces_hold_the_device(light, n_planes):
+    """A patch seen from the side is best lit from over it: as far as may be."""
+    at = np.array([0.0, -0.6, 0.8])
+    limit = np.array([0.0, -1.0, 0.0, 0.4])  # y <= -0.4
+    spare = np.tile([0.0, 0.0, 1.0, -5.0], (n_planes - 1, 1))
+    program = program_of(
+        patch(np.random.default_rng(0), size=0.001),
+        (0, 0, 1),
+        light=light,
+        at=at,
+        axis=np.array([0.0, 0.0, 1.0]),
+        half_spaces=np.vstack([limit, spare]),
+    )
+    assert pose_slack(program, program.world_from_device)[-1] <= 0.2 + 1e-9
+    solution = solve_pose(program)
+    position = solution.world_from_device[:3, 3]
+    assert solution.slack >= 0.0
+    assert position[1] <= -0.4
+    if light == "diverging":
+        # Least incidence at the border, as high as the shell allows.
+        assert position == pytest.approx(
+            [0.0, -0.4, np.sqrt(1.2**2 - 0.4**2)], abs=2e-3
+        )
+    free = solve_pose(dataclasses.replace(program, half_spaces=None))
+    assert free.margin_rad > np.deg2rad(59)
+
+
+def test_half_spaces_of_the_wrong_shape_are_refused():
+    with pytest.raises(ValueError, match=r"half_spaces must be finite, \(k, 4\)"):
+        program_of([[0, 0, 0]], (0, 0, 1), at=(0, 1, 1), half_spaces=np.zeros((2, 3)))

@@ -15,6 +15,7 @@ from .certificates import audit_certificates
 from .consistency import audit_consistency
 from .devices import audit_devices, audit_workspace
 from .estimates import Estimator
+from .existing import audit_existing
 from .groups import audit_groups
 from .inside import audit_inside
 from .ledger import Ledger, as_number
@@ -25,6 +26,7 @@ from .samples import AuditSamples, draw_samples
 from .serving import audit_margins
 from .tables import audit_marginal, audit_rest
 from .verdict import unmet_requirements
+from .zones import audit_zones
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +96,8 @@ def audit_plan(
     estimator = _estimator(plan, samples, ledger)
     audit_devices(plan, ledger)
     audit_workspace(plan, ledger)
+    audit_zones(plan, ledger)
+    audit_existing(plan, ledger)
     audit_areas(own, reach, estimator, ledger)
     audit_causes(own, reach, estimator, ledger)
     audit_inside(plan, own, reach, shadow, ledger, seed=seed)

@@ -9,6 +9,7 @@ from planning.plan import RigPlan
 
 from .areas import ROUNDING
 from .estimates import POINT, Estimator
+from .existing import droppable
 from .ledger import Ledger, as_number, square_centimetres
 from .recompute import Recomputed
 
@@ -26,9 +27,10 @@ def audit_certificates(
         "projectors": plan.surface.reference_projectors,
         "cameras": plan.surface.reference_cameras,
     }
-    for kind, share, of, covers, area in (
+    for kind, devices, share, of, covers, area in (
         (
             "projectors",
+            plan.projectors,
             limits.dominant_coverage,
             "reachable_by_projectors_m2",
             own.lit_by,
@@ -36,6 +38,7 @@ def audit_certificates(
         ),
         (
             "cameras",
+            plan.cameras,
             limits.coverage,
             "reachable_by_cameras_m2",
             own.measured_by,
@@ -62,8 +65,9 @@ def audit_certificates(
         bound = _best_bound(claims)
         if required is not None and bound is not None:
             target = own.samples.in_target
+            spare = droppable(devices)
             _audit_refuted(
-                key, covers & target, bound, required + slack, estimator, ledger
+                key, covers & target, spare, bound, required + slack, estimator, ledger
             )
 
 
@@ -223,6 +227,7 @@ def _best_bound(claims: dict[str, Any]) -> float | None:
 def _audit_refuted(
     key: str,
     covers: NDArray[np.bool_],
+    spare: list[int],
     bound: float,
     enough_m2: float,
     estimator: Estimator,
@@ -230,16 +235,17 @@ def _audit_refuted(
 ) -> None:
     """A bound is false if the plan meets the requirement with fewer devices than that.
 
-    Devices are left out one after the other, always the one that is missed least.
+    Devices are left out one after the other, always the one that is missed least;
+    those that stand already belong to every cover that the bound speaks of.
     """
-    left = list(range(len(covers)))
-    while len(left) >= bound and left:
+    left, spare = list(range(len(covers))), list(spare)
+    while len(left) >= bound and spare:
         areas = [
             estimator.area(np.any(covers[[i for i in left if i != out]], axis=0))
-            for out in left
+            for out in spare
         ]
         best = int(np.argmax(areas))
-        del left[best]
+        left.remove(spare.pop(best))
         if len(left) < bound and not areas[best] <= enough_m2:
             ledger.fail(
                 f"{key}.candidates.lower_bound",

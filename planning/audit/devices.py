@@ -9,7 +9,9 @@ from geometry.devices import ParallelModel
 from planning.plan import PlannedCamera, PlannedProjector, RigPlan
 from planning.requirements import Workspace
 
+from .existing import planned_only
 from .ledger import Ledger
+from .zones import zone_excess
 
 _ROUNDING = 1e-6
 # Positions are written to 0.01 mm, so one on the border may lie outside by as much.
@@ -80,7 +82,8 @@ def audit_workspace(plan: RigPlan, ledger: Ledger) -> None:
             f"{key}.n_reference_{kind}",
             f"{stated} reference poses are claimed, surface.npz holds {len(poses)}",
         )
-        _audit_reference(poses, kind, shell, space, ledger)
+        movable = planned_only(poses, kind, plan)
+        _audit_reference(movable, kind, shell, space, ledger)
     _audit_reference_rings(plan, ledger)
 
 
@@ -90,7 +93,7 @@ def outside_by(
     """Return how far positions (n, 3) lie outside the workspace, <= 0 inside, (n,) [m].
 
     The largest of the amounts by which |Q - c| misses its range, Q stands behind the
-    cone (times |Q - c|) and Q stands below the floor.
+    cone (times |Q - c|), below the floor, and where its zones don't let it.
     """
     offset = positions - np.array(space.centre)
     distance = np.linalg.norm(offset, axis=1)
@@ -101,6 +104,7 @@ def outside_by(
     excess = [shell[0] - distance, distance - shell[1], beyond]
     if space.floor_m is not None:
         excess.append(space.floor_m - offset @ np.array(space.up))
+    excess += zone_excess(offset, space)
     return np.max(excess, axis=0)
 
 
@@ -110,6 +114,9 @@ def _audit_position(
     space: Workspace,
     ledger: Ledger,
 ) -> None:
+    if device.existing:
+        # It stands where it stands: `audit_existing` checks that it does.
+        return
     position = device.world_from_device[:3, 3]
     excess = float(outside_by(position[None], shell, space)[0])
     ledger.holds(

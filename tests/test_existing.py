@@ -1,0 +1,278 @@
+"""Devices that stand already: in every plan, never moved, and counted as given."""
+
+import copy
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from geometry.primitives import box, sphere
+from planning import load_rig, plan_rig
+from planning.audit.audit import audit_plan
+from planning.continuous import Effort, prove_fewest
+from planning.errors import InfeasibleLimitsError, RequirementError, RigError
+from planning.plan import PlannedProjector, RigPlan
+from planning.projector_poses import widen_margins
+from planning.projectors import plan_projectors
+from planning.requirements import Existing, Requirements
+from planning.scene import Scene
+from planning.selection import marginals, select_fewest
+from planning.summary import summary
+
+CENTRE = np.array([0.3, -0.2, 0.1])
+OLD = (
+    '[[existing]]\nname = "old projector"\nkind = "projector"\n'
+    "position_mm = [100, -1200, 300]\naim_mm = [0, 20, 10]\nroll_deg = 15\n"
+)
+POSED = (
+    '[[existing]]\nname = "old camera"\nkind = "camera"\n'
+    "pose_mm = [[1, 0, 0, 50], [0, 0, 1, -1400], [0, -1, 0, 20], [0, 0, 0, 1]]\n"
+)
+
+
+@pytest.fixture
+def required_of(tmp_path):
+    def build(text, **wishes):
+        path = tmp_path / "rig.toml"
+        path.write_text(f'base = "default"\n{text}', encoding="utf-8")
+        settings = {"max_projectors": 3, "tau_m": 0.003} | wishes
+        return load_rig(path).requirements(CENTRE, 0.1, **settings)
+
+    return build
+
+
+# ---- rig files
+
+
+def test_aim_and_pose_are_where_the_file_says(required_of):
+    required = required_of(OLD + POSED)
+    (projector,) = required.existing_of("projector")
+    pose = np.array(projector.world_from_device)
+    assert pose[:3, 3] == pytest.approx(CENTRE + [0.1, -1.2, 0.3], abs=1e-5)
+    device = load_rig().projector_device()
+    local = pose[:3, :3].T @ (np.array([0.0, 0.02, 0.01]) - [0.1, -1.2, 0.3])
+    pixel = device.camera_matrix @ (local / local[2])
+    assert pixel[:2] == pytest.approx([511.5, 383.5], abs=1e-6)
+    (camera,) = required.existing_of("camera")
+    assert np.array(camera.world_from_device) == pytest.approx(
+        np.array([[1, 0, 0, 0.35], [0, 0, 1, -1.6], [0, -1, 0, 0.12], [0, 0, 0, 1]]),
+        abs=1e-12,
+    )
+    assert Requirements.from_document(copy.deepcopy(required.to_document())) == required
+    assert "existing" not in required_of("").to_document()
+    assert "existing" not in load_rig().to_document()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (OLD.replace("aim_mm = [0, 20, 10]\n", ""), "needs position_mm and aim_mm"),
+        (OLD.replace("[0, 20, 10]", "[100, -1200, 300]"), "must not be its position"),
+        (OLD.replace('"projector"', '"lamp"'), r"existing\[0\].kind.*lamp"),
+        (OLD.replace("roll_deg", "role_deg"), "did you mean roll_deg"),
+        (OLD + OLD, "existing names 'old projector' twice"),
+        (POSED + "roll_deg = 3\n", "has pose_mm beside"),
+        (POSED.replace("[1, 0,", "[1.01, 0,"), "must be a rotation.*0.02"),
+        (POSED.replace("[1, 0,", "[-1, 0,"), "must be a rotation"),
+        (POSED.replace("[0, 0, 0, 1]", "[0, 0, 0, 2]"), "last row .* must be 0 0 0 1"),
+    ],
+)
+def test_bad_entries_are_refused(required_of, text, message):
+    with pytest.raises(RigError, match=message):
+        required_of(text)
+
+
+def test_more_devices_than_are_allowed_serve_nothing(required_of):
+    two = OLD + OLD.replace("old", "second")
+    assert len(required_of(two, max_projectors=2).existing) == 2
+    with pytest.raises(
+        InfeasibleLimitsError,
+        match=r"max_projectors = 1 is less than the 2 projectors .* raise --max-proj",
+    ) as caught:
+        required_of(two, max_projectors=1)
+    assert caught.value.exit_code == 4
+    with pytest.raises(InfeasibleLimitsError, match="max_cameras = 1 is less"):
+        required_of(POSED + POSED.replace("old", "second"), max_cameras=1)
+
+
+# ---- covers
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("given", [1, 2])
+def test_covers_hold_what_is_given_and_are_the_fewest_that_do(seed, given):
+    covers = np.random.default_rng(seed).random((40, 9)) < 0.3
+    covers[:, 0] &= np.arange(40) < 3  # so bad that no free cover would take it
+    found = select_fewest(covers, 0.85, max_count=None, seed=0, given=given)
+    fewest = next(
+        k
+        for k in range(given, 10)
+        for rest in combinations(range(given, 9), k - given)
+        if covers[:, [*range(given), *rest]].any(axis=1).sum() >= found.required
+    )
+    assert set(range(given)) <= set(found.chosen.tolist())
+    assert len(found.chosen) == found.lower_bound == fewest
+    others = marginals(covers, found, seed=0, given=given)
+    assert min(others.by_count) == given
+    assert all(set(range(given)) <= set(c.tolist()) for c in others.by_count.values())
+    assert others.greedy >= fewest
+    assert others.one_fewer_bound < found.required
+
+
+# ---- the bound over all poses
+
+
+def ball_scene(existing):
+    """A sphere of which 48 % are asked: two caps of 60 degrees, a quarter each."""
+    ball = sphere(0.08, subdivisions=4)
+    rig = load_rig("default", light="parallel")
+    required = rig.requirements(
+        ball.centre, ball.radius, max_projectors=9, target="surface", tau_m=0.004
+    )
+    required = replace(
+        required,
+        projector=replace(required.projector, min_tangent_angle=0.0),
+        dominant_coverage=0.48,
+        existing=tuple(existing),
+    )
+    n = len(ball.faces)
+    scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    eye, radii = np.eye(4), np.array([0.1, 0.45])
+    return scene, PlannedProjector(
+        "", "parallel", eye, eye, rig.projector_device(), radii
+    )
+
+
+def shining(name, towards, aside=0.0):
+    """Parallel light along -towards, its beam a distance aside of the ball."""
+    z = -np.array(towards, dtype=float)
+    x = np.cross([0.3, 0.5, 0.8], z)
+    x /= np.linalg.norm(x)
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    pose[:3, 3] = -1.1 * z + aside * x
+    return Existing(name, "projector", tuple(tuple(row) for row in pose.tolist()))
+
+
+@pytest.mark.parametrize(
+    ("existing", "count", "idle"),
+    [
+        ([shining("front", [1, 0, 0])], 2, False),
+        ([shining("front", [1, 0, 0]), shining("back", [-1, 0, 0])], 2, True),
+        # One that lights nothing is given all the same: two more are needed.
+        ([shining("blind", [1, 0, 0], aside=5.0)], 3, False),
+    ],
+)
+def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, idle):
+    scene, template = ball_scene(existing)
+    offset = (0.0, 0.0)
+    stage = plan_projectors(scene, template, 600, ring_offset=offset, rounds=1)
+    assert stage.certificate["given"] == len(existing)
+    effort = Effort(finest=6, budget=1e9, shadows=np.inf)
+    stage = prove_fewest(scene, stage, template, effort, ring_offset=offset)
+    proof = stage.certificate
+    assert (proof["count"], proof["status"]) == (count, "optimal")
+    entry = proof["continuous"]
+    assert (entry["lower_bound"], entry["status"]) == (count, "proved")
+    assert entry["n_reached"] == entry["n_samples"] == 2000
+    assert (entry["n_cells"] == 0) == idle
+    assert (proof["one_fewer"] is None) == idle
+    if not idle:
+        assert entry["one_fewer_upper_bound_m2"] < proof["required_m2"]
+    standing = [p for p in stage.projectors if p.existing]
+    assert [p.existing for p in standing] == [e.name for e in existing]
+    widened = {p.existing: p for p in widen_margins(scene, stage) if p.existing}
+    for device in existing:
+        pose = widened[device.name].world_from_device
+        assert np.array_equal(pose, np.array(device.world_from_device))
+    assert not any(p.existing for p in stage.reference[len(existing) :])
+
+
+# ---- a whole plan
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """A plate, seen from both sides; a projector and a camera before it already."""
+    path = tmp_path_factory.mktemp("rig") / "old.toml"
+    path.write_text(
+        'base = "default"\n'
+        + OLD
+        + OLD.replace('"old projector"', '"old camera"')
+        .replace('"projector"', '"camera"')
+        .replace("[100, -1200, 300]", "[-300, -880, 250]")
+        + "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\n"
+        "min_reachable = 0.1\n[placement]\nn_candidate_projectors = 600\n"
+        "n_candidate_cameras = 400\nn_reference_projectors = 600\n"
+        "n_reference_cameras = 400\n"
+    )
+    plate = box((0.1, 0.01, 0.1), divisions=4)
+    try:
+        return plan_rig(
+            plate, load_rig(path), max_projectors=3, target="surface", check=False
+        )
+    except RequirementError as missed:
+        return missed.plan
+
+
+def test_they_stay_are_marked_and_the_audit_agrees(planned):
+    assert audit_plan(planned, n_samples=4000).failures == ()
+    centre = np.array(planned.requirements.workspace.centre)
+    for kind, name, place in (
+        ("projectors", "old projector", [0.1, -1.2, 0.3]),
+        ("cameras", "old camera", [-0.3, -0.88, 0.25]),
+    ):
+        entries = planned.document[kind]
+        (entry,) = [e for e in entries if e.get("existing")]
+        assert entry["name"] == name
+        stands = np.array(entry["world_from_device"])[:3, 3] - centre
+        assert stands == pytest.approx(place, abs=1e-5)
+        assert len(entries) >= 2
+        proof = planned.document["certificates"][kind]
+        assert proof["given"] == 1
+        assert proof["count"] == len(entries)
+    text = summary(planned, (), ())
+    assert text.count("given 1 existing") >= 3
+    assert "existing: old camera" in text
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda d: d["cameras"][0].pop("existing"), "[] are marked existing, but"),
+        (
+            lambda d: d["requirements"].pop("existing"),
+            "holds [], but rig.existing has ['old camera', 'old projector']",
+        ),
+        (
+            lambda d: d["certificates"]["cameras"].pop("given"),
+            "certificates.cameras.given: 0 is claimed, but 1",
+        ),
+        (lambda d: _push(d, 2e-3), "that of the existing 'old projector' is"),
+        (
+            lambda d: _push(d, 2e-3, everywhere=True),
+            "stands 2 mm from where rig.existing has 'old projector'",
+        ),
+        (lambda d: _set(d, "aim_mm", [0, 25, 10]), "misses the image centre"),
+        (lambda d: _set(d, "roll_deg", 14.0), "is rolled by 15 degrees, rig.existing"),
+        (lambda d: _set(d, "kind", "camera"), "is a projector, but rig.existing"),
+    ],
+)
+def test_false_claims_about_them_are_named(planned, change, sentence):
+    document = copy.deepcopy(planned.document)
+    change(document)
+    found = audit_plan(RigPlan(document, planned.surface), n_samples=500).failures
+    assert any(sentence in failure for failure in found), found
+
+
+def _push(document, by_m, *, everywhere=False):
+    pose = document["projectors"][0]["world_from_device"]
+    pose[0][3] += by_m
+    document["projectors"][0]["world_from_ring"][0][3] += by_m
+    if everywhere:
+        document["requirements"]["existing"][0]["world_from_device"] = pose
+
+
+def _set(document, key, value):
+    document["rig"]["existing"][0][key] = value
