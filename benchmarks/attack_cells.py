@@ -11,8 +11,9 @@ numpy for incidence and tangent angle, trimesh's embree for shadows, with offset
 own, and it finds a pose's cell by a formula of its own. The field of view is left out,
 as in the cells: some aim shows each sample.
 
-`--rig-fit default` is the rig as it comes; `close` brings its shell to 1.55 to 2.2 radii
-of the object, where a cell of positions looks widest, and opens its range. A mesh that
+`--rig-fit default` is the rig as it comes; `close` brings its shell to 1.55 to 2.2
+radii of the object, where a cell of positions looks widest, with a range to match and a
+beam a tenth as wide as the object. A mesh that
 reaches into the shell has no cells with shadows, and is passed over.
 
 A pair that the tree lacks is looked at again in float64 against every face; what
