@@ -278,7 +278,7 @@ def held_by_cells(
         alive, owner = alive[split], owner[split]
         steps = np.arange(many.max())
         part = np.minimum(first[owner][:, None] + steps, names.size - 1)
-        inside = _lies_in(tree, names[part], keys[alive][:, None])
+        inside = lies_in(tree, names[part], keys[alive][:, None])
         inside &= steps < many[owner][:, None]
         found = inside.any(axis=1)
         # A pose whose cell was split and that none of the parts holds is lost.
@@ -296,7 +296,7 @@ def held_by_cells(
     return held, depth
 
 
-def _lies_in(
+def lies_in(
     tree: Tree, names: NDArray[np.int64], keys: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Whether cells hold keys: face, both equal angles and radii, shape of names.
