@@ -258,15 +258,16 @@ def test_hessian_times_vector_is_the_change_of_the_gradient(light):
 
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize(
-    ("seed", "changes"),
+    ("seed", "changes", "kinds"),
     [
-        (0, {}),
-        (1, {"half_angle": np.pi, "floor": -np.inf}),
-        (2, {"floor": 0.03, "half_angle": 0.15}),
-        (3, {"ring_radius": 0.05, "range_m": (0.9, 1.06)}),
+        (0, {}, {"cone"}),
+        (1, {"half_angle": np.pi, "floor": -np.inf}, set()),
+        (2, {"half_angle": 0.15, "floor": 0.03}, {"cone"}),
+        (3, {"min_tangent_angle": np.radians(55.0)}, {"tangent"}),
+        (4, {"up": np.array([0.0, 0.0, -1.0]), "floor": -0.04}, {"floor"}),
     ],
 )
-def test_kkt_of_the_pose_program_from_ipopts_multipliers(light, seed, changes):
+def test_kkt_of_the_pose_program_from_ipopts_multipliers(light, seed, changes, kinds):
     """Stationarity, complementarity and signs, with derivatives from numpy alone."""
     program = program_for(light, seed, **changes)
     index = np.arange(16)
@@ -287,6 +288,12 @@ def test_kkt_of_the_pose_program_from_ipopts_multipliers(light, seed, changes):
     assert (of_g[applies, 6] * -y[applies]).sum() == pytest.approx(-1.0, abs=1e-5)
     margin = pose_margins(program, outcome.world_from_device).min()
     assert margin == pytest.approx(outcome.margin_rad, abs=1e-7)
+    binds = y < -1e-6
+    binding = {name for name, k in (("cone", -2), ("floor", -1)) if binds[k]}
+    binding |= {"tangent"} if binds[16:48].any() else set()
+    assert binding >= kinds
+    # Parallel light feels its panel, beam or ring, diverging light the shell.
+    assert "tangent" in kinds or binds[48:-4].any() or binds[-4:-2].any()
 
 
 @pytest.mark.parametrize("seed", range(4))
