@@ -163,8 +163,8 @@ def _run_ipopt(
             "ipopt.mumps_pivot_order": _AMD,
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
-            # The exact Hessian takes longer to build than the whole solution without it,
-            # and no optimum is better for it.
+            # The exact Hessian takes longer to build than the solution without it, and
+            # no optimum is better for it.
             "ipopt.hessian_approximation": "limited-memory",
             "ipopt.max_iter": _MAX_ITERATIONS,
             "ipopt.tol": 1e-7,

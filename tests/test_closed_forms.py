@@ -49,7 +49,7 @@ def planned(
     steep=None,
     effort=EFFORT,
 ):
-    """Plan the projectors of the whole surface of a mesh; convex ones have no shadows."""
+    """Plan the projectors of a surface; shadows count where the effort says so."""
     asked = ASKED | {"max_projectors": 20, "target": "surface"}
     rig = load_rig("default", light)
     order = Order(mesh, rig, asked | {"dominant_coverage": share}, 0, 2, ())
