@@ -12,6 +12,7 @@ from .claims import Claims, Devices, make_claims
 from .cost import cost_entry
 from .draft import Draft
 from .marginal import camera_table, projector_table
+from .overlaps import overlap_entries
 from .plan import FORMAT, VERSION, RigPlan
 from .progress import Stopwatch
 from .relaxations import reachability_relaxations
@@ -124,6 +125,7 @@ def _document(
         "projectors": entries.projector_entries(devices.projectors, claims),
         "cameras": entries.camera_entries(devices.cameras, claims),
         "coverage": coverage,
+        **overlap_entries(draft.scene, devices.projectors),
         "marginal": marginal,
         "certificates": {
             "projectors": draft.stage.certificate,

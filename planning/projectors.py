@@ -16,6 +16,7 @@ from .existing import existing_projectors, movable
 from .lighting import Target
 from .one_fewer import Offer, one_fewer
 from .plan import PlannedProjector
+from .relaxations import nothing_lit
 from .scene import Scene
 from .selection import Selection, certificate, marginals, select_fewest
 from .share_margin import widest_selection
@@ -82,7 +83,7 @@ def plan_projectors(
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
-        raise InfeasibleLimitsError(_nothing_lit(stages, len(candidates)))
+        raise InfeasibleLimitsError(nothing_lit(scene, candidates, rows, stages))
     selection = _fewest(scene, stages)
     # The best of a lattice lies beside the best there is.
     n_lattice = len(candidates)
@@ -311,20 +312,4 @@ def _stage(
             for number, chosen in others.by_count.items()
         },
         proof,
-    )
-
-
-def _nothing_lit(stages: NDArray[np.int8], n_candidates: int) -> str:
-    counts = np.bincount(stages.ravel(), minlength=lighting.LIT)[: lighting.LIT]
-    share = 100.0 * counts / counts.sum()
-    named = ", ".join(
-        f"{cause} {part:.0f} %"
-        for cause, part in sorted(
-            zip(lighting.CAUSES, share, strict=True), key=lambda pair: -pair[1]
-        )
-        if part >= 1.0
-    )
-    return (
-        f"no projector of {n_candidates} poses lights any part of the target; of all "
-        f"pairs of pose and sample, the first limit that fails is {named}; relax it"
     )

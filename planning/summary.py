@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .firing import schedule_line
 from .plan import PlannedCamera, PlannedProjector, RigPlan
 from .requirements import Workspace
 from .shortfall import causes_line
@@ -273,6 +274,8 @@ def _coverage(plan: RigPlan) -> str:
             f"         the parts of {names} don't overlap: register them by the "
             f"calibrated poses, not by the surface"
         )
+    if firing := schedule_line(plan.document):
+        lines.append(firing)
     return "\n".join(lines)
 
 

@@ -14,7 +14,7 @@ The cone program states it (cvxpy, CLARABEL); :func:`smallest_cap` reaches the s
 optimum by an active set of at most four normals, many times faster.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,9 @@ class DirectionSolution:
             has no unit solution; its value is a bound on every direction.
         light: Unit direction L, shape (3,), or None.
         value: t*, the cosine of the largest incidence; an upper bound in any case.
+        multipliers: Of -N_i.L >= t, at least 0, shape (n,); None where no program was
+            solved.
+        steep_multipliers: Of |T_i.L| <= cos(tau_min), 0 where there is no T, (n,).
     """
 
     normals: NDArray[np.float64]
@@ -47,6 +50,8 @@ class DirectionSolution:
     status: SolveStatus
     light: NDArray[np.float64] | None
     value: float
+    multipliers: NDArray[np.float64] | None = None
+    steep_multipliers: NDArray[np.float64] | None = None
 
     @property
     def max_incidence(self) -> float:
@@ -86,10 +91,11 @@ def max_margin_direction(
     light, t = cp.Variable(3), cp.Variable()
     constraints: list[Any] = [-normals @ light >= t, cp.norm(light, 2) <= 1]
     limit = 0.0 if tau_min is None else tau_min
+    binds = np.zeros(len(normals), dtype=bool)
     if steep is not None and limit > 0:
-        lines = steep[np.any(steep != 0.0, axis=1)]
-        if len(lines):
-            constraints.append(cp.abs(lines @ light) <= np.cos(limit))
+        binds = np.any(steep != 0.0, axis=1)
+        if np.any(binds):
+            constraints.append(cp.abs(steep[binds] @ light) <= np.cos(limit))
     problem = cp.Problem(cp.Maximize(t), constraints)
     try:
         problem.solve(solver=cp.CLARABEL)
@@ -101,10 +107,17 @@ def max_margin_direction(
     length = float(np.linalg.norm(found))
     if not value > _UNIT:
         # Feasible is L = 0 always, so "optimal" says nothing; its length does.
-        return _answer(normals, steep, limit, SolveStatus.INFEASIBLE, None, 0.0)
-    if length < 1.0 - _UNIT:
-        return _answer(normals, steep, limit, SolveStatus.UNKNOWN, None, value)
-    return _answer(normals, steep, limit, SolveStatus.OPTIMAL, found / length, value)
+        answer = _answer(normals, steep, limit, SolveStatus.INFEASIBLE, None, 0.0)
+    elif length < 1.0 - _UNIT:
+        answer = _answer(normals, steep, limit, SolveStatus.UNKNOWN, None, value)
+    else:
+        light_of = found / length
+        answer = _answer(normals, steep, limit, SolveStatus.OPTIMAL, light_of, value)
+    lines = np.zeros(len(normals))
+    if np.any(binds):
+        lines[binds] = constraints[-1].dual_value
+    prices = np.asarray(constraints[0].dual_value, dtype=np.float64)
+    return replace(answer, multipliers=prices, steep_multipliers=lines)
 
 
 def smallest_cap(normals: NDArray[np.float64]) -> DirectionSolution:

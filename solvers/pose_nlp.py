@@ -39,11 +39,18 @@ class IpoptOutcome:
         world_from_device: Pose, shape (4, 4).
         margin_rad: The variable t at the end.
         success: Whether IPOPT reports a local optimum.
+        variables: x at the end, shape (7,).
+        multipliers: Of g, as CasADi signs them: df/dx + (dg/dx)^T multipliers +
+            bound_multipliers = 0, and 0 or less where a lower bound holds.
+        bound_multipliers: Of the bounds on x, shape (7,).
     """
 
     world_from_device: NDArray[np.float64]
     margin_rad: float
     success: bool
+    variables: NDArray[np.float64]
+    multipliers: NDArray[np.float64]
+    bound_multipliers: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,9 +267,12 @@ def run_ipopt(
             lbx=np.append(-box[:6], -0.5 * np.pi),
             ubx=np.append(box[:6], program.max_incidence),
         )
-    x = np.asarray(result["x"], dtype=np.float64).ravel()
+    x, of_g, of_x = (
+        np.asarray(result[name], dtype=np.float64).ravel()
+        for name in ("x", "lam_g", "lam_x")
+    )
     success = bool(solver.stats()["success"])
-    return IpoptOutcome(pose_of(program, x), float(x[6]), success)
+    return IpoptOutcome(pose_of(program, x), float(x[6]), success, x, of_g, of_x)
 
 
 def pose_of(program: PoseProgram, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -300,6 +300,21 @@ def _claim(document: dict[str, Any], surface: Surface) -> None:
     shared = area(lambda row: all(row["seen"]), inside)
     together = shared >= 0.01 * coverage["target"]["area_m2"]
     document["camera_groups"] = [["C1", "C2"]] if together else [["C1"], ["C2"]]
+    falls_on_both = area(lambda row: all(row["falls"]), inside)
+    document["overlaps"] = [
+        {
+            "projectors": ["P1", "P2"],
+            "target_m2": falls_on_both,
+            "surface_m2": area(lambda row: all(row["falls"]), everything),
+        }
+    ]
+    document["firing_schedule"] = {
+        "groups": [["P1"], ["P2"]],
+        "n_groups": 2,
+        "lower_bound": 2,
+        "proof": "clique",
+        "clique": ["P1", "P2"],
+    }
     document["members"] = [{"mesh": 0, "coverage": coverage, "regions": [0, 1]}]
 
 
@@ -344,7 +359,13 @@ def _evaluate(
     else:
         cause = LIGHT[max(steps)]
     reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 5
+    any_light = {"max_incidence": math.radians(89.0), "min_tangent_angle": 0.0}
     return {
+        "falls": [
+            light_steps({**entry, "range_m": [0.0, 99.0]}, p, n, [0.0] * 3, any_light)
+            == 5
+            for entry in projectors
+        ],
         "lit": any(lit),
         "lit_by": lit,
         "seen": seen,

@@ -20,9 +20,11 @@ from .groups import audit_groups
 from .inside import audit_inside
 from .ledger import Ledger, as_number
 from .occlusion import Shadow
+from .overlaps import audit_overlaps
 from .recompute import Reach, Recomputed, reach_of, recompute
 from .regions import audit_regions
 from .samples import AuditSamples, draw_samples
+from .schedule import audit_schedule
 from .serving import audit_margins
 from .tables import audit_marginal, audit_rest
 from .verdict import unmet_requirements
@@ -108,6 +110,8 @@ def audit_plan(
     audit_certificates(plan, own, estimator, ledger)
     audit_baselines(plan, ledger)
     audit_groups(plan, own, estimator.n_claimed, ledger)
+    audit_overlaps(plan, shadow, estimator, ledger)
+    audit_schedule(plan, ledger)
     audit_consistency(plan, ledger)
     audit_rest(plan, ledger)
     return _result(plan, own, reach, estimator, ledger)

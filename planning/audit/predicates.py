@@ -92,7 +92,7 @@ def light_steps(
 ) -> NDArray[np.int8]:
     """Return how many limits of *lit* each sample passes, shape (n,); `LIT`: lit."""
     steps = np.zeros(len(samples), dtype=np.int8)
-    alive = np.flatnonzero(_in_beam(lamp, samples.points))
+    alive = np.flatnonzero(in_beam(lamp, samples.points))
     steps[alive] = 1
     along, length = light_of(lamp, samples.points[alive])
     near, far = lamp.device.range_m
@@ -192,7 +192,8 @@ def pair_steps(
     return passed.sum(axis=0, dtype=np.int8)
 
 
-def _in_beam(lamp: Lamp, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def in_beam(lamp: Lamp, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return whether points lie in the image or beam and the last ring, shape (n,)."""
     device, last = lamp.device, lamp.radii[-1]
     local = in_frame(lamp.world_from_device, points)
     ring = in_frame(lamp.world_from_ring, points)

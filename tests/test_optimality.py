@@ -1,0 +1,332 @@
+"""Optima of the cone and the pose program, derived again: KKT, derivatives, searches.
+
+Nothing here comes from CasADi or cvxpy but the answer and its multipliers. The pose
+program is stated once more in numpy, with scipy's rotations.
+"""
+
+import itertools
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from geometry.poses import look_at
+from solvers.cone import max_margin_direction, smallest_cap
+from solvers.pose_nlp import RIDGE, build_pose_nlp, pose_parameters, run_ipopt
+from solvers.pose_program import INSET, PoseProgram, pose_margins, solve_pose
+from solvers.status import SolveStatus
+
+K = np.array([[1400.0, 0.0, 639.5], [0.0, 1400.0, 399.5], [0.0, 0.0, 1.0]])
+LIGHTS = ["diverging", "parallel"]
+
+
+def unit(v):
+    v = np.asarray(v, dtype=float)
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def cap(rng, n, half_angle, axis=(0.0, -1.0, 0.0)):
+    """Normals within an angle of an axis."""
+    lean = unit(np.cross(axis, rng.normal(size=(n, 3))))
+    angle = half_angle * np.sqrt(rng.random(n))[:, None]
+    return np.cos(angle) * unit(axis) + np.sin(angle) * lean
+
+
+# --- the cone program
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("tau_deg", [0.0, 35.0, 70.0])
+def test_kkt_of_the_cone_program_from_its_multipliers(seed, tau_deg):
+    """With a, b the multipliers of -N.L >= t and |T.L| <= c, c = cos tau::
+
+    sum a = 1,   -N^T a - sum b_i sign(T_i.L) T_i = nu L/|L|,   nu >= 0
+    a_i (-N_i.L - t) = 0,   b_i (c - |T_i.L|) = 0,   t* = nu + c sum b
+    """
+    rng = np.random.default_rng(seed)
+    normals = cap(rng, 40, 1.1)
+    steep = unit(np.cross(normals, rng.normal(size=normals.shape)))
+    steep[::3] = 0.0
+    c = np.cos(np.radians(tau_deg))
+    found = max_margin_direction(normals, steep, np.radians(tau_deg))
+    a, b = found.multipliers, found.steep_multipliers
+    assert a.min() >= -1e-8
+    assert b.min() >= -1e-8
+    assert a.sum() == pytest.approx(1.0, abs=1e-7)
+    if found.light is None:
+        # The relaxation is short of a unit direction; nu = 0, and t* = c sum b.
+        assert found.status is SolveStatus.UNKNOWN
+        assert found.value == pytest.approx(c * b.sum(), abs=1e-6)
+        return
+    light = found.light
+    pull = -normals.T @ a - steep.T @ (b * np.sign(steep @ light))
+    nu = float(pull @ light)
+    assert nu >= 0.0
+    assert pull == pytest.approx(nu * light, abs=3e-5)
+    assert a * (-normals @ light - found.value) == pytest.approx(0.0, abs=2e-7)
+    assert b * (c - np.abs(steep @ light)) == pytest.approx(0.0, abs=2e-7)
+    assert found.value == pytest.approx(nu + c * b.sum(), abs=1e-6)
+
+
+def test_cone_program_against_every_set_of_three():
+    """The best cap is that of one, two or three of its normals."""
+    rng = np.random.default_rng(1)
+    for trial in range(60):
+        normals = cap(rng, int(rng.integers(1, 9)), rng.uniform(0.2, 1.5))
+        best = -1.0
+        for k in (1, 2, 3):
+            for chosen in itertools.combinations(normals, min(k, len(normals))):
+                three = np.array(chosen)
+                if np.linalg.matrix_rank(three, tol=1e-9) < len(three):
+                    continue
+                # Equal cosines to all, in their span.
+                axis = np.linalg.pinv(three) @ np.ones(len(three))
+                best = max(best, float(np.min(normals @ unit(axis))))
+        for method in (smallest_cap, max_margin_direction):
+            found = method(normals)
+            assert found.value == pytest.approx(max(best, 0.0), abs=2e-7), trial
+
+
+# --- the pose program
+
+
+def program_for(light, seed, **changes):
+    """A body whose normals lean aside: field, cone, floor, ring and range all apply."""
+    rng = np.random.default_rng(seed)
+    normals = cap(rng, 16, 0.6, axis=(0.35, -1.0, 0.25))
+    steep = unit(np.cross(normals, rng.normal(size=normals.shape)))
+    steep[::3] = 0.0
+    start = look_at(np.array([0.05, -1.0, 0.02]), np.zeros(3), np.array([0, 0, 1.0]))
+    ring = np.eye(4)
+    ring[:3, :3] = Rotation.from_rotvec([0.05, -0.03, 0.02]).as_matrix()
+    ring[:3, 3] = [0.002, 0.001, 0.003]
+    arguments = {
+        "points": 0.05 * normals,
+        "normals": normals,
+        "steep": steep,
+        "light": light,
+        "world_from_device": start,
+        "max_incidence": np.radians(60),
+        "min_tangent_angle": np.radians(25),
+        "range_m": (0.85, 1.3),
+        "shell_m": (0.9, 1.1),
+        "centre": np.array([0.01, 0.0, -0.01]),
+        "axis": unit([0.1, -1.0, 0.0]),
+        "half_angle": 0.22,
+        "camera_matrix": K,
+        "resolution": (1280, 800),
+        "half_panel_m": (0.07, 0.065),
+        "beam_radius_m": 0.075,
+        "ring_radius": 0.12 if light == "diverging" else 0.08,
+        "ring_from_device": ring,
+        "up": np.array([0.0, 0.0, 1.0]),
+        "floor": -0.2,
+    }
+    return PoseProgram(**(arguments | changes))
+
+
+def stated(program, x):
+    """f and g of the pose program at x = (q, s, t), in numpy alone."""
+    q, s, t = x[:3], x[3:6], x[6]
+    start, n = program.world_from_device, len(program.points)
+    size = np.linalg.norm(program.points - start[:3, 3], axis=1).mean()
+    position = start[:3, 3] + size * q
+    turn = start[:3, :3] @ Rotation.from_quat([*s, 1.0]).as_matrix()
+    away = program.points - position
+    local = away @ turn
+    frame = program.ring_from_device
+    ring = (local @ frame[:3, :3].T + frame[:3, 3]) / size
+    local, across = local / size, ring[:, 0] ** 2 + ring[:, 1] ** 2
+    if program.light == "diverging":
+        distance = np.linalg.norm(local, axis=1)
+        rays = unit(away)
+        low = program.pixel_margin - 0.5
+        w, h = program.resolution
+        left, right = (np.array([low, w - 1 - low]) - K[0, 2]) / K[0, 0]
+        top, bottom = (np.array([low, h - 1 - low]) - K[1, 2]) / K[1, 1]
+        u = local / distance[:, None]
+        lows = [
+            u[:, 0] - left * u[:, 2],
+            right * u[:, 2] - u[:, 0],
+            u[:, 1] - top * u[:, 2],
+            bottom * u[:, 2] - u[:, 1],
+            distance**2 - (program.range_m[0] / size) ** 2,
+            (program.range_m[1] / size) ** 2 - distance**2,
+            (
+                (program.ring_radius * ring[:, 2]) ** 2
+                - ring[:, 0] ** 2
+                - ring[:, 1] ** 2
+            )
+            / distance**2,
+        ]
+    else:
+        rays = np.broadcast_to(turn[:, 2], (n, 3))
+        half = np.array(program.half_panel_m) / size
+        lows = [
+            local[:, 0] + half[0],
+            half[0] - local[:, 0],
+            local[:, 1] + half[1],
+            half[1] - local[:, 1],
+            local[:, 2] - program.range_m[0] / size,
+            program.range_m[1] / size - local[:, 2],
+            (program.ring_radius / size) ** 2 - across,
+            (program.beam_radius_m / size) ** 2 - local[:, 0] ** 2 - local[:, 1] ** 2,
+        ]
+    facing = -np.sum(program.normals * rays, axis=1)
+    along = np.sum(program.steep * rays, axis=1)
+    tangent = np.cos(program.min_tangent_angle + t)
+    offset = (position - program.centre) / size
+    radius = offset @ offset
+    g = np.concatenate(
+        [
+            facing - np.cos(program.max_incidence - t),
+            tangent - along,
+            tangent + along,
+            *lows,
+            [
+                radius - (program.shell_m[0] / size) ** 2,
+                (program.shell_m[1] / size) ** 2 - radius,
+                program.axis @ offset - np.cos(program.half_angle) * np.sqrt(radius),
+                (program.up @ position - max(program.floor, -9.0)) / size,
+            ],
+        ]
+    )
+    return -t + RIDGE * (q @ q + s @ s), g
+
+
+def slopes(program, x, step=1e-6):
+    """Central differences of f (7,) and g (m, 7)."""
+    f, g = [], []
+    for e in np.eye(7):
+        (f1, g1), (f0, g0) = (stated(program, x + k * step * e) for k in (1, -1))
+        f.append((f1 - f0) / (2 * step))
+        g.append((g1 - g0) / (2 * step))
+    return np.array(f), np.stack(g, axis=1)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("seed", range(3))
+def test_gradient_and_jacobian_are_those_of_the_statement_in_numpy(light, seed):
+    program = program_for(light, seed)
+    rng = np.random.default_rng(100 + seed)
+    nlp = build_pose_nlp(light, 16)
+    both = ca.vertcat(nlp.f, nlp.g)
+    exact = ca.Function("e", [nlp.x, nlp.p], [both, ca.jacobian(both, nlp.x)])
+    p, lower = pose_parameters(program, np.arange(16))
+    steep = np.any(program.steep != 0.0, axis=1)
+    applies = np.isfinite(lower)
+    # All kinds apply: everything but the tangent limit where there is no T.
+    assert np.array_equal(applies[16:48], np.tile(steep, 2))
+    assert applies[48:].all()
+    for _ in range(4):
+        x = np.append(rng.normal(0, 0.05, 6), rng.uniform(0.0, 0.4))
+        value, slope = (np.asarray(part) for part in exact(x, p))
+        f, g = stated(program, x)
+        assert value.ravel() == pytest.approx(np.array([f, *g]), abs=1e-12)
+        of_f, of_g = slopes(program, x)
+        assert slope[0] == pytest.approx(of_f, abs=1e-8)
+        assert slope[1:] == pytest.approx(of_g, abs=2e-8)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_hessian_times_vector_is_the_change_of_the_gradient(light):
+    """Of the Lagrangian f + y.g, against differences of its numpy gradient."""
+    program = program_for(light, 0)
+    rng = np.random.default_rng(7)
+    nlp = build_pose_nlp(light, 16)
+    y = ca.MX.sym("y", nlp.g.shape[0])
+    hessian, gradient = ca.hessian(nlp.f + ca.dot(y, nlp.g), nlp.x)
+    exact = ca.Function("h", [nlp.x, nlp.p, y], [hessian, gradient])
+    p, _ = pose_parameters(program, np.arange(16))
+    x = np.append(rng.normal(0, 0.05, 6), 0.2)
+    prices = rng.normal(size=nlp.g.shape[0])
+    table = np.asarray(exact(x, p, prices)[0])
+    assert table == pytest.approx(table.T, abs=1e-12)
+
+    def gradient_at(at):
+        of_f, of_g = slopes(program, at, step=1e-4)
+        return of_f + of_g.T @ prices
+
+    for _ in range(3):
+        v = rng.normal(size=7)
+        step = 1e-3
+        change = (gradient_at(x + step * v) - gradient_at(x - step * v)) / (2 * step)
+        # Differences twice over are good to five digits.
+        assert table @ v == pytest.approx(change, rel=1e-4, abs=1e-3)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize(
+    ("seed", "changes", "kinds"),
+    [
+        (0, {}, {"cone"}),
+        (1, {"half_angle": np.pi, "floor": -np.inf}, set()),
+        (2, {"half_angle": 0.15, "floor": 0.03}, {"cone"}),
+        (3, {"min_tangent_angle": np.radians(55.0)}, {"tangent"}),
+        (4, {"up": np.array([0.0, 0.0, -1.0]), "floor": -0.04}, {"floor"}),
+    ],
+)
+def test_kkt_of_the_pose_program_from_ipopts_multipliers(light, seed, changes, kinds):
+    """Stationarity, complementarity and signs, with derivatives from numpy alone."""
+    program = program_for(light, seed, **changes)
+    index = np.arange(16)
+    outcome = run_ipopt(program, index, program.world_from_device, max_iterations=300)
+    assert outcome.success
+    x, y, z = outcome.variables, outcome.multipliers, outcome.bound_multipliers
+    _, lower = pose_parameters(program, index)
+    applies = np.isfinite(lower)
+    _, g = stated(program, x)
+    assert np.all((g - lower)[applies] >= -1e-8)
+    assert set(lower[applies]) <= {0.0, INSET}
+    of_f, of_g = slopes(program, x)
+    assert of_f + of_g[applies].T @ y[applies] + z == pytest.approx(0.0, abs=2e-6)
+    assert np.all(y <= 1e-9)
+    assert y[~applies] == pytest.approx(0.0, abs=1e-20)
+    assert y[applies] * (g - lower)[applies] == pytest.approx(0.0, abs=1e-7)
+    # The margin is what is bought: dt = 1 is shared out among the limits that bind.
+    assert (of_g[applies, 6] * -y[applies]).sum() == pytest.approx(-1.0, abs=1e-5)
+    margin = pose_margins(program, outcome.world_from_device).min()
+    assert margin == pytest.approx(outcome.margin_rad, abs=1e-7)
+    binds = y < -1e-6
+    binding = {name for name, k in (("cone", -2), ("floor", -1)) if binds[k]}
+    binding |= {"tangent"} if binds[16:48].any() else set()
+    assert binding >= kinds
+    # Parallel light feels its panel, beam or ring, diverging light the shell.
+    assert "tangent" in kinds or binds[48:-4].any() or binds[-4:-2].any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_pose_program_against_a_search_over_all_directions(seed):
+    """Parallel light with steep sides: nothing on a grid of 1 degree is better."""
+    rng = np.random.default_rng(40 + seed)
+    normals = cap(rng, 6, 0.9)
+    steep = unit(np.cross(normals, rng.normal(size=normals.shape)))
+    steep[::2] = 0.0
+    i = np.arange(40_000) + 0.5
+    z, turn = 1 - 2 * i / i.size, np.pi * (1 + 5**0.5) * i
+    grid = np.column_stack(
+        [np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z]
+    )
+    incidence = np.arccos(np.clip(normals @ grid.T, -1, 1)).max(axis=0)
+    along = np.abs(steep[1::2] @ grid.T).max(axis=0)
+    least = np.radians(25)
+    margins = np.minimum(np.radians(60) - incidence, np.arccos(along) - least)
+    best = grid[np.argmax(margins)]
+    up = np.array([0.0, 0.0, 1.0])
+    program = program_for(
+        "parallel",
+        0,
+        points=0.02 * normals,
+        normals=normals,
+        steep=steep,
+        world_from_device=look_at(best + 0.02 * rng.normal(size=3), np.zeros(3), up),
+        half_angle=np.pi,
+        floor=-np.inf,
+        shell_m=(0.8, 1.2),
+        range_m=(0.5, 1.5),
+    )
+    solution = solve_pose(program)
+    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    spacing = np.sqrt(4 * np.pi / i.size)
+    assert margins.max() - 1e-6 <= solution.margin_rad <= margins.max() + spacing
