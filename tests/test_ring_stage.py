@@ -1,4 +1,4 @@
-"""Rings on a ball: finer where it bends, nothing measured lost, shares in closed form."""
+"""Rings on a ball: finer where it bends, nothing measured lost; shares of rings."""
 
 from dataclasses import replace
 
@@ -107,7 +107,7 @@ def test_what_even_rings_measure_stays_measured(bench, spaced):
 
 
 def test_gaps_on_lit_samples_lie_between_their_limits(bench, spaced):
-    scene, even, cameras = bench
+    scene, even, _ = bench
     final = spaced.projectors[0]
     rows = lit_samples(scene, [even], scene.target_samples(4000, 78))
     points = rows.target.samples.points
