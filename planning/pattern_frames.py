@@ -72,15 +72,14 @@ class PatternSequence:
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
         """White, black, each bit and its inverse, each camera's disc and inverse."""
-        what: list[tuple[Kind, int | None, str | None, bool]] = [
-            ("white", None, None, False),
-            ("black", None, None, False),
-        ]
+        found = [Frame(0, "white"), Frame(1, "black")]
         for bit in range(self.rings.n_bits):
-            what += [("bit", bit, None, inverse) for inverse in (False, True)]
+            for inverse in (False, True):
+                found.append(Frame(len(found), "bit", bit=bit, inverse=inverse))
         for camera in self.patterns:
-            what += [("root", None, camera, inverse) for inverse in (False, True)]
-        return tuple(Frame(n, *each) for n, each in enumerate(what))
+            for inverse in (False, True):
+                found.append(Frame(len(found), "root", camera=camera, inverse=inverse))
+        return tuple(found)
 
     def annulus_levels(self, frame: Frame) -> NDArray[np.bool_]:
         """Return whether each annulus is bright in a white, black or bit frame."""

@@ -134,7 +134,8 @@ def ellipse_of(
     level = -(conic[2, 2] + linear @ centre)
     values, axes = np.linalg.eigh(quadratic * np.sign(level))
     half = np.sqrt(np.abs(level) / values)
-    return centre, half, float(np.arctan2(axes[1, 0], axes[0, 0]))
+    turn = float(np.arctan2(axes[1, 0], axes[0, 0]))
+    return np.asarray(centre, dtype=np.float64), np.asarray(half), turn
 
 
 def outline_of(
