@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from geometry.devices import PinholeModel
 from geometry.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.primitives import sphere
@@ -122,6 +123,26 @@ def test_gaps_on_lit_samples_lie_between_their_limits(bench, spaced):
     assert np.all(gaps >= drawable[1:] * (1.0 - 1e-9))
 
 
+def test_three_projector_pixels_in_closed_form():
+    """Rings about the optical axis: f a unit of the tangent, or one panel pixel."""
+    _, projector, _ = made("parallel")
+    c = np.array([0.01, 0.1, 0.2])
+    pitch = projector.device.pixel_pitch_m
+    room = ring_pitch._ROOM
+    assert projector_gaps(projector, c) == pytest.approx(room * 3 * pitch)
+    device = PinholeModel(
+        np.array([[1500.0, 0, 511.5], [0, 1500.0, 383.5], [0, 0, 1]]),
+        (1024, 768),
+        (0.5, 2.0),
+    )
+    frame = projector.world_from_device
+    centred = PlannedProjector("P1", "diverging", frame, frame, device, c)
+    found = projector_gaps(centred, np.array([0.01, 0.1, 0.2, 0.9]))
+    # Beyond the panel's corner nothing is drawn.
+    assert found == pytest.approx(room * np.array([2e-3, 2e-3, 2e-3, 0.0]), rel=1e-6)
+    assert room >= 1.0
+
+
 def test_errors_between_rings_fall(spaced):
     report = spaced.reports[0]
     assert report["error_p99_m"] < 0.9 * report["error_p99_even_m"]
@@ -201,15 +222,16 @@ def test_a_roof_is_a_crease_of_its_slope_jump():
     faces = np.array([[4, 5, 0], [0, 5, 1], [4, 2, 5], [2, 3, 5]])
     mesh = TriangleMesh(corners, faces)
     assert np.all(mesh.face_normals[:, 1] < 0)
-    scene, projector, _ = made("parallel", mesh=mesh)
+    scene, projector, _ = made("parallel", tilt_deg=8.0, mesh=mesh)
     creases = find_creases(mesh, 0.005)
     assert creases.length.sum() == pytest.approx(2 * x)
     lit, jump, error = crease_errors(scene, projector, creases)
     assert lit.all()
-    # Along the ridge the rings' normal turns: the jump falls by its cosine to x.
+    # Where a ring crosses the ridge aslant, its own direction sees less of the jump.
     ring = creases.points - projector.world_from_ring[:3, 3]
     local = ring @ projector.world_from_ring[:3, :3]
     share = np.abs(local[:, 0]) / np.hypot(local[:, 0], local[:, 1])
+    assert share.min() > 0.8
     assert jump == pytest.approx(share, abs=1e-9)
     gap = projector.ring_radii[1] - projector.ring_radii[0]
     assert error == pytest.approx(0.25 * share * gap, rel=1e-6, abs=1e-12)
