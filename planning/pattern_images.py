@@ -7,6 +7,7 @@ projector's gamma.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,17 +42,22 @@ class Canvas:
     def image(self, frame: Frame) -> NDArray[np.uint8]:
         """Return a frame's grey levels, 0 to 255, shape (h, w)."""
         if frame.kind == "root":
-            return self._root(frame)
+            assert frame.camera is not None
+            outside = self._outside[frame.camera]
+            return self.within + self.beyond - outside if frame.inverse else outside
         bright = self.sequence.annulus_levels(frame).astype(np.uint8)
         inside = self.within * bright[:-1].take(self.edge)
         return inside + self.beyond * bright[1:].take(self.edge)
 
-    def _root(self, frame: Frame) -> NDArray[np.uint8]:
-        assert frame.camera is not None
+    @cached_property
+    def _outside(self) -> dict[str, NDArray[np.uint8]]:
+        """Where r.m > 0, by camera: outside its root disc."""
         white = self.within + self.beyond
-        level = _root_level(self.sequence.patterns[frame.camera], self.x, self.y)
-        outside = np.rint(white * _share_at_once(level)).astype(np.uint8)
-        return white - outside if frame.inverse else outside
+        found: dict[str, NDArray[np.uint8]] = {}
+        for camera, patterns in self.sequence.patterns.items():
+            share = _share_at_once(_root_level(patterns, self.x, self.y))
+            found[camera] = np.rint(white * share).astype(np.uint8)
+        return found
 
 
 def canvas(sequence: PatternSequence) -> Canvas:
