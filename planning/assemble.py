@@ -18,6 +18,7 @@ from .progress import Stopwatch
 from .relaxations import reachability_relaxations
 from .requirements import Requirements
 from .ring_axes import widest_gap
+from .ring_entries import evenly_ringed, lost_to_rings_m2, with_rings
 from .seams import overlap_components
 from .surface import Surface
 
@@ -25,7 +26,8 @@ from .surface import Surface
 def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
     """Round the poses, recompute every claim from them, and write the document."""
     projectors = tuple(
-        entries.rounded_projector(p, f"P{i}") for i, p in enumerate(draft.projectors, 1)
+        entries.rounded_projector(p, f"P{i}")
+        for i, p in enumerate(draft.final_projectors, 1)
     )
     cameras = tuple(
         entries.rounded_camera(c, f"C{i}") for i, c in enumerate(draft.cameras, 1)
@@ -40,7 +42,13 @@ def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
         claims = make_claims(scene, devices)
         marginal = [
             *projector_table(scene, devices, draft.stage.by_count, claims),
-            *camera_table(scene, devices, draft.camera_stage.by_count, claims),
+            # Rings are fine for the planned cameras; others would get their own.
+            *camera_table(
+                scene,
+                evenly_ringed(devices, draft.rings),
+                draft.camera_stage.by_count,
+                claims,
+            ),
         ]
     surface = Surface(
         scene.mesh,
@@ -88,6 +96,9 @@ def _document(
 ) -> dict[str, Any]:
     samples = claims.target_samples.samples
     coverage = entries.coverage_entry(claims)
+    coverage["lost_to_rings_m2"] = lost_to_rings_m2(
+        draft.scene, devices, draft.rings, claims
+    )
     regions = [
         {
             "id": region.id,
@@ -122,7 +133,12 @@ def _document(
         "rig": draft.order.rig.to_document(),
         "requirements": requirements.to_document(),
         "regions": regions,
-        "projectors": entries.projector_entries(devices.projectors, claims),
+        "projectors": with_rings(
+            entries.projector_entries(devices.projectors, claims),
+            draft.scene,
+            devices,
+            draft.rings,
+        ),
         "cameras": entries.camera_entries(devices.cameras, claims),
         "coverage": coverage,
         **overlap_entries(draft.scene, devices.projectors),

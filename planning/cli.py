@@ -227,6 +227,7 @@ def commands() -> None:
 )
 @click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
 @click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
+@click.option("--no-patterns", is_flag=True, help="Write no pattern images.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
 @click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")

@@ -23,6 +23,7 @@ from .errors import (
 )
 from .face_status import face_status
 from .interest import Interest, read_selection, read_weight
+from .pattern_files import remove_patterns, write_patterns
 from .pipeline import plan_rig
 from .plan import RigPlan
 from .progress import Report
@@ -75,7 +76,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
             plan, code = error.plan, error.exit_code
         # From here on the work is done; a second Ctrl-C must not lose it.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        files = _save(plan, folder, report)
+        files = _save(plan, folder, report, patterns=not options["no_patterns"])
     if options["as_json"]:
         _print_json(plan.document | {"files": files, "missed": list(missed)})
     else:
@@ -203,12 +204,19 @@ def _writable(folder: Path) -> Generator[None]:
         raise
 
 
-def _save(plan: RigPlan, folder: Path, report: Report | None) -> list[str]:
+def _save(
+    plan: RigPlan, folder: Path, report: Report | None, *, patterns: bool
+) -> list[str]:
     names = [folder / name for name in ("plan.json", "surface.npz", "rig.png")]
     plan.save(names[0])
     if report is not None:
         report("drawing")
     save_rig_picture(plan, names[2], face_status=face_status(plan))
+    if patterns:
+        names.append(write_patterns(plan, folder))
+    else:
+        # Those of an earlier plan in this folder aren't of this one.
+        remove_patterns(folder)
     return [str(name) for name in names]
 
 

@@ -11,6 +11,7 @@ from .interest import Interest
 from .plan import PlannedCamera, PlannedProjector
 from .projectors import ProjectorStage
 from .rig import Rig
+from .ring_stage import RingStage
 from .scene import Scene
 
 
@@ -41,7 +42,10 @@ class Order:
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """All stages as far as they came; enough to write a plan from."""
+    """All stages as far as they came; enough to write a plan from.
+
+    `projectors` have evenly spaced rings; `rings` holds those that cameras let finer.
+    """
 
     order: Order
     scene: Scene
@@ -53,3 +57,9 @@ class Draft:
     camera_stage: CameraStage
     cameras: tuple[PlannedCamera, ...]
     truncated: bool = False
+    rings: RingStage | None = None
+
+    @property
+    def final_projectors(self) -> tuple[PlannedProjector, ...]:
+        """The projectors with their own rings, once the cameras stand."""
+        return self.projectors if self.rings is None else self.rings.projectors

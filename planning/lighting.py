@@ -189,15 +189,22 @@ def served_by(lit: NDArray[np.bool_], margin: NDArray[np.float64]) -> NDArray[np
     return np.where(lit.any(axis=1), np.argmax(ranked, axis=1), -1)
 
 
-def _in_beam(
-    projector: PlannedProjector, points: NDArray[np.float64], light: Light
+def in_panel(
+    projector: PlannedProjector, points: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
+    """Return whether points lie in the light that leaves the device, shape (n,)."""
     local = transform(inverse(projector.world_from_device), points)
-    inside = light.ring_coordinate <= projector.ring_radii[-1]
     device = projector.device
     if isinstance(device, PinholeModel):
-        return inside & device.contains(device.project(local))
-    inside &= np.all(np.abs(local[:, :2]) <= device.half_panel, axis=1)
+        return device.contains(device.project(local))
+    inside = np.all(np.abs(local[:, :2]) <= device.half_panel, axis=1)
     if device.beam_radius is not None:
         inside &= np.hypot(local[:, 0], local[:, 1]) <= device.beam_radius
     return inside
+
+
+def _in_beam(
+    projector: PlannedProjector, points: NDArray[np.float64], light: Light
+) -> NDArray[np.bool_]:
+    inside = light.ring_coordinate <= projector.ring_radii[-1]
+    return inside & in_panel(projector, points)

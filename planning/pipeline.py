@@ -29,6 +29,7 @@ from .progress import Report, Stopwatch
 from .projector_poses import widen_margins
 from .projectors import ProjectorStage
 from .rig import Rig
+from .ring_stage import space_rings
 from .scene import Scene
 from .selection import larger
 from .shortfall import shortfalls
@@ -215,6 +216,7 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
                 draft,
                 stage=stage,
                 projectors=projectors,
+                rings=None,
                 camera_stage=cameras,
                 cameras=cameras.cameras,
             )
@@ -224,12 +226,12 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
             clock.say("  fresh samples fall short: one camera more")
             chosen = cameras.by_count[cameras.certificate["count"]]
             cameras = replace(cameras, cameras=chosen)
-            return replace(draft, camera_stage=cameras, cameras=chosen)
+            return replace(draft, camera_stage=cameras, cameras=chosen, rings=None)
     return None
 
 
 def _polish(draft: Draft, clock: Stopwatch) -> Draft:
-    """Section VI: neighbouring cameras slide apart while the coverage holds."""
+    """Section VI: cameras slide apart while the coverage holds; then their rings."""
     with clock.stage("baselines", "baselines: cameras slide apart"):
         moved = spread(draft.scene, draft.projectors, draft.camera_stage)
         if moved.smallest_before_m is not None and moved.smallest_after_m is not None:
@@ -237,7 +239,11 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
                 f"  smallest baseline {1e3 * moved.smallest_before_m:.0f} -> "
                 f"{1e3 * moved.smallest_after_m:.0f} mm"
             )
-    return replace(draft, cameras=moved.cameras)
+    with clock.stage("rings", "rings: radii for the surface and the cameras"):
+        rings = space_rings(
+            draft.scene, draft.projectors, moved.cameras, draft.order.rig.ring_spacing
+        )
+    return replace(draft, cameras=moved.cameras, rings=rings)
 
 
 def _interrupted(

@@ -103,6 +103,11 @@ class Rig:
         return None if gap is None else gap * 1e-3
 
     @property
+    def ring_spacing(self) -> Literal["uniform", "curvature"]:
+        """Whether rings are evenly spaced, or finer where the surface bends."""
+        return self.table.rings.spacing
+
+    @property
     def n_candidate_projectors(self) -> int:
         """Projector poses offered to the cover."""
         return self.table.placement.n_candidate_projectors
@@ -282,6 +287,7 @@ class Rig:
                 "tilt": None if parallel else self.ring_tilt_rad,
                 "shift_m": self.ring_shift_m if parallel else None,
                 "gap_m": self.ring_gap_m,
+                "spacing": self.ring_spacing,
                 "outer_radius": self.outer_ring_radius(),
             },
             "workspace": table.workspace.to_document(),

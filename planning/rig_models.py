@@ -176,10 +176,12 @@ class RingsTable(Table):
             the axis is shifted by standoff x tan(tilt) instead.
         gap_mm: Distance of neighbouring rings on a plane at the standoff; absent: the
             planner chooses.
+        spacing: `uniform`, or `curvature`: finer where the surface bends.
     """
 
     tilt_deg: Annotated[float, Field(ge=0.0, lt=45.0)] = 8.0
     gap_mm: Positive | None = None
+    spacing: Literal["uniform", "curvature"] = "curvature"
 
 
 class LimitsTable(Table):

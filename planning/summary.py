@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from .firing import schedule_line
 from .plan import PlannedCamera, PlannedProjector, RigPlan
 from .requirements import Workspace
+from .ring_entries import rings_lines
 from .shortfall import causes_line
 
 _AXES = "xyz"
@@ -27,6 +28,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         _devices(plan),
         _proofs(plan),
         _coverage(plan),
+        *_rings(plan),
         _marginal(plan),
         _check(plan),
         *(f"MISSED   {line}" for line in missed),
@@ -310,6 +312,11 @@ def _cell(areas: dict[str, float], key: str) -> str:
 
 def _ratio(part: float, whole: float) -> str:
     return f"{100.0 * part / whole:.1f} %" if whole > 0 else "undefined"
+
+
+def _rings(plan: RigPlan) -> list[str]:
+    lines = rings_lines(plan)
+    return ["\n" + "\n".join(lines)] if lines else []
 
 
 def _marginal(plan: RigPlan) -> str:

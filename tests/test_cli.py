@@ -86,6 +86,8 @@ def test_the_main_job_ends_with_0_and_says_what_a_designer_needs(runs):
         "MARGINAL",
         "CHECK    passed",
         "plan.json",
+        "RINGS    P1",
+        "patterns",
     ):
         assert words in first.stdout
     offered = re.findall(r"(\d+) candidate poses", first.stdout.replace(",", ""))
@@ -97,7 +99,12 @@ def test_the_main_job_ends_with_0_and_says_what_a_designer_needs(runs):
 
 def test_the_same_command_gives_the_same_files_whatever_the_threads(runs):
     folder, _ = runs
-    for name in ("surface.npz", "rig.png"):
+    drawn = sorted(
+        path.relative_to(folder / "plan1").as_posix()
+        for path in (folder / "plan1" / "patterns").rglob("*.*")
+    )
+    assert len([name for name in drawn if name.endswith(".png")]) >= 40
+    for name in ("surface.npz", "rig.png", *drawn):
         one, two = ((folder / f"plan{n}" / name).read_bytes() for n in (1, 2))
         assert one == two, name
     texts = []

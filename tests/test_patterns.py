@@ -1,0 +1,293 @@
+"""Pattern files: decoded, from the files alone, by code of this test's own."""
+
+import json
+import re
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from planning.pattern_files import remove_patterns, write_patterns
+from planning.pattern_frames import pattern_sequence
+from planning.pattern_svg import Circle, outline_of, pixels_from_plane
+from planning.plan import RigPlan
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def written(request, rigs, tmp_path_factory):
+    """A plan of one projector and two cameras, and what was written for it."""
+    plan = _plan(rigs, request.param)
+    folder = tmp_path_factory.mktemp(request.param)
+    return plan, write_patterns(plan, folder)
+
+
+def _plan(rigs, light) -> RigPlan:
+    project = rigs.diverging if light == "diverging" else rigs.parallel
+    entry = project("P1", 1.0 * rigs.direction(0.0, 10.0), 0.11, 0.004)
+    if light == "parallel":
+        entry |= {"resolution": [640, 600], "pixel_pitch_m": 0.65e-3}
+    # Uneven rings, wider outside.
+    radii = np.array(entry["ring_radii"])
+    entry["ring_radii"] = (radii * (0.6 + 0.4 * radii / radii[-1])).tolist()
+    cameras = [
+        rigs.camera("C1", rigs.direction(30.0, 20.0)),
+        rigs.camera("C2", rigs.direction(-20.0, -25.0)),
+    ]
+    return rigs.plan_of(rigs.bumpy_sphere(0.1, subdivisions=2), [entry], cameras)
+
+
+def ring_plane_of(projector, pixels):
+    """Points of the ring plane that pixels show: by rays, in this test's own words."""
+    turn = projector.world_from_ring[:3, :3].T @ projector.world_from_device[:3, :3]
+    device = projector.device
+    if projector.light == "diverging":
+        matrix = device.camera_matrix
+        x = (pixels[:, 0] - matrix[0, 2]) / matrix[0, 0]
+        y = (pixels[:, 1] - matrix[1, 2]) / matrix[1, 1]
+        ray = np.column_stack([x, y, np.ones(len(x))]) @ turn.T
+        return ray[:, :2] / ray[:, 2:]
+    width, height = device.resolution
+    x = (pixels[:, 0] - (width - 1) / 2) * device.pixel_pitch_m
+    y = (pixels[:, 1] - (height - 1) / 2) * device.pixel_pitch_m
+    offset = projector.world_from_device[:3, 3] - projector.world_from_ring[:3, 3]
+    place = np.column_stack([x, y, np.zeros(len(x))]) @ turn.T
+    return (place + projector.world_from_ring[:3, :3].T @ offset)[:, :2]
+
+
+def read(folder, name):
+    return np.asarray(Image.open(folder / name)).astype(float)
+
+
+def frames_of(folder):
+    manifest = json.loads((folder / "sequence.json").read_text())
+    return manifest["projectors"][0]
+
+
+def test_the_sequence_has_as_many_frames_as_the_formula_says(written):
+    plan, folder = written
+    entry = frames_of(folder)
+    n = len(plan.projectors[0].ring_radii) + 1
+    assert entry["n_annuli"] == n
+    bits = int(np.ceil(np.log2(n)))
+    assert len(entry["frames"]) == 2 * bits + 2 + 2 * len(plan.cameras)
+    kinds = [frame["kind"] for frame in entry["frames"]]
+    assert kinds == ["white", "black"] + ["bit"] * (2 * bits) + ["root"] * 4
+    for plain, inverse in pairwise(entry["frames"][2:]):
+        if not plain["inverse"]:
+            assert inverse["inverse"]
+            same = ("kind", "bit", "camera")
+            assert [plain[k] for k in same] == [inverse[k] for k in same]
+    files = {p.relative_to(folder).as_posix() for p in folder.rglob("*.*")}
+    listed = {f[kind] for f in entry["frames"] for kind in ("png", "svg")}
+    assert files == listed | {"sequence.json"}
+
+
+def test_images_decode_to_the_annulus_of_every_pixel(written):
+    plan, folder = written
+    projector, entry = plan.projectors[0], frames_of(folder)
+    width, height = projector.device.resolution
+    white = read(folder, entry["frames"][0]["png"])
+    assert white.shape == (height, width)
+    assert read(folder, entry["frames"][1]["png"]).max() == 0
+    code = np.zeros((height, width), dtype=int)
+    for frame in entry["frames"]:
+        if frame["kind"] == "bit" and not frame["inverse"]:
+            image = read(folder, frame["png"])
+            code |= (2 * image > white).astype(int) << frame["bit"]
+    binary, shift = code.copy(), code >> 1
+    while shift.any():
+        binary ^= shift
+        shift >>= 1
+    v, u = np.indices((height, width))
+    plane = ring_plane_of(projector, np.column_stack([u.ravel(), v.ravel()]))
+    rho = np.hypot(*plane.T).reshape(height, width)
+    radii = projector.ring_radii
+    annulus = np.searchsorted(radii, rho)
+    drawn = white == 255
+    assert drawn.mean() > 0.2
+    down, across = np.gradient(rho)
+    away = np.abs(rho[..., None] - radii).min(axis=-1) / np.hypot(down, across)
+    sure = drawn & (away > 0.02)
+    assert np.array_equal(binary[sure], annulus[sure])
+    # One more gap than rings is drawn, and nothing beyond.
+    last = 2 * radii[-1] - radii[-2]
+    assert np.all(white[rho > last + np.hypot(down, across)] == 0)
+
+
+def test_edges_lie_where_the_radii_say_to_a_fiftieth_of_a_pixel(written):
+    """A pixel that an edge crosses is bright by its share beyond: d = level / 2 off."""
+    plan, folder = written
+    projector, entry = plan.projectors[0], frames_of(folder)
+    flips = np.array(entry["flipping_bit"])
+    by_bit = {(f["bit"], f["inverse"]): f["png"] for f in entry["frames"]}
+    seen = set()
+    for bit in range(entry["n_bits"]):
+        one, other = (read(folder, by_bit[bit, inverse]) for inverse in (False, True))
+        level = (one - other) / 255.0
+        v, u = np.nonzero((one + other == 255) & (np.abs(level) < 0.98))
+        places = np.column_stack([u, v]).astype(float)
+        half = 0.5
+        rho, right, left, down, up = (
+            np.hypot(*ring_plane_of(projector, places + np.array(step)).T)
+            for step in ((0, 0), (half, 0), (-half, 0), (0, half), (0, -half))
+        )
+        slope = np.hypot(right - left, down - up)
+        own = projector.ring_radii[flips == bit]
+        off = (rho[:, None] - own) / slope[:, None]
+        nearest = np.abs(off).argmin(axis=1)
+        found = off[np.arange(len(off)), nearest]
+        assert np.abs(np.abs(found) - np.abs(level[v, u]) / 2).max() < 0.02
+        # Bright outside an edge where the bit is set beyond it.
+        ring = np.flatnonzero(flips == bit)[nearest]
+        beyond = ((ring + 1) ^ ((ring + 1) >> 1)) >> bit & 1
+        clear = np.abs(level[v, u]) > 0.1
+        outward = np.where(beyond == 1, 1.0, -1.0) * level[v, u]
+        assert np.all((outward * found)[clear] > 0)
+        seen |= set(ring.tolist())
+    assert len(seen) > 0.9 * len(flips)
+
+
+def test_root_discs_tell_the_sign_of_r_dot_m(written):
+    plan, folder = written
+    projector, entry = plan.projectors[0], frames_of(folder)
+    rng = np.random.default_rng(0)
+    width, height = projector.device.resolution
+    pixels = rng.integers([0, 0], [width, height], (4000, 2))
+    plane = ring_plane_of(projector, pixels.astype(float))
+    rho = np.hypot(*plane.T)
+    white = read(folder, entry["frames"][0]["png"])[pixels[:, 1], pixels[:, 0]]
+    for camera in plan.cameras:
+        names = {
+            f["inverse"]: f["png"] for f in entry["frames"] if f["camera"] == camera.id
+        }
+        bright, dark = (
+            read(folder, names[inverse])[pixels[:, 1], pixels[:, 0]]
+            for inverse in (False, True)
+        )
+        assert np.array_equal(bright + dark, white)
+        frame = projector.world_from_ring
+        eye = frame[:3, :3].T @ (camera.world_from_device[:3, 3] - frame[:3, 3])
+        # A point on the light of each pixel, and the ring surface's normal there.
+        if projector.light == "diverging":
+            point = np.column_stack([plane, np.ones(len(plane))])
+            normal = np.column_stack([plane / rho[:, None], -rho])
+        else:
+            point = np.column_stack([plane, np.ones(len(plane))])
+            normal = np.column_stack([plane / rho[:, None], np.zeros(len(plane))])
+        ray = point - eye
+        along = np.einsum("ij,ij->i", ray, normal)
+        along /= np.linalg.norm(ray, axis=1)
+        sure = (white == 255) & (np.abs(along) > 0.01)
+        assert np.array_equal(bright[sure] > 127, along[sure] > 0)
+        assert 0.02 < np.mean(along[sure] > 0) < 0.98
+
+
+_ELLIPSE = re.compile(
+    r'rx="(\S+)" ry="(\S+)" transform="translate\((\S+) (\S+)\) rotate\((\S+)\)"'
+)
+
+
+def inside_of(element, points):
+    """Whether points lie inside an ellipse or polygon of an SVG file."""
+    found = _ELLIPSE.search(element)
+    if found:
+        a, b, u, v, turn = map(float, found.groups())
+        x, y = (points - [u, v]).T
+        c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        return ((c * x + s * y) / a) ** 2 + ((c * y - s * x) / b) ** 2 <= 1.0
+    text = re.search(r'points="([^"]*)"', element).group(1)
+    corners = np.array([[float(x) for x in p.split(",")] for p in text.split()])
+    begin, end = corners, np.roll(corners, -1, axis=0)
+    inside = np.zeros(len(points), dtype=bool)
+    for (x0, y0), (x1, y1) in zip(begin, end, strict=True):
+        between = (y0 > points[:, 1]) != (y1 > points[:, 1])
+        if y0 != y1:
+            at = x0 + (points[:, 1] - y0) * (x1 - x0) / (y1 - y0)
+            inside ^= between & (points[:, 0] < at)
+    return inside
+
+
+def painted(text, points):
+    """Brightness that an SVG file of ours gives to points: the last shape wins."""
+    bright = np.zeros(len(points), dtype=bool)
+    for element in re.findall(r"<(?:ellipse|polygon)[^>]*fill=[^>]*>", text):
+        bright[inside_of(element, points)] = 'fill="#fff"' in element
+    clip = re.search(r'id="drawn">(<[^>]*>)', text).group(1)
+    beam = re.search(r'<circle cx="(\S+)" cy="(\S+)" r="(\S+)"/>', text)
+    if beam:
+        u, v, radius = map(float, beam.groups())
+        bright &= np.hypot(*(points - [u, v]).T) <= radius
+    return bright & inside_of(clip, points)
+
+
+def test_curves_and_images_agree_on_every_frame(written):
+    plan, folder = written
+    width, height = plan.projectors[0].device.resolution
+    rng = np.random.default_rng(1)
+    points = rng.integers([0, 0], [width, height], (3000, 2))
+    for frame in frames_of(folder)["frames"]:
+        image = read(folder, frame["png"])[points[:, 1], points[:, 0]]
+        sure = (image == 0) | (image == 255)
+        bright = painted((folder / frame["svg"]).read_text(), points.astype(float))
+        assert np.array_equal(bright[sure], image[sure] == 255), frame["svg"]
+
+
+@pytest.mark.parametrize("depth", [0.3, 0.0, -0.3])
+def test_a_root_disc_that_reaches_behind_the_device_is_an_outline(rigs, depth):
+    """A camera beside the projector: its disc is all but a half plane."""
+    plan = _plan(rigs, "diverging")
+    sequence = pattern_sequence(plan.projectors[0], plan.cameras)
+    pixels = pixels_from_plane(sequence.projector)
+    away = np.array([0.4, -0.1])
+    z = depth or 1e-7
+    circle = Circle(away / (2 * z), float(np.hypot(*away)) / abs(2 * z))
+    corners = outline_of(circle, pixels, (1280, 800))
+    assert len(corners) < 4000
+    rng = np.random.default_rng(2)
+    points = rng.uniform([0, 0], [1279, 799], (2000, 2))
+    back = np.column_stack([points, np.ones(2000)]) @ np.linalg.inv(pixels).T
+    plane = back[:, :2] / back[:, 2:]
+    off = np.linalg.norm(plane - circle.centre, axis=1) - circle.radius
+    text = " ".join(f"{u:.4f},{v:.4f}" for u, v in corners)
+    inside = inside_of(f'<polygon points="{text}"/>', points)
+    sure = np.abs(off) * pixels[0, 0] > 0.05
+    assert np.array_equal(inside[sure], off[sure] < 0)
+    assert 0.02 < np.mean(inside) < 0.98
+
+
+def test_the_same_plan_gives_the_same_bytes(written, tmp_path):
+    plan, folder = written
+    again = write_patterns(plan, tmp_path)
+    names = sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
+    assert names == sorted(p.relative_to(again) for p in again.rglob("*.*"))
+    for name in names:
+        assert (folder / name).read_bytes() == (again / name).read_bytes()
+
+
+def test_what_an_earlier_plan_left_is_removed_and_nothing_else(rigs, tmp_path):
+    plan = _plan(rigs, "parallel")
+    place = write_patterns(plan, tmp_path)
+    mine = place / "P1" / "note.txt"
+    mine.write_text("kept")
+    document = plan.document | {"cameras": plan.document["cameras"][:1]}
+    write_patterns(replace(plan, document=document), tmp_path)
+    assert not (place / "P1" / "18-root-C2.png").exists()
+    assert not list(place.rglob("*root-C2*"))
+    remove_patterns(tmp_path)
+    assert [p for p in place.rglob("*") if p.is_file()] == [mine]
+
+
+def test_a_manifest_of_another_maker_removes_nothing(tmp_path):
+    place = tmp_path / "patterns"
+    place.mkdir()
+    victim = tmp_path / "victim.png"
+    victim.write_text("kept")
+    frames = [{"png": "../victim.png", "svg": "/etc/none"}]
+    manifest = {"format": "ringrig-patterns", "projectors": [{"frames": frames}]}
+    (place / "sequence.json").write_text(json.dumps(manifest))
+    remove_patterns(tmp_path)
+    assert victim.exists()
+    assert Path(place / "sequence.json").exists()
