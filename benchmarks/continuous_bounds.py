@@ -53,12 +53,12 @@ def main() -> int:
         f"| mesh | faces | light | {' | '.join(heads)} |\n|{(3 + len(cases)) * '---|'}"
     )
     below: dict[tuple[str, str], Counter[int]] = {}
-    for path, options, up in _jobs(given.names):
+    for path, options, up in jobs(given.names):
         mesh, _ = cut_for_curvature(load_mesh(path, **options))
         for light in given.lights:
             cells = []
             for (share, tangent), head in zip(cases, heads, strict=True):
-                ready = _ready(mesh, light, up, share, tangent)
+                ready = ready_for(mesh, light, up, share, tangent)
                 cell, gap = _cell(ready, prove=given.prove, more=given.more)
                 cells.append(cell)
                 below.setdefault((light, head), Counter())[gap] += 1
@@ -85,7 +85,8 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _jobs(names: list[str]) -> list[tuple[Path, dict[str, object], str | None]]:
+def jobs(names: list[str]) -> list[tuple[Path, dict[str, object], str | None]]:
+    """Return path, reading options and `up` of the meshes named, or of all."""
     table = load("shared_meshes")
     jobs = [(ROOT / "face.obj", {"unit": "mm"}, None)]
     if table.FOLDER.is_dir():
@@ -95,21 +96,40 @@ def _jobs(names: list[str]) -> list[tuple[Path, dict[str, object], str | None]]:
     return [job for job in jobs if not names or job[0].name in names]
 
 
-def _ready(
-    mesh: TriangleMesh, light: str, up: str | None, share: float, tangent: float
+def ready_for(
+    mesh: TriangleMesh,
+    light: str,
+    up: str | None,
+    share: float | None,
+    tangent: float | None,
+    *,
+    devices: int | None = None,
 ) -> Prepared:
+    """Return a mesh ready for planning.
+
+    Args:
+        mesh: The surface.
+        light: Kind of light.
+        up: Axis that points up; None: the rig's.
+        share: Of the target that must be lit; None: the rig's.
+        tangent: Least tangent angle in degrees; None: the rig's.
+        devices: Projectors and cameras at most, and as much measured as they can;
+            None: as many as needed.
+    """
     asked = {
-        "max_projectors": MANY,
-        "max_cameras": None,
+        "max_projectors": devices or MANY,
+        "max_cameras": devices,
         "target": "dominant",
         "dominant_coverage": share,
-        "coverage": None,
+        "coverage": devices and 1.0,
         "min_reachable": None,
         "accuracy_mm": None,
         "up": up,
     }
     order = Order(mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ())
     ready = prepared(order, Stopwatch())
+    if tangent is None:
+        return ready
     required = ready.scene.requirements
     limits = replace(required.projector, min_tangent_angle=float(np.deg2rad(tangent)))
     scene = replace(ready.scene, requirements=replace(required, projector=limits))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.visibility_matrix import visibility_matrix
+from solvers import solve_cover
 
 from . import lighting
 from .candidates import projector_candidates, projectors_around
@@ -18,7 +19,14 @@ from .one_fewer import Offer, one_fewer
 from .plan import PlannedProjector
 from .relaxations import nothing_lit
 from .scene import Scene
-from .selection import Selection, certificate, marginals, select_fewest
+from .selection import (
+    Selection,
+    certificate,
+    cover_problem,
+    marginals,
+    required_rows,
+    select_fewest,
+)
 from .share_margin import widest_selection
 
 _ROWS = 2000
@@ -26,6 +34,8 @@ _CHECK_ROWS = 4000
 _ROUNDS = 3
 # Streams of random samples: rows of the cover, then a fresh check set for each round.
 _STREAM = 100
+# Counted work of the cover about which more candidates are offered.
+_SEEDS_BUDGET = 2e8
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +49,7 @@ class ProjectorStage:
         stages: First failing limit of each row and candidate.
         by_count: Best candidates for each number of devices, for the marginal table.
         certificate: As in the plan file.
+        most_area: As many projectors as taken, those that light most.
     """
 
     projectors: tuple[PlannedProjector, ...]
@@ -47,6 +58,7 @@ class ProjectorStage:
     stages: NDArray[np.int8]
     by_count: dict[int, tuple[PlannedProjector, ...]]
     certificate: dict[str, Any]
+    most_area: tuple[PlannedProjector, ...]
 
 
 def plan_projectors(
@@ -84,11 +96,10 @@ def plan_projectors(
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
         raise InfeasibleLimitsError(nothing_lit(scene, candidates, rows, stages))
-    selection = _fewest(scene, stages)
     # The best of a lattice lies beside the best there is.
     n_lattice = len(candidates)
     around = projectors_around(
-        movable([candidates[i] for i in selection.chosen]),
+        movable([candidates[i] for i in _good_cover(scene, stages)]),
         required.workspace,
         n_lattice,
         ring_offset=ring_offset,
@@ -110,12 +121,13 @@ def plan_projectors(
             break
         rows = merged(rows, fresh)
         stages = np.concatenate([stages, fresh_stages])
+    most_area = selection.chosen
     if confirmed and selection.status != "infeasible":
         wider = _with_widest_margin(scene, candidates, rows, stages, selection)
         covered = lit[:, wider.chosen].any(axis=1).sum()
         if covered >= required.dominant_coverage * lit.any(axis=1).sum():
             selection = wider
-    return _stage(scene, candidates, rows, stages, selection)
+    return _stage(scene, candidates, rows, stages, selection, most_area)
 
 
 def _with_widest_margin(
@@ -182,7 +194,16 @@ def with_more(
     selection = _fewest(scene, stages)
     if selection.needed >= stage.certificate["needed"]["count"]:
         return stage
-    return _stage(scene, stage.reference + more, stage.rows, stages, selection)
+    every = stage.reference + more
+    return _stage(scene, every, stage.rows, stages, selection, selection.chosen)
+
+
+def _good_cover(scene: Scene, stages: NDArray[np.int8]) -> NDArray[np.int64]:
+    """Return candidates that light what is required, no proof asked."""
+    lit = stages == lighting.LIT
+    share = scene.requirements.dominant_coverage
+    problem = cover_problem(lit, required_rows(lit.any(axis=1), share), _n_given(scene))
+    return solve_cover(problem, seed=scene.seed, budget=_SEEDS_BUDGET).selected
 
 
 def _fewest(
@@ -286,6 +307,7 @@ def _stage(
     rows: Target,
     stages: NDArray[np.int8],
     selection: Selection,
+    most_area: NDArray[np.int64],
 ) -> ProjectorStage:
     lit, given = stages == lighting.LIT, _n_given(scene)
     others = marginals(lit, selection, seed=scene.seed, given=given)
@@ -312,4 +334,5 @@ def _stage(
             for number, chosen in others.by_count.items()
         },
         proof,
+        tuple(candidates[i] for i in most_area),
     )

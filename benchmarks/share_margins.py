@@ -1,0 +1,183 @@
+"""How squarely the required share is lit, and what turned ring axes win.
+
+Usage: python benchmarks/share_margins.py [--lights parallel diverging] [--axes]
+       [NAME ...]
+
+For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
+at the default requirements: the margin at the required share (`planning.share_margin`,
+in degrees within the limits) of the cover of most area, of the cover of largest margin
+with as many projectors, and after the pose program. Without a tangent limit the margin
+is by how much the largest incidence of what counts is below its limit.
+
+With `--axes`: measured / lit of the target for three projectors and three cameras, with
+every ring axis in the middle of its beam, and with the axes that the planner turns.
+"""
+
+import argparse
+import os
+import platform
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from continuous_bounds import jobs, ready_for
+
+from geometry.mesh import TriangleMesh
+from geometry.readers import load_mesh
+from geometry.refinement import cut_for_curvature
+from planning import lighting
+from planning.camera_stage import place_cameras
+from planning.cameras import lit_samples, measured_by
+from planning.errors import InfeasibleLimitsError
+from planning.plan import PlannedCamera, PlannedProjector
+from planning.prepare import Prepared
+from planning.projector_poses import widen_margins
+from planning.projectors import (
+    ProjectorStage,
+    lit_margins,
+    lit_stages,
+    plan_projectors,
+)
+from planning.rings import ring_frame
+from planning.selection import required_rows
+from planning.share_margin import margin_at_share
+
+ROWS = 12_000
+
+
+def main() -> int:
+    """Print the tables."""
+    given = _arguments()
+    print(
+        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
+        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
+    )
+    if given.axes:
+        _print_axes(given)
+    else:
+        _print_margins(given)
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="margins at the required share")
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    lights = ("parallel", "diverging")
+    parser.add_argument("--lights", nargs="+", default=lights, choices=lights)
+    parser.add_argument("--tangents", nargs="+", type=float, default=(0.0, 40.0))
+    parser.add_argument("--axes", action="store_true")
+    return parser.parse_args()
+
+
+def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh, str | None]]:
+    for path, options, up in jobs(names):
+        mesh, _ = cut_for_curvature(load_mesh(path, **options))
+        yield path.name, mesh, up
+
+
+def _print_margins(given: argparse.Namespace) -> None:
+    print(
+        "| mesh | light | tangent | projectors | most area | largest margin | posed | "
+        "won | seconds |\n|---|---|---|---|---|---|---|---|---|"
+    )
+    won: dict[tuple[str, float], list[float]] = {}
+    for name, mesh, up in _meshes(given.names):
+        for light in given.lights:
+            for tangent in given.tangents:
+                ready = ready_for(mesh, light, up, None, tangent)
+                row = _margins(ready)
+                if row is None:
+                    print(f"| {name} | {light} | {tangent:g}° | nothing lit |")
+                    continue
+                stage, (most, best, posed), seconds = row
+                won.setdefault((light, tangent), []).append(posed - most)
+                print(
+                    f"| {name} | {light} | {tangent:g}° | {len(stage.projectors)} | "
+                    f"{most:.2f} | {best:.2f} | {posed:.2f} | {posed - most:.2f} | "
+                    f"{seconds:.1f} |",
+                    flush=True,
+                )
+    print()
+    for (light, tangent), gains in won.items():
+        print(
+            f"* {light}, tangent {tangent:g}°: the largest incidence of what counts is "
+            f"{np.median(gains):.2f} degrees lower than in the cover of most area "
+            f"(median of {len(gains)}; {min(gains):.2f} to {max(gains):.2f})"
+        )
+
+
+def _margins(
+    ready: Prepared,
+) -> tuple[ProjectorStage, tuple[float, float, float], float] | None:
+    """Margins in degrees of the cover of most area, the one taken, and as posed."""
+    scene = ready.scene
+    begin = time.perf_counter()
+    try:
+        stage = plan_projectors(
+            scene, ready.template, _number(ready), ring_offset=ready.ring_offset
+        )
+    except InfeasibleLimitsError:
+        return None
+    posed = widen_margins(scene, stage)
+    seconds = time.perf_counter() - begin
+    rows = stage.rows
+    reached = np.any(stage.stages == lighting.LIT, axis=1)
+    required = required_rows(reached, scene.requirements.dominant_coverage)
+
+    def margin(projectors: tuple[PlannedProjector, ...]) -> float:
+        lit = lit_stages(scene, projectors, rows) == lighting.LIT
+        own = lit_margins(scene, projectors, rows, lit)
+        return float(np.degrees(margin_at_share(own, required)))
+
+    found = (margin(stage.most_area), margin(stage.projectors), margin(posed))
+    return stage, found, seconds
+
+
+def _number(ready: Prepared) -> int:
+    rig = ready.order.rig
+    return max(rig.n_candidate_projectors, rig.n_reference_projectors)
+
+
+def _print_axes(given: argparse.Namespace) -> None:
+    print(
+        "| mesh | light | axis in the middle | turned | projectors, cameras |\n"
+        "|---|---|---|---|---|"
+    )
+    for name, mesh, up in _meshes(given.names):
+        for light in given.lights:
+            ready = ready_for(mesh, light, up, 1.0, None, devices=3)
+            shares, counts = _axes(ready)
+            print(
+                f"| {name} | {light} | {shares[0]:.3f} | {shares[1]:.3f} | {counts} |",
+                flush=True,
+            )
+
+
+def _axes(ready: Prepared) -> tuple[list[float], str]:
+    """Measured / lit on fresh samples, axes in the middle and turned."""
+    scene, rig = ready.scene, ready.order.rig
+    stage = plan_projectors(
+        scene, ready.template, _number(ready), ring_offset=ready.ring_offset
+    )
+    posed = widen_margins(scene, stage)
+    camera = PlannedCamera("", np.eye(4), rig.camera_device())
+    n_cameras = max(rig.n_candidate_cameras, rig.n_reference_cameras)
+    target = scene.target_samples(ROWS, 900)
+    middle = tuple(
+        replace(p, world_from_ring=ring_frame(p.world_from_device, p.device, 0.0, 0.0))
+        for p in posed
+    )
+    shares, counts = [], ""
+    for projectors, tilt in ((middle, 0.0), (posed, ready.tilt)):
+        placed = place_cameras(scene, projectors, camera, n_cameras, tilt)
+        rows = lit_samples(scene, placed.projectors, target)
+        seen = measured_by(scene, placed.stage.cameras, rows).any(axis=1)
+        shares.append(float(seen.mean()))
+        counts = f"{len(projectors)}, {len(placed.stage.cameras)}"
+    return shares, counts
+
+
+if __name__ == "__main__":
+    sys.exit(main())

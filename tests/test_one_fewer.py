@@ -1,0 +1,94 @@
+"""Poses between the candidates save a projector where free poses need one fewer.
+
+Parallel light within 45 degrees lights caps of (1 - cos 45)/2 = 0.146 of a ball. Six,
+90 degrees apart, don't overlap and light 0.879; five light 0.732 at most. So 0.875
+takes six, and only if they stand just there: a coarse lattice needs seven.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.primitives import sphere
+from planning import lighting
+from planning.candidates import projector_candidates
+from planning.one_fewer import Offer, one_fewer
+from planning.plan import PlannedProjector
+from planning.projectors import lit_stages
+from planning.rig import load_rig
+from planning.rings import uniform_radii
+from planning.scene import Scene
+from planning.selection import select_fewest
+
+OFFSET = (0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    mesh = sphere(0.1, subdivisions=4)
+    rig = load_rig("default", light="parallel")
+    required = rig.requirements(
+        mesh.centre, mesh.radius, max_projectors=9, target="surface", tau_m=0.004
+    )
+    limits = replace(required.projector, max_incidence=np.radians(45.0))
+    required = replace(required, projector=limits, dominant_coverage=0.875)
+    n = len(mesh.faces)
+    scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    radii = uniform_radii(0.15, 0.0035)
+    eye = np.eye(4)
+    return scene, PlannedProjector(
+        "", "parallel", eye, eye, rig.projector_device(), radii
+    )
+
+
+@pytest.fixture(scope="module")
+def lattice(ball):
+    scene, template = ball
+    poses = projector_candidates(
+        template, scene.requirements.workspace, 40, ring_offset=OFFSET
+    )
+    rows = scene.target_samples(2000, 100)
+
+    def stages_of(projectors):
+        return lit_stages(scene, projectors, rows)
+
+    return scene, Offer(poses, stages_of(poses)), stages_of
+
+
+def moved(lattice, n_projectors, given=0):
+    scene, offer, stages_of = lattice
+    return one_fewer(
+        scene,
+        offer,
+        n_projectors,
+        stages_of=stages_of,
+        given=given,
+        ring_offset=OFFSET,
+    )
+
+
+def test_six_caps_are_found_where_the_lattice_needs_seven(lattice):
+    lit = lattice[1].stages == lighting.LIT
+    alone = select_fewest(lit, 0.875, max_count=None, seed=0)
+    assert alone.needed == alone.lower_bound == 7
+    found = moved(lattice, 6)
+    assert found is not None
+    assert (found.stages == lighting.LIT).any(axis=1).sum() >= 1750
+    axes = np.array([p.world_from_device[:3, 2] for p in found.projectors])
+    apart = np.degrees(np.arccos(np.clip(axes @ axes.T, -1.0, 1.0)))
+    assert np.min(apart + 360 * np.eye(6)) > 80.0
+
+
+def test_what_stands_already_counts_and_is_not_offered_again(lattice):
+    offer = lattice[1]
+    found = moved(lattice, 6, given=1)
+    assert found is not None
+    assert len(found.projectors) == 5
+    assert all(p is not offer.projectors[0] for p in found.projectors)
+    both = np.concatenate([offer.stages[:, :1], found.stages], axis=1)
+    assert (both == lighting.LIT).any(axis=1).sum() >= 1750
+
+
+def test_what_no_poses_can_do_is_given_up(lattice):
+    assert moved(lattice, 5) is None
