@@ -39,7 +39,7 @@ _SHRINK = 0.4
 _REPEATS = 4
 _DEMANDS = 24
 # Gains below this share of a baseline aren't worth an evaluation.
-_GAIN = 2e-3
+_GAIN = 1e-2
 
 
 @dataclass(frozen=True, eq=False)

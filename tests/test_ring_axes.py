@@ -25,7 +25,12 @@ def scene(request):
     ball = sphere(RADIUS, subdivisions=4)
     rig = load_rig("default", light=request.param)
     required = rig.requirements(
-        ball.centre, ball.radius, max_projectors=6, target="surface", tau_m=0.004
+        ball.centre,
+        ball.radius,
+        max_projectors=6,
+        target="surface",
+        tau_m=0.004,
+        dominant_coverage=0.6,
     )
     n = len(ball.faces)
     made = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
@@ -48,11 +53,11 @@ def stages(scene):
 
 
 def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
-    """Caps of 60 degrees (parallel) hold a quarter of the area: 0.9 takes 5 or more."""
+    """Caps of 60 degrees (parallel) hold a quarter of the area: 0.6 takes 3 or more."""
     _, projectors, cameras, _ = stages
     least = projectors.certificate["candidates"]["lower_bound"]
-    assert 4 <= least <= len(projectors.projectors) <= 7
-    assert len(cameras.cameras) >= 3
+    assert 3 <= least <= len(projectors.projectors) <= 4
+    assert len(cameras.cameras) >= 2
 
 
 def test_turned_axes_measure_no_less_and_light_the_same(stages):
