@@ -18,7 +18,7 @@ from solvers import solve_max_coverage
 from .selection import cover_problem
 
 # Of an angle: closer than this no cover is looked for.
-_STEP_RAD = float(np.radians(0.2))
+_STEP_RAD = float(np.radians(0.25))
 # Lit beyond what is required, so that fresh samples don't fall short.
 SPARE = 0.01
 # Counted work of each cover, of which no proof is asked.
@@ -63,7 +63,8 @@ def widest_selection(
 ) -> NDArray[np.int64]:
     """Return as many candidates as chosen, with the largest margin at the share found.
 
-    By bisection: each cover program asks for most samples within a tighter limit.
+    By steps that grow, then bisection: each cover program asks for most samples within
+    a tighter limit.
 
     Args:
         margin: Of each sample and candidate, -inf where unlit, shape (n, m).
@@ -75,8 +76,9 @@ def widest_selection(
     lit_before = int(np.isfinite(margin[:, chosen]).any(axis=1).sum())
     best, low = chosen, margin_at_share(margin[:, chosen], required)
     high = margin_at_share(margin, required)
+    step = 2.0 * _STEP_RAD
     while high - low > _STEP_RAD:
-        level = 0.5 * (low + high)
+        level = min(0.5 * (low + high), low + step)
         problem = cover_problem(margin >= level, required, given)
         offered = solve_max_coverage(
             problem, len(chosen), warm_start=best, seed=seed, budget=_BUDGET
@@ -84,7 +86,7 @@ def widest_selection(
         own = margin[:, offered]
         found = margin_at_share(own, required)
         if found >= level and enough_lit(own, required, lit_before):
-            best, low = offered, found
+            best, low, step = offered, found, 2.0 * step
         else:
             high = level
     return best

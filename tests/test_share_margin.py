@@ -7,7 +7,7 @@ import pytest
 
 from planning.share_margin import enough_lit, margin_at_share, widest_selection
 
-STEP = np.radians(0.2)
+STEP = np.radians(0.25)
 
 
 def random_margins(seed, n=60, m=9):
