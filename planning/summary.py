@@ -58,6 +58,15 @@ def _head(plan: RigPlan) -> str:
     )
 
 
+_EXCLUDED = {
+    "projector_beam": "lie outside the beam",
+    "projector_range": "out of range",
+    "projector_incidence": "beyond the incidence limit",
+    "tangent_angle": "too near the steep direction",
+    "projector_occlusion": "in shadow",
+}
+
+
 def shell_line(mesh: dict[str, Any]) -> str:
     """Return what kind of body a mesh of the plan is, as a line; none for a solid."""
     shell = mesh.get("shell", {"kind": "solid"})
@@ -195,8 +204,29 @@ def _proofs(plan: RigPlan) -> str:
         _proof("camera", proofs["cameras"], asked.coverage, "measure")
         + " (given these projectors)",
         f"         {_regions(plan)}",
+        *_excluded(proofs["projectors"]),
     ]
     return "\n" + "\n".join(lines)
+
+
+def _excluded(proof: dict[str, Any]) -> list[str]:
+    """Return which limit of eq. (2) took how many pairs of pose and sample, in a line.
+
+    A pair counts for the first limit that it fails, in the order in which they stand.
+    """
+    pairs = proof["n_samples"] * proof["candidates"]["n_candidates"]
+    excluded = proof.get("excluded_pairs")
+    if not excluded or not pairs:
+        return []
+    told = [
+        f"{100.0 * excluded[cause] / pairs:.1f} % {words}"
+        for cause, words in _EXCLUDED.items()
+    ]
+    lit = 100.0 * (1.0 - sum(excluded.values()) / pairs)
+    return [
+        f"         of {pairs:,} pairs of pose and sample {', '.join(told)}; "
+        f"{lit:.1f} % are lit"
+    ]
 
 
 def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:

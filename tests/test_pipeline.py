@@ -116,6 +116,20 @@ def test_counts_bounds_and_candidates_are_stated(plan):
         assert proof["status"] == ("optimal" if met else "feasible")
 
 
+def test_pairs_that_each_inequality_excluded_are_told_and_add_up(plan):
+    proof = plan.document["certificates"]["projectors"]
+    (line,) = [s for s in summary(plan, [], ()).splitlines() if "pairs of pose" in s]
+    pairs = proof["n_samples"] * proof["candidates"]["n_candidates"]
+    assert f" {pairs:,} pairs" in line
+    shares = [float(share) for share in re.findall(r"([\d.]+) %", line)]
+    assert len(shares) == 6
+    assert sum(shares) == pytest.approx(100.0, abs=0.31)
+    assert shares[2] == pytest.approx(
+        100.0 * proof["excluded_pairs"]["projector_incidence"] / pairs, abs=0.06
+    )
+    assert shares[-1] > 5.0
+
+
 def test_marginal_table_rises_and_knows_the_plan(plan):
     for kind, key in (("n_projectors", "lit"), ("n_cameras", "measured")):
         rows = [row for row in plan.document["marginal"] if kind in row]
