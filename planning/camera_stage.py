@@ -13,6 +13,7 @@ from .cameras import (
     camera_stage,
     lit_samples,
     measured_by,
+    offered_cameras,
     plan_cameras,
 )
 from .plan import PlannedCamera, PlannedProjector
@@ -58,12 +59,13 @@ def place_cameras(
         tilt: Tilt of the ring axes, or their shift.
     """
     kept = tuple(projectors)
-    best = plan_cameras(scene, kept, template, n_candidates)
+    offered = offered_cameras(scene, template, n_candidates)
+    best = plan_cameras(scene, kept, offered)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
         if all(a is b for a, b in zip(turned, kept, strict=True)):
             break
-        cover = plan_cameras(scene, turned, template, n_candidates)
+        cover = plan_cameras(scene, turned, offered)
         if not _better(cover, best):
             break
         kept, best = turned, cover

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.visibility_matrix import visibility_matrix
-
 from . import lighting, measurability
 from .candidates import camera_candidates
 from .errors import InfeasibleLimitsError
@@ -19,13 +17,12 @@ from .plan import PlannedCamera, PlannedProjector
 from .projectors import lit_stages, merged
 from .scene import Scene
 from .selection import Selection, certificate, marginals, select_fewest
+from .sights import Sight, Sights, sights_of
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
 _ROUNDS = 3
 _STREAM = 200
-# Of a cosine: what this decides roughly, `measurability.view` decides exactly.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,44 +99,81 @@ def rings_of(
 
 
 def measured_by(
-    scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
+    scene: Scene,
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    sights: Sequence[Sight] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return which camera measures which sample with any projector, (n, n_cameras)."""
-    samples = rows.target.samples
-    pairs = [_measurable(scene, camera, rows) for camera in cameras]
-    return visibility_matrix(
-        scene.visibility,
-        np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
-        samples.points,
-        samples.normals,
-        candidates=np.stack(pairs),
-    ).dense_transposed()
+    """Return which camera measures which sample with any projector, (n, n_cameras).
+
+    Args:
+        scene: Surface and requirements.
+        cameras: As they stand.
+        rows: Lit samples.
+        sights: Of these cameras on these samples, where they are at hand.
+    """
+    if sights is None:
+        sights = sights_of(scene, cameras, rows.target)
+    measured = np.zeros((len(rows.target), len(cameras)), dtype=bool)
+    for column, sight in enumerate(sights):
+        scene.pulse()
+        measured[sight.rows, column] = _measured(scene, sight, rows)
+    return measured
+
+
+def _measured(scene: Scene, sight: Sight, rows: LitSamples) -> NDArray[np.bool_]:
+    """Return which of the samples that a camera sees it measures."""
+    limits = scene.requirements.triangulation
+    normals = rows.target.samples.normals
+    measured = np.zeros(len(sight.rows), dtype=bool)
+    for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
+        pairs = np.flatnonzero(rows.lit[sight.rows, p] & ~measured)
+        own = sight.rows[pairs]
+        quality = measurability.pair_quality(
+            normals[own],
+            light.take(own),
+            rings.take(own),
+            sight.view.take(pairs),
+            limits,
+        )
+        stage = measurability.first_pair_failure(quality, limits)
+        measured[pairs[stage == measurability.MEASURED]] = True
+    return measured
+
+
+def offered_cameras(scene: Scene, template: PlannedCamera, n_candidates: int) -> Sights:
+    """Return the candidates, those that stand already first: they are in every cover.
+
+    Args:
+        scene: Surface and requirements.
+        template: Optics of the camera.
+        n_candidates: Poses offered.
+    """
+    required = scene.requirements
+    candidates = existing_cameras(required, template)
+    candidates += camera_candidates(template, required.workspace, n_candidates)
+    return Sights(scene, candidates)
 
 
 def plan_cameras(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    template: PlannedCamera,
-    n_candidates: int,
+    offered: Sights,
 ) -> CameraCover:
     """Choose the fewest cameras that measure the required share of what is lit.
 
     Args:
         scene: Surface and requirements.
         projectors: As planned, with their rings.
-        template: Optics of the camera.
-        n_candidates: Poses offered.
+        offered: Candidates, from `offered_cameras`; what they saw they see again.
 
     Raises:
         InfeasibleLimitsError: If no candidate measures any lit sample.
     """
-    required = scene.requirements
-    # Those that stand already come first, and are in every cover.
-    candidates = existing_cameras(required, template)
-    candidates += camera_candidates(template, required.workspace, n_candidates)
+    required, candidates = scene.requirements, offered.cameras
     target = scene.target_samples(_ROWS, _STREAM)
     rows = lit_samples(scene, projectors, target)
-    measured = measured_by(scene, candidates, rows)
+    measured = measured_by(scene, candidates, rows, offered.on(rows.target))
     if not measured.any():
         raise InfeasibleLimitsError(_nothing_measured(scene, candidates, rows))
     attempt = 0
@@ -154,7 +188,7 @@ def plan_cameras(
         )
         fresh_target = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh = lit_samples(scene, projectors, fresh_target)
-        seen = measured_by(scene, candidates, fresh)
+        seen = measured_by(scene, candidates, fresh, offered.on(fresh.target))
         covered = seen[:, selection.chosen].any(axis=1).sum()
         confirmed = covered >= required.coverage * seen.any(axis=1).sum()
         if confirmed or selection.status == "infeasible" or attempt == _ROUNDS:
@@ -191,44 +225,6 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
 
 def _n_given(scene: Scene) -> int:
     return len(scene.requirements.existing_of("camera"))
-
-
-def _measurable(
-    scene: Scene, camera: PlannedCamera, rows: LitSamples
-) -> NDArray[np.bool_]:
-    """Whether a camera measures each sample, were there nothing in between."""
-    scene.pulse()
-    required = scene.requirements
-    # Most of what a candidate can't see faces away from it.
-    facing = _facing(camera, rows.target, required.camera.max_incidence)
-    target = rows.target.take(facing)
-    seen = measurability.view(camera, target, required.camera, None)
-    measured = np.zeros(len(target), dtype=bool)
-    for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
-        lit = (seen.stage == measurability.SEEN) & rows.lit[facing, p]
-        open_pairs = np.flatnonzero(lit & ~measured)
-        quality = measurability.pair_quality(
-            target.samples.normals[open_pairs],
-            light.take(facing[open_pairs]),
-            rings.take(facing[open_pairs]),
-            seen.take(open_pairs),
-            required.triangulation,
-        )
-        stage = measurability.first_pair_failure(quality, required.triangulation)
-        measured[open_pairs[stage == measurability.MEASURED]] = True
-    wanted = np.zeros(len(rows.target), dtype=bool)
-    wanted[facing[measured]] = True
-    return wanted
-
-
-def _facing(
-    camera: PlannedCamera, target: Target, max_incidence: float
-) -> NDArray[np.int64]:
-    """Samples that a camera may meet within the incidence limit, rounding allowed."""
-    offsets = target.samples.points - camera.world_from_device[:3, 3]
-    along = -np.einsum("ij,ij->i", offsets, target.samples.normals)
-    distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
-    return np.flatnonzero(along >= (np.cos(max_incidence) - _ROUNDING) * distances)
 
 
 def furthest_failure(

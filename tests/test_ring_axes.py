@@ -7,7 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from geometry.primitives import sphere
-from planning.cameras import camera_stage, lit_samples, measured_by, plan_cameras
+from planning.cameras import (
+    camera_stage,
+    lit_samples,
+    measured_by,
+    offered_cameras,
+    plan_cameras,
+)
 from planning.claims import Devices, make_claims
 from planning.plan import PlannedCamera, PlannedProjector
 from planning.projectors import lit_stages, margins_of, merged, plan_projectors
@@ -47,7 +53,8 @@ def stages(scene):
     template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
     projectors = plan_projectors(made, template, 300, ring_offset=(tilt, -np.pi / 2))
     camera = PlannedCamera("", eye, rig.camera_device())
-    cover = plan_cameras(made, projectors.projectors, camera, 240)
+    offered = offered_cameras(made, camera, 240)
+    cover = plan_cameras(made, projectors.projectors, offered)
     cameras = camera_stage(made, cover)
     return made, projectors, cameras, tilt
 

@@ -1,0 +1,105 @@
+"""What each camera sees of samples, apart from the light that falls on them.
+
+Sights don't depend on the projectors, so they are kept while ring axes turn.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.visibility_matrix import visibility_matrix
+
+from . import measurability
+from .lighting import Target
+from .measurability import View
+from .plan import PlannedCamera
+from .scene import Scene
+
+# Of a cosine: what this decides roughly, `measurability.view` decides exactly.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What one camera sees.
+
+    Attributes:
+        rows: Samples seen, within every limit and with nothing in between, shape (k,).
+        view: How it sees them.
+    """
+
+    rows: NDArray[np.int64]
+    view: View
+
+
+def sights_of(
+    scene: Scene, cameras: Sequence[PlannedCamera], target: Target
+) -> tuple[Sight, ...]:
+    """Return what each camera sees of samples."""
+    offered: list[Sight] = []
+    wanted = np.zeros((len(cameras), len(target)), dtype=bool)
+    for row, camera in enumerate(cameras):
+        scene.pulse()
+        sight = _in_the_open(scene, camera, target)
+        wanted[row, sight.rows] = True
+        offered.append(sight)
+    samples = target.samples
+    free = visibility_matrix(
+        scene.visibility,
+        np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
+        samples.points,
+        samples.normals,
+        candidates=wanted,
+    ).dense_transposed()
+    return tuple(
+        _taken(sight, np.flatnonzero(free[sight.rows, column]))
+        for column, sight in enumerate(offered)
+    )
+
+
+class Sights:
+    """Sights of the same cameras on sets of samples, each looked at once.
+
+    Args:
+        scene: Surface and requirements.
+        cameras: Whose sights they are.
+    """
+
+    def __init__(self, scene: Scene, cameras: Sequence[PlannedCamera]) -> None:
+        self._scene, self.cameras = scene, tuple(cameras)
+        self._known: list[tuple[NDArray[np.float64], tuple[Sight, ...]]] = []
+
+    def on(self, target: Target) -> tuple[Sight, ...]:
+        """Return what each camera sees of samples."""
+        points = target.samples.points
+        for known, found in self._known:
+            if np.array_equal(known, points):
+                return found
+        found = sights_of(self._scene, self.cameras, target)
+        self._known.append((points, found))
+        return found
+
+
+def _in_the_open(scene: Scene, camera: PlannedCamera, target: Target) -> Sight:
+    """Return what a camera would see, were there nothing in between."""
+    limits = scene.requirements.camera
+    # Most of what a candidate can't see faces away from it.
+    facing = _facing(camera, target, limits.max_incidence)
+    seen = measurability.view(camera, target.take(facing), limits, None)
+    return _taken(Sight(facing, seen), np.flatnonzero(seen.stage == measurability.SEEN))
+
+
+def _taken(sight: Sight, chosen: NDArray[np.int64]) -> Sight:
+    return Sight(sight.rows[chosen], sight.view.take(chosen))
+
+
+def _facing(
+    camera: PlannedCamera, target: Target, max_incidence: float
+) -> NDArray[np.int64]:
+    """Samples that a camera may meet within the incidence limit, rounding allowed."""
+    offsets = target.samples.points - camera.world_from_device[:3, 3]
+    along = -np.einsum("ij,ij->i", offsets, target.samples.normals)
+    distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
+    return np.flatnonzero(along >= (np.cos(max_incidence) - _ROUNDING) * distances)
