@@ -39,8 +39,8 @@ def schedule_line(document: Mapping[str, Any]) -> str:
         return "FIRING   all projectors together: no two light a surface in common"
     goes = ", then ".join(" + ".join(group) for group in schedule["groups"])
     fewest = {
-        "clique": f"fewer won't do: {', '.join(schedule['clique'])} all light surface "
-        "in common",
+        "clique": f"fewer won't do: any two of {', '.join(schedule['clique'])} light "
+        "surface in common",
         "exhaustion": "fewer won't do: every way was tried",
         "none": f"at least {schedule['lower_bound']} are needed",
     }[schedule["proof"]]
