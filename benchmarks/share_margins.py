@@ -33,13 +33,9 @@ from planning.cameras import lit_samples, measured_by
 from planning.errors import InfeasibleLimitsError
 from planning.plan import PlannedCamera, PlannedProjector
 from planning.prepare import Prepared
+from planning.projector_light import lit_margins, lit_stages
 from planning.projector_poses import widen_margins
-from planning.projectors import (
-    ProjectorStage,
-    lit_margins,
-    lit_stages,
-    plan_projectors,
-)
+from planning.projectors import ProjectorStage, plan_projectors
 from planning.rings import ring_frame
 from planning.selection import required_rows
 from planning.share_margin import margin_at_share

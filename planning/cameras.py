@@ -14,7 +14,7 @@ from .existing import existing_cameras
 from .lighting import Light, Target
 from .measurability import Rings
 from .plan import PlannedCamera, PlannedProjector
-from .projectors import lit_stages, merged
+from .projector_light import lit_stages, merged
 from .scene import Scene
 from .selection import Selection, certificate, marginals, select_fewest
 from .sights import Sight, Sights, sights_of

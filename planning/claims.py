@@ -13,7 +13,7 @@ from . import lighting, measurability
 from .cameras import LitSamples, furthest_failure, lit_samples, measured_by
 from .lighting import Target
 from .plan import PlannedCamera, PlannedProjector
-from .projectors import lit_stages, margins_of
+from .projector_light import lit_stages, margins_of
 from .scene import Scene
 
 N_SAMPLES = 12_000

@@ -10,7 +10,7 @@ from .cameras import lit_samples, measured_by
 from .draw import MEASURED, NOT_LIT, NOT_MEASURED, OUTSIDE_TARGET
 from .lighting import Target
 from .plan import RigPlan
-from .projectors import lit_stages
+from .projector_light import lit_stages
 from .scene import Scene
 
 

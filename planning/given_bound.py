@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .existing import existing_projectors
 from .lighting import LIT, Target
 from .plan import PlannedProjector
-from .projectors import lit_stages
+from .projector_light import lit_stages
 from .scene import Scene
 
 

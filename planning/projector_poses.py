@@ -14,7 +14,8 @@ from solvers.pose_program import PoseProgram, pose_margins, pose_slack, solve_po
 from . import lighting
 from .lighting import Target
 from .plan import PlannedProjector
-from .projectors import ProjectorStage, lit_margins, lit_stages
+from .projector_light import lit_margins, lit_stages
+from .projectors import ProjectorStage
 from .requirements import Workspace
 from .scene import Scene
 from .selection import required_rows

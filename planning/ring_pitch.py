@@ -13,7 +13,7 @@ from .cameras import LitSamples
 from .lighting import served_by
 from .measurability import View
 from .plan import PlannedProjector
-from .projectors import margins_of
+from .projector_light import margins_of
 from .scene import Scene
 
 MIN_PROJECTOR_PX = 3.0

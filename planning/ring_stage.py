@@ -19,7 +19,7 @@ from .cameras import LitSamples, lit_samples
 from .lighting import ring_coordinate
 from .measurability import View
 from .plan import PlannedCamera, PlannedProjector
-from .projectors import merged
+from .projector_light import merged
 from .ring_creases import Creases, crease_errors, find_creases
 from .ring_limits import RingBeam, least_pitch_px, ring_beam
 from .ring_pitch import best_pitch, users

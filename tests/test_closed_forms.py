@@ -17,8 +17,9 @@ from planning.draft import Order
 from planning.lighting import LIT, served_by
 from planning.prepare import prepared
 from planning.progress import Stopwatch
+from planning.projector_light import lit_stages, margins_of
 from planning.projector_poses import widen_margins
-from planning.projectors import lit_stages, margins_of, plan_projectors
+from planning.projectors import plan_projectors
 from planning.rig import load_rig
 from solvers.cone import max_margin_direction, smallest_cap
 

@@ -8,7 +8,7 @@ from geometry.primitives import sphere
 from planning import lighting
 from planning.candidates import projector_candidates
 from planning.plan import PlannedProjector
-from planning.projectors import lit_stages
+from planning.projector_light import lit_stages
 from planning.rig import load_rig
 from planning.rings import uniform_radii
 from planning.scene import Scene

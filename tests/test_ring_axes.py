@@ -16,7 +16,8 @@ from planning.cameras import (
 )
 from planning.claims import Devices, make_claims
 from planning.plan import PlannedCamera, PlannedProjector
-from planning.projectors import lit_stages, margins_of, merged, plan_projectors
+from planning.projector_light import lit_stages, margins_of, merged
+from planning.projectors import plan_projectors
 from planning.relaxations import reachability_relaxations
 from planning.rig import load_rig
 from planning.ring_axes import turn_ring_axes, widest_gap
