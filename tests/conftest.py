@@ -10,8 +10,20 @@ from typing import Any
 import pytest
 from threadpoolctl import threadpool_limits
 
-# Files whose few tests plan whole rigs: begun first, so that no worker ends on one.
-_LONGEST = ("cli", "pipeline", "ring_axes", "readme", "invariance", "flips", "interest")
+# Files whose tests plan rigs or take long: begun first, so that no worker ends on one.
+_LONGEST = (
+    "pipeline",
+    "cli",
+    "audit_claims",
+    "flips",
+    "continuous",
+    "closed_forms",
+    "invariance",
+    "existing",
+    "relaxations",
+    "zones",
+    "interest",
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -104,3 +116,10 @@ def _load(name: str) -> ModuleType:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture
+def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Claims from a quarter of the samples, where exactness isn't the question."""
+    monkeypatch.setattr("planning.claims.N_SAMPLES", 3000)
+    monkeypatch.setattr("planning.overlaps.N_SAMPLES", 3000)

@@ -55,7 +55,7 @@ name = "front"
 [workspace]
 shape = "cone"
 axis = [0.0, -1.0, 0.0]
-half_angle_deg = 50.0
+half_angle_deg = 40.0
 [requirements]
 dominant_coverage = 0.85
 coverage = 0.9

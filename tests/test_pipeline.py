@@ -158,6 +158,7 @@ def test_summary_names_devices_counts_and_denominators(plan):
         assert words in text
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     path = tmp_path / "frontal.toml"
     path.write_text(
@@ -187,6 +188,7 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_too_few_projectors_say_how_many_are_needed():
     cube = box((0.1, 0.1, 0.1), divisions=4)
     options = {"max_projectors": 1, "target": "surface", "coverage": 0.8}
@@ -213,6 +215,7 @@ def test_the_clock_cuts_before_a_first_plan(head):
         plan_rig(head, load_rig("default"), max_projectors=3, time_limit=1e-6)
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     def interrupt(line):
         if line.startswith("baselines"):
@@ -226,6 +229,7 @@ def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     def cut(line):
         if line.startswith("check"):
@@ -240,6 +244,7 @@ def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     assert "--no-check" not in text
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_a_plate_without_curvature_has_no_dominant_region():
     plate = box((2.0, 2.0, 0.001), divisions=8)
     with pytest.raises(InputError, match="--target surface"):

@@ -101,6 +101,7 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
     assert stage.certificate["status"] != "infeasible"
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_a_plate_wider_than_the_beam_misses_its_rim_and_says_what_beam_would_do(
     small_job, tmp_path, monkeypatch
 ):
