@@ -235,7 +235,7 @@ def test_exhaustion_is_tried_again_by_the_audit(plan, failures):
 
 def test_the_line_says_who_fires_when_and_why_not_in_fewer(plan):
     line = schedule_line(plan.document)
-    assert line.startswith("FIRING   P1, then P2: 2 groups, fewer won't do: P1, P2 all")
+    assert line.startswith("FIRING   P1, then P2: 2 groups, fewer won't do: any two of")
     share = plan.document["overlaps"][0]["target_m2"]
     share /= plan.document["coverage"]["target"]["area_m2"]
     assert f"most shared: P1 and P2, {100 * share:.1f} % of the target" in line
