@@ -1,0 +1,72 @@
+"""A projector moves to more margin, but never into a shadow."""
+
+import numpy as np
+import pytest
+
+from geometry.mesh import TriangleMesh
+from geometry.primitives import box
+from planning import lighting
+from planning.candidates import aimed_poses
+from planning.plan import PlannedProjector
+from planning.projector_light import lit_margins, lit_stages
+from planning.projector_poses import widen_margins
+from planning.projectors import ProjectorStage
+from planning.rig import load_rig
+from planning.rings import ring_frame, uniform_radii
+from planning.scene import Scene
+from planning.share_margin import margin_at_share
+
+
+@pytest.fixture(scope="module")
+def shaded():
+    """A plate of 40 mm, 80 mm below a lid of 100 mm that hides it from above.
+
+    At 50 degrees from its normal all of it is lit; the best pose, straight above it
+    within the step that is allowed, lies in the shadow of the lid.
+    """
+    plate = box((0.04, 0.04, 0.002), divisions=8)
+    lid = box((0.1, 0.1, 0.002), divisions=2)
+    mesh = TriangleMesh(
+        np.concatenate([plate.vertices, lid.vertices + [0.0, 0.0, 0.081]]),
+        np.concatenate([plate.faces, lid.faces + len(plate.vertices)]),
+    )
+    rig = load_rig("default")
+    required = rig.requirements(mesh.centre, mesh.radius, max_projectors=1, tau_m=0.004)
+    ours = (mesh.face_normals[:, 2] > 0.9) & (mesh.face_centroids[:, 2] < 0.01)
+    region = np.where(ours, 0, -1)
+    scene = Scene(mesh, region, np.zeros((len(region), 3)), required, 0, 1)
+    turn = np.radians(50.0)
+    outwards = np.array([np.sin(turn), 0.0, np.cos(turn)])
+    radius = float(np.mean(required.workspace.projector_radius_m))
+    position = np.array(required.workspace.centre) + radius * outwards
+    up = np.array(required.workspace.up)
+    device = rig.projector_device()
+    (pose,) = aimed_poses(position[None], np.zeros(3), up, device)
+    start = PlannedProjector(
+        "",
+        "diverging",
+        pose,
+        ring_frame(pose, device, 0.0, 0.0),
+        device,
+        uniform_radii(0.6, 0.0035),
+    )
+    rows = scene.target_samples(800, 1)
+    stages = lit_stages(scene, [start], rows)
+    stage = ProjectorStage((start,), (start,), rows, stages, {}, {}, (start,))
+    return scene, stage
+
+
+def margins(scene, stage, projectors):
+    lit = lit_stages(scene, projectors, stage.rows) == lighting.LIT
+    return lit_margins(scene, projectors, stage.rows, lit)
+
+
+def test_no_move_ends_in_shadow(shaded):
+    scene, stage = shaded
+    before = margins(scene, stage, stage.projectors)
+    assert np.isfinite(before).all()
+    moved = widen_margins(scene, stage)
+    after = margins(scene, stage, moved)
+    assert np.isfinite(after).mean() >= 0.9
+    gained = margin_at_share(after, 720) - margin_at_share(before, 720)
+    assert gained > np.radians(2.0)
