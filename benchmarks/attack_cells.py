@@ -30,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from from_tests import load
+from continuous_bounds import jobs
 from numpy.typing import NDArray
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
@@ -357,7 +357,7 @@ def main() -> int:
         flush=True,
     )
     total = 0
-    for path, options, up in _jobs(given.meshes):
+    for path, options, up in jobs(given.meshes):
         mesh, _ = cut_for_curvature(load_mesh(path, **options))
         for fit in given.rig_fit:
             for light in given.light:
@@ -395,16 +395,6 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--finest", type=int, default=6, help="2^finest cells an edge")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args()
-
-
-def _jobs(names: list[str]) -> list[tuple[Path, dict[str, object], str | None]]:
-    table = load("shared_meshes")
-    jobs = [(ROOT / "face.obj", {"unit": "mm"}, None)]
-    if table.FOLDER.is_dir():
-        for mesh in sorted(table.MESHES, key=lambda mesh: mesh.faces):
-            words = dict(zip(mesh.words[::2], mesh.words[1::2], strict=True))
-            jobs.append((mesh.path, mesh.options, words.get("--up")))
-    return [job for job in jobs if not names or job[0].name in names]
 
 
 def _scene(

@@ -35,9 +35,6 @@ from .selection import larger
 from .shortfall import shortfalls
 from .verification import verify_plan
 
-# Upwards in the image: where the ring axis points until the cameras are known.
-_FIRST_AZIMUTH = -float(np.pi / 2)
-
 
 def plan_rig(
     mesh: TriangleMesh | Sequence[TriangleMesh],
