@@ -9,7 +9,8 @@ sample to the device, N and T1 as in eq. (2)::
 Whether something is in between changes only across silhouettes (`silhouettes`). They
 are marked on the map; of the other cells, those that hang together are all blocked or
 all free, and one ray says which. A cell isn't closed because the ray to its middle is
-blocked.
+blocked. The same is asked of the faces near the sample alone: they have none of the
+silhouettes that they hide, and what they block is blocked.
 
 The mesh must be nearer than the device in every direction asked about.
 """
@@ -28,9 +29,13 @@ from .visibility import Visibility
 
 # Cosines are exact to this.
 _ROUNDING = 1e-9
+# Lengths along rays of single precision are exact to this, with much to spare.
+_SINGLE = 1e-4
 # A sample to which another face comes nearer than this, in slacks of its rays, or whose
 # own face is as narrow, is taken to be free: what is near it counts for some rays only.
 _SLACKS = 16.0
+# How near, in shares of the mesh's size, faces are that are looked at alone.
+_NEAR = (0.04, 0.16)
 _IN_PLANE = np.zeros((3, 3, 3), dtype=bool)
 _IN_PLANE[1] = [[False, True, False], [True, True, True], [False, True, False]]
 
@@ -72,6 +77,8 @@ class OpenDirections:
         self._cone = min(reach, 0.5 * np.pi)
         mesh = visibility.caster.mesh
         self._edges = Silhouettes(mesh) if occlusion else None
+        size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+        self._near = [share * size for share in _NEAR]
         sides = mesh.corners - mesh.corners[:, [1, 2, 0]]
         longest = np.linalg.norm(sides, axis=2).max(axis=1)
         width = 2.0 * mesh.face_areas / np.where(longest > 0, longest, 1.0)
@@ -95,12 +102,18 @@ class OpenDirections:
         cells = self._within_incidence(normals)
         cells &= ~self._along_steep(steep)
         if self._edges is not None:
-            heights = self._edges.heights(points)
-            crossing = self._edges.seen_from(points, normals, heights, self._cone)
-            blocked = self._blocked(crossing, points, normals, cells)
+            sides = self._edges.sides(points, normals)
+            blocked = np.zeros(cells.shape, dtype=bool)
+            for reach in (np.inf, *self._near):
+                among = None
+                if reach < np.inf:
+                    among = self._edges.faces_within(sides, reach)
+                crossing = self._edges.seen_from(sides, self._cone, among)
+                asked = cells & ~blocked
+                blocked |= self._blocked(crossing, points, normals, asked, reach)
             # Rays leave out what is within the slack of a sample, as the planner's do.
             reach = _SLACKS * self._visibility.slack
-            doubtful = self._edges.touched(points, faces, heights, reach, self._cone)
+            doubtful = self._edges.touched(sides, faces, reach, self._cone)
             doubtful |= self._narrow[faces]
             cells &= ~blocked | doubtful[:, None]
         return cells
@@ -138,6 +151,7 @@ class OpenDirections:
         points: NDArray[np.float64],
         normals: NDArray[np.float64],
         cells: NDArray[np.bool_],
+        reach: float,
     ) -> NDArray[np.bool_]:
         """Return the cells that are blocked as a whole; only those given are asked."""
         cube = self._cube
@@ -157,7 +171,7 @@ class OpenDirections:
         first[labels.ravel()[place[::-1]]] = place[::-1]
         row, cell = np.divmod(first[1:], cube.size)
         answer = np.zeros(n_parts + 1, dtype=bool)
-        answer[1:] = self._meets(points[row], normals[row], cube.centres[cell])
+        answer[1:] = self._meets(points[row], normals[row], cube.centres[cell], reach)
         return answer[labels]
 
     def _meets(
@@ -165,19 +179,23 @@ class OpenDirections:
         points: NDArray[np.float64],
         normals: NDArray[np.float64],
         directions: NDArray[np.float64],
+        reach: float,
     ) -> NDArray[np.bool_]:
-        """Return whether rays from samples outwards meet the mesh."""
+        """Return whether rays from samples outwards meet the mesh within reach [m]."""
         caster, slack = self._visibility.caster, self._visibility.slack
         rise = np.einsum("ij,ij->i", normals, directions)
         # The planner's rays end where they are `slack` above the sample's face.
         up = rise > 0.0
-        start = points + directions * (slack / np.where(up, rise, 1.0))[:, None]
+        offset = slack / np.where(up, rise, 1.0)
+        start = points + directions * offset[:, None]
         local, along = caster.local(start), directions.astype(np.float32)
-        reach = np.full(len(points), 4.0 * caster.reach, dtype=np.float32)
+        # What is left of the reach, less what rounding may add.
+        left = np.maximum(reach - offset, 0.0) * (caster.scale * (1.0 - _SINGLE))
+        left = np.minimum(left, 4.0 * caster.reach).astype(np.float32)
         met = np.zeros(len(points), dtype=bool)
         # In the caller's own thread: maps are made in several.
         for part in equal_parts(len(points), CHUNK):
-            met[part] = caster.blocked_local(local[part], along[part], reach[part])
+            met[part] = caster.blocked_local(local[part], along[part], left[part])
         return up & met
 
 

@@ -10,8 +10,14 @@ through x_f::
 (with the sign turned where f and g run along the edge in the same sense). What is too
 near to 0 to call counts as a silhouette.
 
+The border of some of the faces is a silhouette of these alone: what they hide, they
+hide whatever else stands there.
+
 A bit for each of 64 points, so that edges are compared for all of them at once.
 """
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +34,39 @@ _ANGLE = 1e-6
 _NONE = np.uint64(0)
 
 
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """From which side points see faces, and which edges change for them.
+
+    Attributes:
+        local: The points relative to the middle of the mesh in [m], shape (n, 3).
+        normals: Unit axes of their cones, same shape.
+        heights: h_f(p) of each face (row) and point (column) in [m].
+        changes: Bits of the points for which an edge of two faces is a silhouette.
+        above: Bits of the points over whose horizon such an edge rises.
+        alone: The same of each edge of one face or of more than two.
+        centroids: Of the faces, relative to the middle of the mesh in [m].
+    """
+
+    local: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    heights: NDArray[np.float64]
+    changes: NDArray[np.uint64]
+    above: NDArray[np.uint64]
+    alone: NDArray[np.uint64]
+    centroids: NDArray[np.float64]
+
+    @cached_property
+    def apart(self) -> NDArray[np.float64]:
+        """Squared distance of each centroid (row) and point (column) in [m^2]."""
+        square = np.einsum("ij,ij->i", self.centroids, self.centroids)
+        own = np.einsum("ij,ij->i", self.local, self.local)
+        # One product instead of three arrays of faces and points.
+        left = np.column_stack([self.centroids, square, np.ones(len(square))])
+        right = np.column_stack([-2.0 * self.local, np.ones(len(own)), own])
+        return left @ right.T
+
+
 class Silhouettes:
     """The edges of a mesh, ready to be compared.
 
@@ -40,7 +79,12 @@ class Silhouettes:
         pairs, shared = face_pairs(edges)
         self._middle = mesh.bounds.mean(axis=0)
         self._vertices = mesh.vertices - self._middle
-        self._single_ends = edges.ends[edges.n_faces != 2]
+        single = edges.n_faces != 2
+        self._single_ends = edges.ends[single]
+        sides_of_single = np.flatnonzero(single[edges.of_face.ravel()])
+        number = np.cumsum(single) - 1
+        self._single_faces = sides_of_single // 3
+        self._single_of_face = number[edges.of_face.ravel()[sides_of_single]]
         self._pairs, self._ends = pairs, edges.ends[shared]
         forwards = [_runs_along(mesh.faces[f], self._ends) for f in pairs.T]
         self._turned = np.where(forwards[0] == forwards[1], ~_NONE, _NONE)
@@ -59,53 +103,81 @@ class Silhouettes:
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         self._unsure = _UNSURE * size
 
-    def heights(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return h_f(p) of each face (row) and point (column) in [m]."""
-        local = points - self._middle
-        return self._planes @ np.column_stack([local, -np.ones(len(local))]).T
-
-    def seen_from(
-        self,
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        heights: NDArray[np.float64],
-        half_angle: float,
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return the silhouettes that may cross a cone above each point.
+    def sides(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> Sides:
+        """Return from which side points see each face.
 
         Args:
             points: On the mesh in [m], at most `POINTS`, shape (n, 3).
-            normals: Unit axes of the cones, same shape.
-            heights: What `heights` says of the points.
-            half_angle: Their half opening [rad], at most pi / 2.
-
-        Returns:
-            The point that each belongs to, (m,), and the edge's ends relative to it in
-            [m], shape (m, 3) each.
+            normals: Unit axes of the cones that are asked about, same shape.
         """
         local = points - self._middle
+        heights = self._planes @ np.column_stack([local, -np.ones(len(local))]).T
         own = np.einsum("ij,ij->i", normals, local)
         (above,) = _packed(self._vertices @ normals.T - own, [0.0])
         over, under = _packed(heights, [self._unsure, -self._unsure])
         # Above the upper mark: over both; between the marks: not sure.
         unsure = over ^ under
         f, g = self._pairs.T
-        words = (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g]
-        words &= above[self._ends[:, 0]] | above[self._ends[:, 1]]
-        alone = above[self._single_ends[:, 0]] | above[self._single_ends[:, 1]]
-        owners, edges = _unpacked(words, len(points))
-        more, singles = _unpacked(alone, len(points))
+        return Sides(
+            local,
+            normals,
+            heights,
+            (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g],
+            above[self._ends[:, 0]] | above[self._ends[:, 1]],
+            above[self._single_ends[:, 0]] | above[self._single_ends[:, 1]],
+            self._centroids,
+        )
+
+    def faces_within(self, sides: Sides, reach: float) -> NDArray[np.uint64]:
+        """Return for each face the points to which it comes within reach, as bits.
+
+        A few faces that don't quite are told too, none that does is left out.
+
+        Args:
+            sides: Of the points.
+            reach: How near, in [m].
+        """
+        limit = reach + self._radii + self._unsure
+        (beyond,) = _packed(sides.apart - (limit * limit)[:, None], [self._unsure**2])
+        return ~beyond
+
+    def seen_from(
+        self, sides: Sides, half_angle: float, among: NDArray[np.uint64] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the silhouettes that may cross a cone above each point.
+
+        Args:
+            sides: Of the points.
+            half_angle: Half opening of the cones [rad], at most pi / 2.
+            among: For each face the points for which it counts, as bits; None: all do
+                for every point.
+
+        Returns:
+            The point that each belongs to, (m,), and the edge's ends relative to it in
+            [m], shape (m, 3) each.
+        """
+        words, alone = sides.changes & sides.above, sides.alone
+        if among is not None:
+            f, g = self._pairs.T
+            words = (words & among[f] & among[g]) | (
+                sides.above & (among[f] ^ among[g])
+            )
+            counts = np.zeros_like(alone)
+            np.bitwise_or.at(counts, self._single_of_face, among[self._single_faces])
+            alone = alone & counts
+        n = len(sides.local)
+        owners, edges = _unpacked(words, n)
+        more, singles = _unpacked(alone, n)
         ends = np.concatenate([self._ends[edges], self._single_ends[singles]])
         owners = np.concatenate([owners, more])
-        begin, end = (self._vertices[ends[:, k]] - local[owners] for k in (0, 1))
-        near = _may_cross(begin, end, normals[owners], half_angle)
+        begin, end = (self._vertices[ends[:, k]] - sides.local[owners] for k in (0, 1))
+        near = _may_cross(begin, end, sides.normals[owners], half_angle)
         return owners[near], begin[near], end[near]
 
     def touched(
         self,
-        points: NDArray[np.float64],
+        sides: Sides,
         faces: NDArray[np.int64],
-        heights: NDArray[np.float64],
         reach: float,
         half_angle: float,
     ) -> NDArray[np.bool_]:
@@ -115,15 +187,14 @@ class Silhouettes:
         rises by less than the cone leaves.
 
         Args:
-            points: On the mesh in [m], at most `POINTS`, shape (n, 3).
+            sides: Of the points.
             faces: The face that each lies on, shape (n,).
-            heights: What `heights` says of the points.
             reach: How near, in [m].
             half_angle: Half opening of the cone about the face's normal [rad].
         """
-        local = points - self._middle
-        over, under = _packed(heights, [reach, -reach])
-        owner, face = _unpacked(under & ~over, len(points))
+        local = sides.local
+        over, under = _packed(sides.heights, [reach, -reach])
+        owner, face = _unpacked(under & ~over, len(local))
         other = face != faces[owner]
         face, owner = face[other], owner[other]
         # In the plane of a face, a circle about it leaves few to be looked at.
@@ -138,7 +209,7 @@ class Silhouettes:
         key = face * len(self._faces) + own
         place = np.searchsorted(self._smooth, key, side="right") - 1
         even &= self._smooth[place] == key
-        found = np.zeros(len(points), dtype=bool)
+        found = np.zeros(len(local), dtype=bool)
         found[owner[~even]] = True
         return found
 

@@ -37,7 +37,7 @@ def maps_of(mesh, cube, *, limits=FREE, n=POINTS, steep=None, occlusion=True, se
 
 def seen_from(mesh, points, normals, half_angle):
     edges = Silhouettes(mesh)
-    return edges.seen_from(points, normals, edges.heights(points), half_angle)
+    return edges.seen_from(edges.sides(points, normals), half_angle)
 
 
 def is_free(samples, visibility, row, asked):
@@ -149,6 +149,32 @@ def test_under_a_roof_only_the_gap_is_open():
     doubt = 0.03 * np.deg2rad(3.0) / np.maximum(cube.centres[:, 2], 0.02) ** 2
     assert not cells[up & (off < -doubt)].any()
     assert cells[up & (off > doubt) & (cube.centres[:, 2] > 0.05)].all()
+
+
+def test_what_a_near_roof_hides_opens_no_cell(monkeypatch):
+    """Clutter far above a roof: of the faces near the sample it is no part."""
+    parts = [grid(0.3, 0.3, divisions=(1, 1))]
+    parts.append(shifted(grid(0.2, 0.2, divisions=(4, 4)), (0, 0, 0.03)))
+    for x, y, z in np.random.default_rng(3).uniform(-1.0, 1.0, (80, 3)):
+        parts.append(
+            shifted(box((0.03, 0.03, 0.03)), (0.3 * x, 0.3 * y, 0.6 + 0.3 * z))
+        )
+    mesh, cube = joined(*parts), CubeMap(48)
+    visibility, limits = Visibility(mesh), DirectionLimits(np.deg2rad(89.0), 0.0)
+    point, up = np.array([[0.03, 0.01, 0.0]]), np.array([[0.0, 0.0, 1.0]])
+
+    def under_the_roof():
+        makes = OpenDirections(visibility, limits, cube)
+        cells = makes.maps(point, up, np.zeros((1, 3)), np.array([0]))[0]
+        rise = np.maximum(cube.centres[:, 2], 0.02)
+        hit = point + cube.centres * (0.03 / rise)[:, None]
+        off = np.abs(hit[:, :2]).max(axis=1) - 0.1
+        return cells[(cube.centres[:, 2] > 0.02) & (off < -0.03 * 0.07 / rise**2)]
+
+    assert under_the_roof().size > 2000
+    assert not under_the_roof().any()
+    monkeypatch.setattr("geometry.open_directions._NEAR", ())
+    assert under_the_roof().mean() > 0.1
 
 
 @pytest.mark.parametrize("slacks", [0.0, 0.1, 0.5, 1.0, 2.0, 5.0, 12.0, 40.0])

@@ -54,9 +54,7 @@ def test_no_silhouette_above_the_horizon_is_left_out(half_angle):
     rng = np.random.default_rng(4)
     points = np.column_stack([rng.uniform(-0.09, 0.09, (40, 2)), np.zeros(40)])
     normals = np.tile([0.0, 0.0, 1.0], (40, 1))
-    owner, begin, end = edges.seen_from(
-        points, normals, edges.heights(points), half_angle
-    )
+    owner, begin, end = edges.seen_from(edges.sides(points, normals), half_angle)
     through = {True: 0, False: 0}
     for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
         mine = owner == i
