@@ -17,7 +17,6 @@ A bit for each of 64 points, so that edges are compared for all of them at once.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +30,8 @@ POINTS = 64
 _UNSURE = 1e-9
 # What rounding may turn a direction by.
 _ANGLE = 1e-6
+# Faces whose distances are taken at a time: they stay in the second-level cache.
+_FACES = 1 << 12
 _NONE = np.uint64(0)
 
 
@@ -45,7 +46,6 @@ class Sides:
         changes: Bits of the points for which an edge of two faces is a silhouette.
         above: Bits of the points over whose horizon such an edge rises.
         alone: The same of each edge of one face or of more than two.
-        centroids: Of the faces, relative to the middle of the mesh in [m].
     """
 
     local: NDArray[np.float64]
@@ -54,17 +54,6 @@ class Sides:
     changes: NDArray[np.uint64]
     above: NDArray[np.uint64]
     alone: NDArray[np.uint64]
-    centroids: NDArray[np.float64]
-
-    @cached_property
-    def apart(self) -> NDArray[np.float64]:
-        """Squared distance of each centroid (row) and point (column) in [m^2]."""
-        square = np.einsum("ij,ij->i", self.centroids, self.centroids)
-        own = np.einsum("ij,ij->i", self.local, self.local)
-        # One product instead of three arrays of faces and points.
-        left = np.column_stack([self.centroids, square, np.ones(len(square))])
-        right = np.column_stack([-2.0 * self.local, np.ones(len(own)), own])
-        return left @ right.T
 
 
 class Silhouettes:
@@ -125,7 +114,6 @@ class Silhouettes:
             (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g],
             above[self._ends[:, 0]] | above[self._ends[:, 1]],
             above[self._single_ends[:, 0]] | above[self._single_ends[:, 1]],
-            self._centroids,
         )
 
     def faces_within(self, sides: Sides, reach: float) -> NDArray[np.uint64]:
@@ -137,9 +125,18 @@ class Silhouettes:
             sides: Of the points.
             reach: How near, in [m].
         """
-        limit = reach + self._radii + self._unsure
-        (beyond,) = _packed(sides.apart - (limit * limit)[:, None], [self._unsure**2])
-        return ~beyond
+        own = np.einsum("ij,ij->i", sides.local, sides.local)
+        right = np.column_stack([-2.0 * sides.local, np.ones(len(own)), own]).T
+        within = np.empty(len(self._faces), dtype=np.uint64)
+        for begin in range(0, len(within), _FACES):
+            part = slice(begin, begin + _FACES)
+            middle, limit = self._centroids[part], reach + self._radii[part]
+            square = np.einsum("ij,ij->i", middle, middle) - (limit + self._unsure) ** 2
+            # |p - c|^2 - limit^2, as one product.
+            left = np.column_stack([middle, square, np.ones(len(square))])
+            (beyond,) = _packed(left @ right, [self._unsure**2])
+            within[part] = ~beyond
+        return within
 
     def seen_from(
         self, sides: Sides, half_angle: float, among: NDArray[np.uint64] | None = None
