@@ -256,20 +256,11 @@ def test_hessian_times_vector_is_the_change_of_the_gradient(light):
         assert table @ v == pytest.approx(change, rel=1e-4, abs=1e-3)
 
 
-@pytest.mark.parametrize("light", LIGHTS)
-@pytest.mark.parametrize(
-    ("seed", "changes", "kinds"),
-    [
-        (0, {}, {"cone"}),
-        (1, {"half_angle": np.pi, "floor": -np.inf}, set()),
-        (2, {"half_angle": 0.15, "floor": 0.03}, {"cone"}),
-        (3, {"min_tangent_angle": np.radians(55.0)}, {"tangent"}),
-        (4, {"up": np.array([0.0, 0.0, -1.0]), "floor": -0.04}, {"floor"}),
-    ],
-)
-def test_kkt_of_the_pose_program_from_ipopts_multipliers(light, seed, changes, kinds):
-    """Stationarity, complementarity and signs, with derivatives from numpy alone."""
-    program = program_for(light, seed, **changes)
+def multipliers_of_an_optimum(program):
+    """IPOPT's answer and its multipliers, once stationarity, signs and all else hold.
+
+    Derivatives are from numpy alone.
+    """
     index = np.arange(16)
     outcome = run_ipopt(program, index, program.world_from_device, max_iterations=300)
     assert outcome.success
@@ -282,18 +273,75 @@ def test_kkt_of_the_pose_program_from_ipopts_multipliers(light, seed, changes, k
     of_f, of_g = slopes(program, x)
     assert of_f + of_g[applies].T @ y[applies] + z == pytest.approx(0.0, abs=2e-6)
     assert np.all(y <= 1e-9)
-    assert y[~applies] == pytest.approx(0.0, abs=1e-20)
+    assert y[~applies] == pytest.approx(0.0, abs=1e-15)
     assert y[applies] * (g - lower)[applies] == pytest.approx(0.0, abs=1e-7)
     # The margin is what is bought: dt = 1 is shared out among the limits that bind.
     assert (of_g[applies, 6] * -y[applies]).sum() == pytest.approx(-1.0, abs=1e-5)
     margin = pose_margins(program, outcome.world_from_device).min()
     assert margin == pytest.approx(outcome.margin_rad, abs=1e-7)
+    return y
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize(
+    ("seed", "changes", "kinds"),
+    [
+        (0, {}, {"cone"}),
+        (1, {"half_angle": np.pi, "floor": -np.inf}, set()),
+        (2, {"half_angle": 0.15, "floor": 0.03}, {"cone"}),
+        (3, {"min_tangent_angle": np.radians(55.0)}, {"tangent"}),
+        (4, {"up": np.array([0.0, 0.0, -1.0]), "floor": -0.04}, {"floor"}),
+    ],
+)
+def test_kkt_of_the_pose_program_from_ipopts_multipliers(light, seed, changes, kinds):
+    """Stationarity, complementarity and signs, and which limits are felt."""
+    y = multipliers_of_an_optimum(program_for(light, seed, **changes))
     binds = y < -1e-6
     binding = {name for name, k in (("cone", -2), ("floor", -1)) if binds[k]}
     binding |= {"tangent"} if binds[16:48].any() else set()
     assert binding >= kinds
     # Parallel light feels its panel, beam or ring, diverging light the shell.
     assert "tangent" in kinds or binds[48:-4].any() or binds[-4:-2].any()
+
+
+@pytest.mark.parametrize(
+    ("side", "limits", "binding"),
+    [
+        # A ball is lit best from afar, a bowl from near by.
+        (1.0, {"range_m": (0.85, 1.02)}, "far"),
+        (-1.0, {"range_m": (0.97, 1.3)}, "near"),
+        (-1.0, {"range_m": (0.5, 1.3), "shell_m": (0.5, 1.3)}, "field"),
+        (-1.0, {"range_m": (0.5, 1.3), "shell_m": (0.5, 1.3)}, "ring"),
+    ],
+)
+def test_kkt_where_field_and_range_bind_in_diverging_light(side, limits, binding):
+    """What holds a projector back is its image, its last ring, or its focus."""
+    free = {"half_angle": np.pi, "floor": -np.inf, "min_tangent_angle": 0.0}
+    shell = {"shell_m": (0.5, 1.5)}
+    normals = cap(np.random.default_rng(5), 16, 0.6)
+    points = side * 0.05 * normals
+    start = look_at(np.array([0.05, -1.0, 0.02]), np.zeros(3), np.array([0, 0, 1.0]))
+    ring, narrow = (0.035 if binding == "ring" else 0.2), {}
+    if binding == "field":
+        # A strip of 60 columns, far off the axis: turned until the bowl is in it.
+        aside = np.arctan2(K[0, 2] - 29.5, K[0, 0])
+        start[:3, :3] @= Rotation.from_rotvec([0.0, aside, 0.0]).as_matrix()
+        ring, narrow = 0.7, {"resolution": (60, 800)}
+    program = program_for(
+        "diverging",
+        5,
+        points=points,
+        normals=normals,
+        steep=np.zeros((16, 3)),
+        ring_radius=ring,
+        world_from_device=start,
+        **(free | shell | limits | narrow),
+    )
+    y = multipliers_of_an_optimum(program)
+    places = {"field": (48, 112), "near": (112, 128), "far": (128, 144)}
+    places["ring"] = (144, 160)
+    bound = {name for name, (a, b) in places.items() if (y[a:b] < -1e-6).any()}
+    assert binding in bound
 
 
 @pytest.mark.parametrize("seed", range(4))
