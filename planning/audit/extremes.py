@@ -9,7 +9,7 @@ from .ledger import Ledger, as_number
 # An extreme over other samples may lie so much farther out, as a share of itself.
 _BEYOND = 0.1
 # Samples that lie beyond it by less aren't counted against it.
-_CLOSE = 0.02
+_CLOSE = 0.05
 _DEVIATIONS = 3.0
 
 
@@ -26,7 +26,7 @@ def audit_extreme(
     """Check an extreme of positive values over samples that aren't the plan's.
 
     Two honest sets may differ in their very extreme. But not more than 1 % (and three
-    standard errors) of what is sampled may lie beyond the one claimed by over 2 %, and
+    standard errors) of what is sampled may lie beyond the one claimed by over 5 %, and
     some sample must come within 10 % of it.
 
     Args:
