@@ -16,7 +16,9 @@ from planning.audit import audit_plan
 from planning.audit.estimates import Estimator
 from planning.audit.ledger import Ledger
 from planning.audit.occlusion import Shadow
+from planning.audit.predicates import Lamp
 from planning.audit.recompute import recompute
+from planning.audit.ring_light import ring_spacing
 from planning.audit.rings import audit_rings
 from planning.audit.samples import draw_samples
 from planning.cameras import lit_samples, measured_by
@@ -240,3 +242,13 @@ def test_the_audit_of_a_plan_looks_at_its_rings(handmade, light):
     assert found.startswith("P2.rings.error_p99_m: claimed")
     plain = handmade.build_plan(light)
     assert not any("rings" in f for f in audit_plan(plain, n_samples=3000).failures)
+
+
+@pytest.mark.parametrize(("light", "expected"), [("diverging", 0.2), ("parallel", 0.1)])
+def test_rings_stand_apart_along_their_normal(handmade, light, expected):
+    """Cones of tangents 0.9 and 1 at R = 1, z = 2 sqrt 2: 0.1 z / sqrt(1 + R^2)."""
+    device = handmade.build_plan(light).projectors[0].device
+    lamp = Lamp(device, np.eye(4), np.eye(4), np.array([0.9, 1.0]))
+    z = 2.0 * np.sqrt(2.0)
+    point = [[z, 0.0, z] if light == "diverging" else [0.6, 0.8, z]]
+    assert ring_spacing(lamp, np.array(point)) == pytest.approx(expected)
