@@ -27,6 +27,8 @@ _LEVEL = 0.99
 _DEVIATIONS = 4.0
 # Beside sampling: of a share of chords, and of a quantile of their errors.
 _SHARE, _RELATIVE = 0.004, 0.05
+# On a plane errors are roundings, and no claim.
+_FLAT_M = 1e-9
 
 
 def audit_rings(
@@ -149,7 +151,7 @@ def _audit_quantile(
         # Too few chords to bound what they haven't met.
         high = np.inf
     ledger.holds(
-        value is not None and low <= value <= high,
+        value is not None and low - _FLAT_M <= value <= high + _FLAT_M,
         key,
         f"claimed {claimed!r} m, recomputed {np.quantile(errors, _LEVEL):.6g} m, "
         f"accepted {low:.6g} to {high:.6g} m",
