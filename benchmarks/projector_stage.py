@@ -20,10 +20,12 @@ from from_tests import load
 from geometry.mesh import TriangleMesh
 from planning import load_mesh, load_rig
 from planning.pipeline import plan_rig
+from planning.rig import Light
 from planning.sample_head import sample_head
 
 _FACES = 100_000
 _THREADS = 2
+_LIGHTS: tuple[Light, ...] = ("diverging", "parallel")
 _SHARED = ("vtk_horse.ply", "tm_counter.unitsmm.STL")
 # What the planner says when a stage begins; the last one isn't waited for.
 _STAGES = ("projectors: ", "bounds over ", "projector poses: ", "cameras: ")
@@ -56,7 +58,7 @@ def main() -> int:
     print("| mesh | faces | light | cover [s] | bounds [s] | poses [s] | stage [s] |")
     print("|" + 7 * "---|")
     for name, mesh in _meshes(sys.argv[1:]):
-        for light in ("diverging", "parallel"):
+        for light in _LIGHTS:
             spent = np.diff(_begun(mesh, light))
             cells = " | ".join(f"{seconds:.2f}" for seconds in (*spent, spent.sum()))
             print(f"| {name} | {len(mesh.faces):,} | {light} | {cells} |", flush=True)
@@ -72,7 +74,7 @@ def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
             yield mesh.path.name, load_mesh(mesh.path, **mesh.options)
 
 
-def _begun(mesh: TriangleMesh, light: str) -> list[float]:
+def _begun(mesh: TriangleMesh, light: Light) -> list[float]:
     """When each stage begins [s]."""
     clock = _Clock()
     try:
