@@ -113,13 +113,21 @@ class CubeMap:
         Args:
             directions: Not zero, of any length, shape (m, 3).
         """
-        axis = np.argmax(np.abs(directions), axis=1)
-        along = np.take_along_axis(directions, axis[:, None], axis=1)[:, 0]
+        # Column by column: rows of three are too short for numpy's loops.
+        flat = np.ascontiguousarray(directions, dtype=np.float64).ravel()
+        x, y, z = (np.abs(flat[k::3]) for k in range(3))
+        axis = np.where((x >= y) & (x >= z), 0, np.where(y >= z, 1, 2))
+        first = np.arange(0, flat.size, 3)
+        along = flat[first + axis]
         face = 2 * axis + (along < 0)
-        across = np.take_along_axis(directions, _AXES[face][:, :2], axis=1)
-        steps = (np.arctan(across / np.abs(along)[:, None]) * (4.0 / np.pi) + 1.0) / 2.0
-        index = np.clip((steps * self.n).astype(np.int64), 0, self.n - 1)
-        return (face * self.n + index[:, 1]) * self.n + index[:, 0]
+        length = np.abs(along)
+        i, j = (self._steps(flat[first + _AXES[face, k]] / length) for k in (0, 1))
+        return (face * self.n + j) * self.n + i
+
+    def _steps(self, gnomonic: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Column or row of cells that a gnomonic coordinate falls into, shape (m,)."""
+        steps = (np.arctan(gnomonic) * (4.0 / np.pi) + 1.0) / 2.0
+        return np.clip((steps * self.n).astype(np.int64), 0, self.n - 1)
 
     def halved(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Return for each cell of the map of n/2 the rows of its four cells, joined.

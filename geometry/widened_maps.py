@@ -74,7 +74,8 @@ class WidenedMaps:
         """
         level = np.searchsorted(self._angles, angles)
         found = np.ones(len(angles), dtype=bool)
-        for k in np.unique(level[level < len(self._maps)]):
+        counts = np.bincount(level, minlength=len(self._maps))
+        for k in np.flatnonzero(counts[: len(self._maps)]):
             own = self._maps[k]
             some = np.flatnonzero(level == k)
             cell, sample = own.cube.locate(directions[some]), samples[some]

@@ -57,7 +57,7 @@ class Claims:
         unreachable_by_cause: Target area that no reference projector lights [m²].
         unreachable_inside_m2: The part of it that lies inside the body.
         lit_area_m2: Target area that each projector lights.
-        min_margin_rad: Least margin over what each projector serves.
+        min_margin_rad: Least margin over what each projector serves, None for nothing.
         seen_area_m2: Target area that each camera measures.
         sole_area_m2: Target area that only this camera measures.
         regions: `lit_by` and `lit_fraction` of each region.
@@ -71,7 +71,7 @@ class Claims:
     unreachable_by_cause: dict[str, float]
     unreachable_inside_m2: float
     lit_area_m2: tuple[float, ...]
-    min_margin_rad: tuple[float, ...]
+    min_margin_rad: tuple[float | None, ...]
     seen_area_m2: tuple[float, ...]
     sole_area_m2: tuple[float, ...]
     regions: tuple[dict[str, Any], ...]
@@ -218,10 +218,10 @@ def _reachable_by_projectors(
 
 def _least_margins(
     scene: Scene, devices: Devices, target: Target, served: NDArray[np.int64]
-) -> tuple[float, ...]:
+) -> tuple[float | None, ...]:
     margin = margins_of(scene, devices.projectors, target)
     return tuple(
-        float(margin[served == p, p].min()) if np.any(served == p) else 0.0
+        float(margin[served == p, p].min()) if np.any(served == p) else None
         for p in range(len(devices.projectors))
     )
 

@@ -27,11 +27,13 @@ from .draw_marks import Panel
 from .draw_text import draw_heading, draw_legend, draw_title
 from .draw_views import BACKGROUND, SUPERSAMPLING, Colour, Shader, fitted
 from .draw_views import draw_mesh as draw_mesh
+from .draw_zones import ZONES, draw_zones, seen_corners, zone_figures
 from .files import write_atomically
 from .plan import RigPlan
 
 _DEVICES: dict[str, Colour] = {"projector": (200, 80, 0), "camera": (0, 90, 160)}
 _MIN_SIZE = (800, 500)
+_LONGEST = 20
 
 
 def save_rig_picture(
@@ -70,7 +72,8 @@ def draw_rig(
     """Return a picture of a rig: devices, their distances, and what they measure.
 
     Every panel is orthographic and carries its own scale bar and the file's axes. Lines
-    behind the object are faint.
+    behind the object are faint. Zones are drawn lightly, as far as devices may stand;
+    a square marks a device that stands already.
 
     Args:
         plan: The plan; only its devices, workspace and surface are drawn.
@@ -115,7 +118,7 @@ def _overview(
     figures, mesh = _figures(plan), plan.surface.mesh
     positions = np.array([figure.position for figure in figures])
     direction = best_direction(positions, mesh.centre, up)
-    panel = _scene(figures, shader, direction, up, size)
+    panel = _scene(plan, figures, shader, direction, up, size)
     draw_heading(panel, "All devices, to scale; x, y, z are the axes of the mesh file")
     _mark_devices(panel, figures, shader.caster, type_size=17.0, distances=False)
     return panel.image
@@ -125,7 +128,7 @@ def _from_above(
     plan: RigPlan, shader: Shader, up: NDArray[np.float64], size: tuple[int, int]
 ) -> Image.Image:
     figures = _figures(plan)
-    panel = _scene(figures, shader, up, up, size)
+    panel = _scene(plan, figures, shader, up, up, size)
     draw_heading(panel, "From above; distances to the object's centre")
     _mark_devices(panel, figures, shader.caster, type_size=14.0, distances=True)
     return panel.image
@@ -137,6 +140,7 @@ def _figures(plan: RigPlan) -> list[DeviceFigure]:
 
 
 def _scene(
+    plan: RigPlan,
     figures: Sequence[DeviceFigure],
     shader: Shader,
     direction: NDArray[np.float64],
@@ -145,10 +149,12 @@ def _scene(
 ) -> Panel:
     corners = _box_corners(shader.caster.mesh)
     bodies = [line for figure in figures for line in figure.body]
-    everything = np.concatenate([corners, *bodies])
+    zones = zone_figures(plan)
+    everything = np.concatenate([corners, *bodies, *seen_corners(plan, zones)])
     view = fitted(everything, direction, up, size, margin_px=0.085 * min(size))
     panel = Panel(shader.shade(view), view)
     panel.keep_clear(corners)
+    draw_zones(panel, zones, shader.caster)
     return panel
 
 
@@ -169,11 +175,15 @@ def _mark_devices(
         for line in figure.body:
             panel.polyline(line, colour, width=2.0, caster=caster)
         panel.dot(figure.position, colour, radius=3.0)
+        if figure.existing:
+            panel.frame(figure.position, colour, radius=8.0)
         panel.keep_clear(np.concatenate(figure.body))
     panel.scale_bar(size=14.0)
     panel.axes(size=15.0)
     for figure in figures:
         text = figure.id
+        if figure.existing:
+            text += f"  {_shortened(figure.existing)}"
         if distances:
             text += f"  {1e3 * figure.distance_m:.0f} mm"
         panel.label(figure.position, text, _DEVICES[figure.kind], size=type_size)
@@ -188,6 +198,8 @@ def _close_up(
 ) -> Image.Image:
     picture = Image.new("RGB", size, BACKGROUND)
     rows = [*legend, *((f"{kind}s", colour) for kind, colour in _DEVICES.items())]
+    kinds = {figure.kind for figure in zone_figures(plan)}
+    rows += [(kind, colour) for kind, colour in ZONES.items() if kind in kinds]
     columns, line = 2, 21 * SUPERSAMPLING
     foot = -(-len(rows) // columns) * line + 8 * SUPERSAMPLING
     half = (size[0] // 2, size[1] - foot)
@@ -205,6 +217,10 @@ def _close_up(
         picture.paste(panel.image, (k * half[0], 0))
     draw_legend(ImageDraw.Draw(picture), rows, (size[0], size[1] - foot), columns, line)
     return picture
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 3]}..."
 
 
 def _box_corners(mesh: TriangleMesh) -> NDArray[np.float64]:

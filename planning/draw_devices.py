@@ -31,6 +31,7 @@ class DeviceFigure:
         beam: Edges of the light or the field of view as far as the object.
         axis: From the origin along the optical axis to the object's depth, (2, 3).
         distance_m: From the origin to the centre of the object [m].
+        existing: Name of the device that stands already; empty: it is planned.
     """
 
     id: str
@@ -40,6 +41,7 @@ class DeviceFigure:
     beam: tuple[NDArray[np.float64], ...]
     axis: NDArray[np.float64]
     distance_m: float
+    existing: str
 
 
 def device_figures(plan: RigPlan, *, body_m: float) -> list[DeviceFigure]:
@@ -75,6 +77,7 @@ def _figure(
         tuple(transform(pose, line) for line in local_beam),
         transform(pose, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, depth]])),
         float(np.linalg.norm(position - centre)),
+        device.existing,
     )
 
 

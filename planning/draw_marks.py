@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+from scipy.spatial import ConvexHull
 
 from geometry.mesh import TriangleMesh
 from geometry.rays import RayCaster
@@ -72,6 +73,25 @@ class Panel:
                 opacity = alpha // 6 if hidden[first : last + 1].any() else alpha
                 ends = [tuple(pixels[first]), tuple(pixels[last])]
                 draw.line(ends, fill=(*colour, opacity), width=thick)
+
+    def tint(self, points: NDArray[np.float64], colour: Colour, *, alpha: int) -> None:
+        """Tint what the convex hull of points of the world covers, shape (n, 3)."""
+        pixels = self.view.project(points)
+        # A slab seen edge on covers less than a pixel and has no hull to fill.
+        if np.linalg.matrix_rank(pixels - pixels[0], tol=1.0) < 2:
+            return
+        outline = pixels[ConvexHull(pixels).vertices]
+        self._draw.polygon([tuple(p) for p in outline], fill=(*colour, alpha))
+
+    def frame(
+        self, point: NDArray[np.float64], colour: Colour, *, radius: float
+    ) -> None:
+        """Draw a square about a point of the world; the radius is in final pixels."""
+        x, y = self.view.project(point)
+        r = radius * SUPERSAMPLING
+        box = (x - r, y - r, x + r, y + r)
+        self._draw.rectangle(box, outline=(*colour, 255), width=2 * SUPERSAMPLING)
+        self.taken.append(box)
 
     def dot(self, point: NDArray[np.float64], colour: Colour, *, radius: float) -> None:
         """Draw a filled dot at a point of the world; the radius is in final pixels."""

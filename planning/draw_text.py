@@ -8,7 +8,7 @@ import numpy as np
 from PIL import ImageDraw
 
 from .draw_marks import INK, PALE, Panel, font
-from .draw_views import SUPERSAMPLING, Colour
+from .draw_views import BACKGROUND, SUPERSAMPLING, Colour
 from .plan import RigPlan
 
 
@@ -58,8 +58,11 @@ def draw_heading(panel: Panel, text: str) -> None:
     """Name a panel in its upper left corner and keep labels off the name."""
     spot = (14 * SUPERSAMPLING, 10 * SUPERSAMPLING)
     draw = ImageDraw.Draw(panel.image)
+    box = draw.textbbox(spot, text, font=font(15.0))
+    # Lines of a room may run behind it.
+    draw.rectangle(box, fill=BACKGROUND)
     draw.text(spot, text, PALE, font=font(15.0))
-    panel.taken.append(draw.textbbox(spot, text, font=font(15.0)))
+    panel.taken.append(box)
 
 
 def draw_legend(

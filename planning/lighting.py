@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
+from geometry.lengths import lengths
 from geometry.poses import inverse, transform
 from geometry.sampling import SurfaceSamples
 from geometry.visibility import Visibility
@@ -82,7 +83,7 @@ def light_on(projector: PlannedProjector, target: Target) -> Light:
         directions = np.broadcast_to(pose[:3, 2], points.shape)
         distances = offsets @ pose[:3, 2]
     else:
-        distances = np.linalg.norm(offsets, axis=1)
+        distances = lengths(offsets)
         directions = offsets / np.where(distances > 0, distances, 1.0)[:, None]
     return Light(
         directions,

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.cube_map import FACES, CubeMap, angle_between, middles, quarters
+from geometry.lengths import lengths
 from geometry.widened_maps import WidenedMaps
 from solvers.bit_rows import GrowingArray, words_for
 from solvers.cells import CellBatch
@@ -173,7 +174,7 @@ class PositionTree:
             return np.zeros(rows.size, dtype=bool)
         half = 0.5 * (high - low)
         towards = 0.5 * (low + high) * outwards - self._points[rows]
-        distance = np.linalg.norm(towards, axis=1)
+        distance = lengths(towards)
         side = 2.0 * high * np.sin(0.5 * angle)
         extent = half + side + _ROUNDING
         near, far = self._range
@@ -214,14 +215,12 @@ def _spread(
     """Return psi of a cell for each sample, shape (n,)."""
     along = towards @ outwards
     across = np.sqrt(np.maximum(distance**2 - along**2, 0.0))
-    turns = [
-        np.arctan2(half * across, distance**2 + sign * half * along)
-        for sign in (1.0, -1.0)
-    ]
+    # The end of the interval that lies nearer turns by more.
+    turn = np.arctan2(half * across, distance**2 - half * np.abs(along))
     nearest = distance - half
     reached = nearest > side
     share = side / np.where(reached, nearest, 1.0)
-    psi = np.maximum(*turns) + np.arcsin(np.where(reached, share, 0.0)) + _ROUNDING
+    psi = turn + np.arcsin(np.where(reached, share, 0.0)) + _ROUNDING
     return np.where(reached, psi, np.pi)
 
 

@@ -156,14 +156,21 @@ def _creased(
     masked = np.zeros((len(edges) - 1, _AZIMUTHS), dtype=bool)
     ring = creases.points - projector.world_from_ring[:3, 3]
     ring = ring @ projector.world_from_ring[:3, :3]
+    degree = 2.0 * np.pi / _AZIMUTHS
     turn = np.arctan2(ring[:, 1], ring[:, 0]) % (2.0 * np.pi)
-    column = np.floor(turn * (_AZIMUTHS / (2.0 * np.pi))).astype(np.int64)
+    column = np.floor(turn / degree).astype(np.int64)
     row = np.searchsorted(edges, ring_coordinate(projector, creases.points)) - 1
+    # Near the axis a short piece of crease is seen under a wide angle.
+    half = 0.5 * creases.length
+    angle = np.arctan2(half, np.hypot(ring[:, 0], ring[:, 1]))
+    width = 1 + np.floor(angle / degree).astype(np.int64)
+    most = int(width.max(initial=0))
     reach = CELLS // 2 + 1
     for down in range(-reach, reach + 1):
         inside = (row + down >= 0) & (row + down < len(masked))
-        for aside in (-1, 0, 1):
-            masked[row[inside] + down, (column[inside] + aside) % _AZIMUTHS] = True
+        for aside in range(-most, most + 1):
+            near = inside & (width >= abs(aside))
+            masked[row[near] + down, (column[near] + aside) % _AZIMUTHS] = True
     return masked
 
 

@@ -21,6 +21,8 @@ from .plan import PlannedCamera, PlannedProjector
 from .scene import Scene
 
 _AZIMUTHS = 360
+# From just inside each: rounding doesn't decide between two gaps, nor about the last.
+_INSIDE = 1.0 - 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,7 @@ def ring_shares(
         cameras: As planned.
     """
     scene.pulse()
-    profile = cast_beam(scene, projector, projector.ring_radii, _AZIMUTHS)
+    profile = cast_beam(scene, projector, _INSIDE * projector.ring_radii, _AZIMUTHS)
     origins, rays = beam_rays(projector, profile.coordinates, profile.azimuths)
     drawn = lighting.in_panel(projector, origins + rays)
     return RingShares(

@@ -299,13 +299,23 @@ def _coverage(plan: RigPlan) -> str:
     left = coverage["uncovered_by_cause"]
     if left:
         lines.append(f"         not measured: {causes_line(left, target['area_m2'])}")
-    groups = plan.document["camera_groups"]
+    idle = {e["id"] for e in plan.document["cameras"] if e["seen_area_m2"] == 0.0}
+    groups = [g for g in plan.document["camera_groups"] if not idle.issuperset(g)]
     if len(groups) > 1:
         names = ", ".join("{" + " ".join(group) + "}" for group in groups)
         lines.append(
             f"         the parts of {names} don't overlap: register them by the "
             f"calibrated poses, not by the surface"
         )
+    lines += [
+        f"         {entry['id']} {does} none of the target"
+        for does, kind, area in (
+            ("lights", "projectors", "lit_area_m2"),
+            ("measures", "cameras", "seen_area_m2"),
+        )
+        for entry in plan.document[kind]
+        if entry[area] == 0.0
+    ]
     if firing := schedule_line(plan.document):
         lines.append(firing)
     return "\n".join(lines)

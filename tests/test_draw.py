@@ -13,7 +13,8 @@ from geometry.rays import RayCaster
 from planning.draw import draw_mesh, draw_rig, region_colours, save_rig_picture
 from planning.draw_devices import best_direction, device_figures
 from planning.draw_marks import Panel, round_length
-from planning.draw_views import Shader, View, facing, fitted
+from planning.draw_views import BACKGROUND, Shader, View, facing, fitted
+from planning.draw_zones import ZONES, draw_zones, zone_figures
 from planning.geodesic import geodesic_grid
 from planning.plan import RigPlan
 from planning.sample_head import sample_head
@@ -476,3 +477,90 @@ def test_a_large_mesh_is_drawn_in_seconds(plan):
     begin = time.process_time()
     draw_rig(plan_of(large, plan.document["projectors"], plan.document["cameras"]))
     assert time.process_time() - begin < 8.0, "about 1 s on an idle core"
+
+
+def zone(name, centre, half, degrees=0.0):
+    c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+    axes = [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+    return {"name": name, "centre_m": centre, "half_m": half, "axes": axes}
+
+
+def zoned(plan, **zones):
+    required = plan.document["requirements"]
+    space = required["workspace"] | zones
+    document = plan.document | {"requirements": required | {"workspace": space}}
+    return RigPlan(document, plan.surface)
+
+
+PRESS = zone("press", [0.7, -0.2, 0.1], [0.3, 0.1, 0.2], 30.0)
+CEILING = zone("ceiling", [0.0, 0.0, 0.9], [0.8, 0.5, 0.005])
+
+
+def test_zones_are_boxes_about_the_centre_of_the_object(plan):
+    ceiling, press = zone_figures(zoned(plan, keep_out=[PRESS], mounting=[CEILING]))
+    assert [ceiling.kind, press.kind] == ["mounting plane", "keep out"]
+    assert press.name == "press"
+    offset = press.corners - plan.surface.mesh.centre - PRESS["centre_m"]
+    along = np.abs(offset @ np.array(PRESS["axes"]).T)
+    assert along == pytest.approx(np.tile(PRESS["half_m"], (8, 1)))
+    assert len(np.unique(press.corners.round(9), axis=0)) == 8
+    lengths = np.linalg.norm(np.diff(press.edges, axis=1)[:, 0], axis=1)
+    sides = np.repeat(2.0 * np.array(PRESS["half_m"]), 4)
+    assert np.sort(lengths) == pytest.approx(np.sort(sides))
+
+
+def test_a_zone_is_tinted_inside_its_outline_and_nowhere_else(plan):
+    (press,) = zone_figures(zoned(plan, keep_out=[PRESS]))
+    middle = press.corners.mean(axis=0)
+    view = View(middle, np.eye(3)[0], np.eye(3)[1], (400, 400), 2.5e-3)
+    panel = Panel(Image.new("RGB", view.size, BACKGROUND), view)
+    draw_zones(panel, [press], RayCaster(plan.surface.mesh))
+    drawn = pixels(panel.image)
+    rows, columns = np.nonzero(drawn.sum(axis=2) < 3 * 255)
+    local = (np.stack([columns, rows], axis=1) + 0.5 - 200.0) * 2.5e-3 * [1, -1]
+    along = np.abs(local @ np.array(PRESS["axes"])[:2, :2].T)
+    # Two pixels of line stick out.
+    assert np.all(along <= np.array(PRESS["half_m"][:2]) + 5e-3)
+    assert len(rows) * 2.5e-3**2 == pytest.approx(0.6 * 0.2, rel=0.08)
+    pale, line = drawn[190, 200], drawn[rows, columns].min(axis=0)
+    assert np.all(pale > 235)
+    assert pale[0] > pale[1]
+    assert line[0] > line[1] + 40
+
+
+def test_a_slab_seen_edge_on_is_a_line(plan):
+    (ceiling,) = zone_figures(zoned(plan, mounting=[CEILING]))
+    middle = ceiling.corners.mean(axis=0)
+    view = View(middle, np.eye(3)[0], np.eye(3)[2], (400, 400), 0.1)
+    panel = Panel(Image.new("RGB", view.size, BACKGROUND), view)
+    draw_zones(panel, [ceiling], RayCaster(plan.surface.mesh))
+    rows, _ = np.nonzero(pixels(panel.image).sum(axis=2) < 3 * 255)
+    assert 0 < np.ptp(rows) + 1 <= 4
+
+
+def test_the_picture_holds_the_zones_and_names_them(plan):
+    small = (800, 500)
+    room = zone("box", [0.0, 0.0, 0.0], [1.0, 1.0, 1.0])
+    picture = draw_rig(zoned(plan, box=room, keep_out=[PRESS]), size=small)
+    plain = draw_rig(plan, size=small)
+    # In the legend, below the object: there is no such colour without zones.
+    for kind, count in (("room", 1), ("keep out", 1), ("mounting plane", 0)):
+        rows, columns = like(picture, ZONES[kind], tolerance=0)
+        assert (np.count_nonzero((columns > 456) & (rows > 400)) > 50) == count
+        assert len(like(plain, ZONES[kind], tolerance=0)[0]) == 0
+
+
+def test_a_device_that_stands_already_is_framed_and_named(plan):
+    first, *rest = plan.document["cameras"]
+    old = [first | {"existing": True, "name": "old camera"}, *rest]
+    known = RigPlan(plan.document | {"cameras": old}, plan.surface)
+    assert [figure.existing for figure in device_figures(known, body_m=0.1)] == [
+        "",
+        "",
+        "old camera",
+        "",
+        "",
+    ]
+    blue = [len(like(draw_rig(p), BLUE, tolerance=30)[0]) for p in (plan, known)]
+    # Two square frames of 16 px a side and 2 px wide, and the letters of the name.
+    assert blue[1] - blue[0] > 2 * 4 * 14 * 2

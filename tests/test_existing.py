@@ -10,9 +10,10 @@ import pytest
 from geometry.primitives import box, sphere
 from planning import load_rig, plan_rig
 from planning.audit.audit import audit_plan
+from planning.claims import Devices, make_claims
 from planning.continuous import Effort, prove_fewest
 from planning.errors import InfeasibleLimitsError, RequirementError, RigError
-from planning.plan import PlannedProjector, RigPlan
+from planning.plan import PlannedCamera, PlannedProjector, RigPlan
 from planning.projector_poses import widen_margins
 from planning.projectors import plan_projectors
 from planning.requirements import Existing, Requirements
@@ -276,3 +277,37 @@ def _push(document, by_m, *, everywhere=False):
 
 def _set(document, key, value):
     document["rig"]["existing"][0][key] = value
+
+
+def test_a_projector_that_lights_nothing_has_no_margin():
+    scene, template = ball_scene(())
+    ball = shining("at the ball", [1.0, 0.0, 0.0])
+    idle = shining("beside it", [1.0, 0.0, 0.0], aside=0.6)
+    poses = [np.array(e.world_from_device) for e in (ball, idle)]
+    lamps = tuple(
+        replace(template, world_from_device=pose, world_from_ring=pose)
+        for pose in poses
+    )
+    eye = PlannedCamera("C1", lamps[0].world_from_device, load_rig().camera_device())
+    claims = make_claims(scene, Devices(lamps, (eye,), lamps, (eye,)))
+    lights, nothing = claims.min_margin_rad
+    assert lights is not None
+    assert 0.0 <= lights < 0.1
+    assert nothing is None
+    assert claims.lit_area_m2[1] == 0.0
+
+
+def test_the_summary_says_who_does_nothing_and_asks_no_one_to_register_it(planned):
+    document = copy.deepcopy(planned.document)
+    assert "none of the target" not in summary(planned, (), ())
+    document["projectors"][0]["lit_area_m2"] = 0.0
+    document["cameras"][0]["seen_area_m2"] = 0.0
+    names = [entry["id"] for entry in document["cameras"]]
+    document["camera_groups"] = [names[:1], names[1:]]
+    text = summary(RigPlan(document, planned.surface), (), ())
+    assert "P1 lights none of the target" in text
+    assert "C1 measures none of the target" in text
+    assert "don't overlap" not in text
+    document["cameras"][0]["seen_area_m2"] = 1e-4
+    text = summary(RigPlan(document, planned.surface), (), ())
+    assert "don't overlap" in text

@@ -23,6 +23,7 @@ from .occlusion import Shadow
 from .overlaps import audit_overlaps
 from .recompute import Reach, Recomputed, reach_of, recompute
 from .regions import audit_regions
+from .rings import audit_rings
 from .samples import AuditSamples, draw_samples
 from .schedule import audit_schedule
 from .serving import audit_margins
@@ -112,6 +113,7 @@ def audit_plan(
     audit_groups(plan, own, estimator.n_claimed, ledger)
     audit_overlaps(plan, shadow, estimator, ledger)
     audit_schedule(plan, ledger)
+    audit_rings(plan, own, shadow, estimator, ledger, seed=seed)
     audit_consistency(plan, ledger)
     audit_rest(plan, ledger)
     return _result(plan, own, reach, estimator, ledger)

@@ -1,0 +1,111 @@
+"""Claims about how a projector's rings are spaced."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .areas import ROUNDING
+from .estimates import POINT
+from .extremes import audit_extreme
+from .ledger import Ledger
+from .predicates import Lamp
+from .ring_light import Strikes, ring_spacing
+
+
+def audit_spacing(
+    key: str, rings: Mapping[str, Any], lamp: Lamp, wish: object, ledger: Ledger
+) -> NDArray[np.float64] | None:
+    """Check `spacing`, `kept_even` and `n_even` against the radii.
+
+    Args:
+        key: Of the claims.
+        rings: What is claimed of a projector's rings.
+        lamp: The projector.
+        wish: `rings.spacing` of the rig.
+        ledger: Takes the false claims.
+
+    Returns:
+        Radii of the even rings; None if the plan doesn't say how many there were.
+    """
+    spacing, kept, count = (rings.get(k) for k in ("spacing", "kept_even", "n_even"))
+    ledger.holds(
+        spacing in ("uniform", "curvature"),
+        f"{key}.spacing",
+        f"{spacing!r} must be 'uniform' or 'curvature'",
+    )
+    ledger.holds(
+        spacing == "uniform" or wish != "uniform",
+        f"{key}.spacing",
+        f"{spacing!r} is claimed, but rig.rings.spacing is 'uniform'",
+    )
+    ledger.holds(
+        kept is (spacing == "uniform" and wish == "curvature"),
+        f"{key}.kept_even",
+        f"{kept!r} is claimed where rings are {spacing!r} and rig.rings.spacing is "
+        f"{wish!r}",
+    )
+    if not isinstance(count, int) or isinstance(count, bool) or count < 2:
+        ledger.fail(f"{key}.n_even", f"{count!r} must be a number of rings, at least 2")
+        return None
+    even = float(lamp.radii[-1]) * np.arange(1, count + 1) / count
+    ledger.holds(
+        spacing != "uniform"
+        or (
+            len(even) == len(lamp.radii)
+            and np.allclose(lamp.radii, even, rtol=0.0, atol=ROUNDING * even[-1])
+        ),
+        f"{key}.n_even",
+        f"the {len(lamp.radii)} ring_radii aren't {count} at equal steps, but "
+        f"'uniform' is claimed",
+    )
+    return even
+
+
+def audit_gaps(
+    key: str,
+    rings: Mapping[str, Any],
+    lamp: Lamp,
+    even: NDArray[np.float64],
+    strikes: Strikes,
+    ledger: Ledger,
+) -> None:
+    """Check `gap_m`, the least and largest distance of rings on lit surface.
+
+    No gap there is wider than an even one: that bounds `n_even`.
+
+    Args:
+        key: Of the claims.
+        rings: What is claimed of a projector's rings.
+        lamp: The projector.
+        even: Radii of the even rings.
+        strikes: Random rays of its light.
+        ledger: Takes the false claims.
+    """
+    points = strikes.samples.points[strikes.lit]
+    found, claimed = ring_spacing(lamp, points), rings.get("gap_m")
+    if len(found) == 0:
+        # A sliver may be lit that no ray of the audit met.
+        return
+    ends = claimed if isinstance(claimed, list) and len(claimed) == 2 else [None, None]
+    weights = np.ones(len(found))
+    for place, largest in ((0, False), (1, True)):
+        audit_extreme(
+            f"{key}.gap_m.{place}",
+            ends[place],
+            found,
+            weights,
+            ledger,
+            largest=largest,
+            unit="m",
+        )
+    allowed = ring_spacing(replace(lamp, radii=even), points)
+    share = float(np.mean(found > allowed * (1.0 + ROUNDING)))
+    ledger.holds(
+        share <= POINT,
+        f"{key}.n_even",
+        f"{len(even)} even rings stand closer than the plan's on {100 * share:.3g} % "
+        f"of its light on the surface, nowhere may they",
+    )
