@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .axis_moves import move_ring_axes
 from .camera_spread import CameraSpread, spread_cameras
 from .cameras import (
     CameraCover,
@@ -49,7 +50,8 @@ def place_cameras(
     """Choose cameras, turn the ring axes for them, and choose again until it settles.
 
     A later round counts only if it needs no more cameras and measures no less, so the
-    certificate always belongs to the ring axes that are kept.
+    certificate always belongs to the ring axes that are kept. The last round leaves the
+    azimuths of one tilt and moves the axes to where errors are smallest.
 
     Args:
         scene: Surface and requirements.
@@ -63,13 +65,49 @@ def place_cameras(
     best = plan_cameras(scene, kept, offered)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
-        if all(a is b for a, b in zip(turned, kept, strict=True)):
+        if not _differ(turned, kept):
             break
         cover = plan_cameras(scene, turned, offered)
         if not _better(cover, best):
             break
         kept, best = turned, cover
+    moved = move_ring_axes(scene, kept, best.cameras, best.rows)
+    if _differ(moved, kept):
+        cover = plan_cameras(scene, moved, offered)
+        if not _better(best, cover):
+            kept, best = moved, cover
     return CameraSolution(kept, camera_stage(scene, best))
+
+
+def follow_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    stage: CameraStage,
+) -> CameraSolution:
+    """Move the ring axes for cameras that have left the candidates' poses.
+
+    What was proved of the number of cameras holds for one set of ring axes, so it is
+    proved again; axes under which it no longer is this number, or less is proved, are
+    dropped.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with even rings.
+        cameras: As they stand.
+        stage: Of these projectors; as many cameras as these.
+    """
+    moved = move_ring_axes(scene, projectors, cameras, stage.rows)
+    if _differ(moved, projectors):
+        cover = plan_cameras(scene, moved, stage.offered)
+        proved = stage.certificate["candidates"]["lower_bound"]
+        chosen = len(cover.selection.chosen)
+        if (
+            chosen == len(cameras)
+            and min(cover.selection.lower_bound, chosen) >= proved
+        ):
+            return CameraSolution(moved, camera_stage(scene, cover))
+    return CameraSolution(tuple(projectors), stage)
 
 
 def spread(
@@ -122,6 +160,10 @@ def spread(
             rows.lit,
         ),
     )
+
+
+def _differ(a: Sequence[PlannedProjector], b: Sequence[PlannedProjector]) -> bool:
+    return any(new is not old for new, old in zip(a, b, strict=True))
 
 
 def _better(new: CameraCover, old: CameraCover) -> bool:
