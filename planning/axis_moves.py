@@ -57,7 +57,7 @@ def move_ring_axes(
         rows: Lit samples that the cameras were chosen on.
     """
     fresh = lit_samples(scene, projectors, scene.target_samples(_FRESH, _STREAM))
-    judges = tuple(_Judge(scene, projectors, cameras, r) for r in (rows, fresh))
+    judges = tuple(AxisJudge(scene, projectors, cameras, r) for r in (rows, fresh))
     moved = list(projectors)
     for _ in range(_SWEEPS):
         if not any([_move(judges, moved, p) for p in range(len(moved))]):
@@ -65,7 +65,7 @@ def move_ring_axes(
     return tuple(moved)
 
 
-class _Judge:
+class AxisJudge:
     """Samples, how the cameras see them, and the best s_N by each projector."""
 
     def __init__(
@@ -120,7 +120,7 @@ class _Judge:
         return bool(np.all(ring_coordinate(projector, lit) <= projector.ring_radii[-1]))
 
 
-def _move(judges: tuple[_Judge, ...], moved: list[PlannedProjector], p: int) -> bool:
+def _move(judges: tuple[AxisJudge, ...], moved: list[PlannedProjector], p: int) -> bool:
     """Move one axis if that is better; the judges keep what it then measures."""
     scene, projector = judges[0].scene, moved[p]
     scene.pulse()

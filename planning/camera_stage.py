@@ -20,11 +20,14 @@ from .cameras import (
 from .plan import PlannedCamera, PlannedProjector
 from .ring_axes import turn_ring_axes
 from .scene import Scene
+from .sights import Sights
 from .spread_problem import RingsOnTarget, SpreadLimits
 
 _ROUNDS = 3
 _SPREAD_ROWS = 6000
 _STREAM = 300
+# Share of the measured area for which other cameras aren't worth larger errors.
+_SPARE = 0.002
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,21 +50,36 @@ def place_cameras(
     n_candidates: int,
     tilt: float,
 ) -> CameraSolution:
-    """Choose cameras, turn the ring axes for them, and choose again until it settles.
-
-    A later round counts only if it needs no more cameras and measures no less, so the
-    certificate always belongs to the ring axes that are kept. The last round leaves the
-    azimuths of one tilt and moves the axes to where errors are smallest.
+    """Choose cameras and ring axes: azimuths of one tilt first, then any axis.
 
     Args:
         scene: Surface and requirements.
         projectors: As planned.
         template: Optics of the camera.
         n_candidates: Poses offered.
+        tilt: Tilt of the ring axes, or their shift, to search azimuths of.
+    """
+    offered = offered_cameras(scene, template, n_candidates)
+    turned, cover = choose_cameras(scene, projectors, offered, tilt)
+    moved, cover = move_axes(scene, turned, cover)
+    return CameraSolution(moved, camera_stage(scene, cover))
+
+
+def choose_cameras(
+    scene: Scene, projectors: Sequence[PlannedProjector], offered: Sights, tilt: float
+) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
+    """Choose cameras, turn the ring axes for them, and choose again until it settles.
+
+    A later round counts only if it needs no more cameras and measures no less, so the
+    certificate always belongs to the ring axes that are kept.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned.
+        offered: Candidates, from `offered_cameras`.
         tilt: Tilt of the ring axes, or their shift.
     """
     kept = tuple(projectors)
-    offered = offered_cameras(scene, template, n_candidates)
     best = plan_cameras(scene, kept, offered)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
@@ -71,12 +89,47 @@ def place_cameras(
         if not _better(cover, best):
             break
         kept, best = turned, cover
-    moved = move_ring_axes(scene, kept, best.cameras, best.rows)
-    if _differ(moved, kept):
-        cover = plan_cameras(scene, moved, offered)
-        if not _better(best, cover):
-            kept, best = moved, cover
-    return CameraSolution(kept, camera_stage(scene, best))
+    return kept, best
+
+
+def move_axes(
+    scene: Scene, projectors: Sequence[PlannedProjector], cover: CameraCover
+) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
+    """Move the ring axes to where errors are smallest, and choose cameras again.
+
+    The cameras stay, for which the axes were moved, unless others measure notably more;
+    then the axes move for these. All stays as it was where more cameras would be needed
+    or less is measured.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned.
+        cover: Cameras chosen for these ring axes.
+    """
+    kept = tuple(projectors)
+    for _ in range(_ROUNDS):
+        moved = move_ring_axes(scene, kept, cover.cameras, cover.rows)
+        if not _differ(moved, kept):
+            break
+        again = plan_cameras(scene, moved, cover.offered)
+        if _better(cover, again):
+            break
+        as_chosen = _with_cameras(again, cover)
+        if as_chosen is not None:
+            return moved, as_chosen
+        kept, cover = moved, again
+    return kept, cover
+
+
+def _with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
+    """Return a cover with the cameras of one before; None where that loses too much."""
+    selection, chosen = cover.selection, before.selection.chosen
+    rows = int(cover.measured[:, chosen].any(axis=1).sum())
+    least = min(selection.required, selection.best_rows)
+    least = max(least, int(np.ceil((1.0 - _SPARE) * selection.best_rows)))
+    if len(chosen) != len(selection.chosen) or rows < least:
+        return None
+    return replace(cover, selection=replace(selection, chosen=chosen, best_rows=rows))
 
 
 def follow_cameras(
