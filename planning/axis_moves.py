@@ -132,7 +132,7 @@ def _move(judges: tuple[AxisJudge, ...], moved: list[PlannedProjector], p: int) 
         if not all(judge.holds(offered, p) for judge in judges):
             continue
         trials = [judge.with_axis(offered, p) for judge in judges]
-        if _better(trials, [judge.sigma for judge in judges]):
+        if better(trials, [judge.sigma for judge in judges]):
             moved[p] = offered
             for judge, trial in zip(judges, trials, strict=True):
                 judge.sigma = trial
@@ -151,7 +151,7 @@ def _proposals(program: AxisProgram) -> list[NDArray[np.float64]]:
     return offers
 
 
-def _better(
+def better(
     trials: Sequence[NDArray[np.float64]], kept: Sequence[NDArray[np.float64]]
 ) -> bool:
     """Whether no set has fewer measured, and more are or errors fall, over all sets."""

@@ -20,8 +20,6 @@ from .status import interruptible
 _COLUMNS = 16
 _SLOTS = (64, 128, 256, 512, 1024)
 _HELD_SLOTS = (32, 64, 128, 256)
-# In units of the largest ring; no axis that holds a point is half as far.
-_FARTHEST = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +125,7 @@ def run_ipopt(
     pairs: NDArray[np.int64],
     held: NDArray[np.int64],
     start: NDArray[np.float64],
+    reach: float,
     max_iterations: int,
 ) -> AxisOutcome:
     """Run IPOPT on one camera a sample; ``nlpsol`` never raises, so check.
@@ -136,6 +135,7 @@ def run_ipopt(
         pairs: Rows (sample, camera), at least one, shape (m, 2).
         held: Held points that may bind.
         start: a to start from, shape (2,).
+        reach: Largest change of each coordinate, in units of the largest ring.
         max_iterations: Limit of the run.
     """
     slots, places = _slots(len(pairs), _SLOTS), _slots(len(held), _HELD_SLOTS)
@@ -146,8 +146,8 @@ def run_ipopt(
             p=axis_parameters(program, pairs, held),
             lbg=INSET,
             ubg=np.inf,
-            lbx=-_FARTHEST,
-            ubx=_FARTHEST,
+            lbx=start / program.ring_radius - reach,
+            ubx=start / program.ring_radius + reach,
         )
     x, multipliers = (
         np.asarray(result[name], dtype=np.float64).ravel() for name in ("x", "lam_g")

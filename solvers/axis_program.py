@@ -36,7 +36,10 @@ Light = Literal["diverging", "parallel"]
 INSET = 1e-6
 # Pitch limits count little until they are near: error shares to this power of k.
 PITCH_POWER = 4
-_ROUNDS = 6
+_ROUNDS = 10
+# Of a round, in units of the largest ring.
+_REACH = 0.5
+_SHRINK = 0.3
 _DIRECTIONS = 32
 _SETTLED = 1e-5
 _AZIMUTHS = 12
@@ -114,9 +117,9 @@ class AxisSolution:
 
     Attributes:
         program: The program this answers.
-        status: ``LOCALLY_OPTIMAL`` if IPOPT's answer chooses the cameras that it was
-            given, ``FEASIBLE`` if the rounds ended before, ``UNKNOWN`` if no axis held
-            every point inside the largest ring.
+        status: ``LOCALLY_OPTIMAL`` if at IPOPT's answer the cameras that it was given
+            are the best, ``FEASIBLE`` if the rounds ended before, ``UNKNOWN`` if no
+            axis held every point inside the largest ring.
         axis: a, shape (2,); the start unless a better was found.
         value: Mean of :func:`axis_scores`.
         slack: Least of :func:`axis_slack`.
@@ -195,32 +198,37 @@ def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSoluti
     """
     from .axis_nlp import run_ipopt
 
-    axis = np.array(program.start, dtype=np.float64)
-    best, best_value, best_slack = axis, *_figures(program, axis)
-    binding, pairs = _outermost(program), _assigned(program, axis)
-    settled = False
+    best = np.array(program.start, dtype=np.float64)
+    best_value, best_slack = _figures(program, best)
+    binding, reach, settled = _outermost(program), _REACH, False
     for _ in range(_ROUNDS):
+        pairs = _assigned(program, best)
         if pairs.size == 0:
             break
-        outcome = run_ipopt(program, pairs, binding, axis, max_iterations)
-        if not np.all(np.isfinite(outcome.axis)):
-            break
+        outcome = run_ipopt(program, pairs, binding, best, reach, max_iterations)
         axis = outcome.axis
-        value, slack = _figures(program, axis)
-        gain = value - best_value
-        if slack >= 0.0 and (gain > 0.0 or not best_slack >= 0.0):
-            best, best_value, best_slack = axis, value, slack
+        if not np.all(np.isfinite(axis)):
+            break
         broken = np.flatnonzero(axis_slack(program, axis) < 0.0)
         if broken.size:
             binding = np.union1d(binding, broken[:_DIRECTIONS])
             continue
-        before, pairs = pairs, _assigned(program, axis)
-        settled = outcome.success and np.array_equal(before, pairs)
-        if settled or gain < _SETTLED:
+        value, slack = _figures(program, axis)
+        gain = value - best_value
+        if best_slack >= 0.0 and gain < -_SETTLED:
+            # IPOPT may leap over a peak into a lower valley: no farther than this.
+            reach *= _SHRINK
+            continue
+        inside = np.max(np.abs(axis - best)) < 0.99 * reach * program.ring_radius
+        if gain > 0.0 or not best_slack >= 0.0:
+            best, best_value, best_slack = axis, value, slack
+        settled = outcome.success and bool(inside)
+        settled &= np.array_equal(pairs, _assigned(program, axis))
+        if settled or (inside and gain < _SETTLED):
             break
     if not best_slack >= 0.0:
         status = SolveStatus.UNKNOWN
-    elif settled and np.array_equal(axis, best):
+    elif settled:
         status = SolveStatus.LOCALLY_OPTIMAL
     else:
         status = SolveStatus.FEASIBLE
