@@ -12,8 +12,8 @@ is by how much the largest incidence of what counts is below its limit.
 With `--axes`: measured / lit of the target for three projectors and three cameras, and
 rms and 95th percentile of the error s_N on what is measured, on fresh samples: with
 every ring axis in the middle of its beam, with the azimuths that `ring_axes` chooses,
-and with the axes that the program moves; and the seconds of these two searches, covers
-included.
+and with the axes that the program moves; and the CPU seconds of these two searches,
+covers included.
 """
 
 import argparse
@@ -144,7 +144,7 @@ def _number(ready: Prepared) -> int:
 def _print_axes(given: argparse.Namespace) -> None:
     print(
         "| mesh | light | axis in the middle | azimuth turned | program | projectors, "
-        "cameras | seconds |\n|---|---|---|---|---|---|---|"
+        "cameras | CPU s |\n|---|---|---|---|---|---|---|"
     )
     for name, mesh, up in _meshes(given.names):
         for light in given.lights:
@@ -172,11 +172,11 @@ def _axes(ready: Prepared) -> tuple[list[str], str, list[float]]:
         for p in posed
     )
     first = plan_cameras(scene, middle, offered)
-    begin = time.perf_counter()
+    begin = time.process_time()
     turned, cover = choose_cameras(scene, posed, offered, ready.tilt)
-    between = time.perf_counter()
+    between = time.process_time()
     moved, last = move_axes(scene, turned, cover)
-    seconds = [between - begin, time.perf_counter() - between]
+    seconds = [between - begin, time.process_time() - between]
     cells = [
         _quality(scene, projectors, of.cameras)
         for projectors, of in ((middle, first), (turned, cover), (moved, last))

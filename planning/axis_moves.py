@@ -124,7 +124,7 @@ def _move(judges: tuple[AxisJudge, ...], moved: list[PlannedProjector], p: int) 
     """Move one axis if that is better; the judges keep what it then measures."""
     scene, projector = judges[0].scene, moved[p]
     scene.pulse()
-    for axis in _proposals(
+    for axis in proposals(
         axis_program(scene, moved, p, judges[0].rows, judges[0].views)
     ):
         frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
@@ -140,7 +140,7 @@ def _move(judges: tuple[AxisJudge, ...], moved: list[PlannedProjector], p: int) 
     return False
 
 
-def _proposals(program: AxisProgram) -> list[NDArray[np.float64]]:
+def proposals(program: AxisProgram) -> list[NDArray[np.float64]]:
     """Axes to try, the one of largest value first: near, partly there, and far."""
     here, elsewhere = program.start, best_start(program)
     near = solve_axis(program)
@@ -156,11 +156,11 @@ def better(
 ) -> bool:
     """Whether no set has fewer measured, and more are or errors fall, over all sets."""
     after, before = ([np.min(s, axis=0) for s in sets] for sets in (trials, kept))
-    counts = [
-        [np.count_nonzero(np.isfinite(least)) for least in sets]
+    now, then = (
+        np.array([np.count_nonzero(np.isfinite(least)) for least in sets])
         for sets in (after, before)
-    ]
-    gains = np.subtract(*counts)
+    )
+    gains = now - then
     if np.any(gains < 0):
         return False
     return bool(np.any(gains > 0)) or _rms(after) < (1.0 - _GAIN) * _rms(before)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from .cameras import (
 from .plan import PlannedCamera, PlannedProjector
 from .ring_axes import turn_ring_axes
 from .scene import Scene
+from .selection import Selection
 from .sights import Sights
 from .spread_problem import RingsOnTarget, SpreadLimits
 
@@ -114,14 +116,14 @@ def move_axes(
         again = plan_cameras(scene, moved, cover.offered)
         if _better(cover, again):
             break
-        as_chosen = _with_cameras(again, cover)
+        as_chosen = with_cameras(again, cover)
         if as_chosen is not None:
             return moved, as_chosen
         kept, cover = moved, again
     return kept, cover
 
 
-def _with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
+def with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
     """Return a cover with the cameras of one before; None where that loses too much."""
     selection, chosen = cover.selection, before.selection.chosen
     rows = int(cover.measured[:, chosen].any(axis=1).sum())
@@ -153,14 +155,18 @@ def follow_cameras(
     moved = move_ring_axes(scene, projectors, cameras, stage.rows)
     if _differ(moved, projectors):
         cover = plan_cameras(scene, moved, stage.offered)
-        proved = stage.certificate["candidates"]["lower_bound"]
-        chosen = len(cover.selection.chosen)
-        if (
-            chosen == len(cameras)
-            and min(cover.selection.lower_bound, chosen) >= proved
-        ):
+        if proves_as_much(cover.selection, stage.certificate, len(cameras)):
             return CameraSolution(moved, camera_stage(scene, cover))
     return CameraSolution(tuple(projectors), stage)
+
+
+def proves_as_much(new: Selection, old: dict[str, Any], count: int) -> bool:
+    taken = len(new.chosen)
+    return (
+        taken == count
+        and new.status in (old["status"], "optimal")
+        and min(new.lower_bound, taken) >= old["candidates"]["lower_bound"]
+    )
 
 
 def spread(

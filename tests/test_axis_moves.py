@@ -7,8 +7,19 @@ import pytest
 
 from geometry.primitives import sphere
 from planning import measurability
-from planning.axis_moves import AxisJudge, axis_program, better, move_ring_axes
-from planning.camera_stage import follow_cameras, move_axes
+from planning.axis_moves import (
+    AxisJudge,
+    axis_program,
+    better,
+    move_ring_axes,
+    proposals,
+)
+from planning.camera_stage import (
+    follow_cameras,
+    move_axes,
+    proves_as_much,
+    with_cameras,
+)
 from planning.cameras import (
     camera_stage,
     lit_samples,
@@ -17,11 +28,12 @@ from planning.cameras import (
     plan_cameras,
 )
 from planning.candidates import projector_candidates
+from planning.lighting import ring_coordinate
 from planning.plan import PlannedCamera, PlannedProjector
 from planning.rig import load_rig
 from planning.rings import ring_axis, ring_frame, ring_frame_of_axis, uniform_radii
 from planning.scene import Scene
-from solvers.axis_program import pair_scores
+from solvers.axis_program import axis_scores, axis_slack, pair_scores
 
 RADIUS = 0.1
 INF = np.inf
@@ -126,9 +138,46 @@ def test_no_axis_leaves_lit_samples_outside_the_last_ring(ball):
     ]
     rows = lit_samples(scene, tight, cover.rows.target)
     assert np.array_equal(rows.lit, cover.rows.lit)
+    views = AxisJudge(scene, tight, cover.cameras, rows).views
+    program = axis_program(scene, tight, 0, rows, views)
+    coordinate = ring_coordinate(tight[0], points[rows.lit[:, 0]])
+    inside = coordinate <= 0.99 * tight[0].ring_radii[-1]
+    assert np.array_equal(axis_slack(program, program.start) >= 0.0, inside)
+    assert not inside.all()
     after = move_ring_axes(scene, tight, cover.cameras, rows)
     assert any(new is not old for new, old in zip(after, tight, strict=True))
     assert np.array_equal(lit_samples(scene, after, rows.target).lit, rows.lit)
+
+
+def test_fresh_samples_stay_inside_the_last_ring_too(ball):
+    """A dozen rows reach less far than all that is lit: they would let the axis go."""
+    scene, projectors, cover = ball
+    few = cover.rows.target.take(np.arange(0, len(cover.rows.target), 150))
+    every = scene.target_samples(4000, 250)
+    lit = lit_samples(scene, projectors, every)
+    points = lit.target.samples.points
+    tight = [
+        _with_last_ring(p, points[lit.lit[:, i]]) for i, p in enumerate(projectors)
+    ]
+    after = move_ring_axes(scene, tight, cover.cameras, lit_samples(scene, tight, few))
+    assert np.array_equal(lit_samples(scene, after, lit.target).lit, lit.lit)
+
+
+def test_the_best_proposal_is_tried_first(ball):
+    """Near or far: from a start that blind curves close in, far is better."""
+    scene, projectors, cover = ball
+    views = AxisJudge(scene, projectors, cover.cameras, cover.rows).views
+    offered = []
+    for p in range(len(projectors)):
+        program = axis_program(scene, projectors, p, cover.rows, views)
+        for factor in (1.0, 0.0, -0.5):
+            tried = replace(program, start=factor * program.start)
+            axes = proposals(tried)
+            values = [axis_scores(tried, axis).mean() for axis in axes]
+            assert values[0] == max(values)
+            assert values[0] > axis_scores(tried, tried.start).mean()
+            offered.append(len(axes))
+    assert max(offered) > 3
 
 
 def _with_last_ring(projector, points):
@@ -212,6 +261,23 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
     assert all(a is b for a, b in zip(more.projectors, projectors, strict=True))
 
 
+@pytest.mark.parametrize(
+    ("changes", "enough"),
+    [
+        ({}, True),
+        ({"lower_bound": 2}, False),
+        ({"status": "infeasible"}, False),
+        ({"status": "feasible"}, True),
+        ({"chosen": np.array([4, 5])}, False),
+    ],
+)
+def test_axes_that_cost_the_proof_are_dropped(ball, changes, enough):
+    _, _, cover = ball
+    three = {"chosen": np.array([1, 2, 3]), "lower_bound": 3, "status": "optimal"}
+    old = {"status": "feasible", "candidates": {"lower_bound": 3}}
+    assert proves_as_much(replace(cover.selection, **three | changes), old, 3) == enough
+
+
 def test_cameras_stay_with_the_axes_that_were_moved_for_them(ball, moved):
     scene, projectors, cover = ball
     axes, again = move_axes(scene, projectors, cover)
@@ -224,3 +290,28 @@ def test_cameras_stay_with_the_axes_that_were_moved_for_them(ball, moved):
             np.array_equal(a.world_from_ring, m.world_from_ring)
             for a, m in zip(axes, moved, strict=True)
         )
+    # Under axes that had measured more, nothing changes.
+    more = replace(cover, selection=replace(cover.selection, best_rows=10**6))
+    axes, again = move_axes(scene, projectors, more)
+    assert again is more
+    assert all(a is b for a, b in zip(axes, projectors, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("chosen", "required", "rows"),
+    [([0, 2], 900, 999), ([0, 2], 1000, None), ([1, 2], 900, None), ([0], 100, None)],
+)
+def test_cameras_stay_if_others_measure_hardly_more(ball, chosen, required, rows):
+    """Of 1000 samples the best two measure all, others 999 and 990."""
+    measured = np.zeros((1000, 3), dtype=bool)
+    measured[:600, 0] = measured[590:, 1] = measured[601:, 2] = True
+    _, _, cover = ball
+    selection = replace(
+        cover.selection, chosen=np.array([0, 1]), required=required, best_rows=1000
+    )
+    best = replace(cover, measured=measured, selection=selection)
+    before = replace(best, selection=replace(selection, chosen=np.array(chosen)))
+    found = with_cameras(best, before)
+    assert (found and found.selection.best_rows) == rows
+    if found:
+        assert np.array_equal(found.selection.chosen, chosen)

@@ -294,6 +294,22 @@ def test_rounds_hand_samples_to_the_camera_that_sees_them_better():
     assert solution.status is SolveStatus.LOCALLY_OPTIMAL
 
 
+def test_samples_that_another_projector_serves_better_do_not_pull():
+    program = program_for("parallel", seed=2)
+    ours = np.flatnonzero(program.points[:, 0] > 0.0)
+    others = np.full(40, 0.999)
+    others[ours] = 0.0
+    found = solve_axis(replace(program, others=others))
+    names = ("points", "rays", "slopes", "seen", "noise", "placement_m", "facing")
+    part = replace(
+        program,
+        others=np.zeros(len(ours)),
+        **{name: getattr(program, name)[ours] for name in names},
+    )
+    assert found.axis == pytest.approx(solve_axis(part).axis, abs=1e-6)
+    assert np.linalg.norm(found.axis - solve_axis(program).axis) > 1e-4
+
+
 @pytest.mark.parametrize("light", LIGHTS)
 def test_rings_too_small_for_what_is_lit_leave_the_axis_where_it_is(light):
     program = program_for(light, ring_radius=0.09)
