@@ -161,6 +161,13 @@ def follow_cameras(
 
 
 def proves_as_much(new: Selection, old: dict[str, Any], count: int) -> bool:
+    """Return whether a selection takes so many cameras, met and bounded no worse.
+
+    Args:
+        new: Selection under other ring axes.
+        old: Certificate under those before.
+        count: Cameras that stand.
+    """
     taken = len(new.chosen)
     return (
         taken == count
