@@ -10,8 +10,11 @@ with as many projectors, and after the pose program. Without a tangent limit the
 is by how much the largest incidence of what counts is below its limit, to which the
 largest incidence of all that a cover lights comes near: both are compared.
 
-With `--axes`: measured / lit of the target for three projectors and three cameras, with
-every ring axis in the middle of its beam, and with the axes that the planner turns.
+With `--axes`: measured / lit of the target for three projectors and three cameras, and
+rms and 95th percentile of the error s_N on what is measured, on fresh samples: with
+every ring axis in the middle of its beam, with the azimuths that `ring_axes` chooses,
+and with the axes that the program moves; and the CPU seconds of these two searches,
+covers included.
 """
 
 import argparse
@@ -29,8 +32,9 @@ from geometry.mesh import TriangleMesh
 from geometry.readers import load_mesh
 from geometry.refinement import cut_for_curvature
 from planning import lighting
-from planning.camera_stage import place_cameras
-from planning.cameras import lit_samples, measured_by
+from planning.axis_moves import AxisJudge
+from planning.camera_stage import choose_cameras, move_axes
+from planning.cameras import lit_samples, offered_cameras, plan_cameras
 from planning.errors import InfeasibleLimitsError
 from planning.plan import PlannedCamera, PlannedProjector
 from planning.prepare import Prepared
@@ -38,6 +42,7 @@ from planning.projector_light import lit_margins, lit_stages
 from planning.projector_poses import widen_margins
 from planning.projectors import ProjectorStage, plan_projectors
 from planning.rings import ring_frame
+from planning.scene import Scene
 from planning.selection import required_rows
 from planning.share_margin import margin_at_share
 
@@ -141,21 +146,22 @@ def _number(ready: Prepared) -> int:
 
 def _print_axes(given: argparse.Namespace) -> None:
     print(
-        "| mesh | light | axis in the middle | turned | projectors, cameras |\n"
-        "|---|---|---|---|---|"
+        "| mesh | light | axis in the middle | azimuth turned | program | projectors, "
+        "cameras | CPU s |\n|---|---|---|---|---|---|---|"
     )
     for name, mesh, up in _meshes(given.names):
         for light in given.lights:
             ready = ready_for(mesh, light, up, 1.0, None, devices=3)
-            shares, counts = _axes(ready)
+            cells, counts, seconds = _axes(ready)
+            took = " + ".join(f"{s:.1f}" for s in seconds)
             print(
-                f"| {name} | {light} | {shares[0]:.3f} | {shares[1]:.3f} | {counts} |",
+                f"| {name} | {light} | {' | '.join(cells)} | {counts} | {took} |",
                 flush=True,
             )
 
 
-def _axes(ready: Prepared) -> tuple[list[float], str]:
-    """Measured / lit on fresh samples, axes in the middle and turned."""
+def _axes(ready: Prepared) -> tuple[list[str], str, list[float]]:
+    """On fresh samples, by where ring axes stand; and seconds of the last two."""
     scene, rig = ready.scene, ready.order.rig
     stage = plan_projectors(
         scene, ready.template, _number(ready), ring_offset=ready.ring_offset
@@ -163,19 +169,37 @@ def _axes(ready: Prepared) -> tuple[list[float], str]:
     posed = widen_margins(scene, stage)
     camera = PlannedCamera("", np.eye(4), rig.camera_device())
     n_cameras = max(rig.n_candidate_cameras, rig.n_reference_cameras)
-    target = scene.target_samples(ROWS, 900)
+    offered = offered_cameras(scene, camera, n_cameras)
     middle = tuple(
         replace(p, world_from_ring=ring_frame(p.world_from_device, p.device, 0.0, 0.0))
         for p in posed
     )
-    shares, counts = [], ""
-    for projectors, tilt in ((middle, 0.0), (posed, ready.tilt)):
-        placed = place_cameras(scene, projectors, camera, n_cameras, tilt)
-        rows = lit_samples(scene, placed.projectors, target)
-        seen = measured_by(scene, placed.stage.cameras, rows).any(axis=1)
-        shares.append(float(seen.mean()))
-        counts = f"{len(projectors)}, {len(placed.stage.cameras)}"
-    return shares, counts
+    first = plan_cameras(scene, middle, offered)
+    begin = time.process_time()
+    turned, cover = choose_cameras(scene, posed, offered, ready.tilt)
+    between = time.process_time()
+    moved, last = move_axes(scene, turned, cover)
+    seconds = [between - begin, time.process_time() - between]
+    cells = [
+        _quality(scene, projectors, of.cameras)
+        for projectors, of in ((middle, first), (turned, cover), (moved, last))
+    ]
+    return cells, f"{len(moved)}, {len(last.cameras)}", seconds
+
+
+def _quality(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    cameras: tuple[PlannedCamera, ...],
+) -> str:
+    """Measured / lit, and the rms and 95th percentile of s_N in micrometres."""
+    rows = lit_samples(scene, projectors, scene.target_samples(ROWS, 900))
+    sigma = AxisJudge(scene, projectors, cameras, rows).sigma.min(axis=0)
+    known = 1e6 * sigma[np.isfinite(sigma)]
+    return (
+        f"{len(known) / len(sigma):.4f}, {np.sqrt(np.mean(known**2)):.0f}, "
+        f"{np.quantile(known, 0.95):.0f} um"
+    )
 
 
 if __name__ == "__main__":

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .axis_moves import move_ring_axes
 from .camera_spread import CameraSpread, spread_cameras
 from .cameras import (
     CameraCover,
@@ -19,11 +21,15 @@ from .cameras import (
 from .plan import PlannedCamera, PlannedProjector
 from .ring_axes import turn_ring_axes
 from .scene import Scene
+from .selection import Selection
+from .sights import Sights
 from .spread_problem import RingsOnTarget, SpreadLimits
 
 _ROUNDS = 3
 _SPREAD_ROWS = 6000
 _STREAM = 300
+# Share of the measured area for which other cameras aren't worth larger errors.
+_SPARE = 0.002
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +52,24 @@ def place_cameras(
     n_candidates: int,
     tilt: float,
 ) -> CameraSolution:
+    """Choose cameras and ring axes: azimuths of one tilt first, then any axis.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned.
+        template: Optics of the camera.
+        n_candidates: Poses offered.
+        tilt: Tilt of the ring axes, or their shift, to search azimuths of.
+    """
+    offered = offered_cameras(scene, template, n_candidates)
+    turned, cover = choose_cameras(scene, projectors, offered, tilt)
+    moved, cover = move_axes(scene, turned, cover)
+    return CameraSolution(moved, camera_stage(scene, cover))
+
+
+def choose_cameras(
+    scene: Scene, projectors: Sequence[PlannedProjector], offered: Sights, tilt: float
+) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
     """Choose cameras, turn the ring axes for them, and choose again until it settles.
 
     A later round counts only if it needs no more cameras and measures no less, so the
@@ -54,22 +78,102 @@ def place_cameras(
     Args:
         scene: Surface and requirements.
         projectors: As planned.
-        template: Optics of the camera.
-        n_candidates: Poses offered.
+        offered: Candidates, from `offered_cameras`.
         tilt: Tilt of the ring axes, or their shift.
     """
     kept = tuple(projectors)
-    offered = offered_cameras(scene, template, n_candidates)
     best = plan_cameras(scene, kept, offered)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
-        if all(a is b for a, b in zip(turned, kept, strict=True)):
+        if not _differ(turned, kept):
             break
         cover = plan_cameras(scene, turned, offered)
         if not _better(cover, best):
             break
         kept, best = turned, cover
-    return CameraSolution(kept, camera_stage(scene, best))
+    return kept, best
+
+
+def move_axes(
+    scene: Scene, projectors: Sequence[PlannedProjector], cover: CameraCover
+) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
+    """Move the ring axes to where errors are smallest, and choose cameras again.
+
+    The cameras stay, for which the axes were moved, unless others measure notably more;
+    then the axes move for these. All stays as it was where more cameras would be needed
+    or less is measured.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned.
+        cover: Cameras chosen for these ring axes.
+    """
+    kept = tuple(projectors)
+    for _ in range(_ROUNDS):
+        moved = move_ring_axes(scene, kept, cover.cameras, cover.rows)
+        if not _differ(moved, kept):
+            break
+        again = plan_cameras(scene, moved, cover.offered)
+        if _better(cover, again):
+            break
+        as_chosen = with_cameras(again, cover)
+        if as_chosen is not None:
+            return moved, as_chosen
+        kept, cover = moved, again
+    return kept, cover
+
+
+def with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
+    """Return a cover with the cameras of one before; None where that loses too much."""
+    selection, chosen = cover.selection, before.selection.chosen
+    rows = int(cover.measured[:, chosen].any(axis=1).sum())
+    least = min(selection.required, selection.best_rows)
+    least = max(least, int(np.ceil((1.0 - _SPARE) * selection.best_rows)))
+    if len(chosen) != len(selection.chosen) or rows < least:
+        return None
+    return replace(cover, selection=replace(selection, chosen=chosen, best_rows=rows))
+
+
+def follow_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    stage: CameraStage,
+) -> CameraSolution:
+    """Move the ring axes for cameras that have left the candidates' poses.
+
+    What was proved of the number of cameras holds for one set of ring axes, so it is
+    proved again; axes under which it no longer is this number, or less is proved, are
+    dropped.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with even rings.
+        cameras: As they stand.
+        stage: Of these projectors; as many cameras as these.
+    """
+    moved = move_ring_axes(scene, projectors, cameras, stage.rows)
+    if _differ(moved, projectors):
+        cover = plan_cameras(scene, moved, stage.offered)
+        if proves_as_much(cover.selection, stage.certificate, len(cameras)):
+            return CameraSolution(moved, camera_stage(scene, cover))
+    return CameraSolution(tuple(projectors), stage)
+
+
+def proves_as_much(new: Selection, old: dict[str, Any], count: int) -> bool:
+    """Return whether a selection takes so many cameras, met and bounded no worse.
+
+    Args:
+        new: Selection under other ring axes.
+        old: Certificate under those before.
+        count: Cameras that stand.
+    """
+    taken = len(new.chosen)
+    return (
+        taken == count
+        and new.status in (old["status"], "optimal")
+        and min(new.lower_bound, taken) >= old["candidates"]["lower_bound"]
+    )
 
 
 def spread(
@@ -122,6 +226,10 @@ def spread(
             rows.lit,
         ),
     )
+
+
+def _differ(a: Sequence[PlannedProjector], b: Sequence[PlannedProjector]) -> bool:
+    return any(new is not old for new, old in zip(a, b, strict=True))
 
 
 def _better(new: CameraCover, old: CameraCover) -> bool:

@@ -47,13 +47,13 @@ class CameraCover:
     """Cameras chosen for projectors as they are.
 
     Attributes:
-        candidates: Poses offered, which are the reference set.
+        offered: Candidates, which are the reference set, and what they see.
         rows: Lit samples that the cover was solved on.
         measured: Which candidate measures which sample, shape (n, m).
         selection: Candidates taken, and what was proved of their number.
     """
 
-    candidates: tuple[PlannedCamera, ...]
+    offered: Sights
     rows: LitSamples
     measured: NDArray[np.bool_]
     selection: Selection
@@ -61,18 +61,27 @@ class CameraCover:
     @property
     def cameras(self) -> tuple[PlannedCamera, ...]:
         """The cameras taken."""
-        return tuple(self.candidates[i] for i in self.selection.chosen)
+        return tuple(self.offered.cameras[i] for i in self.selection.chosen)
 
 
 @dataclass(frozen=True, eq=False)
 class CameraStage:
-    """What the camera stage found; the attributes are those of `ProjectorStage`."""
+    """What the camera stage found; the attributes are those of `ProjectorStage`.
+
+    `offered` keeps what the reference cameras see, to prove the count again after ring
+    axes have moved.
+    """
 
     cameras: tuple[PlannedCamera, ...]
-    reference: tuple[PlannedCamera, ...]
+    offered: Sights
     rows: LitSamples
     by_count: dict[int, tuple[PlannedCamera, ...]]
     certificate: dict[str, Any]
+
+    @property
+    def reference(self) -> tuple[PlannedCamera, ...]:
+        """The candidates."""
+        return self.offered.cameras
 
 
 def lit_samples(
@@ -196,20 +205,20 @@ def plan_cameras(
         target = merged(target, fresh_target)
         rows = lit_samples(scene, projectors, target)
         measured = np.concatenate([measured, seen])
-    return CameraCover(candidates, rows, measured, selection)
+    return CameraCover(offered, rows, measured, selection)
 
 
 def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     """Return what the stage found, with the best cameras for every other count."""
     given = _n_given(scene)
     others = marginals(cover.measured, cover.selection, seed=scene.seed, given=given)
-    target = cover.rows.target
+    target, candidates = cover.rows.target, cover.offered.cameras
     return CameraStage(
         cover.cameras,
-        cover.candidates,
+        cover.offered,
         cover.rows,
         {
-            number: tuple(cover.candidates[i] for i in chosen)
+            number: tuple(candidates[i] for i in chosen)
             for number, chosen in others.by_count.items()
         },
         certificate(
@@ -217,7 +226,7 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
             others,
             n_rows=len(target),
             row_area_m2=target.samples.weight,
-            n_candidates=len(cover.candidates),
+            n_candidates=len(candidates),
             given=given,
         ),
     )

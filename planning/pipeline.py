@@ -11,7 +11,7 @@ from geometry.mesh import TriangleMesh
 from geometry.refinement import cut_for_curvature
 
 from .assemble import falls_short, write_plan
-from .camera_stage import place_cameras, spread
+from .camera_stage import follow_cameras, place_cameras, spread
 from .cameras import CameraStage
 from .continuous import DEFAULT, PROVE, prove_fewest
 from .cost import cost_entry
@@ -236,11 +236,20 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
                 f"  smallest baseline {1e3 * moved.smallest_before_m:.0f} -> "
                 f"{1e3 * moved.smallest_after_m:.0f} mm"
             )
-    with clock.stage("rings", "rings: radii for the surface and the cameras"):
-        rings = space_rings(
-            draft.scene, draft.projectors, moved.cameras, draft.order.rig.ring_spacing
+    with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
+        final = follow_cameras(
+            draft.scene, draft.projectors, moved.cameras, draft.camera_stage
         )
-    return replace(draft, cameras=moved.cameras, rings=rings)
+        rings = space_rings(
+            draft.scene, final.projectors, moved.cameras, draft.order.rig.ring_spacing
+        )
+    return replace(
+        draft,
+        projectors=final.projectors,
+        camera_stage=final.stage,
+        cameras=moved.cameras,
+        rings=rings,
+    )
 
 
 def _interrupted(

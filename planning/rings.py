@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
+from geometry.poses import inverse
+from solvers.axis_program import axis_direction
 
 from .requirements import TriangulationLimits
 
@@ -32,21 +34,65 @@ def ring_frame(
             the axis in the device plane in [m] (parallel).
         azimuth: Direction of the tilt, from the device's +x towards +y in [rad].
     """
-    device_from_ring = np.eye(4)
     c, s = np.cos(azimuth), np.sin(azimuth)
     if isinstance(device, ParallelModel):
-        device_from_ring[:3, 3] = [tilt * c, tilt * s, 0.0]
-        return world_from_device @ device_from_ring
+        return world_from_device @ _shifted(np.array([tilt * c, tilt * s]))
     width, height = device.resolution
     middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
     aside = np.array([c, s, 0.0])
     aside -= middle * (aside @ middle)
     aside /= np.linalg.norm(aside)
-    z = np.cos(tilt) * middle + np.sin(tilt) * aside
+    return world_from_device @ _along(np.cos(tilt) * middle + np.sin(tilt) * aside)
+
+
+def ring_frame_of_axis(
+    world_from_device: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    axis: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return ``world_from_ring`` of an axis in the coordinates of `ring_axis`.
+
+    Args:
+        world_from_device: Pose of the projector, shape (4, 4).
+        device: Its optics.
+        axis: a, shape (2,).
+    """
+    if isinstance(device, ParallelModel):
+        return world_from_device @ _shifted(axis)
+    middle = ring_frame(np.eye(4), device, 0.0, 0.0)[:3, :3]
+    return world_from_device @ _along(middle @ axis_direction(axis))
+
+
+def ring_axis(
+    world_from_device: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    world_from_ring: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the ring axis as two numbers a, (0, 0) in the middle of the beam.
+
+    Parallel: where it meets the device plane, in [m]. Diverging: tan(tilt/2) times the
+    unit vector towards which it is turned against the ray of the image centre, so that
+    `solvers.axis_program.axis_direction` is its inverse.
+    """
+    middle = ring_frame(world_from_device, device, 0.0, 0.0)
+    frame = inverse(middle) @ world_from_ring
+    if isinstance(device, ParallelModel):
+        return frame[:2, 3]
+    return frame[:2, 2] / (1.0 + frame[2, 2])
+
+
+def _shifted(shift: NDArray[np.float64]) -> NDArray[np.float64]:
+    frame = np.eye(4)
+    frame[:2, 3] = shift
+    return frame
+
+
+def _along(z: NDArray[np.float64]) -> NDArray[np.float64]:
     x = np.cross([0.0, 1.0, 0.0], z)
     x /= np.linalg.norm(x)
-    device_from_ring[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    return world_from_device @ device_from_ring
+    frame = np.eye(4)
+    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    return frame
 
 
 def outer_radius(

@@ -1,0 +1,317 @@
+"""Ring axes move only where the exact predicate agrees, and the proof follows them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.primitives import sphere
+from planning import measurability
+from planning.axis_moves import (
+    AxisJudge,
+    axis_program,
+    better,
+    move_ring_axes,
+    proposals,
+)
+from planning.camera_stage import (
+    follow_cameras,
+    move_axes,
+    proves_as_much,
+    with_cameras,
+)
+from planning.cameras import (
+    camera_stage,
+    lit_samples,
+    measured_by,
+    offered_cameras,
+    plan_cameras,
+)
+from planning.candidates import projector_candidates
+from planning.lighting import ring_coordinate
+from planning.plan import PlannedCamera, PlannedProjector
+from planning.rig import load_rig
+from planning.rings import ring_axis, ring_frame, ring_frame_of_axis, uniform_radii
+from planning.scene import Scene
+from solvers.axis_program import axis_scores, axis_slack, pair_scores
+
+RADIUS = 0.1
+INF = np.inf
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def ball(request):
+    """A ball, two projectors beside each other, and cameras chosen for them."""
+    mesh = sphere(RADIUS, subdivisions=3)
+    rig = load_rig("default", light=request.param)
+    required = rig.requirements(
+        mesh.centre,
+        mesh.radius,
+        max_projectors=2,
+        target="surface",
+        tau_m=0.004,
+        coverage=0.8,
+    )
+    n = len(mesh.faces)
+    scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    parallel = rig.light == "parallel"
+    tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
+    radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
+    eye = np.eye(4)
+    template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
+    offered = projector_candidates(
+        template, required.workspace, 100, ring_offset=(tilt, -np.pi / 2)
+    )
+    stands = np.stack([p.world_from_device[:3, 3] - mesh.centre for p in offered])
+    wanted = np.array([[0.88, -0.46, 0.1], [0.92, 0.38, 0.1]])
+    projectors = tuple(offered[i] for i in np.argmax(wanted @ stands.T, axis=1))
+    camera = PlannedCamera("", eye, rig.camera_device())
+    cover = plan_cameras(scene, projectors, offered_cameras(scene, camera, 60))
+    return scene, projectors, cover
+
+
+def errors(scene, projectors, cameras, target):
+    """Whether each is measured, and the rms of the least s_N."""
+    rows = lit_samples(scene, projectors, target)
+    sigma = AxisJudge(scene, projectors, cameras, rows).sigma.min(axis=0)
+    measured = measured_by(scene, cameras, rows).any(axis=1)
+    assert np.array_equal(np.isfinite(sigma), measured)
+    return measured, np.sqrt(np.mean(sigma[measured] ** 2)), rows.lit
+
+
+@pytest.fixture(scope="module")
+def moved(ball):
+    scene, projectors, cover = ball
+    return move_ring_axes(scene, projectors, cover.cameras, cover.rows)
+
+
+def test_errors_fall_and_nothing_is_lost(ball, moved):
+    scene, projectors, cover = ball
+    for target in (cover.rows.target, scene.target_samples(3000, 77)):
+        (kept, before, lit), (now, after, still_lit) = (
+            errors(scene, p, cover.cameras, target) for p in (projectors, moved)
+        )
+        assert np.array_equal(lit, still_lit)
+        assert after < 0.97 * before
+        assert np.count_nonzero(now) >= np.count_nonzero(kept) * 0.999
+    assert now.sum() <= kept.size
+    for old, new in zip(projectors, moved, strict=True):
+        assert np.array_equal(old.world_from_device, new.world_from_device)
+        assert np.array_equal(old.ring_radii, new.ring_radii)
+    tilts = [
+        np.linalg.norm(ring_axis(p.world_from_device, p.device, p.world_from_ring))
+        for p in moved
+    ]
+    assert np.ptp(tilts) > 1e-4
+
+
+def test_on_the_rows_no_fewer_are_measured(ball, moved):
+    scene, projectors, cover = ball
+    counts = [
+        np.count_nonzero(errors(scene, p, cover.cameras, cover.rows.target)[0])
+        for p in (projectors, moved)
+    ]
+    assert counts[1] >= counts[0]
+
+
+def test_a_move_that_loses_a_sample_is_not_taken():
+    """Whatever it wins elsewhere; one that measures more is, whatever it costs."""
+    before = [np.array([[3.0, 3.0, INF], [INF, 9.0, INF]]), np.array([[3.0], [3.0]])]
+    lost = [np.array([[1.0, INF, INF], [INF, INF, INF]]), np.array([[1.0], [1.0]])]
+    assert not better(lost, before)
+    traded = [np.array([[1.0, INF, 1.0], [INF, 9.0, INF]]), np.array([[INF], [INF]])]
+    assert not better(traded, before)
+    won = [np.array([[3.0, 3.0, 99.0], [INF, 9.0, INF]]), np.array([[3.0], [3.0]])]
+    assert better(won, before)
+    sharper = [np.array([[3.0, 3.0, INF], [INF, 2.0, INF]]), np.array([[3.0], [3.0]])]
+    assert better(sharper, before)
+    assert not better(before, before)
+
+
+def test_no_axis_leaves_lit_samples_outside_the_last_ring(ball):
+    """Rings that end just behind the farthest lit sample: any axis but theirs loses."""
+    scene, projectors, cover = ball
+    points = cover.rows.target.samples.points
+    tight = [
+        _with_last_ring(p, points[cover.rows.lit[:, i]])
+        for i, p in enumerate(projectors)
+    ]
+    rows = lit_samples(scene, tight, cover.rows.target)
+    assert np.array_equal(rows.lit, cover.rows.lit)
+    views = AxisJudge(scene, tight, cover.cameras, rows).views
+    program = axis_program(scene, tight, 0, rows, views)
+    coordinate = ring_coordinate(tight[0], points[rows.lit[:, 0]])
+    inside = coordinate <= 0.99 * tight[0].ring_radii[-1]
+    assert np.array_equal(axis_slack(program, program.start) >= 0.0, inside)
+    assert not inside.all()
+    after = move_ring_axes(scene, tight, cover.cameras, rows)
+    assert any(new is not old for new, old in zip(after, tight, strict=True))
+    assert np.array_equal(lit_samples(scene, after, rows.target).lit, rows.lit)
+
+
+def test_fresh_samples_stay_inside_the_last_ring_too(ball):
+    """A dozen rows reach less far than all that is lit: they would let the axis go."""
+    scene, projectors, cover = ball
+    few = cover.rows.target.take(np.arange(0, len(cover.rows.target), 150))
+    every = scene.target_samples(4000, 250)
+    lit = lit_samples(scene, projectors, every)
+    points = lit.target.samples.points
+    tight = [
+        _with_last_ring(p, points[lit.lit[:, i]]) for i, p in enumerate(projectors)
+    ]
+    after = move_ring_axes(scene, tight, cover.cameras, lit_samples(scene, tight, few))
+    assert np.array_equal(lit_samples(scene, after, lit.target).lit, lit.lit)
+
+
+def test_the_best_proposal_is_tried_first(ball):
+    """Near or far: from a start that blind curves close in, far is better."""
+    scene, projectors, cover = ball
+    views = AxisJudge(scene, projectors, cover.cameras, cover.rows).views
+    offered = []
+    for p in range(len(projectors)):
+        program = axis_program(scene, projectors, p, cover.rows, views)
+        for factor in (1.0, 0.0, -0.5):
+            tried = replace(program, start=factor * program.start)
+            axes = proposals(tried)
+            values = [axis_scores(tried, axis).mean() for axis in axes]
+            assert values[0] == max(values)
+            assert values[0] > axis_scores(tried, tried.start).mean()
+            offered.append(len(axes))
+    assert max(offered) > 3
+
+
+def _with_last_ring(projector, points):
+    local = (points - projector.world_from_ring[:3, 3]) @ projector.world_from_ring[:3]
+    reach = np.hypot(local[:, 0], local[:, 1])
+    if projector.light == "diverging":
+        reach = reach / local[:, 2]
+    radii = uniform_radii(1.0001 * reach.max(), projector.ring_radii[0])
+    return replace(projector, ring_radii=radii)
+
+
+def test_the_program_scores_pairs_as_the_exact_predicate_does(ball):
+    """Conditioning, s_N and pitch of `measurability`, as shares of their limits."""
+    scene, projectors, cover = ball
+    required = scene.requirements
+    triangulation = replace(required.triangulation, ring_sigma_m=5e-5)
+    scene = replace(scene, requirements=replace(required, triangulation=triangulation))
+    # Fine rings, which damp nothing, and a pitch limit as fine.
+    fine = tuple(
+        replace(p, ring_radii=uniform_radii(p.ring_radii[-1], 1e-4)) for p in projectors
+    )
+    limits = replace(triangulation, min_ring_pitch_px=0.17)
+    scene = replace(
+        scene, requirements=replace(scene.requirements, triangulation=limits)
+    )
+    rows = lit_samples(scene, fine, cover.rows.target)
+    views = AxisJudge(scene, fine, cover.cameras, rows).views
+    program = axis_program(scene, fine, 1, rows, views)
+    scores = pair_scores(program, program.start)
+    lit = np.flatnonzero(rows.lit[:, 1])
+    chosen = lit[:: -(-len(lit) // len(program.points))]
+    seen = np.stack([v.stage[chosen] == measurability.SEEN for v in views], axis=1)
+    assert np.array_equal(scores > 0.0, seen)
+    assert 100 < seen.sum() < seen.size
+    samples = rows.target.samples.take(chosen)
+    for k, view in enumerate(views):
+        quality = measurability.pair_quality(
+            samples.normals,
+            rows.lights[1].take(chosen),
+            measurability.rings_at(fine[1], samples.points),
+            view.take(chosen),
+            limits,
+        )
+        e = (limits.min_conditioning / quality.conditioning) ** 2
+        e = e + (quality.sigma / limits.max_sigma_m) ** 2
+        e = e + (0.17 / quality.pitch) ** 8
+        exact = 1.0 / (1.0 + e[seen[:, k]])
+        assert scores[seen[:, k], k] == pytest.approx(exact, rel=1e-4)
+    # What the other projector makes of a sample counts as given.
+    assert program.others.max() > 0.3
+    assert np.all(program.others[~rows.lit[chosen, 0]] == 0.0)
+
+
+def test_an_axis_and_its_ring_frame_are_the_same(ball):
+    _, projectors, _ = ball
+    for p in projectors:
+        for tilt, azimuth in ((0.05, 0.3), (0.12, 4.0)):
+            frame = ring_frame(p.world_from_device, p.device, tilt, azimuth)
+            axis = ring_axis(p.world_from_device, p.device, frame)
+            again = ring_frame_of_axis(p.world_from_device, p.device, axis)
+            assert again == pytest.approx(frame, abs=1e-12)
+            size = tilt if p.light == "parallel" else np.tan(tilt / 2)
+            assert np.linalg.norm(axis) == pytest.approx(size)
+
+
+def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
+    scene, projectors, cover = ball
+    stage = camera_stage(scene, cover)
+    followed = follow_cameras(scene, projectors, cover.cameras, stage)
+    for new, expected in zip(followed.projectors, moved, strict=True):
+        assert np.array_equal(new.world_from_ring, expected.world_from_ring)
+    points = followed.stage.rows.target.samples.points
+    for p, rings in zip(followed.projectors, followed.stage.rows.rings, strict=True):
+        own = measurability.rings_at(p, points)
+        assert np.array_equal(own.normals, rings.normals)
+    count = len(cover.cameras)
+    assert followed.stage.certificate["count"] == count
+    # Another number of cameras than is proved: axes and proof stay.
+    more = follow_cameras(scene, projectors, (*cover.cameras, cover.cameras[0]), stage)
+    assert more.stage is stage
+    assert all(a is b for a, b in zip(more.projectors, projectors, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("changes", "enough"),
+    [
+        ({}, True),
+        ({"lower_bound": 2}, False),
+        ({"status": "infeasible"}, False),
+        ({"status": "feasible"}, True),
+        ({"chosen": np.array([4, 5])}, False),
+    ],
+)
+def test_axes_that_cost_the_proof_are_dropped(ball, changes, enough):
+    _, _, cover = ball
+    three = {"chosen": np.array([1, 2, 3]), "lower_bound": 3, "status": "optimal"}
+    old = {"status": "feasible", "candidates": {"lower_bound": 3}}
+    assert proves_as_much(replace(cover.selection, **three | changes), old, 3) == enough
+
+
+def test_cameras_stay_with_the_axes_that_were_moved_for_them(ball, moved):
+    scene, projectors, cover = ball
+    axes, again = move_axes(scene, projectors, cover)
+    assert len(again.cameras) <= len(cover.cameras)
+    rows = int(again.measured[:, again.selection.chosen].any(axis=1).sum())
+    assert again.selection.best_rows == rows
+    assert rows >= again.selection.required
+    if np.array_equal(again.selection.chosen, cover.selection.chosen):
+        assert all(
+            np.array_equal(a.world_from_ring, m.world_from_ring)
+            for a, m in zip(axes, moved, strict=True)
+        )
+    # Under axes that had measured more, nothing changes.
+    more = replace(cover, selection=replace(cover.selection, best_rows=10**6))
+    axes, again = move_axes(scene, projectors, more)
+    assert again is more
+    assert all(a is b for a, b in zip(axes, projectors, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("chosen", "required", "rows"),
+    [([0, 2], 900, 999), ([0, 2], 1000, None), ([1, 2], 900, None), ([0], 100, None)],
+)
+def test_cameras_stay_if_others_measure_hardly_more(ball, chosen, required, rows):
+    """Of 1000 samples the best two measure all, others 999 and 990."""
+    measured = np.zeros((1000, 3), dtype=bool)
+    measured[:600, 0] = measured[590:, 1] = measured[601:, 2] = True
+    _, _, cover = ball
+    selection = replace(
+        cover.selection, chosen=np.array([0, 1]), required=required, best_rows=1000
+    )
+    best = replace(cover, measured=measured, selection=selection)
+    before = replace(best, selection=replace(selection, chosen=np.array(chosen)))
+    found = with_cameras(best, before)
+    assert (found and found.selection.best_rows) == rows
+    if found:
+        assert np.array_equal(found.selection.chosen, chosen)
