@@ -1,6 +1,7 @@
 """Where devices stand side by side, over an object that is wider than their field.
 
-Seen along a direction, what faces a device fills a rectangle. It is cut into as few
+Seen along a direction, what faces a device fills a rectangle, the smallest at any turn
+about the line of sight; the device is rolled to that. It is cut into as few
 tiles as the field holds, and once more into one more either way, so that neighbours
 overlap. A device looks at the middle of each tile, from the standoff over what stands
 out farthest in it; diverging light also from as far as shell and range allow, where a
@@ -28,6 +29,9 @@ _FARTHER = 1.05
 # Depths tried along a line of sight that zones cut.
 _DEPTHS = 9
 _LEVEL = 1e-12
+# Turns of a rectangle that are tried; how much smaller than upright one must be.
+_TURNS = 45
+_SMALLER = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,17 +63,22 @@ def tiled_poses(
     Args:
         site: What is looked at.
         directions: Unit vectors from the object to the device, shape (n, 3).
-        rolls: Turns of the device about its line of sight [rad].
+        rolls: Turns of the device about its line of sight, against the upright or, if
+            that is clearly smaller, the smallest rectangle [rad].
 
     Returns:
         Poses, shape (m, 4, 4), and the direction of each, shape (m,).
     """
     frames, anchors, depths, owner = [], [], [], []
-    up = np.array(site.workspace.up)
-    for roll in rolls:
-        aimed = look_at(directions, np.zeros(3), up, roll=roll)
-        for k, frame in enumerate(aimed):
-            for anchor, depth in _tiles(site, frame[:3, :3]):
+    upright = look_at(directions, np.zeros(3), np.array(site.workspace.up))
+    for k, level in enumerate(upright):
+        seen = _facing(site, directions[k])
+        if not len(seen):
+            continue
+        along = _smallest_rectangle(seen @ level[:3, :2])
+        for roll in rolls:
+            frame = level @ _rolled(roll + along)
+            for anchor, depth in _tiles(site, seen, frame[:3, :3]):
                 frames.append(frame)
                 anchors.append(anchor)
                 depths.append(depth)
@@ -115,13 +124,35 @@ def poses_beside(site: Site, poses: _Array, n: int, *, reach: float) -> _Array:
     return np.concatenate(found)
 
 
-def _tiles(site: Site, frame: _Array) -> Iterator[tuple[_Array, float]]:
+def _facing(site: Site, outwards: _Array) -> _Array:
+    """Return what can be of use from a direction, from the centre, shape (n, 3)."""
+    facing = site.samples.normals @ outwards >= np.cos(site.max_incidence)
+    return site.samples.points[facing] - np.array(site.workspace.centre)
+
+
+def _smallest_rectangle(flat: _Array) -> float:
+    """Return the turn of the smallest rectangle about points (n, 2); 0 if it's as good.
+
+    From +x towards +y, less than a right angle.
+    """
+    turns = np.arange(_TURNS) * (0.5 * np.pi / _TURNS)
+    axes = np.stack([np.cos(turns), np.sin(turns)])
+    x, y = flat @ axes, flat @ np.stack([-axes[1], axes[0]])
+    areas = np.ptp(x, axis=0) * np.ptp(y, axis=0)
+    best = int(np.argmin(areas))
+    return float(turns[best]) if areas[best] < _SMALLER * areas[0] else 0.0
+
+
+def _rolled(angle: float) -> _Array:
+    pose = np.eye(4)
+    c, s = np.cos(angle), np.sin(angle)
+    pose[:2, :2] = [[c, -s], [s, c]]
+    return pose
+
+
+def _tiles(site: Site, points: _Array, frame: _Array) -> Iterator[tuple[_Array, float]]:
     """Anchor on a line of sight, from the centre, and the distance of the device."""
     x, y, outwards = frame[:, 0], frame[:, 1], -frame[:, 2]
-    facing = site.samples.normals @ outwards >= np.cos(site.max_incidence)
-    if not facing.any():
-        return
-    points = site.samples.points[facing] - np.array(site.workspace.centre)
     flat, height = points @ np.column_stack([x, y]), points @ outwards
     low, high = flat.min(axis=0), flat.max(axis=0)
     for distance, more in _distances(site):
