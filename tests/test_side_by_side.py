@@ -10,11 +10,16 @@ from geometry.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.primitives import box, grid
 from planning.audit.devices import outside_by
-from planning.candidates import camera_candidates, projector_candidates
+from planning.candidates import (
+    camera_candidates,
+    projector_candidates,
+    projectors_towards,
+)
 from planning.continuous import Effort, prove_fewest
 from planning.draft import Order
 from planning.field import half_rectangle, middle_ray, overflows
 from planning.lighting import LIT
+from planning.one_fewer import Offer, one_fewer
 from planning.plan import PlannedCamera
 from planning.prepare import prepared
 from planning.progress import Stopwatch
@@ -23,6 +28,7 @@ from planning.projector_poses import widen_margins
 from planning.projectors import plan_projectors
 from planning.requirements import Requirements
 from planning.rig import load_rig
+from planning.rings import ring_frame
 from planning.share_margin import margin_at_share
 from planning.view_tiles import poses_beside, tiled_poses
 from planning.wider_field import wider_field
@@ -122,6 +128,61 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
         )
     )
     assert after > before
+
+
+def test_two_beams_that_leave_a_gap_are_moved_together():
+    """Panels of 819 mm, 880 apart over a plate of 1.4 m: 61 mm between are dark."""
+    scene, template, offset = readied(
+        grid(1.4, 0.55, divisions=(6, 4)), "parallel", 15.0, half_angle=0.3
+    )
+    rows = scene.target_samples(1000, 100)
+    turn = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, -1.0]])
+    apart = []
+    for x in (-0.44, 0.0, 0.44):
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = turn, (x, 0.0, 1.2)
+        frame = ring_frame(pose, template.device, *offset)
+        apart.append(replace(template, world_from_device=pose, world_from_ring=frame))
+    lattice = Offer(tuple(apart), lit_stages(scene, apart, rows))
+    dark = ~np.any((lattice.stages == LIT)[:, [0, 2]], axis=1)
+    assert dark.mean() == pytest.approx(0.061 / 1.4, abs=0.01)
+    found = one_fewer(
+        scene,
+        lattice,
+        2,
+        stages_of=lambda projectors: lit_stages(scene, projectors, rows),
+        given=0,
+        ring_offset=offset,
+    )
+    assert found is not None
+    assert len(found.projectors) == 2
+    assert np.any(found.stages == LIT, axis=1).mean() >= 0.99
+
+
+def test_offers_towards_a_direction_look_beside_the_centre_too():
+    scene, template, offset = readied(
+        grid(2.0, 0.5, divisions=(6, 4)), "parallel", 50.0
+    )
+    found = projectors_towards(
+        template,
+        scene.requirements.workspace,
+        np.array([[0.0, 0.6, 0.8]]),
+        ring_offset=offset,
+        site=scene.site("projector", template.device),
+    )
+    poses = np.stack([p.world_from_device for p in found])
+    assert np.allclose(poses[:, :3, 2], [0.0, -0.6, -0.8])
+    assert poses[:, 0, 3].min() < -0.5
+    assert poses[:, 0, 3].max() > 0.5
+    rows = scene.target_samples(300, 7)
+    assert np.any(lit_stages(scene, found, rows) == LIT, axis=1).all()
+
+
+@pytest.mark.parametrize("light", ["parallel", "diverging"])
+def test_rings_reach_the_corners_of_an_image_that_looks_beside(light):
+    _, template, _ = readied(box((0.62, 0.1, 0.1)), light, 60.0)
+    corner = load_rig("default", light).outer_ring_radius()
+    assert template.ring_radii[-1] == pytest.approx(corner)
 
 
 def test_one_beam_too_few_says_how_wide_two_must_be():
