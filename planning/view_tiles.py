@@ -57,7 +57,7 @@ class Site:
 
 def tiled_poses(
     site: Site, directions: _Array, rolls: Sequence[float]
-) -> tuple[_Array, _Array]:
+) -> tuple[_Array, NDArray[np.int64]]:
     """Return admissible ``world_from_device`` over the tiles of each direction.
 
     Args:
@@ -209,7 +209,7 @@ def _placed(
     good = admissible(site.workspace, site.radius_m, offsets.reshape(-1, 3))
     good = good.reshape(trials.shape)
     best = np.argmin(np.where(good, np.abs(trials - out[:, None]), np.inf), axis=1)
-    return offsets[np.arange(len(best)), best], good.any(axis=1)
+    return offsets[np.arange(len(best)), best], np.asarray(np.any(good, axis=1))
 
 
 def _depths(
