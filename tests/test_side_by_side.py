@@ -8,13 +8,10 @@ import pytest
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh import TriangleMesh
 from geometry.poses import inverse, transform
-from geometry.primitives import box, grid
+from geometry.primitives import box, grid, sphere
 from planning.audit.devices import outside_by
-from planning.candidates import (
-    camera_candidates,
-    projector_candidates,
-    projectors_towards,
-)
+from planning.cameras import offered_cameras
+from planning.candidates import projector_candidates, projectors_towards
 from planning.continuous import Effort, prove_fewest
 from planning.draft import Order
 from planning.field import half_rectangle, middle_ray, overflows
@@ -43,6 +40,17 @@ SHIFTED = PinholeModel(
     (1024, 768),
     (0.9, 2.0),
 )
+
+
+ASKEW = np.array(
+    [[np.cos(0.6), np.sin(0.6), 0], [-np.sin(0.6), np.cos(0.6), 0], [0, 0, 1]]
+)
+
+
+def askew(width, height):
+    """A plate whose sides are along no axis."""
+    flat = grid(width, height, divisions=(6, 4))
+    return TriangleMesh(flat.vertices @ ASKEW, flat.faces)
 
 
 def readied(mesh, light, incidence, most=9, share=0.99, **workspace):
@@ -94,13 +102,9 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
 
     The plate lies askew: its sides are along no axis.
     """
-    flat = grid(*sides, divisions=(6, 4))
-    c, s = np.cos(0.6), np.sin(0.6)
-    askew = flat.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    plate = TriangleMesh(askew, flat.faces)
     # Directions around the normal alone: a lattice of the whole shell takes more poses.
     scene, template, offset = readied(
-        plate, light, incidence, share=0.98, half_angle=0.6
+        askew(*sides), light, incidence, share=0.98, half_angle=0.6
     )
     least = 0.98 * sides[0] * sides[1] / most_lit(template.device, incidence)
     assert count - 1 < least <= count
@@ -280,6 +284,10 @@ def test_devices_side_by_side_stand_where_the_workspace_lets_them(light, zones):
     found = projector_candidates(template, space, 40, ring_offset=offset, site=site)
     places = np.stack([p.world_from_device for p in found])[:, :3, 3]
     assert outside_by(places, space.projector_radius_m, space).max() <= 1e-9
+    if not ("box" in zones or "mounting" in zones):
+        # Those that look at the centre stand off the ball about the object.
+        away = np.linalg.norm(places[:40] - np.array(space.centre), axis=1)
+        assert np.allclose(away, 1.0 + space.object_radius_m)
     rows = scene.target_samples(100, 7)
     assert np.all(np.any(lit_stages(scene, found, rows) == LIT, axis=1))
     beside = poses_beside(
@@ -289,27 +297,48 @@ def test_devices_side_by_side_stand_where_the_workspace_lets_them(light, zones):
 
 
 def test_tiles_hold_the_plate_from_each_direction_and_none_is_offered_from_behind():
-    scene, template, _ = readied(grid(2.0, 0.5, divisions=(6, 4)), "parallel", 50.0)
+    """A plate of 2 m lies askew; a panel is 819 mm wide, 614 high, or the other way.
+
+    Seen along its normal it takes 3 or 4 tiles, at 30 degrees (1.73 m) 3 either way, at
+    48 (1.34 m) 2 or 3; and once more one more.
+    """
+    scene, template, _ = readied(askew(2.0, 0.5), "parallel", 50.0)
     site = scene.site("projector", template.device)
-    directions = np.array([[0.0, 0.0, 1.0], [0.5, 0.0, 0.75**0.5], [0.0, 0.0, -1.0]])
-    poses, owner = tiled_poses(site, directions, (np.pi / 2,))
-    assert set(owner) == {0, 1}
-    # 2 m by a panel of 0.819 takes three; aslant, 1.73 m take three, too: and four.
-    assert np.bincount(owner).tolist() == [3 + 4, 3 + 4]
+    tilts = np.radians([0.0, 30.0, 48.0, 180.0])
+    along = np.column_stack([np.sin(tilts), 0.0 * tilts, np.cos(tilts)])
+    directions = along @ ASKEW
+    poses, owner = tiled_poses(site, directions, (0.0, np.pi / 2))
+    assert np.bincount(owner).tolist() == [3 + 4 + 4 + 5, 2 * (3 + 4), 2 + 3 + 3 + 4]
     points = site.samples.points
     space = scene.requirements.workspace
     many = projector_candidates(template, space, 300, ring_offset=(0.1, 0), site=site)
     assert 300 < len(many) <= 5 * 300
-    for k in (0, 1):
+    for k in range(3):
         held = np.zeros(len(points), dtype=bool)
-        for pose in poses[owner == k][:3]:
+        for pose in poses[owner == k]:
             assert np.allclose(pose[:3, 2], -directions[k])
             local = transform(inverse(pose), points)
             inside = np.all(np.abs(local[:, :2]) <= template.device.half_panel, axis=1)
             held |= inside
-            # The standoff over what stands out farthest.
-            assert local[inside, 2].min() == pytest.approx(1.0, abs=0.02)
+            # The standoff over what stands out farthest, or where the shell begins.
+            near = local[inside, 2].min()
+            inner = np.linalg.norm(pose[:3, 3] - np.array(space.centre)) < 1.0 + 1e-9
+            assert near == pytest.approx(1.0, abs=0.02) or (inner and near > 1.0)
         assert held.all()
+
+
+def test_a_farther_set_of_tiles_stays_below_the_top_of_the_shell():
+    """A ball of 0.4 m faces 60 degrees of light with 0.69 m across.
+
+    At 1 m the image holds 592 x 423 mm of it: 2 x 2 tiles, and 3 x 3; at 1.4 m, the
+    farthest from the centre, 829 mm: 1 x 2.
+    """
+    scene, template, _ = readied(sphere(0.4, subdivisions=3), "diverging", 60.0)
+    site = scene.site("projector", template.device)
+    poses, _ = tiled_poses(site, np.array([[0.0, 0.0, 1.0]]), (0.0,))
+    assert len(poses) == 4 + 9 + 2
+    away = np.linalg.norm(poses[:, :3, 3], axis=1)
+    assert away.max() <= 1.4 + 1e-9
 
 
 @pytest.mark.parametrize("light", ["parallel", "diverging"])
@@ -339,11 +368,9 @@ def test_cameras_stand_side_by_side_over_what_only_they_are_too_narrow_for():
     assert space.projector_standoff_m is None
     assert space.camera_standoff_m == 1.0
     device = load_rig("default", "parallel").camera_device()
-    site = scene.site("camera", device)
     template = PlannedCamera("", np.eye(4), device)
-    few = camera_candidates(template, space, 60, site)
-    centred = camera_candidates(template, space, 60)
-    assert len(centred) <= len(few) <= 6 * 60
+    few = offered_cameras(scene, template, 60).cameras
+    assert 60 < len(few) <= 6 * 60
     places = np.stack([c.world_from_device[:3, 3] for c in few])
     assert outside_by(places, space.camera_radius_m, space).max() <= 1e-9
     # Each side of the tiles' middle ones looks at its own half.
