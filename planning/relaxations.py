@@ -243,19 +243,24 @@ def field_limit(scene: Scene, template: PlannedProjector) -> Lifted:
             if parallel
             else f"an image that reaches {value:.0f} degrees off its middle"
         ),
-        _widened,
+        widened,
         scene.requirements.projector,
         _off_axis,
     )
 
 
-def _widened(projector: PlannedProjector) -> PlannedProjector:
-    """Return a projector of three times the image or beam, and rings all over it."""
+def widened(projector: PlannedProjector, times: int = _WIDER) -> PlannedProjector:
+    """Return a projector of a wider image or beam, and rings all over it.
+
+    Args:
+        projector: Its pose stays.
+        times: As many as the image or panel is wide and high.
+    """
     device, radii = projector.device, projector.ring_radii
     width, height = device.resolution
-    size = (_WIDER * width, _WIDER * height)
+    size = (times * width, times * height)
     if isinstance(device, PinholeModel):
-        aside = 0.5 * (_WIDER - 1) * np.array([width, height])
+        aside = 0.5 * (times - 1) * np.array([width, height])
         k = device.camera_matrix.copy()
         k[:2, 2] += aside
         wide: PinholeModel | ParallelModel = replace(

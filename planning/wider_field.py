@@ -1,25 +1,34 @@
 """How wide a field would let as many projectors as are allowed light what is required.
 
-Poses stay where they are offered; at each the field is widened, and of every sample
-that is lit then it is known how far it lies off the middle. The cover program asks for
-most samples within a trial field, and bisection finds the least field that is enough.
+At each pose that is offered the field is widened, and of every sample that is lit then
+it is known how far it lies off the middle. Poses for larger tiles join them, since what
+is looked at from beside with one field is looked at whole with another. The cover
+program asks for most samples within a trial field, and bisection finds the least field
+that is enough.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers import solve_max_coverage
 
+from .candidates import projector_candidates
 from .lighting import LIT
+from .plan import PlannedProjector
 from .projector_light import lit_stages
 from .projectors import ProjectorStage
-from .relaxations import field_limit
+from .relaxations import field_limit, widened
 from .scene import Scene
 from .selection import cover_problem, required_rows
+from .view_tiles import Site
 
 _ROWS = 2000
+# Poses for larger tiles: so many times as wide and high, so many that look at the
+# centre.
+_TIMES = (2, 3)
+_OFFERED = 150
 # Counted work of each cover, of which no proof is asked.
 _BUDGET = 1e8
 
@@ -65,12 +74,14 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
         Up to a whole degree or millimetre; None where the object fits the field, or
         where a field three times as wide isn't enough either.
     """
-    if scene.site("projector", stage.reference[0].device) is None:
+    site = scene.site("projector", stage.reference[0].device)
+    if site is None:
         return None
     n = min(len(stage.rows), _ROWS)
     rows = stage.rows.take(np.arange(n))
     field = field_limit(scene, stage.reference[0])
     poses = [field.projector(pose) for pose in stage.reference]
+    poses += _over_larger_tiles(site, stage.reference[0])
     lit = lit_stages(scene, poses, rows) == LIT
     asked = np.full(lit.shape, np.inf)
     for column, pose in enumerate(poses):
@@ -87,3 +98,22 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
         middle = (low + high) // 2
         low, high = (low, middle) if fields.enough(middle) else (middle, high)
     return field.say(high)
+
+
+def _over_larger_tiles(
+    site: Site, template: PlannedProjector
+) -> list[PlannedProjector]:
+    """Return projectors of the widest field at poses that suit wider ones."""
+    found: list[PlannedProjector] = []
+    for times in _TIMES:
+        device = widened(template, times).device
+        wide = replace(site, device=device)
+        offered = projector_candidates(
+            replace(template, device=device),
+            site.workspace,
+            _OFFERED,
+            ring_offset=(0.0, 0.0),
+            site=wide,
+        )
+        found += [widened(replace(p, device=template.device)) for p in offered]
+    return found

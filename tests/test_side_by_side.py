@@ -206,6 +206,20 @@ def test_one_beam_too_few_says_how_wide_two_must_be():
     assert np.floor(aslant) <= radius <= np.ceil(upright) + 1
 
 
+def test_one_image_too_few_is_wide_enough_from_as_far_as_it_is_sharp():
+    """What counts is up to r from the middle, at asin(r / 1.77) degrees or more."""
+    scene, template, offset = readied(
+        askew(1.5, 0.66), "diverging", 40.0, most=1, share=0.95
+    )
+    stage = plan_projectors(scene, template, 60, ring_offset=offset, rounds=1)
+    said = wider_field(scene, stage, 1)
+    degrees = int(said.removeprefix("an image that reaches ").split(" degrees")[0])
+    off = np.hypot(*stage.rows.samples.points[:2000, :2].T)
+    reach = np.quantile(off, 0.95)
+    least = np.degrees(np.arcsin(reach / template.device.range_m[1]))
+    assert np.floor(least) <= degrees <= least + 4.0
+
+
 def test_what_fits_stays_as_it_was_and_is_named_by_no_key():
     """The threshold is that of the ball: R = 307 mm for the panel, sin for an image."""
     beam = ParallelModel((1024, 768), 8e-4, (0.4, 2.5))
