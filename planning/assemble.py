@@ -21,6 +21,7 @@ from .ring_axes import widest_gap
 from .ring_entries import evenly_ringed, lost_to_rings_m2, with_rings
 from .seams import overlap_components
 from .surface import Surface
+from .wider_field import wider_field
 
 
 def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
@@ -69,6 +70,13 @@ def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
             document["coverage"]["relaxations"] = reachability_relaxations(
                 scene, reference, (draft.tilt, 0.0)
             )
+    proof = document["certificates"]["projectors"]
+    if proof["needed"]["count"] > requirements.max_projectors:
+        with clock.stage("relaxations", "what would help"):
+            field = wider_field(scene, draft.stage, requirements.max_projectors)
+        if field is not None:
+            needed = proof["needed"] | {"wider_field": field}
+            document["certificates"]["projectors"] = proof | {"needed": needed}
     return plan
 
 

@@ -160,7 +160,8 @@ def offered_cameras(scene: Scene, template: PlannedCamera, n_candidates: int) ->
     """
     required = scene.requirements
     candidates = existing_cameras(required, template)
-    candidates += camera_candidates(template, required.workspace, n_candidates)
+    site = scene.site("camera", template.device)
+    candidates += camera_candidates(template, required.workspace, n_candidates, site)
     return Sights(scene, candidates)
 
 

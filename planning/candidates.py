@@ -1,4 +1,8 @@
-"""Poses offered to the cover programs, spread evenly over the workspace."""
+"""Poses offered to the cover programs, spread evenly over the workspace.
+
+They look at its centre; over an object that is wider than the field also beside it, as
+far as a `Site` says so (`view_tiles`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,9 +14,11 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import fibonacci_cap, look_at
 
 from .errors import InfeasibleLimitsError
+from .field import holds_ball, middle_ray, turned_to
 from .plan import PlannedCamera, PlannedProjector
 from .requirements import Workspace
 from .rings import ring_frame
+from .view_tiles import Site, poses_beside, tiled_poses
 from .zone_conflicts import no_position
 from .zone_positions import along_rays, filled, is_zoned
 
@@ -21,6 +27,11 @@ _QUARTER = float(np.pi / 2)
 _MOST_OFFERED = 1000
 # Positions offered around a chosen one.
 _AROUND = 60
+# Side by side: poses for each that looks at the centre, and directions at least and
+# for an estimate.
+_BESIDE = 3
+_LEAST_DIRECTIONS = 24
+_PROBED = 48
 # Sine of the angle to the vertical below which a direction has no level across it.
 _LEVEL = 1e-6
 
@@ -90,13 +101,7 @@ def rolls_for(
     if isinstance(device, ParallelModel):
         half = float(device.half_panel.min())
         return (0.0,) if object_radius <= half else (0.0, _QUARTER)
-    width, height = device.resolution
-    edges = np.array([[-0.5, (height - 1) / 2], [(width - 1) / 2, -0.5]])
-    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
-    half_angle = np.arccos(np.clip(device.rays(edges) @ middle, -1.0, 1.0)).min()
-    fits = (
-        object_radius < distance and np.arcsin(object_radius / distance) <= half_angle
-    )
+    fits = holds_ball(device, object_radius, distance)
     return (0.0,) if fits else (0.0, _QUARTER)
 
 
@@ -106,6 +111,7 @@ def projector_candidates(
     n: int,
     *,
     ring_offset: tuple[float, float],
+    site: Site | None = None,
 ) -> tuple[PlannedProjector, ...]:
     """Return projector candidates over the whole workspace.
 
@@ -114,8 +120,12 @@ def projector_candidates(
         workspace: Where devices may stand.
         n: Candidates wanted, at least.
         ring_offset: Tilt and azimuth of the ring axis, as `ring_frame` takes them.
+        site: What they stand over side by side; None: all look at the centre.
+
+    Raises:
+        InfeasibleLimitsError: If the workspace holds no position.
     """
-    poses = _poses(template.device, workspace, workspace.projector_radius_m, n)
+    poses = _poses(template.device, workspace, workspace.projector_radius_m, n, site)
     return _projectors(template, poses, ring_offset)
 
 
@@ -125,6 +135,7 @@ def projectors_towards(
     directions: NDArray[np.float64],
     *,
     ring_offset: tuple[float, float],
+    site: Site | None = None,
 ) -> tuple[PlannedProjector, ...]:
     """Return candidates in given directions from the centre, those that are admissible.
 
@@ -133,12 +144,14 @@ def projectors_towards(
         workspace: Where devices may stand.
         directions: Unit vectors, shape (n, 3).
         ring_offset: As for `projector_candidates`.
+        site: As for `projector_candidates`.
     """
-    near, far = workspace.projector_radius_m
-    radius, device = 0.5 * (near + far), template.device
-    rolls = rolls_for(device, workspace.object_radius_m, radius)
-    positions = np.array(workspace.centre) + _offsets(directions, workspace)
-    poses = _aimed(positions, device, workspace, rolls)
+    shell, device = _about_ball(workspace.projector_radius_m, site), template.device
+    rolls = rolls_for(device, workspace.object_radius_m, 0.5 * (shell[0] + shell[1]))
+    offsets = _offsets(directions, workspace, shell)
+    poses = _aimed(np.array(workspace.centre) + offsets, device, workspace, rolls)
+    if site is not None:
+        poses = np.concatenate([poses, tiled_poses(site, directions, rolls)[0]])
     return _projectors(template, poses, ring_offset)
 
 
@@ -149,12 +162,14 @@ def projectors_around(
     *,
     ring_offset: tuple[float, float],
     scale: float = 1.0,
+    site: Site | None = None,
 ) -> tuple[PlannedProjector, ...]:
     """Return candidates between those of a lattice, close around chosen ones.
 
     Each chosen pose gets positions out to the lattice's spacing, as seen from the
     centre of the workspace, as far as they are admissible; laid out from the vertical
-    through it, so that they turn with the workspace.
+    through it, so that they turn with the workspace. Side by side, they are turned
+    about what they look at and moved along with it.
 
     Args:
         chosen: Projectors of the lattice.
@@ -162,17 +177,20 @@ def projectors_around(
         n_lattice: Poses of the lattice.
         ring_offset: As for `projector_candidates`.
         scale: How far out, as a share of the lattice's spacing.
+        site: As for `projector_candidates`.
     """
     if not chosen:
         return ()
+    if site is not None:
+        own = np.stack([projector.world_from_device for projector in chosen])
+        reach = scale * _spacing(workspace, n_lattice // (1 + _BESIDE))
+        beside = poses_beside(site, own, _AROUND, reach=reach)
+        return _projectors(chosen[0], beside, ring_offset)
     device, centre = chosen[0].device, np.array(workspace.centre)
     near, far = workspace.projector_radius_m
     radius = 0.5 * (near + far)
     rolls = rolls_for(device, workspace.object_radius_m, radius)
-    n_positions = max(1, n_lattice // len(rolls))
-    # Each position of the lattice has this much of the solid angle.
-    solid_angle = 2 * np.pi * (1 - np.cos(workspace.half_angle))
-    reach = scale * float(np.sqrt(solid_angle / n_positions))
+    reach = scale * _spacing(workspace, n_lattice // len(rolls))
     found: list[NDArray[np.float64]] = []
     for projector in chosen:
         outwards = projector.world_from_device[:3, 3] - centre
@@ -180,21 +198,40 @@ def projectors_around(
         level = np.cross(np.array(workspace.up), outwards)
         start = level if np.linalg.norm(level) > _LEVEL else None
         cap = fibonacci_cap(_AROUND, outwards, reach, start=start)
-        found.append(centre + _offsets(cap, workspace))
+        found.append(centre + _offsets(cap, workspace, workspace.projector_radius_m))
     positions = np.concatenate(found)
     poses = _aimed(positions, device, workspace, rolls)
     return _projectors(chosen[0], poses, ring_offset)
 
 
 def _offsets(
-    directions: NDArray[np.float64], workspace: Workspace
+    directions: NDArray[np.float64],
+    workspace: Workspace,
+    shell_m: tuple[float, float],
 ) -> NDArray[np.float64]:
     """Admissible positions of projectors in given directions, from the centre."""
     if is_zoned(workspace):
-        return along_rays(workspace, workspace.projector_radius_m, directions)
-    near, far = workspace.projector_radius_m
+        return along_rays(workspace, shell_m, directions)
+    near, far = shell_m
     radius = 0.5 * (near + far)
     return radius * directions[_stands(directions, radius, workspace)]
+
+
+def _about_ball(
+    radius_m: tuple[float, float], site: Site | None
+) -> tuple[float, float]:
+    """The part of the shell a standoff away from the ball about the object."""
+    if site is None:
+        return radius_m
+    middle = site.standoff_m + site.workspace.object_radius_m
+    return 2.0 * middle - radius_m[1], radius_m[1]
+
+
+def _spacing(workspace: Workspace, n_positions: int) -> float:
+    """Angle between neighbours of a lattice of so many positions [rad]."""
+    # Each position of the lattice has this much of the solid angle.
+    solid_angle = 2 * np.pi * (1 - np.cos(workspace.half_angle))
+    return float(np.sqrt(solid_angle / max(1, n_positions)))
 
 
 def _stands(
@@ -224,10 +261,13 @@ def _projectors(
 
 
 def camera_candidates(
-    template: PlannedCamera, workspace: Workspace, n: int
+    template: PlannedCamera, workspace: Workspace, n: int, site: Site | None = None
 ) -> tuple[PlannedCamera, ...]:
-    """Return camera candidates over the whole workspace, at least n."""
-    poses = _poses(template.device, workspace, workspace.camera_radius_m, n)
+    """Return camera candidates over the whole workspace, at least n.
+
+    The arguments are those of `projector_candidates`.
+    """
+    poses = _poses(template.device, workspace, workspace.camera_radius_m, n, site)
     return tuple(replace(template, world_from_device=pose) for pose in poses)
 
 
@@ -236,13 +276,35 @@ def _poses(
     workspace: Workspace,
     radius_m: tuple[float, float],
     n: int,
+    site: Site | None,
 ) -> NDArray[np.float64]:
-    distance = 0.5 * (radius_m[0] + radius_m[1])
+    shell = _about_ball(radius_m, site)
+    distance = 0.5 * (shell[0] + shell[1])
     rolls = rolls_for(device, workspace.object_radius_m, distance)
-    positions = shell_positions(workspace, radius_m, -(-n // len(rolls)))
-    if not len(positions):
+    positions = shell_positions(workspace, shell, -(-n // len(rolls)))
+    poses = _aimed(positions, device, workspace, rolls)
+    if site is not None:
+        poses = np.concatenate([poses, _side_by_side(site, n, rolls)])
+    if not len(poses):
         raise InfeasibleLimitsError(no_position(workspace, radius_m))
-    return _aimed(positions, device, workspace, rolls)
+    return poses
+
+
+def _side_by_side(site: Site, n: int, rolls: Sequence[float]) -> NDArray[np.float64]:
+    """About three times n poses over tiles: the more tiles, the fewer directions."""
+    lattice = _directions(site, _PROBED)
+    if not len(lattice):
+        return np.empty((0, 4, 4))
+    each = len(tiled_poses(site, lattice, rolls)[0]) / len(lattice)
+    wanted = max(_LEAST_DIRECTIONS, int(min(n, _BESIDE * n / max(each, 1.0))))
+    return tiled_poses(site, _directions(site, wanted), rolls)[0]
+
+
+def _directions(site: Site, n: int) -> NDArray[np.float64]:
+    """Directions from the centre of n positions or more, if there are as many."""
+    offsets = shell_positions(site.workspace, site.radius_m, n)
+    offsets = offsets - np.array(site.workspace.centre)
+    return offsets / np.linalg.norm(offsets, axis=1, keepdims=True)
 
 
 def _aimed(
@@ -261,12 +323,5 @@ def _aim_from_device(device: PinholeModel | ParallelModel) -> NDArray[np.float64
     pose = np.eye(4)
     if isinstance(device, ParallelModel):
         return pose
-    width, height = device.resolution
-    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
-    # Smallest rotation that takes the middle ray onto +z (Rodrigues).
-    axis = np.cross(middle, [0.0, 0.0, 1.0])
-    skew = np.array(
-        [[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]]
-    )
-    pose[:3, :3] += skew + skew @ skew / (1.0 + middle[2])
+    pose[:3, :3] = turned_to(middle_ray(device))
     return pose

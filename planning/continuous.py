@@ -124,7 +124,11 @@ def prove_fewest(
     while stage.certificate["needed"]["count"] > stage.certificate.get("given", 0):
         bound = _bound_of(scene, stage, template, effort)
         found = projectors_towards(
-            template, workspace, bound.directions, ring_offset=ring_offset
+            template,
+            workspace,
+            bound.directions,
+            ring_offset=ring_offset,
+            site=scene.site("projector", template.device),
         )
         better = with_more(scene, stage, found) if found else stage
         if better is stage:

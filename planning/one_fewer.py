@@ -76,6 +76,7 @@ def one_fewer(
         ring_offset: As for `projector_candidates`.
     """
     begun: list[list[int]] = []
+    site = scene.site("projector", lattice.projectors[0].device)
     for start in range(_STARTS):
         offer, best, short = lattice, _NONE, np.inf
         for attempt, scale in enumerate((*_SCALES, None)):
@@ -98,6 +99,7 @@ def one_fewer(
                 len(lattice.projectors),
                 ring_offset=ring_offset,
                 scale=scale,
+                site=site,
             )
             # They join the others: the best may be of both.
             offer = offer.joined(Offer(between, stages_of(between)))

@@ -57,7 +57,7 @@ class PositionTree:
     """Cells of positions, made when they are asked for.
 
     Args:
-        workspace: Where projectors may stand; the shell holds the whole mesh inside.
+        workspace: Where projectors may stand; samples may lie in the shell, too.
         range_m: Least and largest distance of a lit sample [m].
         points: Samples in [m], shape (n_rows, 3).
         maps: Directions that are open to each sample, widened.
@@ -180,7 +180,8 @@ class PositionTree:
         near, far = self._range
         served = (distance - extent <= far) & (distance + extent >= near)
         psi = _spread(towards, distance, outwards, half, side)
-        directions = towards / distance[:, None]
+        # A sample in the middle of a cell has no direction; any is open to it there.
+        directions = towards / np.where(distance > 0.0, distance, 1.0)[:, None]
         served[served] = self._maps.open(directions[served], psi[served], rows[served])
         return served
 

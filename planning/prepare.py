@@ -125,13 +125,13 @@ def _resolve(order: Order) -> tuple[Requirements, Any, float]:
     gap = rig.ring_gap_m or ring_gap(
         projector, camera, requirements.triangulation, rig.standoff_m
     )
+    corner = rig.outer_ring_radius()
     outer = outer_radius(
-        projector,
-        tilt,
-        mesh.radius,
-        workspace.projector_radius_m[0],
-        rig.outer_ring_radius(),
+        projector, tilt, mesh.radius, workspace.projector_radius_m[0], corner
     )
+    if workspace.projector_standoff_m is not None:
+        # What is looked at from beside reaches to the corners of the image.
+        outer = corner
     radii = uniform_radii(outer, gap if parallel else gap / rig.standoff_m)
     workspace = replace(
         workspace,

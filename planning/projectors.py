@@ -88,8 +88,13 @@ def plan_projectors(
     required = scene.requirements
     # Those that stand already come first, and are in every cover.
     candidates = existing_projectors(required, template, ring_offset)
+    site = scene.site("projector", template.device)
     candidates += projector_candidates(
-        template, required.workspace, n_candidates, ring_offset=ring_offset
+        template,
+        required.workspace,
+        n_candidates,
+        ring_offset=ring_offset,
+        site=site,
     )
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
@@ -102,6 +107,7 @@ def plan_projectors(
         required.workspace,
         n_lattice,
         ring_offset=ring_offset,
+        site=site,
     )
     stages = np.concatenate([stages, lit_stages(scene, around, rows)], axis=1)
     candidates += around

@@ -84,8 +84,13 @@ def reachability_relaxations(
         mounting=(),
     )
     if whole != workspace:
+        site = scene.site("projector", reference[0].device)
         anywhere = projector_candidates(
-            reference[0], whole, len(reference), ring_offset=ring_offset
+            reference[0],
+            whole,
+            len(reference) if site is None else workspace.n_reference_projectors,
+            ring_offset=ring_offset,
+            site=None if site is None else replace(site, workspace=whole),
         )
         rest = _unreached(scene, anywhere, target)
         shares["the whole shell as workspace"] = 1.0 - len(rest) / len(target)
@@ -171,7 +176,6 @@ def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
     limits, device = scene.requirements.projector, template.device
     near, far = (1e3 * edge for edge in device.range_m)
     now = np.degrees([limits.max_incidence, limits.min_tangent_angle])
-    angle = "beam_radius_mm" if isinstance(device, ParallelModel) else "field"
 
     def same(projector: PlannedProjector) -> PlannedProjector:
         return projector
@@ -226,26 +230,37 @@ def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
             limits,
             farther,
         ),
-        Lifted(
-            lambda value: (
-                f"a beam of {value:.0f} mm about its axis"
-                if angle == "beam_radius_mm"
-                else f"an image that reaches {value:.0f} degrees off its middle"
-            ),
-            _widened,
-            limits,
-            _off_axis,
-        ),
+        field_limit(scene, template),
     )
 
 
-def _widened(projector: PlannedProjector) -> PlannedProjector:
-    """Return a projector of three times the image or beam, and rings all over it."""
+def field_limit(scene: Scene, template: PlannedProjector) -> Lifted:
+    """Return the field of projectors, image or beam, out of force."""
+    parallel = isinstance(template.device, ParallelModel)
+    return Lifted(
+        lambda value: (
+            f"a beam of {value:.0f} mm about its axis"
+            if parallel
+            else f"an image that reaches {value:.0f} degrees off its middle"
+        ),
+        widened,
+        scene.requirements.projector,
+        _off_axis,
+    )
+
+
+def widened(projector: PlannedProjector, times: int = _WIDER) -> PlannedProjector:
+    """Return a projector of a wider image or beam, and rings all over it.
+
+    Args:
+        projector: Its pose stays.
+        times: As many as the image or panel is wide and high.
+    """
     device, radii = projector.device, projector.ring_radii
     width, height = device.resolution
-    size = (_WIDER * width, _WIDER * height)
+    size = (times * width, times * height)
     if isinstance(device, PinholeModel):
-        aside = 0.5 * (_WIDER - 1) * np.array([width, height])
+        aside = 0.5 * (times - 1) * np.array([width, height])
         k = device.camera_matrix.copy()
         k[:2, 2] += aside
         wide: PinholeModel | ParallelModel = replace(

@@ -11,6 +11,13 @@ from typing import Any, Literal, Self, TypeVar
 from .zones import Box, read_zones
 
 _T = TypeVar("_T")
+_LEFT_OUT = (
+    "box",
+    "keep_out",
+    "mounting",
+    "projector_standoff_m",
+    "camera_standoff_m",
+)
 
 
 @dataclass(frozen=True)
@@ -113,6 +120,10 @@ class Workspace:
         box: Room that holds every device; None: no room.
         keep_out: Volumes in which no optical centre stands.
         mounting: Planes on which optical centres lie; none: anywhere.
+        projector_standoff_m: Where the object overflows a projector's field, so that
+            projectors stand side by side: their distance from the surface [m]; else
+            None.
+        camera_standoff_m: The same of cameras.
     """
 
     centre: tuple[float, float, float]
@@ -130,6 +141,8 @@ class Workspace:
     box: Box | None = None
     keep_out: tuple[Box, ...] = ()
     mounting: tuple[Box, ...] = ()
+    projector_standoff_m: float | None = None
+    camera_standoff_m: float | None = None
 
     def inset(self, by_m: float) -> "Workspace":
         """Return the workspace shrunk on all sides.
@@ -206,11 +219,11 @@ class Requirements:
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
         document = asdict(self)
-        # Zones that aren't given have no key.
+        # Zones and standoffs that aren't given have no key.
         document["workspace"] = {
             key: _listed(value)
             for key, value in document["workspace"].items()
-            if value or key not in ("box", "keep_out", "mounting")
+            if value or key not in _LEFT_OUT
         }
         existing = document.pop("existing")
         return document | ({"existing": _listed(existing)} if existing else {})

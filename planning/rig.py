@@ -19,6 +19,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from . import optics
 from .errors import InfeasibleLimitsError, RigError
 from .existing import build_existing, check_existing
+from .field import overflows
 from .requirements import Requirements
 from .rig_devices import (
     parallel_device,
@@ -244,6 +245,7 @@ class Rig:
             InfeasibleLimitsError: If no position in the workspace is admissible, or
                 more devices stand already than are allowed.
         """
+        projector, camera = self.projector_device(), self.camera_device()
         required = build_requirements(
             self.table,
             self.outer_ring_radius(),
@@ -259,8 +261,11 @@ class Rig:
             min_reachable=min_reachable,
             accuracy_mm=accuracy_mm,
             up=up,
+            overflowing=(
+                overflows(projector, object_radius_m, self.standoff_m),
+                overflows(camera, object_radius_m, self.standoff_m),
+            ),
         )
-        projector, camera = self.projector_device(), self.camera_device()
         tables = self.table.existing
         existing = build_existing(tables, required.workspace, projector, camera)
         required = replace(required, existing=existing)

@@ -22,6 +22,7 @@ from .zone_tables import build_zones
 
 Pattern = Literal["rings", "dense", "none"]
 Target = Literal["dominant", "surface"]
+Overflowing = tuple[bool, bool]
 
 UP_VECTORS: dict[str, tuple[float, float, float]] = {
     "x": (1.0, 0.0, 0.0),
@@ -49,8 +50,12 @@ def build_requirements(
     min_reachable: float | None,
     accuracy_mm: float | None,
     up: str | None,
+    overflowing: Overflowing = (False, False),
 ) -> Requirements:
     """Return what a plan must reach; `Rig.requirements` documents the arguments.
+
+    But for `overflowing`: whether the object is wider than the field of projectors, and
+    of cameras.
 
     Raises:
         InputError: If an argument isn't usable.
@@ -64,7 +69,7 @@ def build_requirements(
         _check_count("max_cameras", max_cameras)
     _check_positive("tau_m", tau_m)
     workspace = build_workspace(
-        table, reference_ring_radius, mesh_centre, object_radius_m, up
+        table, reference_ring_radius, mesh_centre, object_radius_m, up, overflowing
     )
     return Requirements(
         max_projectors=max_projectors,
@@ -90,6 +95,7 @@ def build_workspace(
     mesh_centre: Sequence[float] | NDArray[np.float64],
     object_radius_m: float,
     up: str | None,
+    overflowing: Overflowing = (False, False),
 ) -> Workspace:
     """Return where devices may stand about an object.
 
@@ -97,6 +103,11 @@ def build_workspace(
     radius R both kinds of device keep::
 
         s + R - p <= |Q - centre| <= s + R + p
+
+    Over an object that is wider than their field devices stand side by side, s from
+    the part of it that they look at, which may be as near to the centre as it likes::
+
+        s - p <= |Q - centre| <= s + R + p
 
     Raises:
         InputError: If an argument isn't usable.
@@ -109,20 +120,27 @@ def build_workspace(
     up_vector = UP_VECTORS[up or spec.up]
     axis = np.array(spec.axis or up_vector, dtype=np.float64)
     axis /= np.linalg.norm(axis)
-    middle = placement.standoff_mm * 1e-3 + float(object_radius_m)
+    standoff = placement.standoff_mm * 1e-3
+    middle = standoff + float(object_radius_m)
     play = placement.standoff_play_mm * 1e-3
+    projector, camera = (
+        (standoff - play if wide else middle - play, middle + play)
+        for wide in overflowing
+    )
     workspace = Workspace(
         centre=_three("mesh_centre", mesh_centre),
         object_radius_m=float(object_radius_m),
         up=up_vector,
         axis=_three("axis", axis),
         half_angle=math.radians(spec.half_angle_deg or 180.0),
-        projector_radius_m=(middle - play, middle + play),
-        camera_radius_m=(middle - play, middle + play),
+        projector_radius_m=projector,
+        camera_radius_m=camera,
         floor_m=None if spec.floor_mm is None else spec.floor_mm * 1e-3,
         n_reference_projectors=placement.n_reference_projectors,
         n_reference_cameras=placement.n_reference_cameras,
         reference_ring_radius=reference_ring_radius,
+        projector_standoff_m=standoff if overflowing[0] else None,
+        camera_standoff_m=standoff if overflowing[1] else None,
         **build_zones(spec, up_vector),
     )
     _check_floor(workspace)

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.devices import ParallelModel, PinholeModel
 from geometry.hollow import Shell, measure_shell
 from geometry.mesh import TriangleMesh
 from geometry.sampling import sample_surface
@@ -14,9 +16,15 @@ from geometry.visibility import Visibility
 
 from .lighting import Target
 from .requirements import Requirements, Workspace
+from .view_tiles import Site
+
+Kind = Literal["projector", "camera"]
 
 # Positions are written to 0.01 mm; twice the half diagonal of that cube.
 _ROUNDING_M = 2e-5
+# Enough that no part of a field's size goes without.
+_SITE_SAMPLES = 2000
+_SITE_STREAM = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +78,24 @@ class Scene:
     def surface_samples(self, n: int, stream: int) -> Target:
         """Return n area-true samples of the whole surface."""
         return self._samples(n, stream, None)
+
+    def site(self, kind: Kind, device: PinholeModel | ParallelModel) -> Site | None:
+        """Return what devices stand over side by side; None where the object fits.
+
+        Args:
+            kind: Of the device.
+            device: Its optics.
+        """
+        required, space = self.requirements, self.requirements.workspace
+        radius, standoff, limits = (
+            (space.projector_radius_m, space.projector_standoff_m, required.projector)
+            if kind == "projector"
+            else (space.camera_radius_m, space.camera_standoff_m, required.camera)
+        )
+        if standoff is None:
+            return None
+        samples = self.target_samples(_SITE_SAMPLES, _SITE_STREAM).samples
+        return Site(device, space, radius, standoff, samples, limits.max_incidence)
 
     def _samples(self, n: int, stream: int, within: NDArray[np.bool_] | None) -> Target:
         # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.

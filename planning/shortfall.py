@@ -109,7 +109,8 @@ def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
         verb = deed if proof["count"] > 1 else deed.replace(" ", "s ", 1)
         yield (
             f"{proof['count']} {devices} {verb.format(_percent(share))}, "
-            f"{_percent(required)} is required. What would help: "
+            f"{_percent(required)} is required; {_cm2(whole - part)} of "
+            f"{_cm2(whole)} are left. What would help: "
             f"{_more(kind, proof['needed'], asked, share)}"
         )
 
@@ -125,7 +126,9 @@ def _more(kind: str, needed: dict[str, Any], asked: Requirements, share: float) 
         if needed["lower_bound"] == needed["count"]
         else f"at least {needed['lower_bound']} proved over the candidates"
     )
-    return f"--max-{kind} {needed['count']} ({bound}), or {accept}"
+    more = f"--max-{kind} {needed['count']} ({bound})"
+    field = needed.get("wider_field")
+    return f"{more}, or {accept}" if field is None else f"{more}, {field}, or {accept}"
 
 
 def _check(document: dict[str, Any]) -> tuple[str, ...]:

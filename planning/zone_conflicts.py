@@ -103,19 +103,20 @@ def _out_of_reach(box: Box, workspace: Workspace) -> str | None:
     low, high = workspace.projector_radius_m
     near, far = _distances(box)
     begins, ends = f"{1e3 * near:.0f} mm", f"{1e3 * far:.0f} mm"
+    ball = f" + the object's radius of {1e3 * workspace.object_radius_m:.0f}"
+    # Side by side, devices stand that near to any part.
+    inner = ball if workspace.projector_standoff_m is None else ""
     if far < low:
         return (
             f"it ends {ends} from the object's centre, but devices stand at least "
-            f"{1e3 * low:.0f} mm from there (standoff_mm - standoff_play_mm + the "
-            f"object's radius of {1e3 * workspace.object_radius_m:.0f}); make it reach "
-            f"farther or lower placement.standoff_mm"
+            f"{1e3 * low:.0f} mm from there (standoff_mm - standoff_play_mm{inner}); "
+            f"make it reach farther or lower placement.standoff_mm"
         )
     if near > high:
         return (
             f"it begins {begins} from the object's centre, but devices stand at most "
-            f"{1e3 * high:.0f} mm from there (standoff_mm + standoff_play_mm + the "
-            f"object's radius of {1e3 * workspace.object_radius_m:.0f}); move it "
-            f"nearer or raise placement.standoff_mm"
+            f"{1e3 * high:.0f} mm from there (standoff_mm + standoff_play_mm{ball}); "
+            f"move it nearer or raise placement.standoff_mm"
         )
     top = np.array(workspace.up) @ np.array(box.centre_m) + float(
         np.abs(np.array(box.axes) @ np.array(workspace.up)) @ np.array(box.half_m)

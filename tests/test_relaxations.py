@@ -102,31 +102,34 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
 
 
 @pytest.mark.usefixtures("few_samples")
-def test_a_plate_wider_than_the_beam_misses_its_rim_and_says_what_beam_would_do(
+def test_too_few_beams_for_a_plate_say_how_many_or_how_wide_they_must_be(
     small_job, tmp_path, monkeypatch
 ):
-    """Beams are aimed at the middle: of a plate of 200 mm a disc and a bit is lit.
+    """A plate of 200 mm, light at 20 degrees at most, beams of 50 mm, one allowed.
 
-    A beam of radius r at incidence i lights an ellipse r by r/cos i. For 0.9 of the
-    plate a radius between the circle's of that area (107 mm) and the plate's half
-    diagonal (141 mm) is needed, less where light is aslant (at 60 degrees half of it).
+    A beam of radius r lights an ellipse of r by r / cos i, less what the edges cut off:
+    nine tenths of the plate at r = 108.3 for i = 20 degrees, at 111.4 upright.
     """
-    rig = "[parallel_projector]\nbeam_radius_mm = 30.0\n"
-    words = ["--light", "parallel", "--coverage", "0.01"]
+    rig = (
+        "[parallel_projector]\nbeam_radius_mm = 50.0\n"
+        "[limits]\nprojector_max_incidence_deg = 20.0\n"
+    )
+    words = ["--light", "parallel", "--coverage", "0.01", "--max-projectors", "1"]
     plate = grid(0.2, 0.2, divisions=(6, 6))
     ended = plan(small_job, tmp_path, monkeypatch, plate, rig, words)
     assert ended.code == 1
-    assert ended.plan is not None
+    areas = ended.plan["coverage"]["target"]
+    assert areas["reachable_by_projectors_m2"] == pytest.approx(0.04, rel=1e-3)
+    disc = np.pi * 0.05**2
+    assert 0.94 * disc <= areas["lit_m2"] <= 1.06 * disc / np.cos(np.radians(20.0))
+    needed = ended.plan["certificates"]["projectors"]["needed"]
+    # Discs that cover nine tenths of it: five have less area than that.
+    assert needed["count"] >= 5
+    left = 1e4 * (areas["reachable_by_projectors_m2"] - areas["lit_m2"])
     written = RigPlan.load(tmp_path / "plan" / "plan.json")
-    (missed,) = (
-        line
-        for line in shortfalls(written.document, written.requirements)
-        if "--min-reachable" in line
-    )
-    assert re.search(r"[\d.]+ cm² of 400\.0 cm² can't be reached", missed)
-    radius = re.search(r"a beam of (\d+) mm about its axis would reach", missed)
-    assert 50 <= int(radius[1]) <= 141
-    (entry,) = [
-        e for e in ended.plan["coverage"]["relaxations"] if "beam" in e["change"]
-    ]
-    assert entry["reachable_share"] >= 0.9
+    missed = "".join(shortfalls(written.document, written.requirements))
+    assert f"{left:.1f} cm² of 400.0 cm² are left" in missed
+    assert f"--max-projectors {needed['count']} (" in missed
+    radius = re.search(r"a beam of (\d+) mm about its axis", missed)
+    assert 107 <= int(radius[1]) <= 112
+    assert radius[0] == needed["wider_field"]
