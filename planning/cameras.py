@@ -17,7 +17,7 @@ from .plan import PlannedCamera, PlannedProjector
 from .projector_light import lit_stages, merged
 from .scene import Scene
 from .selection import Selection, certificate, marginals, select_fewest
-from .sights import Sight, Sights, sights_of
+from .sights import Sight, Sights, sights_of, view_of
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
@@ -238,9 +238,7 @@ def furthest_failure(
     required = scene.requirements
     for camera in cameras:
         scene.pulse()
-        seen = measurability.view(
-            camera, rows.target, required.camera, scene.visibility
-        )
+        seen = view_of(scene, camera, rows.target)
         furthest = np.maximum(furthest, seen.stage)
         clear = np.flatnonzero(seen.stage == measurability.SEEN)
         for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):

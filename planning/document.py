@@ -11,6 +11,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.hollow import Shell
 from geometry.mesh import TriangleMesh
 
+from .bodies import body_entry
 from .claims import Claims
 from .interest import Interest
 from .plan import PlannedCamera, PlannedProjector
@@ -51,6 +52,7 @@ def projector_entries(
             "ring_radii": projector.ring_radii.tolist(),
             "min_margin_rad": claims.min_margin_rad[index],
             "lit_area_m2": claims.lit_area_m2[index],
+            **body_entry(projector.body),
             **_existing(projector),
         }
         for index, projector in enumerate(projectors)
@@ -71,6 +73,7 @@ def camera_entries(
             "range_m": list(camera.device.range_m),
             "seen_area_m2": claims.seen_area_m2[index],
             "sole_area_m2": claims.sole_area_m2[index],
+            **body_entry(camera.body),
             **_existing(camera),
         }
         for index, camera in enumerate(cameras)

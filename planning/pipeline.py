@@ -181,7 +181,9 @@ def _placed(
         projectors = widen_margins(scene, stage)
     with clock.stage("cameras", "cameras: candidates, measurability and cover"):
         n_cameras = max(rig.n_candidate_cameras, rig.n_reference_cameras)
-        camera = PlannedCamera("", np.eye(4), rig.camera_device())
+        camera = PlannedCamera(
+            "", np.eye(4), rig.camera_device(), body=rig.camera_body()
+        )
         solution = place_cameras(scene, projectors, camera, n_cameras, tilt)
         cameras = solution.stage
         clock.say(

@@ -73,7 +73,13 @@ def prepared(order: Order, clock: Stopwatch) -> Prepared:
         clock.check,
     )
     template = PlannedProjector(
-        "", rig.light, np.eye(4), np.eye(4), rig.projector_device(), radii
+        "",
+        rig.light,
+        np.eye(4),
+        np.eye(4),
+        rig.projector_device(),
+        radii,
+        body=rig.projector_body(),
     )
     return Prepared(order, scene, regions, field.radius, template, tilt)
 

@@ -244,6 +244,7 @@ def _stage(
     proof["excluded_pairs"] = {
         cause: int((stages == index).sum())
         for index, cause in enumerate(lighting.CAUSES)
+        if index != lighting.BLOCKED or scene.standing
     }
     proof["n_regions"] = int(scene.region.max()) + 1
     return ProjectorStage(
