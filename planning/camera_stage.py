@@ -6,10 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .body_room import lacks_room
+from .camera_bodies import lit_among, settled_cover
 from .camera_spread import CameraSpread, spread_cameras
 from .cameras import (
     CameraCover,
     CameraStage,
+    LitSamples,
     camera_stage,
     lit_samples,
     measured_by,
@@ -45,6 +48,8 @@ def place_cameras(
     template: PlannedCamera,
     n_candidates: int,
     tilt: float,
+    *,
+    spare_light: float = 0.0,
 ) -> CameraSolution:
     """Choose cameras, turn the ring axes for them, and choose again until it settles.
 
@@ -57,15 +62,19 @@ def place_cameras(
         template: Optics of the camera.
         n_candidates: Poses offered.
         tilt: Tilt of the ring axes, or their shift.
+        spare_light: Share of what is lit that bodies of cameras may keep dark.
     """
     kept = tuple(projectors)
+    scene = scene.among(kept)
     offered = offered_cameras(scene, template, n_candidates)
-    best = plan_cameras(scene, kept, offered)
+    cover = plan_cameras(scene, kept, offered)
+    best = settled_cover(scene, kept, cover, spare_light)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
         if all(a is b for a, b in zip(turned, kept, strict=True)):
             break
         cover = plan_cameras(scene, turned, offered)
+        cover = settled_cover(scene, turned, cover, spare_light)
         if not _better(cover, best):
             break
         kept, best = turned, cover
@@ -85,7 +94,7 @@ def spread(
         projectors: As planned, with their rings.
         stage: Cameras from the cover.
     """
-    required = scene.requirements
+    required, scene = scene.requirements, scene.among(projectors)
     rows = lit_samples(scene, projectors, scene.target_samples(_SPREAD_ROWS, _STREAM))
     samples = rows.target.samples
 
@@ -94,8 +103,9 @@ def spread(
             replace(camera, world_from_device=pose)
             for camera, pose in zip(stage.cameras, poses, strict=True)
         ]
-        return measured_by(scene, moved, rows)
+        return _measured_among(scene, tuple(projectors), moved, rows, spared)
 
+    spared = int(lit_among(projectors, rows, stage.cameras).any(axis=1).sum())
     return spread_cameras(
         stage.cameras,
         measure,
@@ -122,6 +132,32 @@ def spread(
             rows.lit,
         ),
     )
+
+
+def _measured_among(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    spared: int,
+) -> NDArray[np.bool_]:
+    """Return which camera measures which sample; none where their bodies don't fit.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned.
+        cameras: As they are to stand.
+        rows: Samples lit, were there no cameras.
+        spared: How many must stay lit.
+    """
+    if all(camera.body is None or camera.existing for camera in cameras):
+        return measured_by(scene, cameras, rows)
+    among = scene.among((*projectors, *cameras))
+    lit = lit_among(projectors, rows, cameras)
+    fits = not any(lacks_room(among, camera) for camera in cameras)
+    if not fits or lit.any(axis=1).sum() < spared:
+        return np.zeros((len(rows.target), len(cameras)), dtype=bool)
+    return measured_by(among, cameras, replace(rows, lit=lit))
 
 
 def _better(new: CameraCover, old: CameraCover) -> bool:

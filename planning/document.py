@@ -132,7 +132,14 @@ def coverage_entry(claims: Claims) -> dict[str, Any]:
         "uncovered_by_cause": claims.uncovered_by_cause,
         "unreachable_by_cause": claims.unreachable_by_cause,
         "unreachable_inside_m2": claims.unreachable_inside_m2,
+        **_by_body(claims),
     }
+
+
+def _by_body(claims: Claims) -> dict[str, Any]:
+    """What bodies keep from being measured; nothing where no device has one."""
+    areas = claims.blocked_by_body_m2
+    return {"blocked_by_body_m2": areas} if areas else {}
 
 
 def _existing(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:

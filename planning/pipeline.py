@@ -11,6 +11,7 @@ from geometry.mesh import TriangleMesh
 from geometry.refinement import cut_for_curvature
 
 from .assemble import falls_short, write_plan
+from .camera_bodies import light_to_spare
 from .camera_stage import place_cameras, spread
 from .cameras import CameraStage
 from .continuous import DEFAULT, PROVE, prove_fewest
@@ -184,7 +185,10 @@ def _placed(
         camera = PlannedCamera(
             "", np.eye(4), rig.camera_device(), body=rig.camera_body()
         )
-        solution = place_cameras(scene, projectors, camera, n_cameras, tilt)
+        spare = light_to_spare(scene, stage, projectors) if camera.body else 0.0
+        solution = place_cameras(
+            scene, projectors, camera, n_cameras, tilt, spare_light=spare
+        )
         cameras = solution.stage
         clock.say(
             f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "
@@ -239,8 +243,9 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
                 f"{1e3 * moved.smallest_after_m:.0f} mm"
             )
     with clock.stage("rings", "rings: radii for the surface and the cameras"):
+        scene = draft.scene.among((*draft.projectors, *moved.cameras))
         rings = space_rings(
-            draft.scene, draft.projectors, moved.cameras, draft.order.rig.ring_spacing
+            scene, draft.projectors, moved.cameras, draft.order.rig.ring_spacing
         )
     return replace(draft, cameras=moved.cameras, rings=rings)
 

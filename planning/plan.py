@@ -244,9 +244,7 @@ def _camera(entry: dict[str, Any]) -> PlannedCamera:
         (k1, k2, p1, p2, k3),
     )
     pose = _pose(entry, "world_from_device")
-    return PlannedCamera(
-        entry["id"], pose, device, _existing(entry), Body.read(entry)
-    )
+    return PlannedCamera(entry["id"], pose, device, _existing(entry), Body.read(entry))
 
 
 def _existing(entry: dict[str, Any]) -> str:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from solvers import solve_cover
 
 from . import lighting
+from .body_conflicts import LitCrowd, settle, settle_others
+from .body_room import offered_with_room, with_room
 from .candidates import projector_candidates, projectors_around
 from .errors import InfeasibleLimitsError
 from .existing import existing_projectors, movable
@@ -19,6 +21,7 @@ from .projector_light import lit_margins, lit_stages, merged
 from .relaxations import nothing_lit
 from .scene import Scene
 from .selection import (
+    BODIES_LEFT_OUT,
     Selection,
     certificate,
     cover_problem,
@@ -88,9 +91,12 @@ def plan_projectors(
     required = scene.requirements
     # Those that stand already come first, and are in every cover.
     candidates = existing_projectors(required, template, ring_offset)
-    candidates += projector_candidates(
-        template, required.workspace, n_candidates, ring_offset=ring_offset
-    )
+
+    def lattice(n: int) -> tuple[PlannedProjector, ...]:
+        space = required.workspace
+        return projector_candidates(template, space, n, ring_offset=ring_offset)
+
+    candidates += offered_with_room(scene, n_candidates, lattice)
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
@@ -103,6 +109,7 @@ def plan_projectors(
         n_lattice,
         ring_offset=ring_offset,
     )
+    around = with_room(scene, around)
     stages = np.concatenate([stages, lit_stages(scene, around, rows)], axis=1)
     candidates += around
     attempt = 0
@@ -194,7 +201,10 @@ def with_more(
     if selection.needed >= stage.certificate["needed"]["count"]:
         return stage
     every = stage.reference + more
-    return _stage(scene, every, stage.rows, stages, selection, selection.chosen)
+    found = _stage(scene, every, stage.rows, stages, selection, selection.chosen)
+    # Bodies in each other's way may cost what fewer would have saved.
+    fewer = found.certificate["needed"]["count"] < stage.certificate["needed"]["count"]
+    return found if fewer else stage
 
 
 def _good_cover(scene: Scene, stages: NDArray[np.int8]) -> NDArray[np.int64]:
@@ -232,7 +242,21 @@ def _stage(
     most_area: NDArray[np.int64],
 ) -> ProjectorStage:
     lit, given = stages == lighting.LIT, _n_given(scene)
+    crowd, as_before = LitCrowd(candidates, rows, lit), selection
+    selection = settle(
+        crowd,
+        lit,
+        selection,
+        max_count=scene.requirements.max_projectors,
+        seed=scene.seed,
+        given=given,
+    )
+    if selection is not as_before:
+        most_area = selection.chosen
     others = marginals(lit, selection, seed=scene.seed, given=given)
+    others = settle_others(
+        crowd, lit, others, len(selection.chosen), seed=scene.seed, given=given
+    )
     proof = certificate(
         selection,
         others,
@@ -241,6 +265,8 @@ def _stage(
         n_candidates=len(candidates),
         given=given,
     )
+    if crowd.bodied:
+        proof["bounds_leave_out"] = BODIES_LEFT_OUT
     proof["excluded_pairs"] = {
         cause: int((stages == index).sum())
         for index, cause in enumerate(lighting.CAUSES)

@@ -40,10 +40,7 @@ def turn_ring_axes(
         rows: Lit samples.
         tilt: Tilt of the axes, or their shift, as `ring_frame` takes it.
     """
-    views = [
-        view_of(scene, c, rows.target)
-        for c in cameras
-    ]
+    views = [view_of(scene, c, rows.target) for c in cameras]
     turned = list(projectors)
     scores = np.stack(
         [_scores(scene, rows, p, views, rings) for p, rings in enumerate(rows.rings)]

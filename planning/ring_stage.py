@@ -152,10 +152,7 @@ def _draw(
         scene.surface_samples(_SAMPLES, stream + 1),
     )
     rows = lit_samples(scene, even, both)
-    views = tuple(
-        view_of(scene, c, rows.target)
-        for c in cameras
-    )
+    views = tuple(view_of(scene, c, rows.target) for c in cameras)
     return _Draw(rows, views, best_pitch(scene, even, views, rows))
 
 

@@ -111,9 +111,21 @@ def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
         verb = deed if proof["count"] > 1 else deed.replace(" ", "s ", 1)
         yield (
             f"{proof['count']} {devices} {verb.format(_percent(share))}, "
-            f"{_percent(required)} is required. What would help: "
+            f"{_percent(required)} is required{_bodies(document)}. What would help: "
             f"{_more(kind, proof['needed'], asked, share)}"
         )
+
+
+def _bodies(document: dict[str, Any]) -> str:
+    """Whose bodies stand in the way of how much, the largest area first."""
+    areas = document["coverage"].get("blocked_by_body_m2", {})
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
+    told = [
+        f"{1e6 * area:.0f} mm² blocked by the body of {name}"
+        for name, area in ranked
+        if area > 0.0
+    ]
+    return f" ({', '.join(told)})" if told else ""
 
 
 def _more(kind: str, needed: dict[str, Any], asked: Requirements, share: float) -> str:

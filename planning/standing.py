@@ -1,4 +1,4 @@
-"""Bodies of devices in the world: what they keep light and views from, and collide with.
+"""Bodies of devices in the world: what they stand in the way of, and collide with.
 
 A body blocks the beams and the views of every device but its own. Light leaves a point,
 or in parallel light the plane of the panel, and ends at the sample.

@@ -64,6 +64,7 @@ _EXCLUDED = {
     "projector_incidence": "beyond the incidence limit",
     "tangent_angle": "too near the steep direction",
     "projector_occlusion": "in shadow",
+    "projector_body": "behind a device's body",
 }
 
 
@@ -221,6 +222,7 @@ def _excluded(proof: dict[str, Any]) -> list[str]:
     told = [
         f"{100.0 * excluded[cause] / pairs:.1f} % {words}"
         for cause, words in _EXCLUDED.items()
+        if cause in excluded
     ]
     lit = 100.0 * (1.0 - sum(excluded.values()) / pairs)
     return [
