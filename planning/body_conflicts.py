@@ -124,7 +124,8 @@ def settle(
     chosen, required = selection.chosen, min(selection.required, selection.best_rows)
     more = max(len(chosen), selection.needed) + MORE
     most = more if max_count is None else max_count
-    wanted = _Wanted(required, most, given, seed)
+    spare = max(selection.best_rows - required, int((1.0 - _HELD) * required))
+    wanted = _Wanted(required, spare, most, given, seed)
     settled, rows = _settled(crowd, covers.shape[1], chosen, wanted)
     if np.array_equal(settled, np.sort(chosen)) and rows == selection.best_rows:
         return selection
@@ -177,17 +178,27 @@ def settle_others(
     by_count = dict(others.by_count)
     for count, chosen in others.by_count.items():
         if count != taken:
-            held = int(_HELD * covers[:, chosen].any(axis=1).sum())
-            wanted = _Wanted(held, count, given, seed)
+            rows = int(covers[:, chosen].any(axis=1).sum())
+            held = int(_HELD * rows)
+            wanted = _Wanted(held, rows - held, count, given, seed)
             by_count[count], _ = _settled(crowd, covers.shape[1], chosen, wanted)
     return replace(others, by_count=by_count)
 
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Rows to be covered, by how many at most, with the first ones whatever."""
+    """What is asked of candidates that bear each other.
+
+    Attributes:
+        required: Rows to be covered.
+        spare: Rows that one of them may take from those that stood before it.
+        most: Candidates allowed.
+        given: First candidates that are taken whatever they cover.
+        seed: Of the heuristics.
+    """
 
     required: int
+    spare: int
     most: int
     given: int
     seed: int
@@ -214,13 +225,33 @@ def _settled(
             standing = [*standing, left[int(np.argmax(alone))]]
         elif len(tried) >= wanted.most:
             break
-        completed = _completed(crowd.covers(standing, every), standing, tried, wanted)
+        covers = _harmless(crowd, standing, every, wanted.spare)
+        completed = _completed(covers, standing, tried, wanted)
         if not left and completed == tried:
             break
         tried = completed
     if best_rows < 0:
         best_rows = int(crowd.covers(best, best).any(axis=1).sum())
     return np.array(sorted(best), dtype=np.int64), best_rows
+
+
+def _harmless(
+    crowd: Crowd, standing: list[int], every: list[int], spare: int
+) -> NDArray[np.bool_]:
+    """What candidates cover; nothing where they cost those that stand more than spare.
+
+    A cover can't count rows that a member takes away, so who takes many isn't offered.
+    """
+    covers = crowd.covers(standing, every)
+    before = int(covers[:, standing].any(axis=1).sum())
+    if before <= spare:
+        return covers
+    for column in np.flatnonzero(covers.any(axis=0)):
+        if column not in standing:
+            left = crowd.covers([*standing, int(column)], standing)
+            if before - int(left.any(axis=1).sum()) > spare:
+                covers[:, column] = False
+    return covers
 
 
 def _completed(

@@ -17,8 +17,9 @@ from .standing import CLEARANCE_M, Device, collide, placed_box
 from .zones import Box
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
-# How often a lattice is refined for candidates that have no room.
+# A lattice is refined this often, to so many poses for each wanted, to leave enough.
 _ROUNDS = 4
+_MOST_OFFERED = 20
 
 
 def lacks_room(scene: Scene, device: Device) -> str:
@@ -61,7 +62,8 @@ def offered_with_room(
         kept = with_room(scene, candidates)
         if len(kept) >= min(n, len(candidates)):
             return kept
-        offered = int(np.ceil(1.1 * offered * n / max(len(kept), 0.1 * n)))
+        more = np.ceil(1.1 * offered * n / max(len(kept), 1))
+        offered = int(min(more, _MOST_OFFERED * n))
     if not kept:
         raise InfeasibleLimitsError(_no_room(scene, candidates))
     return kept
