@@ -129,19 +129,23 @@ def settle(
     settled, rows = _settled(crowd, covers.shape[1], chosen, wanted)
     if np.array_equal(settled, np.sort(chosen)) and rows == selection.best_rows:
         return selection
-    smallest = settled
-    if rows < selection.required:
+    smallest, met = settled, rows >= selection.required
+    but_for_bodies = None
+    if len(settled) > selection.needed:
+        but_for_bodies = selection.needed
+    if not met:
         # How many would do it, were more allowed.
         wanted = replace(wanted, required=selection.required, most=more)
         enough, there = _settled(crowd, covers.shape[1], selection.smallest, wanted)
         found = enough if there >= selection.required else selection.smallest
         smallest = max((found, settled), key=len)
+        if found is not enough or len(enough) > selection.needed:
+            but_for_bodies = selection.needed
     bound = selection.best_rows_bound
     if len(settled) != len(chosen):
         problem = cover_problem(covers, required, given)
         best = solve_max_coverage(problem, len(settled), seed=seed, budget=_BUDGET)
         bound = int(np.floor(best.upper_bound + 1e-6))
-    met = rows >= selection.required
     proved = selection.lower_bound >= len(settled)
     status = ("optimal" if proved else "feasible") if met else "infeasible"
     return replace(
@@ -151,6 +155,7 @@ def settle(
         status=status,
         best_rows=rows,
         best_rows_bound=bound,
+        but_for_bodies=but_for_bodies,
     )
 
 
@@ -270,5 +275,5 @@ def _completed(
         ).selected
         if covers[:, found].any(axis=1).sum() >= wanted.required:
             break
-    serves = covers.any(axis=0)
+    serves = np.asarray(covers.any(axis=0))
     return sorted(i for i in map(int, found) if serves[i] or i in standing)

@@ -17,8 +17,7 @@ from .standing import CLEARANCE_M, Device, collide, placed_box
 from .zones import Box
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
-# A lattice is refined this often, to so many poses for each wanted, to leave enough.
-_ROUNDS = 4
+# Poses that are tried for each wanted, at most.
 _MOST_OFFERED = 20
 
 
@@ -56,14 +55,14 @@ def offered_with_room(
     Raises:
         InfeasibleLimitsError: If no candidate's body has room.
     """
-    offered = n
-    for _ in range(_ROUNDS):
+    offered, most = n, _MOST_OFFERED * n
+    while True:
         candidates = offer(offered)
         kept = with_room(scene, candidates)
-        if len(kept) >= min(n, len(candidates)):
-            return kept
+        if len(kept) >= min(n, len(candidates)) or offered >= most:
+            break
         more = np.ceil(1.1 * offered * n / max(len(kept), 1))
-        offered = int(min(more, _MOST_OFFERED * n))
+        offered = int(min(more, most))
     if not kept:
         raise InfeasibleLimitsError(_no_room(scene, candidates))
     return kept

@@ -111,12 +111,12 @@ def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
         verb = deed if proof["count"] > 1 else deed.replace(" ", "s ", 1)
         yield (
             f"{proof['count']} {devices} {verb.format(_percent(share))}, "
-            f"{_percent(required)} is required{_bodies(document)}. What would help: "
-            f"{_more(kind, proof['needed'], asked, share)}"
+            f"{_percent(required)} is required{_bodies(document, proof)}. What would "
+            f"help: {_more(kind, proof, asked, share)}"
         )
 
 
-def _bodies(document: dict[str, Any]) -> str:
+def _bodies(document: dict[str, Any], proof: dict[str, Any]) -> str:
     """Whose bodies stand in the way of how much, the largest area first."""
     areas = document["coverage"].get("blocked_by_body_m2", {})
     ranked = sorted(areas.items(), key=lambda pair: -pair[1])
@@ -125,14 +125,22 @@ def _bodies(document: dict[str, Any]) -> str:
         for name, area in ranked
         if area > 0.0
     ]
+    if "but_for_bodies" in proof:
+        told.append(
+            f"{proof['but_for_bodies']} would do if their bodies didn't collide or "
+            f"stand in each other's way"
+        )
     return f" ({', '.join(told)})" if told else ""
 
 
-def _more(kind: str, needed: dict[str, Any], asked: Requirements, share: float) -> str:
+def _more(kind: str, proof: dict[str, Any], asked: Requirements, share: float) -> str:
+    needed = proof["needed"]
     allowed = getattr(asked, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {_down(share)} accepts this plan"
-    if allowed is None or needed["count"] <= allowed:
+    # Where bodies are in the way, more devices may be no help.
+    in_vain = needed["count"] <= proof.get("but_for_bodies", 0)
+    if allowed is None or needed["count"] <= allowed or in_vain:
         return accept
     bound = (
         "proved over the candidates"

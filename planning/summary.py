@@ -241,7 +241,10 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
     name = f"{kind}s"
     if needed["count"] > count:
         have = f"at least {needed['lower_bound']} {name} are needed"
-        return f"PROVED   {have}, {needed['count']} suffice, {scope}"
+        enough = f"{needed['count']} suffice"
+        if needed["count"] <= proof.get("but_for_bodies", 0):
+            enough += " but for their bodies"
+        return f"PROVED   {have}, {enough}, {scope}"
     if proof["status"] == "optimal":
         one = count == 1
         return (

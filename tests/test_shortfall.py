@@ -77,6 +77,16 @@ def test_bodies_that_are_in_the_way_are_named(plan):
     assert f"is required ({words}). What would help" in line
     assert "P1" not in line
     assert missed(plan, blocked=blocked) == ()
+    document = copy.deepcopy(plan.document)
+    proof = document["certificates"]["projectors"]
+    proof |= {"count": 2, "needed": {"count": 3, "lower_bound": 3}}
+    proof["but_for_bodies"] = 3
+    asked = dataclasses.replace(plan.requirements, dominant_coverage=1.0)
+    target = document["coverage"]["target"]
+    target["lit_m2"] = 0.5 * target["reachable_by_projectors_m2"]
+    line = next(s for s in shortfalls(document, asked) if "2 projectors light" in s)
+    assert "3 would do if their bodies didn't collide" in line
+    assert "--max-projectors" not in line
 
 
 def test_a_failed_check_lists_its_own_sentences(plan):
