@@ -353,7 +353,7 @@ def settled(devices, lit, share, max_count=None):
 
 SIDE_BY_SIDE = [
     projector(0.0, body=HOUSING),
-    projector(0.05, body=HOUSING),
+    projector(0.08, body=HOUSING),
     projector(1.0, body=HOUSING),
     projector(-1.0, body=HOUSING),
 ]
@@ -443,15 +443,19 @@ def test_moves_into_anothers_body_or_beam_are_refused(scene):
     assert 0.1 < np.isinf(under[:, 0]).mean() < 0.2
     lit = lit_samples(scene, lamps, rows)
 
-    def measure(x, z):
-        eyes = [camera(x, 0.5, z), camera(-0.5, 0.5, 1.0)]
-        return _measured_among(
-            scene.among(lamps), tuple(lamps), eyes, lit, len(lit.target)
-        )
+    def measure(x, y, spared):
+        eyes = [camera(x, y, 0.8), camera(-0.5, 0.5, 0.8)]
+        return _measured_among(scene.among(lamps), tuple(lamps), eyes, lit, spared)
 
-    eyes = [camera(0.5, 0.5, 1.0), camera(-0.5, 0.5, 1.0)]
-    assert np.array_equal(measure(0.5, 1.0), measured_by(scene, eyes, lit))
-    assert not measure(-0.45, 1.0).any()
+    n = len(lit.target)
+    eyes = [camera(0.5, 0.5, 0.8), camera(-0.5, 0.5, 0.8)]
+    expected = measured_by(scene, eyes, lit)
+    assert expected.any()
+    assert np.array_equal(measure(0.5, 0.5, n), expected)
+    assert not measure(-0.45, 0.5, n).any()
+    # In the beams of both it takes light for good.
+    assert measure(0.1, 0.0, 0).any()
+    assert not measure(0.1, 0.0, n).any()
 
 
 # ---- rig files
