@@ -411,9 +411,10 @@ def test_without_bodies_nothing_is_looked_at():
 
 
 def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
-    lamp, eyes = projector(), [camera(), camera(0.6, 0.0, 1.0, name="C2")]
+    places = [(0.02, 0.01, 0.6), (0.6, 0.0, 1.0), (0.68, 0.0, 1.0), (0.3, 0.0, 1.0)]
+    lamp, eyes = projector(), [camera(*place) for place in places]
     rows = lit_samples(scene, [lamp], scene.target_samples(2000, 9))
-    measured = np.ones((len(rows.target), 2), dtype=bool)
+    measured = np.ones((len(rows.target), len(eyes)), dtype=bool)
     low, high = shadow_of_housing("diverging")
     points = rows.target.samples.points[:, :2]
     dark = np.all((points > low) & (points < high), axis=1)
@@ -430,6 +431,13 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
     assert not covers[dark].any()
     # What stays lit is measured anew where the light on it changed, else as before.
     assert covers[~dark].all()
+    # The third is too near to the second; the first stands in the view of the fourth.
+    assert not lax.stand_together([1, 2])
+    assert lax.covers([1], [1, 2]).sum(axis=0).tolist() == [len(dark), 0]
+    body, aside = bodies_of(eyes[:1])[0].box, np.array(places[3])
+    hidden = lines_cross(body, aside, rows.target.samples.points)
+    assert 0 < (hidden & ~dark).sum() < len(dark)
+    assert np.array_equal(lax.covers([0], [3])[:, 0], ~hidden & ~dark)
 
 
 def test_moves_into_anothers_body_or_beam_are_refused(scene):
@@ -454,7 +462,7 @@ def test_moves_into_anothers_body_or_beam_are_refused(scene):
     expected = measured_by(scene, eyes, lit)
     assert expected.any()
     assert np.array_equal(measure(0.5, 0.5, n), expected)
-    assert not measure(-0.45, 0.5, n).any()
+    assert not measure(-0.42, 0.5, n).any()
     # In the beam it takes light for good.
     assert measure(0.1, 0.0, 0).any()
     assert not measure(0.1, 0.0, n).any()
