@@ -39,6 +39,7 @@ def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
     )
     devices = Devices(projectors, cameras, reference, reference_cameras)
     scene = draft.scene
+    standing = scene.among((*projectors, *cameras))
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
         marginal = [
@@ -61,7 +62,15 @@ def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
         np.stack([c.world_from_device for c in reference_cameras]),
     )
     requirements = _final_requirements(draft, claims, devices)
-    document = _document(draft, clock, devices, claims, requirements, marginal, surface)
+    document = _document(
+        replace(draft, scene=standing),
+        clock,
+        devices,
+        claims,
+        requirements,
+        marginal,
+        surface,
+    )
     plan = RigPlan(document, surface)
     areas = document["coverage"]["target"]
     reachable, whole = "reachable_by_projectors_m2", "area_m2"
@@ -88,7 +97,8 @@ def _final_requirements(draft: Draft, claims: Claims, devices: Devices) -> Requi
         n_reference_projectors=len(devices.reference_projectors),
         n_reference_cameras=len(devices.reference_cameras),
     )
-    gap = widest_gap(draft.scene, devices.projectors, claims.target_samples)
+    scene = draft.scene.among((*devices.projectors, *devices.cameras))
+    gap = widest_gap(scene, devices.projectors, claims.target_samples)
     check = replace(requirements.check, tau_m=round(gap, 6))
     return replace(requirements, workspace=workspace, check=check)
 

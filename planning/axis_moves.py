@@ -21,6 +21,7 @@ from .plan import PlannedCamera, PlannedProjector
 from .requirements import TriangulationLimits
 from .rings import ring_axis, ring_frame, ring_frame_of_axis
 from .scene import Scene
+from .sights import view_of
 
 _SWEEPS = 2
 _STEPS = (1.0, 0.5, 0.25)
@@ -76,12 +77,7 @@ class AxisJudge:
         rows: LitSamples,
     ) -> None:
         self.scene, self.rows = scene, rows
-        self.views = tuple(
-            measurability.view(
-                c, rows.target, scene.requirements.camera, scene.visibility
-            )
-            for c in cameras
-        )
+        self.views = tuple(view_of(scene, c, rows.target) for c in cameras)
         self.sigma = np.stack(
             [self.sigma_with(projector, p) for p, projector in enumerate(projectors)]
         )

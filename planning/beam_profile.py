@@ -83,6 +83,7 @@ def cast_beam(
     stage = lighting.first_failure_in_the_open(
         projector, met, scene.requirements.projector
     )
+    lighting.mark_blocked(stage, projector, points, scene.standing)
     ring = points - projector.world_from_ring[:3, 3]
     heights = ring @ projector.world_from_ring[:3, 2]
     return BeamProfile(

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis_moves import move_ring_axes
+from .body_room import lacks_room
+from .camera_bodies import lit_among, settled_cover
 from .camera_spread import CameraSpread, spread_cameras
 from .cameras import (
     CameraCover,
     CameraStage,
+    LitSamples,
     camera_stage,
     lit_samples,
     measured_by,
@@ -51,6 +54,8 @@ def place_cameras(
     template: PlannedCamera,
     n_candidates: int,
     tilt: float,
+    *,
+    spare_light: float = 0.0,
 ) -> CameraSolution:
     """Choose cameras and ring axes: azimuths of one tilt first, then any axis.
 
@@ -60,15 +65,24 @@ def place_cameras(
         template: Optics of the camera.
         n_candidates: Poses offered.
         tilt: Tilt of the ring axes, or their shift, to search azimuths of.
+        spare_light: Share of what is lit that bodies of cameras may keep dark.
     """
+    scene = scene.among(projectors)
     offered = offered_cameras(scene, template, n_candidates)
-    turned, cover = choose_cameras(scene, projectors, offered, tilt)
-    moved, cover = move_axes(scene, turned, cover)
+    turned, cover = choose_cameras(
+        scene, projectors, offered, tilt, spare_light=spare_light
+    )
+    moved, cover = move_axes(scene, turned, cover, spare_light=spare_light)
     return CameraSolution(moved, camera_stage(scene, cover))
 
 
 def choose_cameras(
-    scene: Scene, projectors: Sequence[PlannedProjector], offered: Sights, tilt: float
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    offered: Sights,
+    tilt: float,
+    *,
+    spare_light: float = 0.0,
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
     """Choose cameras, turn the ring axes for them, and choose again until it settles.
 
@@ -76,18 +90,19 @@ def choose_cameras(
     certificate always belongs to the ring axes that are kept.
 
     Args:
-        scene: Surface and requirements.
+        scene: With the bodies of the projectors.
         projectors: As planned.
         offered: Candidates, from `offered_cameras`.
         tilt: Tilt of the ring axes, or their shift.
+        spare_light: Share of what is lit that bodies of cameras may keep dark.
     """
     kept = tuple(projectors)
-    best = plan_cameras(scene, kept, offered)
+    best = _cover(scene, kept, offered, spare_light)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
         if not _differ(turned, kept):
             break
-        cover = plan_cameras(scene, turned, offered)
+        cover = _cover(scene, turned, offered, spare_light)
         if not _better(cover, best):
             break
         kept, best = turned, cover
@@ -95,7 +110,11 @@ def choose_cameras(
 
 
 def move_axes(
-    scene: Scene, projectors: Sequence[PlannedProjector], cover: CameraCover
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cover: CameraCover,
+    *,
+    spare_light: float = 0.0,
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
     """Move the ring axes to where errors are smallest, and choose cameras again.
 
@@ -104,16 +123,18 @@ def move_axes(
     or less is measured.
 
     Args:
-        scene: Surface and requirements.
+        scene: With the bodies of the projectors.
         projectors: As planned.
         cover: Cameras chosen for these ring axes.
+        spare_light: As for `choose_cameras`.
     """
     kept = tuple(projectors)
     for _ in range(_ROUNDS):
-        moved = move_ring_axes(scene, kept, cover.cameras, cover.rows)
+        among = scene.among((*kept, *cover.cameras))
+        moved = move_ring_axes(among, kept, cover.cameras, cover.rows)
         if not _differ(moved, kept):
             break
-        again = plan_cameras(scene, moved, cover.offered)
+        again = _cover(scene, moved, cover.offered, spare_light)
         if _better(cover, again):
             break
         as_chosen = with_cameras(again, cover)
@@ -126,7 +147,11 @@ def move_axes(
 def with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
     """Return a cover with the cameras of one before; None where that loses too much."""
     selection, chosen = cover.selection, before.selection.chosen
-    rows = int(cover.measured[:, chosen].any(axis=1).sum())
+    measured = cover.measured[:, chosen]
+    if cover.crowd is not None and cover.crowd.bodied:
+        each = chosen.tolist()
+        measured = cover.crowd.covers(each, each)
+    rows = int(measured.any(axis=1).sum())
     least = min(selection.required, selection.best_rows)
     least = max(least, int(np.ceil((1.0 - _SPARE) * selection.best_rows)))
     if len(chosen) != len(selection.chosen) or rows < least:
@@ -139,6 +164,8 @@ def follow_cameras(
     projectors: Sequence[PlannedProjector],
     cameras: Sequence[PlannedCamera],
     stage: CameraStage,
+    *,
+    spare_light: float = 0.0,
 ) -> CameraSolution:
     """Move the ring axes for cameras that have left the candidates' poses.
 
@@ -151,10 +178,13 @@ def follow_cameras(
         projectors: As planned, with even rings.
         cameras: As they stand.
         stage: Of these projectors; as many cameras as these.
+        spare_light: As for `choose_cameras`.
     """
-    moved = move_ring_axes(scene, projectors, cameras, stage.rows)
+    among = scene.among((*projectors, *cameras))
+    moved = move_ring_axes(among, projectors, cameras, stage.rows)
     if _differ(moved, projectors):
-        cover = plan_cameras(scene, moved, stage.offered)
+        scene = scene.among(projectors)
+        cover = _cover(scene, moved, stage.offered, spare_light)
         if proves_as_much(cover.selection, stage.certificate, len(cameras)):
             return CameraSolution(moved, camera_stage(scene, cover))
     return CameraSolution(tuple(projectors), stage)
@@ -189,7 +219,7 @@ def spread(
         projectors: As planned, with their rings.
         stage: Cameras from the cover.
     """
-    required = scene.requirements
+    required, scene = scene.requirements, scene.among(projectors)
     rows = lit_samples(scene, projectors, scene.target_samples(_SPREAD_ROWS, _STREAM))
     samples = rows.target.samples
 
@@ -198,8 +228,9 @@ def spread(
             replace(camera, world_from_device=pose)
             for camera, pose in zip(stage.cameras, poses, strict=True)
         ]
-        return measured_by(scene, moved, rows)
+        return _measured_among(scene, tuple(projectors), moved, rows, spared)
 
+    spared = int(lit_among(projectors, rows, stage.cameras).any(axis=1).sum())
     return spread_cameras(
         stage.cameras,
         measure,
@@ -226,6 +257,43 @@ def spread(
             rows.lit,
         ),
     )
+
+
+def _cover(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    offered: Sights,
+    spare_light: float,
+) -> CameraCover:
+    """The fewest cameras for these ring axes, that bear each other's bodies."""
+    cover = plan_cameras(scene, projectors, offered)
+    return settled_cover(scene, projectors, cover, spare_light)
+
+
+def _measured_among(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    spared: int,
+) -> NDArray[np.bool_]:
+    """Return which camera measures which sample; none where their bodies don't fit.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned.
+        cameras: As they are to stand.
+        rows: Samples lit, were there no cameras.
+        spared: How many must stay lit.
+    """
+    if all(camera.body is None or camera.existing for camera in cameras):
+        return measured_by(scene, cameras, rows)
+    among = scene.among((*projectors, *cameras))
+    lit = lit_among(projectors, rows, cameras)
+    fits = not any(lacks_room(among, camera) for camera in cameras)
+    if not fits or lit.any(axis=1).sum() < spared:
+        return np.zeros((len(rows.target), len(cameras)), dtype=bool)
+    return measured_by(among, cameras, replace(rows, lit=lit))
 
 
 def _differ(a: Sequence[PlannedProjector], b: Sequence[PlannedProjector]) -> bool:

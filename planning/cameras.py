@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import lighting, measurability
+from .body_conflicts import Crowd, settle_others
+from .body_room import offered_with_room
 from .candidates import camera_candidates
 from .errors import InfeasibleLimitsError
 from .existing import existing_cameras
@@ -16,8 +18,14 @@ from .measurability import Rings
 from .plan import PlannedCamera, PlannedProjector
 from .projector_light import lit_stages, merged
 from .scene import Scene
-from .selection import Selection, certificate, marginals, select_fewest
-from .sights import Sight, Sights, sights_of
+from .selection import (
+    BODIES_LEFT_OUT,
+    Selection,
+    certificate,
+    marginals,
+    select_fewest,
+)
+from .sights import Sight, Sights, sights_of, view_of
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
@@ -51,12 +59,14 @@ class CameraCover:
         rows: Lit samples that the cover was solved on.
         measured: Which candidate measures which sample, shape (n, m).
         selection: Candidates taken, and what was proved of their number.
+        crowd: The candidates among each other's bodies, where they have any.
     """
 
     offered: Sights
     rows: LitSamples
     measured: NDArray[np.bool_]
     selection: Selection
+    crowd: Crowd | None = None
 
     @property
     def cameras(self) -> tuple[PlannedCamera, ...]:
@@ -161,7 +171,11 @@ def offered_cameras(scene: Scene, template: PlannedCamera, n_candidates: int) ->
     required = scene.requirements
     candidates = existing_cameras(required, template)
     site = scene.site("camera", template.device)
-    candidates += camera_candidates(template, required.workspace, n_candidates, site)
+
+    def lattice(n: int) -> tuple[PlannedCamera, ...]:
+        return camera_candidates(template, required.workspace, n, site)
+
+    candidates += offered_with_room(scene, n_candidates, lattice)
     return Sights(scene, candidates)
 
 
@@ -213,6 +227,16 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     """Return what the stage found, with the best cameras for every other count."""
     given = _n_given(scene)
     others = marginals(cover.measured, cover.selection, seed=scene.seed, given=given)
+    bodied = cover.crowd is not None and cover.crowd.bodied
+    if cover.crowd is not None:
+        others = settle_others(
+            cover.crowd,
+            cover.measured,
+            others,
+            len(cover.selection.chosen),
+            seed=scene.seed,
+            given=given,
+        )
     target, candidates = cover.rows.target, cover.offered.cameras
     return CameraStage(
         cover.cameras,
@@ -229,7 +253,8 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
             row_area_m2=target.samples.weight,
             n_candidates=len(candidates),
             given=given,
-        ),
+        )
+        | ({"bounds_leave_out": BODIES_LEFT_OUT} if bodied else {}),
     )
 
 
@@ -248,9 +273,7 @@ def furthest_failure(
     required = scene.requirements
     for camera in cameras:
         scene.pulse()
-        seen = measurability.view(
-            camera, rows.target, required.camera, scene.visibility
-        )
+        seen = view_of(scene, camera, rows.target)
         furthest = np.maximum(furthest, seen.stage)
         clear = np.flatnonzero(seen.stage == measurability.SEEN)
         for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):

@@ -15,6 +15,8 @@ from .lighting import Target
 from .plan import PlannedCamera, PlannedProjector
 from .projector_light import lit_stages, margins_of
 from .scene import Scene
+from .sights import view_of
+from .standing import Device, blocked_by
 
 N_SAMPLES = 12_000
 _TARGET_STREAM = 900
@@ -63,6 +65,8 @@ class Claims:
         regions: `lit_by` and `lit_fraction` of each region.
         target_samples: The samples behind the target's figures.
         measured_by: Which camera measures which of those, (n, n_cameras).
+        blocked_by_body_m2: Target area that isn't measured and from which the body of
+            each device keeps light or a view.
     """
 
     surface: Areas
@@ -77,15 +81,17 @@ class Claims:
     regions: tuple[dict[str, Any], ...]
     target_samples: Target
     measured_by: NDArray[np.bool_]
+    blocked_by_body_m2: dict[str, float]
 
 
 def make_claims(scene: Scene, devices: Devices) -> Claims:
     """Recompute every area from poses as they will be written."""
+    planned = scene.among((*devices.projectors, *devices.cameras))
     target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
     weight = target.samples.weight
-    stages = lit_stages(scene, devices.projectors, target)
+    stages = lit_stages(planned, devices.projectors, target)
     lit = stages == lighting.LIT
-    seen = _measured_by(scene, devices, target, lit)
+    seen = _measured_by(planned, devices, target, lit)
     measured = _any(seen)
     reachable, furthest = _reachable_by_projectors(scene, devices, target, _any(lit))
     areas = _areas(scene, devices, target, reachable, lit, measured)
@@ -93,7 +99,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
     return Claims(
         _surface_areas(scene, devices),
         areas,
-        _by_cause(_uncovered(scene, devices, target, stages, measured), weight),
+        _by_cause(_uncovered(planned, devices, target, stages, measured), weight),
         _by_cause([lighting.CAUSES[stage] for stage in furthest[~reachable]], weight),
         weight * _n_inside(scene, target.take(~reachable)),
         tuple(weight * lit.sum(axis=0)),
@@ -103,6 +109,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
         _regions(scene, devices, target, lit, served),
         target,
         seen,
+        _blocked_by_body(planned, devices, target, stages, measured),
     )
 
 
@@ -110,7 +117,8 @@ def lit_area(
     scene: Scene, projectors: Sequence[PlannedProjector]
 ) -> tuple[float, float]:
     """Return the area of target and surface that projectors light, in [m²]."""
-    return _union(scene, lambda target: _lit(scene, projectors, target))
+    among = scene.among(projectors)
+    return _union(scene, lambda target: _lit(among, projectors, target))
 
 
 def measured_area(
@@ -119,10 +127,11 @@ def measured_area(
     cameras: Sequence[PlannedCamera],
 ) -> tuple[float, float]:
     """Return the area of target and surface that devices measure, in [m²]."""
+    among = scene.among((*projectors, *cameras))
 
     def measured(target: Target) -> NDArray[np.bool_]:
-        rows = lit_samples(scene, projectors, target)
-        return _any(measured_by(scene, cameras, rows))
+        rows = lit_samples(among, projectors, target)
+        return _any(measured_by(among, cameras, rows))
 
     return _union(scene, measured)
 
@@ -140,8 +149,9 @@ def _union(
 
 def _surface_areas(scene: Scene, devices: Devices) -> Areas:
     surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
-    lit = lit_stages(scene, devices.projectors, surface) == lighting.LIT
-    measured = _any(_measured_by(scene, devices, surface, lit))
+    planned = scene.among((*devices.projectors, *devices.cameras))
+    lit = lit_stages(planned, devices.projectors, surface) == lighting.LIT
+    measured = _any(_measured_by(planned, devices, surface, lit))
     reachable, _ = _reachable_by_projectors(scene, devices, surface, _any(lit))
     return _areas(scene, devices, surface, reachable, lit, measured)
 
@@ -156,12 +166,14 @@ def _areas(
 ) -> Areas:
     weight = target.samples.weight
     by_cameras = measured.copy()
+    # Another camera needn't stand among those that were chosen.
+    among = scene.among(devices.projectors)
     for camera in devices.reference_cameras:
         left = np.flatnonzero(_any(lit) & ~by_cameras)
         if not len(left):
             break
         rows = _lit_rows(devices.projectors, target.take(left), lit[left])
-        by_cameras[left] = measured_by(scene, [camera], rows)[:, 0]
+        by_cameras[left] = measured_by(among, [camera], rows)[:, 0]
     counts = (
         len(target),
         reachable.sum(),
@@ -209,7 +221,11 @@ def _reachable_by_projectors(
         if not len(left):
             break
         stage = lighting.first_failure(
-            projector, target.take(left), scene.requirements.projector, scene.visibility
+            projector,
+            target.take(left),
+            scene.requirements.projector,
+            scene.visibility,
+            bodies=scene.standing,
         )
         reachable[left] = stage == lighting.LIT
         furthest[left] = np.maximum(furthest[left], stage)
@@ -241,6 +257,36 @@ def _uncovered(
     rows = _lit_rows(devices.projectors, target.take(left), lit[left])
     furthest = furthest_failure(scene, devices.cameras, rows)
     return causes + [measurability.CAUSES[stage] for stage in furthest]
+
+
+def _blocked_by_body(
+    scene: Scene,
+    devices: Devices,
+    target: Target,
+    stages: NDArray[np.int8],
+    measured: NDArray[np.bool_],
+) -> dict[str, float]:
+    """Unmeasured area on which nothing but a body stops some device, by body."""
+    if not scene.standing:
+        return {}
+    stopped = np.zeros((len(target), len(scene.standing)), dtype=bool)
+
+    def note(device: Device, rows: NDArray[np.int64]) -> None:
+        points = target.samples.points[rows]
+        stopped[rows] |= blocked_by(scene.standing, device, points)
+
+    for p, projector in enumerate(devices.projectors):
+        note(projector, np.flatnonzero(~measured & (stages[:, p] == lighting.BLOCKED)))
+    left = np.flatnonzero(~measured & _any(stages == lighting.LIT))
+    for camera in devices.cameras:
+        stage = view_of(scene, camera, target.take(left)).stage
+        note(camera, left[stage == measurability.BLOCKED])
+    areas = target.samples.weight * stopped.sum(axis=0)
+    every = (*devices.projectors, *devices.cameras)
+    return {
+        next(d.id for d in every if body.is_of(d)): float(area)
+        for body, area in zip(scene.standing, areas, strict=True)
+    }
 
 
 def _n_inside(scene: Scene, target: Target) -> int:

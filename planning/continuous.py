@@ -21,6 +21,7 @@ from solvers.bit_rows import BitSum, words_for
 from solvers.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cell_problem import CellProblem
 
+from .body_room import with_room
 from .candidates import projectors_towards
 from .direction_cells import DirectionTree
 from .given_bound import enough, given_on
@@ -130,6 +131,7 @@ def prove_fewest(
             ring_offset=ring_offset,
             site=scene.site("projector", template.device),
         )
+        found = with_room(scene, found)
         better = with_more(scene, stage, found) if found else stage
         if better is stage:
             return replace(stage, certificate=_joined(stage.certificate, bound.entry()))

@@ -11,6 +11,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.hollow import Shell
 from geometry.mesh import TriangleMesh
 
+from .bodies import body_entry
 from .claims import Claims
 from .interest import Interest
 from .plan import PlannedCamera, PlannedProjector
@@ -51,6 +52,7 @@ def projector_entries(
             "ring_radii": projector.ring_radii.tolist(),
             "min_margin_rad": claims.min_margin_rad[index],
             "lit_area_m2": claims.lit_area_m2[index],
+            **body_entry(projector.body),
             **_existing(projector),
         }
         for index, projector in enumerate(projectors)
@@ -71,6 +73,7 @@ def camera_entries(
             "range_m": list(camera.device.range_m),
             "seen_area_m2": claims.seen_area_m2[index],
             "sole_area_m2": claims.sole_area_m2[index],
+            **body_entry(camera.body),
             **_existing(camera),
         }
         for index, camera in enumerate(cameras)
@@ -129,7 +132,14 @@ def coverage_entry(claims: Claims) -> dict[str, Any]:
         "uncovered_by_cause": claims.uncovered_by_cause,
         "unreachable_by_cause": claims.unreachable_by_cause,
         "unreachable_inside_m2": claims.unreachable_inside_m2,
+        **_by_body(claims),
     }
+
+
+def _by_body(claims: Claims) -> dict[str, Any]:
+    """What bodies keep from being measured; nothing where no device has one."""
+    areas = claims.blocked_by_body_m2
+    return {"blocked_by_body_m2": areas} if areas else {}
 
 
 def _existing(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:

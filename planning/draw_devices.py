@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import transform
 
+from .bodies import Body
 from .draw_views import facing
 from .plan import PlannedCamera, PlannedProjector, RigPlan
 
@@ -27,7 +28,8 @@ class DeviceFigure:
         id: Its name in the plan.
         kind: What it is.
         position: Its origin in the world [m], shape (3,).
-        body: Outline of a small frustum, or of a parallel projector's panel.
+        body: Outline of a small frustum, or of a parallel projector's panel; and the
+            edges of its housing, where the plan has one.
         beam: Edges of the light or the field of view as far as the object.
         axis: From the origin along the optical axis to the object's depth, (2, 3).
         distance_m: From the origin to the centre of the object [m].
@@ -69,6 +71,8 @@ def _figure(
         local_body, local_beam = _parallel(model, radius, depth)
     else:
         local_body, local_beam = _pinhole(model, body_m, depth)
+    if device.body is not None:
+        local_body = [*local_body, *_housing(device.body)]
     return DeviceFigure(
         device.id,
         "projector" if isinstance(device, PlannedProjector) else "camera",
@@ -127,6 +131,16 @@ def _parallel(
     edges = range(0, len(outline), max(len(outline) // 4, 1))
     beam = [np.array([outline[k], end[k]]) for k in edges]
     return [_closed(panel), tick], [*beam, _closed(outline), _closed(end)]
+
+
+def _housing(body: Body) -> list[NDArray[np.float64]]:
+    """The twelve edges of a body: its back, its front, and what joins them."""
+    x, y, z = body.half_m
+    back = np.array([[-x, -y, -z], [x, -y, -z], [x, y, -z], [-x, y, -z]])
+    back = back + np.array(body.centre_m)
+    front = back + np.array([0.0, 0.0, 2.0 * z])
+    sides = [np.array([a, b]) for a, b in zip(back, front, strict=True)]
+    return [_closed(back), _closed(front), *sides]
 
 
 def _closed(points: NDArray[np.float64]) -> NDArray[np.float64]:

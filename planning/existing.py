@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 
+from .bodies import Body
 from .candidates import aimed_poses
 from .errors import InfeasibleLimitsError
 from .existing_models import ExistingTable
@@ -39,7 +40,7 @@ def build_existing(
         device = projector if table.kind == "projector" else camera
         pose = rounded_pose(_pose(table, workspace, device))
         rows = tuple(tuple(row) for row in pose.tolist())
-        found.append(Existing(table.name, table.kind, rows))
+        found.append(Existing(table.name, table.kind, rows, Body.of(table.body)))
     return tuple(found)
 
 
@@ -79,8 +80,9 @@ def existing_projectors(
             world_from_device=pose,
             world_from_ring=ring_frame(pose, template.device, *ring_offset),
             existing=name,
+            body=body,
         )
-        for name, pose in _poses(required, "projector")
+        for name, pose, body in _poses(required, "projector")
     )
 
 
@@ -89,8 +91,8 @@ def existing_cameras(
 ) -> tuple[PlannedCamera, ...]:
     """Return the cameras that stand already, of a template's optics."""
     return tuple(
-        replace(template, world_from_device=pose, existing=name)
-        for name, pose in _poses(required, "camera")
+        replace(template, world_from_device=pose, existing=name, body=body)
+        for name, pose, body in _poses(required, "camera")
     )
 
 
@@ -99,9 +101,11 @@ def movable(devices: Sequence[_D]) -> list[_D]:
     return [device for device in devices if not device.existing]
 
 
-def _poses(required: Requirements, kind: str) -> list[tuple[str, NDArray[np.float64]]]:
+def _poses(
+    required: Requirements, kind: str
+) -> list[tuple[str, NDArray[np.float64], Body | None]]:
     return [
-        (device.name, np.array(device.world_from_device))
+        (device.name, np.array(device.world_from_device), device.body)
         for device in required.existing_of(kind)
     ]
 

@@ -1,10 +1,11 @@
 """The schema of `[[existing]]`: devices that stand already and stay where they are."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from .bodies import BodyTable
 from .table_types import Axis, Name, Table
 
 _Row = Annotated[list[float], Field(min_length=4, max_length=4)]
@@ -26,6 +27,7 @@ class ExistingTable(Table):
         aim_mm: What the middle of the image looks at.
         roll_deg: Turn of the image about that line, clockwise as the device sees it.
         pose_mm: ``world_from_device``, 4 x 4, its last column in millimetres.
+        body: Its own body; absent: that of its kind.
     """
 
     name: Name
@@ -34,6 +36,7 @@ class ExistingTable(Table):
     aim_mm: Axis | None = None
     roll_deg: float = 0.0
     pose_mm: _Rows | None = None
+    body: BodyTable | None = None
 
     @model_validator(mode="after")
     def _check_pose(self) -> Self:
@@ -59,3 +62,8 @@ class ExistingTable(Table):
         if self.pose_mm[3] != [0.0, 0.0, 0.0, 1.0]:
             raise ValueError(f"pose_mm: its last row {self.pose_mm[3]} must be 0 0 0 1")
         return self
+
+    def to_document(self) -> dict[str, Any]:
+        """Return plain values as written; without a body of its own no key for it."""
+        document = self.model_dump(mode="json")
+        return {key: v for key, v in document.items() if key != "body" or v}

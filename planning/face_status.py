@@ -26,6 +26,7 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
     """
     mesh, required = plan.surface.mesh, plan.requirements
     scene = Scene(mesh, plan.surface.region, plan.surface.steep, required, 0, threads)
+    scene = scene.among((*plan.projectors, *plan.cameras))
     faces = np.arange(len(mesh.faces))
     centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)
     target = Target(centroids, plan.surface.steep)

@@ -1,5 +1,6 @@
 """Eq. (2) with margins: what a projector lights, and which limit forbids it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from geometry.visibility import Visibility
 
 from .plan import PlannedProjector
 from .requirements import ProjectorLimits
+from .standing import Standing, blocked_by
 
 CAUSES = (
     "projector_beam",
@@ -20,9 +22,11 @@ CAUSES = (
     "projector_incidence",
     "tangent_angle",
     "projector_occlusion",
+    "projector_body",
 )
 LIT = len(CAUSES)
-OCCLUDED = LIT - 1
+OCCLUDED = CAUSES.index("projector_occlusion")
+BLOCKED = CAUSES.index("projector_body")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +120,7 @@ def first_failure(
     visibility: Visibility,
     *,
     light: Light | None = None,
+    bodies: Sequence[Standing] = (),
 ) -> NDArray[np.int8]:
     """Return the index in `CAUSES` of the first limit that fails; `LIT` if none does.
 
@@ -125,6 +130,7 @@ def first_failure(
         limits: Margins of eq. (2).
         visibility: Occlusion.
         light: What `light_on` returned, to save computing it again.
+        bodies: Of devices, which stand in the way of light as well.
 
     Returns:
         Shape (n,).
@@ -139,7 +145,22 @@ def first_failure(
         along=pose[:3, 2] if projector.light == "parallel" else None,
     )
     stage[clear[blocked]] = OCCLUDED
+    mark_blocked(stage, projector, samples.points, bodies)
     return stage
+
+
+def mark_blocked(
+    stage: NDArray[np.int8],
+    projector: PlannedProjector,
+    points: NDArray[np.float64],
+    bodies: Sequence[Standing],
+) -> None:
+    """Set the stage of lit samples (n,) whose light meets a body to `BLOCKED`."""
+    if not bodies:
+        return
+    lit = np.flatnonzero(stage == LIT)
+    blocked = blocked_by(bodies, projector, points[lit]).any(axis=1)
+    stage[lit[blocked]] = BLOCKED
 
 
 def first_failure_in_the_open(

@@ -10,6 +10,7 @@ g = J_r^T v::
 with s_px = s_0 / (-N.L) and h the ring spacing along m. `formulation.md`, section 3.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,18 +22,22 @@ from geometry.visibility import Visibility
 from .lighting import Light, Target
 from .plan import PlannedCamera, PlannedProjector
 from .requirements import CameraLimits, TriangulationLimits
+from .standing import Standing, blocked_by
 
 SEEN_CAUSES = (
     "camera_field",
     "camera_range",
     "camera_incidence",
     "camera_occlusion",
+    "camera_body",
     "sample_distance",
 )
 PAIR_CAUSES = ("conditioning", "sigma", "pitch")
 CAUSES = SEEN_CAUSES + PAIR_CAUSES
 SEEN = len(SEEN_CAUSES)
 MEASURED = len(CAUSES)
+BLOCKED = CAUSES.index("camera_body")
+_OCCLUDED, _COARSE = BLOCKED - 1, BLOCKED + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +74,17 @@ def view(
     target: Target,
     limits: CameraLimits,
     visibility: Visibility | None,
+    bodies: Sequence[Standing] = (),
 ) -> View:
-    """Return how a camera sees samples; without `visibility`, occlusion is left out."""
+    """Return how a camera sees samples; without `visibility`, occlusion is left out.
+
+    Args:
+        camera: Pose and optics.
+        target: Samples.
+        limits: Of incidence and sampling distance.
+        visibility: Occlusion by the mesh.
+        bodies: Of devices, which stand in the way as well.
+    """
     points, normals = target.samples.points, target.samples.normals
     pose, device = camera.world_from_device, camera.device
     offsets = points - pose[:3, 3]
@@ -83,17 +97,19 @@ def view(
     stage = np.full(len(points), SEEN, dtype=np.int8)
     if limits.max_sample_distance_m is not None:
         step = local[:, 2] / (device.focal_px * np.maximum(facing, 1e-9))
-        stage[~(step <= limits.max_sample_distance_m)] = 4
+        stage[~(step <= limits.max_sample_distance_m)] = _COARSE
     tests = (
         within,
         (distances >= low) & (distances <= high),
         facing >= np.cos(limits.max_incidence),
     )
-    passed = np.logical_and.reduce(tests)
+    clear = np.flatnonzero(np.logical_and.reduce(tests))
+    if bodies:
+        between = blocked_by(bodies, camera, points[clear]).any(axis=1)
+        stage[clear[between]] = BLOCKED
     if visibility is not None:
-        clear = np.flatnonzero(passed)
         blocked = visibility.blocked(pose[:3, 3], points[clear], normals[clear])
-        stage[clear[blocked]] = 3
+        stage[clear[blocked]] = _OCCLUDED
     for index in range(len(tests) - 1, -1, -1):
         stage[~tests[index]] = index
     jacobian = np.zeros((len(points), 3, 2))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from solvers import solve_max_coverage
 
 from . import lighting
+from .body_room import with_room
 from .candidates import projectors_around
 from .plan import PlannedProjector
 from .scene import Scene
@@ -101,6 +102,7 @@ def one_fewer(
                 scale=scale,
                 site=site,
             )
+            between = with_room(scene, between)
             # They join the others: the best may be of both.
             offer = offer.joined(Offer(between, stages_of(between)))
     return None

@@ -79,6 +79,10 @@ def light_falls(
     # No steep direction: along it, light is poor, but it is light.
     plain = replace(target, steep=np.zeros_like(target.steep))
     stages = lighting.first_failure(
-        replace(projector, device=anywhere), plain, _ANY_LIGHT, scene.visibility
+        replace(projector, device=anywhere),
+        plain,
+        _ANY_LIGHT,
+        scene.visibility,
+        bodies=scene.standing,
     )
     return stages == LIT

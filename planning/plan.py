@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 
+from .bodies import Body
 from .errors import PlanFileError
 from .files import sha256_of, write_together
 from .requirements import Requirements
@@ -58,6 +59,7 @@ class PlannedProjector:
         ring_radii: Tangents R = x/z (diverging) or radii in [m] (parallel) of the ring
             edges, increasing, shape (n_rings,).
         existing: Name of the device that stands already; empty: it is planned.
+        body: Its housing; None: it takes no room.
     """
 
     id: str
@@ -67,6 +69,7 @@ class PlannedProjector:
     device: PinholeModel | ParallelModel
     ring_radii: NDArray[np.float64]
     existing: str = ""
+    body: Body | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,12 +81,14 @@ class PlannedCamera:
         world_from_device: Pose, shape (4, 4) [m].
         device: Its optics.
         existing: Name of the device that stands already; empty: it is planned.
+        body: Its housing; None: it takes no room.
     """
 
     id: str
     world_from_device: NDArray[np.float64]
     device: PinholeModel
     existing: str = ""
+    body: Body | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,6 +229,7 @@ def _projector(entry: dict[str, Any]) -> PlannedProjector:
         device,
         radii,
         _existing(entry),
+        Body.read(entry),
     )
 
 
@@ -238,7 +244,7 @@ def _camera(entry: dict[str, Any]) -> PlannedCamera:
         (k1, k2, p1, p2, k3),
     )
     pose = _pose(entry, "world_from_device")
-    return PlannedCamera(entry["id"], pose, device, _existing(entry))
+    return PlannedCamera(entry["id"], pose, device, _existing(entry), Body.read(entry))
 
 
 def _existing(entry: dict[str, Any]) -> str:

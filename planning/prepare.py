@@ -11,9 +11,10 @@ from geometry.curvature import CurvatureField, principal_curvatures
 from geometry.regions import DominantRegions, dominant_regions
 from geometry.selected_regions import regions_of_faces
 
+from .body_room import check_existing_room
 from .draft import Order
 from .errors import InputError
-from .plan import PlannedProjector
+from .plan import PlannedCamera, PlannedProjector
 from .progress import Stopwatch
 from .projectors import ProjectorStage, plan_projectors
 from .requirements import Requirements
@@ -73,8 +74,16 @@ def prepared(order: Order, clock: Stopwatch) -> Prepared:
         clock.check,
     )
     template = PlannedProjector(
-        "", rig.light, np.eye(4), np.eye(4), rig.projector_device(), radii
+        "",
+        rig.light,
+        np.eye(4),
+        np.eye(4),
+        rig.projector_device(),
+        radii,
+        body=rig.projector_body(),
     )
+    camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
+    check_existing_room(scene, template, camera)
     return Prepared(order, scene, regions, field.radius, template, tilt)
 
 

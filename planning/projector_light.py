@@ -28,6 +28,10 @@ def lit_stages(
         if alike:
             own = [projectors[i] for i in alike]
             stages[:, alike] = _with_shadows(scene, own, target, stages[:, alike])
+    for column, projector in enumerate(projectors):
+        lighting.mark_blocked(
+            stages[:, column], projector, target.samples.points, scene.standing
+        )
     return stages
 
 

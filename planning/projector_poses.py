@@ -12,6 +12,7 @@ from geometry.poses import inverse
 from solvers.pose_program import PoseProgram, pose_margins, pose_slack, solve_pose
 
 from . import lighting
+from .body_room import lacks_room
 from .lighting import Target
 from .plan import PlannedProjector
 from .projector_light import lit_margins, lit_stages
@@ -76,8 +77,24 @@ class _Lit:
 
     def margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
         """Margin of each row and projector in [rad], -inf where unlit."""
-        lit = lit_stages(self.scene, projectors, self.rows) == lighting.LIT
-        return lit_margins(self.scene, projectors, self.rows, lit)
+        scene = self.scene.among(projectors)
+        lit = lit_stages(scene, projectors, self.rows) == lighting.LIT
+        return lit_margins(scene, projectors, self.rows, lit)
+
+    def with_moved(
+        self, p: int, offered: PlannedProjector
+    ) -> NDArray[np.float64] | None:
+        """Margins with one projector elsewhere; None if its body has no room there."""
+        if offered.body is None:
+            margin = self.margin.copy()
+            margin[:, p] = self.margins([offered])[:, 0]
+            return margin
+        # Its body moves along, and what others light may change.
+        projectors = [*self.projectors]
+        projectors[p] = offered
+        if lacks_room(self.scene.among(projectors), offered):
+            return None
+        return self.margins(projectors)
 
 
 def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
@@ -102,8 +119,9 @@ def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
         if not (inside and float(pose_margins(program, pose).min()) > before + _GAIN):
             continue
         offered = moved_to(projector, pose)
-        margin = state.margin.copy()
-        margin[:, p] = state.margins([offered])[:, 0]
+        margin = state.with_moved(p, offered)
+        if margin is None:
+            continue
         kept = margin_at_share(margin, required) >= level
         if kept and enough_lit(margin, required, lit_before):
             state.projectors[p], state.margin = offered, margin

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from solvers import solve_cover
 
 from . import lighting
+from .body_conflicts import LitCrowd, settle, settle_others
+from .body_room import offered_with_room, with_room
 from .candidates import projector_candidates, projectors_around
 from .errors import InfeasibleLimitsError
 from .existing import existing_projectors, movable
@@ -19,6 +21,7 @@ from .projector_light import lit_margins, lit_stages, merged
 from .relaxations import nothing_lit
 from .scene import Scene
 from .selection import (
+    BODIES_LEFT_OUT,
     Selection,
     certificate,
     cover_problem,
@@ -89,13 +92,13 @@ def plan_projectors(
     # Those that stand already come first, and are in every cover.
     candidates = existing_projectors(required, template, ring_offset)
     site = scene.site("projector", template.device)
-    candidates += projector_candidates(
-        template,
-        required.workspace,
-        n_candidates,
-        ring_offset=ring_offset,
-        site=site,
-    )
+
+    def lattice(n: int) -> tuple[PlannedProjector, ...]:
+        return projector_candidates(
+            template, required.workspace, n, ring_offset=ring_offset, site=site
+        )
+
+    candidates += offered_with_room(scene, n_candidates, lattice)
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
@@ -109,6 +112,7 @@ def plan_projectors(
         ring_offset=ring_offset,
         site=site,
     )
+    around = with_room(scene, around)
     stages = np.concatenate([stages, lit_stages(scene, around, rows)], axis=1)
     candidates += around
     attempt = 0
@@ -200,7 +204,10 @@ def with_more(
     if selection.needed >= stage.certificate["needed"]["count"]:
         return stage
     every = stage.reference + more
-    return _stage(scene, every, stage.rows, stages, selection, selection.chosen)
+    found = _stage(scene, every, stage.rows, stages, selection, selection.chosen)
+    # Bodies in each other's way may cost what fewer would have saved.
+    fewer = found.certificate["needed"]["count"] < stage.certificate["needed"]["count"]
+    return found if fewer else stage
 
 
 def _good_cover(scene: Scene, stages: NDArray[np.int8]) -> NDArray[np.int64]:
@@ -238,7 +245,21 @@ def _stage(
     most_area: NDArray[np.int64],
 ) -> ProjectorStage:
     lit, given = stages == lighting.LIT, _n_given(scene)
+    crowd, as_before = LitCrowd(candidates, rows, lit), selection
+    selection = settle(
+        crowd,
+        lit,
+        selection,
+        max_count=scene.requirements.max_projectors,
+        seed=scene.seed,
+        given=given,
+    )
+    if selection is not as_before:
+        most_area = selection.chosen
     others = marginals(lit, selection, seed=scene.seed, given=given)
+    others = settle_others(
+        crowd, lit, others, len(selection.chosen), seed=scene.seed, given=given
+    )
     proof = certificate(
         selection,
         others,
@@ -247,9 +268,12 @@ def _stage(
         n_candidates=len(candidates),
         given=given,
     )
+    if crowd.bodied:
+        proof["bounds_leave_out"] = BODIES_LEFT_OUT
     proof["excluded_pairs"] = {
         cause: int((stages == index).sum())
         for index, cause in enumerate(lighting.CAUSES)
+        if index != lighting.BLOCKED or scene.standing
     }
     proof["n_regions"] = int(scene.region.max()) + 1
     return ProjectorStage(

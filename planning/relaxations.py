@@ -159,7 +159,11 @@ def least_relaxations(
         for projector in projectors:
             scene.pulse()
             stage = lighting.first_failure(
-                lifted.projector(projector), dark, lifted.limits, scene.visibility
+                lifted.projector(projector),
+                dark,
+                lifted.limits,
+                scene.visibility,
+                bodies=scene.standing,
             )
             lit = stage == LIT
             asked = lifted.asks(projector, dark.take(lit))
@@ -292,7 +296,11 @@ def _unreached(
         if not len(left):
             break
         stage = lighting.first_failure(
-            projector, target.take(left), limits, scene.visibility
+            projector,
+            target.take(left),
+            limits,
+            scene.visibility,
+            bodies=scene.standing,
         )
         left = left[stage != LIT]
     return left

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal, Self, TypeVar
 
+from .bodies import Body
 from .zones import Box, read_zones
 
 _T = TypeVar("_T")
@@ -176,11 +177,13 @@ class Existing:
         name: As in the rig file.
         kind: `projector` or `camera`.
         world_from_device: Its pose, rows of a 4 x 4 matrix [m].
+        body: Its own, or that of its kind; None: it has none.
     """
 
     name: str
     kind: str
     world_from_device: tuple[tuple[float, ...], ...]
+    body: Body | None = None
 
 
 @dataclass(frozen=True)
@@ -225,7 +228,10 @@ class Requirements:
             for key, value in document["workspace"].items()
             if value or key not in _LEFT_OUT
         }
-        existing = document.pop("existing")
+        existing = [
+            {key: value for key, value in table.items() if key != "body" or value}
+            for table in document.pop("existing")
+        ]
         return document | ({"existing": _listed(existing)} if existing else {})
 
     @classmethod
@@ -267,7 +273,7 @@ def _existing(table: dict[str, Any]) -> Existing:
     rows = tuple(tuple(float(x) for x in row) for row in table["world_from_device"])
     if [len(row) for row in rows] != [4] * 4:
         raise ValueError("existing: world_from_device must be 4 x 4")
-    return Existing(str(table["name"]), str(table["kind"]), rows)
+    return Existing(str(table["name"]), str(table["kind"]), rows, Body.read(table))
 
 
 def _listed(value: object) -> object:

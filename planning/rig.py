@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 
 from . import optics
+from .bodies import Body
 from .errors import InfeasibleLimitsError, RigError
 from .existing import build_existing, check_existing
 from .field import overflows
@@ -139,6 +140,16 @@ class Rig:
     def camera_device(self) -> PinholeModel:
         """Return the optics of a camera."""
         return self._camera
+
+    def projector_body(self) -> Body | None:
+        """Return the body of a projector of this light, None where none is given."""
+        table, parallel = self.table, self.table.parallel_projector
+        device = parallel if self.light == "parallel" else table.projector
+        return None if device is None else Body.of(device.body)
+
+    def camera_body(self) -> Body | None:
+        """Return the body of a camera, None where none is given."""
+        return Body.of(self.table.camera.body)
 
     def projector_centre_ray(self) -> NDArray[np.float64]:
         """Return the unit direction of the image centre in the projector's frame, (3,).
@@ -268,6 +279,11 @@ class Rig:
         )
         tables = self.table.existing
         existing = build_existing(tables, required.workspace, projector, camera)
+        bodies = {"projector": self.projector_body(), "camera": self.camera_body()}
+        existing = tuple(
+            replace(device, body=device.body or bodies[device.kind])
+            for device in existing
+        )
         required = replace(required, existing=existing)
         check_existing(required)
         return required
@@ -305,7 +321,7 @@ class Rig:
 
     def _existing_document(self) -> dict[str, Any]:
         """Return the existing devices as written; no key where there are none."""
-        tables = [t.model_dump(mode="json") for t in self.table.existing]
+        tables = [table.to_document() for table in self.table.existing]
         return {"existing": tables} if tables else {}
 
     @cached_property

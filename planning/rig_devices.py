@@ -8,6 +8,7 @@ import numpy as np
 from geometry.devices import ParallelModel, PinholeModel
 
 from . import optics
+from .bodies import Body, body_entry
 from .errors import RigError
 from .rig_models import ParallelTable, PinholeTable
 
@@ -67,6 +68,7 @@ def pinhole_document(table: PinholeTable, device: PinholeModel) -> dict[str, Any
         "beam_radius": None,
         "figures": _figures(table),
         "sources": _sources(table),
+        **body_entry(Body.of(table.body)),
     }
 
 
@@ -82,6 +84,7 @@ def parallel_document(table: ParallelTable, device: ParallelModel) -> dict[str, 
         "beam_radius": device.beam_radius,
         "figures": _figures(table),
         "sources": _sources(table),
+        **body_entry(Body.of(table.body)),
     }
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from .bodies import BodyTable
 from .existing_models import ExistingTable
 from .table_types import (
     Acute,
@@ -42,9 +43,10 @@ class FocusTable(Table):
 
 
 class SourcedTable(Table):
-    """A device whose figures name their sources."""
+    """A device whose figures name their sources, with a body if one is given."""
 
     name: Name
+    body: BodyTable | None = None
     sources: dict[str, Name] = Field(default={})
 
     def figures(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from .measurability import Rings, View
 from .plan import PlannedCamera, PlannedProjector
 from .rings import ring_frame
 from .scene import Scene
+from .sights import view_of
 
 _AZIMUTHS = 16
 _SWEEPS = 2
@@ -39,10 +40,7 @@ def turn_ring_axes(
         rows: Lit samples.
         tilt: Tilt of the axes, or their shift, as `ring_frame` takes it.
     """
-    views = [
-        measurability.view(c, rows.target, scene.requirements.camera, scene.visibility)
-        for c in cameras
-    ]
+    views = [view_of(scene, c, rows.target) for c in cameras]
     turned = list(projectors)
     scores = np.stack(
         [_scores(scene, rows, p, views, rings) for p, rings in enumerate(rows.rings)]

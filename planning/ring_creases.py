@@ -84,7 +84,11 @@ def crease_errors(
         samples = SurfaceSamples(points, mesh.face_normals[faces], faces, 0.0)
         target = Target(samples, scene.steep[faces])
         stage = first_failure(
-            projector, target, scene.requirements.projector, scene.visibility
+            projector,
+            target,
+            scene.requirements.projector,
+            scene.visibility,
+            bodies=scene.standing,
         )
         lit &= stage == LIT
         light = light_on(projector, target)

@@ -24,6 +24,7 @@ from .ring_creases import Creases, crease_errors, find_creases
 from .ring_limits import RingBeam, least_pitch_px, ring_beam
 from .ring_pitch import best_pitch, users
 from .scene import Scene
+from .sights import view_of
 
 Spacing = Literal["uniform", "curvature"]
 
@@ -151,10 +152,7 @@ def _draw(
         scene.surface_samples(_SAMPLES, stream + 1),
     )
     rows = lit_samples(scene, even, both)
-    views = tuple(
-        measurability.view(c, rows.target, scene.requirements.camera, scene.visibility)
-        for c in cameras
-    )
+    views = tuple(view_of(scene, c, rows.target) for c in cameras)
     return _Draw(rows, views, best_pitch(scene, even, views, rows))
 
 

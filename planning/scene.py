@@ -1,7 +1,7 @@
 """What both planning stages look at: the surface, its target, and how rays see it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -16,6 +16,7 @@ from geometry.visibility import Visibility
 
 from .lighting import Target
 from .requirements import Requirements, Workspace
+from .standing import Device, Standing, bodies_of, existing_bodies
 from .view_tiles import Site
 
 Kind = Literal["projector", "camera"]
@@ -39,6 +40,7 @@ class Scene:
         seed: Of every random draw.
         threads: Worker threads; no result depends on it.
         pulse: Called between pieces of work; raises when the run is to be cut.
+        placed: Bodies of devices that were chosen, beside those that stand already.
     """
 
     mesh: TriangleMesh
@@ -48,6 +50,22 @@ class Scene:
     seed: int
     threads: int
     pulse: Callable[[], None] = lambda: None
+    placed: tuple[Standing, ...] = ()
+
+    @cached_property
+    def standing(self) -> tuple[Standing, ...]:
+        """Every body that stands in the way of light and views."""
+        return existing_bodies(self.requirements) + self.placed
+
+    def among(self, devices: Iterable[Device]) -> "Scene":
+        """Return the scene with the bodies of these devices, and no other planned."""
+        placed = bodies_of(device for device in devices if not device.existing)
+        if not (placed or self.placed):
+            return self
+        other = replace(self, placed=placed)
+        # What rays are cast against is the same mesh.
+        other.__dict__["visibility"] = self.visibility
+        return other
 
     @cached_property
     def safe_workspace(self) -> Workspace:

@@ -16,6 +16,8 @@ from solvers import CoverProblem, SolveStatus, solve_cover
 from solvers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
 
 MORE = 2
+# What a certificate says where chosen devices have bodies.
+BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
 # Counted work for the marginal table's other counts, where no proof is claimed.
 _MARGINAL_BUDGET = 3e8
 
@@ -33,6 +35,8 @@ class Selection:
         required: Rows that must be covered.
         best_rows: Most rows that k candidates were found to cover.
         best_rows_bound: Proven upper bound on that.
+        but_for_bodies: How many would do if bodies didn't collide or stand in each
+            other's way, where that costs more or leaves too little; else None.
     """
 
     chosen: NDArray[np.int64]
@@ -43,6 +47,7 @@ class Selection:
     required: int
     best_rows: int
     best_rows_bound: int
+    but_for_bodies: int | None = None
 
     @property
     def needed(self) -> int:
@@ -237,6 +242,11 @@ def certificate(
         if count > given
         else None,
         **({"given": given} if given else {}),
+        **(
+            {"but_for_bodies": selection.but_for_bodies}
+            if selection.but_for_bodies is not None
+            else {}
+        ),
     }
 
 

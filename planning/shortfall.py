@@ -12,10 +12,12 @@ _CAUSE_WORDS = {
     "projector_incidence": "met by the light at too large an angle",
     "tangent_angle": "lit along the steep direction (tangent angle too small)",
     "projector_occlusion": "shadowed from every projector that faces it",
+    "projector_body": "kept from the light by a device's body",
     "camera_field": "outside the image of every camera",
     "camera_range": "out of the cameras' depth of field",
     "camera_incidence": "seen at too large an angle",
     "camera_occlusion": "hidden from every camera that faces it",
+    "camera_body": "hidden by a device's body",
     "sample_distance": "sampled too coarsely",
     "conditioning": "on a blind curve (|r.m| too small)",
     "sigma": "measured with too large a deviation",
@@ -110,16 +112,36 @@ def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
         yield (
             f"{proof['count']} {devices} {verb.format(_percent(share))}, "
             f"{_percent(required)} is required; {_cm2(whole - part)} of "
-            f"{_cm2(whole)} are left. What would help: "
-            f"{_more(kind, proof['needed'], asked, share)}"
+            f"{_cm2(whole)} are left{_bodies(document, proof)}. What would help: "
+            f"{_more(kind, proof, asked, share)}"
         )
 
 
-def _more(kind: str, needed: dict[str, Any], asked: Requirements, share: float) -> str:
+def _bodies(document: dict[str, Any], proof: dict[str, Any]) -> str:
+    """Whose bodies stand in the way of how much, the largest area first."""
+    areas = document["coverage"].get("blocked_by_body_m2", {})
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
+    told = [
+        f"{1e6 * area:.0f} mm² blocked by the body of {name}"
+        for name, area in ranked
+        if area > 0.0
+    ]
+    if "but_for_bodies" in proof:
+        told.append(
+            f"{proof['but_for_bodies']} would do if their bodies didn't collide or "
+            f"stand in each other's way"
+        )
+    return f" ({', '.join(told)})" if told else ""
+
+
+def _more(kind: str, proof: dict[str, Any], asked: Requirements, share: float) -> str:
+    needed = proof["needed"]
     allowed = getattr(asked, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {_down(share)} accepts this plan"
-    if allowed is None or needed["count"] <= allowed:
+    # Where bodies are in the way, more devices may be no help.
+    in_vain = needed["count"] <= proof.get("but_for_bodies", 0)
+    if allowed is None or needed["count"] <= allowed or in_vain:
         return accept
     bound = (
         "proved over the candidates"

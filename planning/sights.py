@@ -16,6 +16,7 @@ from .lighting import Target
 from .measurability import View
 from .plan import PlannedCamera
 from .scene import Scene
+from .standing import Standing, blocked_by
 
 # Of a cosine: what this decides roughly, `measurability.view` decides exactly.
 _ROUNDING = 1e-9
@@ -53,10 +54,33 @@ def sights_of(
         samples.normals,
         candidates=wanted,
     ).dense_transposed()
-    return tuple(
+    clear = (
         _taken(sight, np.flatnonzero(free[sight.rows, column]))
         for column, sight in enumerate(offered)
     )
+    return tuple(
+        unblocked(sight, camera, samples.points, scene.standing)
+        for sight, camera in zip(clear, cameras, strict=True)
+    )
+
+
+def unblocked(
+    sight: Sight,
+    camera: PlannedCamera,
+    points: NDArray[np.float64],
+    bodies: Sequence[Standing],
+) -> Sight:
+    """Return what is left of a sight of points (n, 3) with bodies in the way."""
+    if not bodies:
+        return sight
+    blocked = blocked_by(bodies, camera, points[sight.rows]).any(axis=1)
+    return _taken(sight, np.flatnonzero(~blocked))
+
+
+def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> View:
+    """Return how a camera sees samples, everything in between included."""
+    limits = scene.requirements.camera
+    return measurability.view(camera, target, limits, scene.visibility, scene.standing)
 
 
 class Sights:

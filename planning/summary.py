@@ -64,6 +64,7 @@ _EXCLUDED = {
     "projector_incidence": "beyond the incidence limit",
     "tangent_angle": "too near the steep direction",
     "projector_occlusion": "in shadow",
+    "projector_body": "behind a device's body",
 }
 
 
@@ -221,6 +222,7 @@ def _excluded(proof: dict[str, Any]) -> list[str]:
     told = [
         f"{100.0 * excluded[cause] / pairs:.1f} % {words}"
         for cause, words in _EXCLUDED.items()
+        if cause in excluded
     ]
     lit = 100.0 * (1.0 - sum(excluded.values()) / pairs)
     return [
@@ -239,7 +241,10 @@ def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
     name = f"{kind}s"
     if needed["count"] > count:
         have = f"at least {needed['lower_bound']} {name} are needed"
-        return f"PROVED   {have}, {needed['count']} suffice, {scope}"
+        enough = f"{needed['count']} suffice"
+        if needed["count"] <= proof.get("but_for_bodies", 0):
+            enough += " but for their bodies"
+        return f"PROVED   {have}, {enough}, {scope}"
     if proof["status"] == "optimal":
         one = count == 1
         return (

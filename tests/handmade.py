@@ -28,12 +28,14 @@ LIGHT = (
     "projector_incidence",
     "tangent_angle",
     "projector_occlusion",
+    "projector_body",
 )
 SIGHT = (
     "camera_field",
     "camera_range",
     "camera_incidence",
     "camera_occlusion",
+    "camera_body",
     "sample_distance",
 )
 PAIR = ("conditioning", "sigma", "pitch")
@@ -342,13 +344,13 @@ def _evaluate(
     steps = [
         light_steps(entry, p, n, steep, limits["projector"]) for entry in projectors
     ]
-    lit = [s == 5 for s in steps]
+    lit = [s == 6 for s in steps]
     pairs = [
         [pair_steps(projector, camera, p, n, limits) for camera in cameras]
         for projector, on in zip(projectors, lit, strict=True)
         if on
     ]
-    seen = [any(pair[j] == 8 for pair in pairs) for j in range(len(cameras))]
+    seen = [any(pair[j] == 9 for pair in pairs) for j in range(len(cameras))]
     margins = [
         margin(entry, p, n, steep, limits["projector"]) if on else -math.inf
         for entry, on in zip(projectors, lit, strict=True)
@@ -358,12 +360,12 @@ def _evaluate(
         cause = (SIGHT + PAIR)[max(map(max, pairs))] if not measured else None
     else:
         cause = LIGHT[max(steps)]
-    reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 5
+    reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 6
     any_light = {"max_incidence": math.radians(89.0), "min_tangent_angle": 0.0}
     return {
         "falls": [
             light_steps({**entry, "range_m": [0.0, 99.0]}, p, n, [0.0] * 3, any_light)
-            == 5
+            == 6
             for entry in projectors
         ],
         "lit": any(lit),
@@ -372,11 +374,11 @@ def _evaluate(
         "measured": measured,
         "margins": margins,
         "server": margins.index(max(margins)) if any(lit) else None,
-        "by_projectors": reference == 5,
+        "by_projectors": reference == 6,
         "by_cameras": measured
         or (any(lit) and _reference_sight(document, surface, p, n, lit)),
         "uncovered_by_cause": cause,
-        "unreachable_by_cause": None if reference == 5 else LIGHT[reference],
+        "unreachable_by_cause": None if reference == 6 else LIGHT[reference],
         "inside": inside,
     }
 
@@ -419,7 +421,7 @@ def _reference_sight(
             n,
             document["requirements"],
         )
-        == 8
+        == 9
         for pose in surface.reference_cameras.tolist()
         for projector, on in zip(document["projectors"], lit, strict=True)
         if on
@@ -427,7 +429,7 @@ def _reference_sight(
 
 
 def light_steps(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> int:
-    """Limits of *lit* that a point on a convex body passes, 5: lit."""
+    """Limits of *lit* that a point on a convex body passes, 6: lit."""
     local = _into(entry["world_from_device"], p)
     ring = _into(entry["world_from_ring"], p)
     last = entry["ring_radii"][-1]
@@ -454,7 +456,7 @@ def light_steps(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> int:
         return 2
     if not abs(_dot(steep, along)) <= math.cos(limits["min_tangent_angle"]):
         return 3
-    return 5
+    return 6
 
 
 def light(entry: Any, p: Any) -> tuple[list[float], float]:
@@ -476,7 +478,7 @@ def margin(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> float:
 
 
 def pair_steps(projector: Any, camera: Any, p: Any, n: Any, limits: Any) -> int:
-    """Limits of *seen*, then *measurable*, that a lit point passes, 8: measured."""
+    """Limits of *seen*, then *measurable*, that a lit point passes, 9: measured."""
     local = _into(camera["world_from_device"], p)
     origin = [camera["world_from_device"][i][3] for i in range(3)]
     r, t = _unit([p[i] - origin[i] for i in range(3)])
@@ -493,8 +495,8 @@ def pair_steps(projector: Any, camera: Any, p: Any, n: Any, limits: Any) -> int:
         return 2
     focal = math.sqrt(camera["K"][0][0] * camera["K"][1][1])
     if not local[2] / (focal * cosine) <= limits["camera"]["max_sample_distance_m"]:
-        return 4
-    return 5 + _triangulation_steps(projector, camera, p, n, (r, t, u, v), limits)
+        return 5
+    return 6 + _triangulation_steps(projector, camera, p, n, (r, t, u, v), limits)
 
 
 def _triangulation_steps(

@@ -221,6 +221,7 @@ def test_the_audit_imports_nothing_of_the_maker():
         "planning.plan",
         "planning.requirements",
         "planning.surface",
+        "planning.bodies",
         "planning.zones",
         "planning.errors",
         "planning.files",

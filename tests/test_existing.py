@@ -26,6 +26,12 @@ OLD = (
     '[[existing]]\nname = "old projector"\nkind = "projector"\n'
     "position_mm = [100, -1200, 300]\naim_mm = [0, 20, 10]\nroll_deg = 15\n"
 )
+# The camera's body reaches across the upper part of the projector's beam.
+BODIES = (
+    "[existing.body]\nsize_mm = [700, 60, 60]\ncentre_mm = [350, -140, -31]\n"
+    "[projector.body]\nsize_mm = [300, 120, 250]\ncentre_mm = [0, -20, -126]\n"
+    "[camera.body]\nsize_mm = [60, 60, 120]\ncentre_mm = [0, 0, -61]\n"
+)
 POSED = (
     '[[existing]]\nname = "old camera"\nkind = "camera"\n'
     "pose_mm = [[1, 0, 0, 50], [0, 0, 1, -1400], [0, -1, 0, 20], [0, 0, 0, 1]]\n"
@@ -203,6 +209,7 @@ def planned(tmp_path_factory):
         + OLD.replace('"old projector"', '"old camera"')
         .replace('"projector"', '"camera"')
         .replace("[100, -1200, 300]", "[-300, -880, 250]")
+        + BODIES
         + "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\n"
         "min_reachable = 0.1\n[placement]\nn_candidate_projectors = 600\n"
         "n_candidate_cameras = 400\nn_reference_projectors = 600\n"
@@ -215,6 +222,19 @@ def planned(tmp_path_factory):
         )
     except RequirementError as missed:
         return missed.plan
+
+
+def test_a_body_in_its_beam_leaves_a_projector_little_to_light(planned):
+    (old, *new), areas = planned.document["projectors"], planned.coverage["target"]
+    assert old["lit_area_m2"] < 0.2 * min(entry["lit_area_m2"] for entry in new)
+    assert areas["lit_m2"] == pytest.approx(0.02, rel=0.01)
+    proof = planned.document["certificates"]["projectors"]
+    assert proof["excluded_pairs"]["projector_body"] > 1000
+    assert "bodies of chosen devices" in proof["bounds_leave_out"]
+    names = [
+        d["id"] for kind in ("projectors", "cameras") for d in planned.document[kind]
+    ]
+    assert sorted(planned.coverage["blocked_by_body_m2"]) == sorted(names)
 
 
 def test_they_stay_are_marked_and_the_audit_agrees(planned):
@@ -258,6 +278,36 @@ def test_they_stay_are_marked_and_the_audit_agrees(planned):
         (lambda d: _set(d, "aim_mm", [0, 25, 10]), "misses the image centre"),
         (lambda d: _set(d, "roll_deg", 14.0), "is rolled by 15 degrees, rig.existing"),
         (lambda d: _set(d, "kind", "camera"), "is a projector, but rig.existing"),
+        (
+            lambda d: d["projectors"][0].update(lit_area_m2=0.01),
+            "P1.lit_area_m2: claimed 0.01",
+        ),
+        (
+            lambda d: d["coverage"]["blocked_by_body_m2"].update(C1=0.004),
+            "coverage.blocked_by_body_m2.C1: claimed 0.004 m², recomputed 0 m²",
+        ),
+        (
+            lambda d: d["coverage"].pop("blocked_by_body_m2"),
+            "blocked_by_body_m2: must hold an area for each of ['C1', 'C2', 'P1'",
+        ),
+        (
+            lambda d: d["cameras"][1]["body"].update(half_m=[0.03, 0.03, 0.05]),
+            "C2.body.half_m: claimed [0.03, 0.03, 0.05], but size_mm is",
+        ),
+        (lambda d: d["cameras"][1].pop("body"), "C2.body: None is claimed, but the"),
+        (
+            lambda d: d["requirements"]["existing"][1].pop("body"),
+            "requirements.existing.1.body: None is claimed",
+        ),
+        (lambda d: _beside(d, 0.2), "P1.body: overlaps the body of P3"),
+        (
+            lambda d: d["cameras"][1]["body"].update(half_m=[0.03, 0.03, 1.1]),
+            "C2.body: touches the object",
+        ),
+        (
+            lambda d: d["requirements"]["workspace"].update(floor_m=0.02),
+            "P3.body: reaches",
+        ),
     ],
 )
 def test_false_claims_about_them_are_named(planned, change, sentence):
@@ -273,6 +323,13 @@ def _push(document, by_m, *, everywhere=False):
     document["projectors"][0]["world_from_ring"][0][3] += by_m
     if everywhere:
         document["requirements"]["existing"][0]["world_from_device"] = pose
+
+
+def _beside(document, by_m):
+    """The third projector a little beside the first."""
+    pose = copy.deepcopy(document["projectors"][0]["world_from_device"])
+    pose[0][3] += by_m
+    document["projectors"][2]["world_from_device"] = pose
 
 
 def _set(document, key, value):

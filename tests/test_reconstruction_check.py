@@ -345,3 +345,29 @@ def test_progress_counts_every_pair(one_light):
     calls: list[tuple[int, int]] = []
     reconstruct_plan(one_light, seed=0, progress=lambda *step: calls.append(step))
     assert calls == [(n, 6) for n in range(1, 7)]
+
+
+def housed(document: dict[str, Any], owner: str, before: str) -> None:
+    """Give a device a body half way between another one and the object."""
+    every = {d["id"]: d for k in ("projectors", "cameras") for d in document[k]}
+    halfway = 0.5 * np.array(every[before]["world_from_device"])[:3, 3]
+    pose = np.array(every[owner]["world_from_device"])
+    centre = pose[:3, :3].T @ (halfway - pose[:3, 3])
+    every[owner]["body"] = {"centre_m": centre.tolist(), "half_m": [0.05, 0.05, 0.05]}
+
+
+@pytest.mark.parametrize(
+    ("owner", "before", "dark"),
+    [("C2", "P1", {"C1", "C2"}), ("P1", "C1", {"C1"}), ("P1", "P1", set())],
+)
+def test_bodies_of_others_stop_light_and_views(rigs, owner, before, dark):
+    ball = sphere(0.04, subdivisions=3)
+    rig = rigs.small_rig(ball, focal=700.0)
+    document = copy.deepcopy(rig.document)
+    document["projectors"] = document["projectors"][:1]
+    document["cameras"] = document["cameras"][:2]
+    housed(document, owner, before)
+    found = reconstruct_plan(RigPlan(document, rig.surface), seed=0)
+    points = {pair.camera: pair.n_points for pair in found.pairs}
+    assert {name for name, n in points.items() if n == 0} == dark
+    assert all(n > 200 for name, n in points.items() if name not in dark)

@@ -13,8 +13,10 @@ def plan(handmade):
     return handmade.build_plan()
 
 
-def missed(plan, **areas):
+def missed(plan, *, blocked=None, **areas):
     document = copy.deepcopy(plan.document)
+    if blocked is not None:
+        document["coverage"]["blocked_by_body_m2"] = blocked
     target = document["coverage"]["target"]
     target |= {
         "area_m2": 1.0,
@@ -66,6 +68,25 @@ def test_cameras_that_miss_by_a_hair_offer_the_share_they_reach(plan):
     assert line.startswith("3 cameras measure 94.0 %")
     assert "--coverage 0.93 accepts this plan" in line
     assert "--max-cameras" not in line
+
+
+def test_bodies_that_are_in_the_way_are_named(plan):
+    blocked = {"P1": 0.0, "C1": 2.5e-5, "C2": 4.1e-4}
+    (line,) = missed(plan, blocked=blocked, lit_m2=0.4)
+    words = "410 mm² blocked by the body of C2, 25 mm² blocked by the body of C1"
+    assert f"is required ({words}). What would help" in line
+    assert "P1" not in line
+    assert missed(plan, blocked=blocked) == ()
+    document = copy.deepcopy(plan.document)
+    proof = document["certificates"]["projectors"]
+    proof |= {"count": 2, "needed": {"count": 3, "lower_bound": 3}}
+    proof["but_for_bodies"] = 3
+    asked = dataclasses.replace(plan.requirements, dominant_coverage=1.0)
+    target = document["coverage"]["target"]
+    target["lit_m2"] = 0.5 * target["reachable_by_projectors_m2"]
+    line = next(s for s in shortfalls(document, asked) if "2 projectors light" in s)
+    assert "3 would do if their bodies didn't collide" in line
+    assert "--max-projectors" not in line
 
 
 def test_a_failed_check_lists_its_own_sentences(plan):

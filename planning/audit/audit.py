@@ -11,6 +11,8 @@ from planning.surface import Surface
 
 from .areas import audit_areas, audit_causes, audit_contributions, recomputed_areas
 from .baselines import audit_baselines
+from .bodies import audit_room
+from .body_claims import audit_blocked, audit_bodies
 from .certificates import audit_certificates
 from .consistency import audit_consistency
 from .devices import audit_devices, audit_workspace
@@ -101,8 +103,11 @@ def audit_plan(
     audit_workspace(plan, ledger)
     audit_zones(plan, ledger)
     audit_existing(plan, ledger)
+    audit_bodies(plan, ledger)
+    audit_room(plan, shadow, ledger)
     audit_areas(own, reach, estimator, ledger)
     audit_causes(own, reach, estimator, ledger)
+    audit_blocked(plan, own, estimator, ledger)
     audit_inside(plan, own, reach, shadow, ledger, seed=seed)
     audit_contributions(plan, own, estimator, ledger)
     audit_margins(plan, own, shadow, ledger)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from planning.plan import RigPlan
 
+from .bodies import free_of
 from .estimates import Estimator
 from .ledger import Ledger, entries
 from .occlusion import Shadow
@@ -70,7 +71,7 @@ def light_falls(lamp: Lamp, samples: AuditSamples, shadow: Shadow) -> NDArray[np
     rest = chosen[met]
     falls[rest] = shadow.free(
         samples.points[rest], samples.faces[rest], along[met], length[met]
-    )
+    ) & free_of(lamp.blocks, samples.points[rest], along[met], length[met])
     return falls
 
 

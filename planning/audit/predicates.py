@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 from planning.requirements import CameraLimits, ProjectorLimits, TriangulationLimits
 
+from .bodies import Block, free_of
 from .occlusion import Shadow
 from .optics import (
     in_frame,
@@ -30,12 +31,14 @@ LIGHT_CAUSES = (
     "projector_incidence",
     "tangent_angle",
     "projector_occlusion",
+    "projector_body",
 )
 SIGHT_CAUSES = (
     "camera_field",
     "camera_range",
     "camera_incidence",
     "camera_occlusion",
+    "camera_body",
     "sample_distance",
 )
 PAIR_CAUSES = ("conditioning", "sigma", "pitch")
@@ -44,6 +47,8 @@ LIT, SEEN, MEASURED = (
     len(SIGHT_CAUSES),
     len(SIGHT_CAUSES + PAIR_CAUSES),
 )
+PROJECTOR_BODY = LIGHT_CAUSES.index("projector_body")
+CAMERA_BODY = SIGHT_CAUSES.index("camera_body")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +60,14 @@ class Lamp:
         world_from_device: Pose, shape (4, 4) [m].
         world_from_ring: Pose of the ring frame, shape (4, 4) [m].
         radii: Ring radii; of a reference pose the outermost alone.
+        blocks: Bodies of other devices, which stand in its light.
     """
 
     device: PinholeModel | ParallelModel
     world_from_device: NDArray[np.float64]
     world_from_ring: NDArray[np.float64]
     radii: NDArray[np.float64]
+    blocks: tuple[Block, ...] = ()
 
     @property
     def diverging(self) -> bool:
@@ -70,10 +77,11 @@ class Lamp:
 
 @dataclass(frozen=True, eq=False)
 class Eye:
-    """A camera at a pose."""
+    """A camera at a pose, and the bodies of other devices."""
 
     device: PinholeModel
     world_from_device: NDArray[np.float64]
+    blocks: tuple[Block, ...] = ()
 
 
 def light_of(
@@ -112,7 +120,8 @@ def light_steps(
     free = shadow.free(
         samples.points[rest], samples.faces[rest], along[left], length[left]
     )
-    steps[rest] += free
+    clear = free_of(lamp.blocks, samples.points[rest], along[left], length[left])
+    steps[rest] += free + (free & clear).astype(np.int8)
     return steps
 
 
@@ -156,7 +165,8 @@ def sight_steps(
     limit = (
         np.inf if limits.max_sample_distance_m is None else limits.max_sample_distance_m
     )
-    steps[rest] += free + (free & (distance <= limit)).astype(np.int8)
+    clear = free & free_of(eye.blocks, samples.points[rest], along[left], length[left])
+    steps[rest] += free.astype(np.int8) + clear + (clear & (distance <= limit))
     return steps
 
 

@@ -10,6 +10,7 @@ from geometry.devices import PinholeModel
 from planning.plan import RigPlan
 from planning.requirements import Requirements
 
+from .bodies import blocks_before, blocks_beside
 from .occlusion import Shadow
 from .predicates import (
     LIT,
@@ -103,14 +104,22 @@ class Reach:
 def lamps_of(plan: RigPlan) -> tuple[Lamp, ...]:
     """Return the plan's projectors."""
     return tuple(
-        Lamp(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
+        Lamp(
+            p.device,
+            p.world_from_device,
+            p.world_from_ring,
+            p.ring_radii,
+            blocks_beside(plan, p),
+        )
         for p in plan.projectors
     )
 
 
 def eyes_of(plan: RigPlan) -> tuple[Eye, ...]:
     """Return the plan's cameras."""
-    return tuple(Eye(c.device, c.world_from_device) for c in plan.cameras)
+    return tuple(
+        Eye(c.device, c.world_from_device, blocks_beside(plan, c)) for c in plan.cameras
+    )
 
 
 def light_only(
@@ -168,7 +177,7 @@ def reference_lamps(plan: RigPlan) -> list[Lamp]:
     device = plan.projectors[0].device
     last = np.array([plan.requirements.workspace.reference_ring_radius])
     return [
-        Lamp(device, pose, ring, last)
+        Lamp(device, pose, ring, last, blocks_before(plan, "projector", pose))
         for pose, ring in zip(
             surface.reference_projectors, surface.reference_rings, strict=True
         )
@@ -207,7 +216,7 @@ def _reach_by_cameras(
         if len(left) == 0:
             break
         found = _measurable(
-            Eye(device, poses[index]),
+            Eye(device, poses[index], blocks_before(plan, "camera", poses[index])),
             lamps,
             rest,
             own.lit_by[:, left],

@@ -13,7 +13,7 @@ from .areas import ROUNDING
 from .estimates import POINT, Estimator
 from .ledger import Ledger, as_number
 from .occlusion import Shadow
-from .predicates import LIT, light_steps
+from .predicates import LIGHT_CAUSES, light_steps
 from .recompute import Recomputed, lamps_of
 from .samples import AuditSamples, samples_at_centroids
 from .serving import MARGIN_SLACK
@@ -85,7 +85,9 @@ def _able(plan: RigPlan, samples: AuditSamples, shadow: Shadow) -> NDArray[np.bo
         limits.max_incidence + MARGIN_SLACK, limits.min_tangent_angle - MARGIN_SLACK
     )
     steps = [light_steps(lamp, samples, relaxed, shadow) for lamp in lamps_of(plan)]
-    return np.array(steps).reshape(-1, len(samples)) >= LIT - 1
+    return np.array(steps).reshape(-1, len(samples)) >= LIGHT_CAUSES.index(
+        "projector_occlusion"
+    )
 
 
 def _audit_size(

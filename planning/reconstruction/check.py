@@ -24,6 +24,7 @@ from .causes import likely_cause, rejection
 from .cloud import Cloud
 from .decode import Decoded, decode
 from .merge import merge
+from .obstacles import Both, obstacles_of
 from .patterns import ring_patterns
 from .photometry import Photometry
 from .render import render_pair
@@ -165,7 +166,10 @@ def _decode_pairs(
     def look(c: int) -> View | None:
         camera = standing.get(believed[c].id)
         with spent.on("render"):
-            return camera and view(camera, mesh, caster, photometry)
+            if camera is None:
+                return None
+            before = obstacles_of(truth, camera.id)
+            return view(camera, mesh, caster, photometry, before)
 
     def measure(pair: tuple[int, int]) -> Decoded:
         p, c = pair
@@ -175,8 +179,10 @@ def _decode_pairs(
             return Decoded.nothing()
         patterns = ring_patterns(design, radii[p], believed[c])
         with spent.on("render"):
+            before = obstacles_of(truth, projector.id)
+            past = caster if before is None else Both(caster, before)
             frames = render_pair(
-                seen, projector, design, patterns, caster, photometry, (seed, p, c)
+                seen, projector, design, patterns, past, photometry, (seed, p, c)
             )
         with spent.on("decode"):
             return decode(

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from geometry.rays import CHUNK, RayCaster, equal_parts
+from geometry.rays import CHUNK, equal_parts
 
 from .calibration import ProjectorCalibration
+from .obstacles import Occluder
 from .patterns import Frames, Images, RingPatterns, ring_plane
 from .photometry import Photometry
 from .view import View
@@ -99,7 +100,7 @@ def render_pair(
     projector: ProjectorCalibration,
     design: ProjectorCalibration,
     patterns: RingPatterns,
-    caster: RayCaster,
+    caster: Occluder,
     photometry: Photometry,
     seed: tuple[int, ...],
 ) -> Frames:
@@ -110,7 +111,7 @@ def render_pair(
         projector: As it really stands.
         design: As the patterns were drawn for it.
         patterns: What is drawn.
-        caster: Of the mesh that really stands there.
+        caster: Of the mesh, and the bodies, that really stand there.
         photometry: Light and sensor.
         seed: Of the noise of this pair.
     """
@@ -154,7 +155,7 @@ def _shine(
     projector: ProjectorCalibration,
     design: ProjectorCalibration,
     patterns: RingPatterns,
-    caster: RayCaster,
+    caster: Occluder,
     photometry: Photometry,
 ) -> _Light:
     facing = _facing(seen, projector)
@@ -177,7 +178,7 @@ def _shine_on(
     projector: ProjectorCalibration,
     design: ProjectorCalibration,
     patterns: RingPatterns,
-    caster: RayCaster,
+    caster: Occluder,
     photometry: Photometry,
 ) -> tuple[_Light, NDArray[np.float64]]:
     """Light on those of some samples that it reaches, and their depths.
@@ -217,7 +218,7 @@ def _reached(
     seen: View,
     facing: NDArray[np.int64],
     projector: ProjectorCalibration,
-    caster: RayCaster,
+    caster: Occluder,
 ) -> tuple[
     NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:

@@ -49,8 +49,17 @@ def view(
     mesh: TriangleMesh,
     caster: RayCaster,
     photometry: Photometry,
+    obstacles: RayCaster | None = None,
 ) -> View | None:
-    """Cast a camera's pixels against the mesh; None if it sees nothing of it."""
+    """Cast a camera's pixels against the mesh; None if it sees nothing of it.
+
+    Args:
+        camera: The camera that looks.
+        mesh: What it looks at.
+        caster: Casts rays against the mesh.
+        photometry: Albedo of the mesh.
+        obstacles: Casts rays against what stands before it.
+    """
     window = _window(camera, mesh)
     if window is None:
         return None
@@ -59,14 +68,14 @@ def view(
     grid[:, :, 0] = np.arange(left, left + columns)
     grid[:, :, 1] = np.arange(top, top + rows)[:, None]
     grid = grid.reshape(-1, 2)
-    rays, faces, distances = _cast(camera, caster, grid)
+    rays, faces, distances = _cast(camera, caster, grid, obstacles)
     if not np.any(faces >= 0):
         return None
     steps = _depth_steps(faces, distances, (rows, columns), camera.focal_px)
     whole = np.flatnonzero((faces >= 0) & ~steps)
     split = np.flatnonzero(steps)
     fine = (grid[split][:, None] + _SUB).reshape(-1, 2)
-    fine_rays, fine_faces, fine_distances = _cast(camera, caster, fine)
+    fine_rays, fine_faces, fine_distances = _cast(camera, caster, fine, obstacles)
     hit = fine_faces >= 0
     pixels = np.concatenate([whole, np.repeat(split, len(_SUB))[hit]])
     all_rays = np.concatenate([rays[whole], fine_rays[hit]])
@@ -107,7 +116,10 @@ def _window(
 
 
 def _cast(
-    camera: CameraCalibration, caster: RayCaster, pixels: NDArray[np.float64]
+    camera: CameraCalibration,
+    caster: RayCaster,
+    pixels: NDArray[np.float64],
+    obstacles: RayCaster | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
     n = len(pixels)
     rays, faces, distances = np.empty((n, 3)), np.empty(n, dtype=np.int64), np.empty(n)
@@ -119,6 +131,10 @@ def _cast(
         faces[part], distances[part] = caster.first_hits(camera.centre, along)
         faces[part][blind] = -1
         rays[part] = along
+    if obstacles is not None:
+        hit = np.flatnonzero(faces >= 0)
+        hidden = obstacles.occluded(camera.centre, rays[hit], distances[hit])
+        faces[hit[hidden]] = -1
     return rays, faces, distances
 
 
