@@ -74,7 +74,7 @@ def test_bodies_that_are_in_the_way_are_named(plan):
     blocked = {"P1": 0.0, "C1": 2.5e-5, "C2": 4.1e-4}
     (line,) = missed(plan, blocked=blocked, lit_m2=0.4)
     words = "410 mm² blocked by the body of C2, 25 mm² blocked by the body of C1"
-    assert f"is required ({words}). What would help" in line
+    assert f"are left ({words}). What would help" in line
     assert "P1" not in line
     assert missed(plan, blocked=blocked) == ()
     document = copy.deepcopy(plan.document)

@@ -25,7 +25,8 @@ def audit_margins(
     more than 1 % (and three standard errors) of the served area may have a smaller
     margin than claimed, and somewhere in the lit area, of which any sliver may be
     served, the margin must be as small, within 2 degrees. There the centroids of all
-    faces of the target help to find the least. A projector that serves nothing has 0.
+    faces of the target help to find the least. A projector that serves nothing has
+    none.
     """
     within = plan.surface.target_faces(plan.requirements.target)
     centroids = samples_at_centroids(plan.surface, within)
@@ -47,9 +48,6 @@ def _audit_margin(
     ledger: Ledger,
 ) -> None:
     value = as_number(claimed)
-    if value == 0.0 and len(served) == 0:
-        # It serves nothing, though it may light what others serve better.
-        return
     if value is None or len(lit) == 0:
         ledger.holds(
             claimed is None and len(served) == 0,
