@@ -92,7 +92,7 @@ def random_case(seed, **kinds):
     return tree, leaves, random_problem(rng, leaves, **kinds)
 
 
-@pytest.mark.parametrize("block", range(20))
+@pytest.mark.parametrize("block", range(8))
 def test_what_is_complete_equals_brute_force(block):
     statuses = set()
     for seed in range(25 * block, 25 * block + 25):
@@ -118,7 +118,7 @@ def test_what_is_complete_equals_brute_force(block):
 @pytest.mark.parametrize("multipliers", ["none", "weights", "random", "one"])
 def test_the_tuple_search_equals_brute_force(n_poses, multipliers):
     outcomes = []
-    for seed in range(150):
+    for seed in range(60):
         tree, leaves, problem = random_case(10_000 + seed)
         whole = whole_rows(problem)
         rng = np.random.default_rng(seed)
@@ -147,7 +147,7 @@ def test_the_tuple_search_equals_brute_force(n_poses, multipliers):
             assert names.size == n_poses
             assert np.all(np.isin(names, tree.leaves))
             assert serves_enough(problem, unpack_rows(tree.rows[names], tree.n_rows))
-    assert 20 < sum(outcomes) < 140
+    assert 8 < sum(outcomes) < 56
 
 
 def test_two_poses_in_one_cell_are_two_poses():
@@ -196,7 +196,7 @@ def test_every_multiset_of_leaves_is_met_once(n_poses):
 
 def test_a_cut_bound_is_true_and_says_so():
     cut = 0
-    for seed in range(300):
+    for seed in range(120):
         tree, leaves, problem = random_case(20_000 + seed)
         count = 1 + seed % 4
         truth = fewest(problem, leaves, count)
@@ -209,7 +209,7 @@ def test_a_cut_bound_is_true_and_says_so():
             cut += 1
             assert answer.lower_bound < count
             assert answer.proof.endswith("search cut by the work budget")
-    assert cut > 30
+    assert cut > 12
     tree, leaves, problem = random_case(3)
     answer = bound_count(problem, tree, 9, time_limit=0.0)
     assert answer.proof.endswith("search cut by the time limit")
