@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from geometry.poses import inverse, transform
+from geometry.poses import inverse, lengths, transform
 from geometry.sampling import SurfaceSamples
 from geometry.visibility import Visibility
 
@@ -22,6 +22,7 @@ CAUSES = (
 )
 LIT = len(CAUSES)
 OCCLUDED = LIT - 1
+INCIDENCE = CAUSES.index("projector_incidence")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ def light_on(projector: PlannedProjector, target: Target) -> Light:
         directions = np.broadcast_to(pose[:3, 2], points.shape)
         distances = offsets @ pose[:3, 2]
     else:
-        distances = np.linalg.norm(offsets, axis=1)
+        distances = lengths(offsets)
         directions = offsets / np.where(distances > 0, distances, 1.0)[:, None]
     return Light(
         directions,
@@ -159,8 +160,23 @@ def first_failure_in_the_open(
     )
     stage = np.full(len(target), LIT, dtype=np.int8)
     for index in range(len(tests) - 1, -1, -1):
-        stage[~tests[index]] = index
+        np.copyto(stage, np.int8(index), where=~tests[index])
     return stage
+
+
+def faces_away(projector: PlannedProjector, target: Target) -> NDArray[np.bool_]:
+    """Return which samples surely show light their back, shape (n,).
+
+    N.(Q - P) < 0, or N.L > 0 in parallel light, by more than rounding: beyond every
+    limit of incidence, so that `first_failure` is at most `INCIDENCE`.
+    """
+    points, normals = target.samples.points, target.samples.normals
+    pose = projector.world_from_device
+    if projector.light == "parallel":
+        return normals @ pose[:3, 2] > 1e-9
+    offsets = points - pose[:3, 3]
+    behind = np.einsum("ij,ij->i", normals, offsets)
+    return behind > 1e-9 * np.abs(offsets).max(axis=0, initial=0.0).sum()
 
 
 def margins(light: Light, limits: ProjectorLimits) -> NDArray[np.float64]:
