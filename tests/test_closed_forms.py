@@ -23,7 +23,7 @@ from planning.projectors import plan_projectors
 from planning.rig import load_rig
 from solvers.cone import max_margin_direction, smallest_cap
 
-EFFORT = Effort(finest=5, budget=3e8, shadows=0.0, most_samples=800)
+EFFORT = Effort(finest=5, budget=3e8, shadows=0.0, most_samples=2000)
 SHADOWS = replace(EFFORT, finest=6, shadows=np.inf)
 ASKED = dict.fromkeys(
     ("max_cameras", "coverage", "min_reachable", "accuracy_mm", "up"), None

@@ -175,7 +175,7 @@ def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, i
     assert (proof["count"], proof["status"]) == (count, "optimal")
     entry = proof["continuous"]
     assert (entry["lower_bound"], entry["status"]) == (count, "proved")
-    assert entry["n_reached"] == entry["n_samples"] == 600
+    assert entry["n_reached"] == entry["n_samples"] >= 600
     assert (entry["n_cells"] == 0) == idle
     assert (proof["one_fewer"] is None) == idle
     if not idle:

@@ -21,11 +21,11 @@ name = "above"
 [workspace]
 shape = "cone"
 axis = {axis}
-half_angle_deg = 50.0
+half_angle_deg = 65.0
 [requirements]
-dominant_coverage = 0.7
+dominant_coverage = 0.6
 coverage = 0.8
-min_reachable = 0.2
+min_reachable = 0.3
 [placement]
 n_candidate_projectors = 600
 n_candidate_cameras = 400
@@ -43,7 +43,7 @@ def planned(path, unit, up):
 
 @pytest.fixture(scope="module")
 def head():
-    return sample_head(n_faces=3000)
+    return sample_head(n_faces=5000)
 
 
 @pytest.fixture(scope="module")
