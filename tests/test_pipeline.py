@@ -12,6 +12,7 @@ import pytest
 
 from geometry.primitives import box
 from planning import RigPlan, load_rig, plan_rig, verify_plan
+from planning.audit import audit_plan
 from planning.errors import (
     InfeasibleLimitsError,
     InputError,
@@ -196,7 +197,7 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
         offset = device.world_from_device[:3, 3] - plan.surface.mesh.centre
         angle = np.arccos(offset @ axis / np.linalg.norm(offset))
         assert np.degrees(angle) <= 10.0
-    assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
+    assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
 @pytest.mark.usefixtures("few_samples")
@@ -237,7 +238,7 @@ def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     plan = caught.value.plan
     assert plan.document["truncated"] is True
     assert plan.document["reconstruction"] is None
-    assert verify_plan(plan, seed=3, check_pixels=False).failures == ()
+    assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
 @pytest.mark.usefixtures("few_samples")
