@@ -119,6 +119,7 @@ def test_the_same_command_gives_the_same_files_whatever_the_threads(runs):
         for key in VOLATILE:
             assert document.pop(key)
         assert (document.pop("reconstruction") is None) == (n == 2)
+        del document["members"][0]["reconstruction"]
         texts.append(json.dumps(document))
     assert texts[0] == texts[1]
 
