@@ -220,9 +220,14 @@ def _reachable_by_projectors(
         left = np.flatnonzero(~reachable)
         if not len(left):
             break
+        rest = target.take(left)
+        # What shows its back comes no further than it did before.
+        idle = furthest[left] >= lighting.INCIDENCE
+        idle &= lighting.faces_away(projector, rest)
+        left, rest = left[~idle], rest.take(~idle)
         stage = lighting.first_failure(
             projector,
-            target.take(left),
+            rest,
             scene.requirements.projector,
             scene.visibility,
             bodies=scene.standing,

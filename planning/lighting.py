@@ -27,6 +27,7 @@ CAUSES = (
 LIT = len(CAUSES)
 OCCLUDED = CAUSES.index("projector_occlusion")
 BLOCKED = CAUSES.index("projector_body")
+INCIDENCE = CAUSES.index("projector_incidence")
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +182,23 @@ def first_failure_in_the_open(
     )
     stage = np.full(len(target), LIT, dtype=np.int8)
     for index in range(len(tests) - 1, -1, -1):
-        stage[~tests[index]] = index
+        np.copyto(stage, np.int8(index), where=~tests[index])
     return stage
+
+
+def faces_away(projector: PlannedProjector, target: Target) -> NDArray[np.bool_]:
+    """Return which samples surely show light their back, shape (n,).
+
+    N.(Q - P) < 0, or N.L > 0 in parallel light, by more than rounding: beyond every
+    limit of incidence, so that `first_failure` is at most `INCIDENCE`.
+    """
+    points, normals = target.samples.points, target.samples.normals
+    pose = projector.world_from_device
+    if projector.light == "parallel":
+        return normals @ pose[:3, 2] > 1e-9
+    offsets = points - pose[:3, 3]
+    behind = np.einsum("ij,ij->i", normals, offsets)
+    return behind > 1e-9 * np.abs(offsets).max(axis=0, initial=0.0).sum()
 
 
 def margins(light: Light, limits: ProjectorLimits) -> NDArray[np.float64]:

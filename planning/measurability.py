@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.lengths import lengths
 from geometry.poses import inverse, transform
 from geometry.visibility import Visibility
 
@@ -88,7 +89,7 @@ def view(
     points, normals = target.samples.points, target.samples.normals
     pose, device = camera.world_from_device, camera.device
     offsets = points - pose[:3, 3]
-    distances = np.linalg.norm(offsets, axis=1)
+    distances = lengths(offsets)
     rays = offsets / np.where(distances > 0, distances, 1.0)[:, None]
     facing = -np.einsum("ij,ij->i", normals, rays)
     local = transform(inverse(pose), points)
@@ -111,7 +112,7 @@ def view(
         blocked = visibility.blocked(pose[:3, 3], points[clear], normals[clear])
         stage[clear[blocked]] = _OCCLUDED
     for index in range(len(tests) - 1, -1, -1):
-        stage[~tests[index]] = index
+        np.copyto(stage, np.int8(index), where=~tests[index])
     jacobian = np.zeros((len(points), 3, 2))
     seen = stage == SEEN
     jacobian[seen] = pose[:3, :3] @ device.ray_jacobian(local[seen])

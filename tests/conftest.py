@@ -3,6 +3,7 @@
 import importlib.util
 import sys
 from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -118,8 +119,24 @@ def _load(name: str) -> ModuleType:
     return module
 
 
+@pytest.fixture(scope="session")
+def with_few_samples() -> Callable[[], AbstractContextManager[None]]:
+    """A quarter of the samples behind claims, for plans that a module shares."""
+
+    @contextmanager
+    def few() -> Generator[None]:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("planning.claims.N_SAMPLES", 3000)
+            patch.setattr("planning.overlaps.N_SAMPLES", 3000)
+            yield
+
+    return few
+
+
 @pytest.fixture
-def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_samples(
+    with_few_samples: Callable[[], AbstractContextManager[None]],
+) -> Generator[None]:
     """Claims from a quarter of the samples, where exactness isn't the question."""
-    monkeypatch.setattr("planning.claims.N_SAMPLES", 3000)
-    monkeypatch.setattr("planning.overlaps.N_SAMPLES", 3000)
+    with with_few_samples():
+        yield

@@ -92,7 +92,7 @@ def random_case(seed, **kinds):
     return tree, leaves, random_problem(rng, leaves, **kinds)
 
 
-@pytest.mark.parametrize("block", range(20))
+@pytest.mark.parametrize("block", range(8))
 def test_what_is_complete_equals_brute_force(block):
     statuses = set()
     for seed in range(25 * block, 25 * block + 25):
@@ -118,7 +118,7 @@ def test_what_is_complete_equals_brute_force(block):
 @pytest.mark.parametrize("multipliers", ["none", "weights", "random", "one"])
 def test_the_tuple_search_equals_brute_force(n_poses, multipliers):
     outcomes = []
-    for seed in range(150):
+    for seed in range(60):
         tree, leaves, problem = random_case(10_000 + seed)
         whole = whole_rows(problem)
         rng = np.random.default_rng(seed)
@@ -147,7 +147,7 @@ def test_the_tuple_search_equals_brute_force(n_poses, multipliers):
             assert names.size == n_poses
             assert np.all(np.isin(names, tree.leaves))
             assert serves_enough(problem, unpack_rows(tree.rows[names], tree.n_rows))
-    assert 20 < sum(outcomes) < 140
+    assert 8 < sum(outcomes) < 56
 
 
 def test_two_poses_in_one_cell_are_two_poses():
@@ -174,7 +174,7 @@ def test_two_poses_in_one_leaf_serve_what_needs_two():
 
 @pytest.mark.parametrize("n_poses", [1, 2, 3, 4])
 def test_every_multiset_of_leaves_is_met_once(n_poses):
-    for seed in range(6):
+    for seed in range(3):
         tree, leaves, problem = random_case(seed)
         store = CellStore(tree, WorkBudget(PLENTY))
         twigs = Twigs(
@@ -196,7 +196,7 @@ def test_every_multiset_of_leaves_is_met_once(n_poses):
 
 def test_a_cut_bound_is_true_and_says_so():
     cut = 0
-    for seed in range(300):
+    for seed in range(120):
         tree, leaves, problem = random_case(20_000 + seed)
         count = 1 + seed % 4
         truth = fewest(problem, leaves, count)
@@ -209,7 +209,7 @@ def test_a_cut_bound_is_true_and_says_so():
             cut += 1
             assert answer.lower_bound < count
             assert answer.proof.endswith("search cut by the work budget")
-    assert cut > 30
+    assert cut > 12
     tree, leaves, problem = random_case(3)
     answer = bound_count(problem, tree, 9, time_limit=0.0)
     assert answer.proof.endswith("search cut by the time limit")
@@ -232,7 +232,7 @@ def most_of(problem, leaves, k):
     )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     st.integers(0, len(CASES) - 1), arrays(np.float64, 12, elements=NUMBERS), st.data()
 )
@@ -264,7 +264,7 @@ def fractional_fewest(problem, leaves):
 
 def test_multipliers_reach_the_linear_program_over_leaves():
     reached, worth = 0, set()
-    for seed in range(120):
+    for seed in range(60):
         tree, leaves, problem = random_case(40_000 + seed)
         optimum = fractional_fewest(problem, leaves)
         if optimum is None or abs(optimum - round(optimum)) < 1e-4:
@@ -277,7 +277,7 @@ def test_multipliers_reach_the_linear_program_over_leaves():
         assert search.bound == math.ceil(optimum), seed
         reached += 1
         worth.add(search.bound)
-    assert reached > 20
+    assert reached > 10
     assert {2.0, 3.0} <= worth
 
 
@@ -318,7 +318,7 @@ def test_a_spoiled_answer_is_caught():
 
 
 def test_order_of_rows_and_cells_changes_nothing():
-    for seed in range(40):
+    for seed in range(20):
         tree, _, problem = random_case(seed)
         rng = np.random.default_rng(seed)
         rows = rng.permutation(tree.n_rows)
@@ -484,7 +484,7 @@ def test_rows_of_cells_hold_what_their_poses_serve(cap_trees, kind):
         cells = rng.integers(0, 2**11 - 1, 250)
     else:
         tree = cap_trees.SphereTree(cap_trees.spread(200), 0.5, 6)
-        cells = rng.integers(0, 2 * (4**7 - 1), 250)
+        cells = rng.integers(0, 2 * (4**7 - 1), 100)
     held = {}
     for cell in cells:
         poses = tree.inside(cell, rng, 400)
@@ -523,7 +523,7 @@ def test_no_cover_by_free_poses_beats_the_bound(cap_trees):
         points /= np.linalg.norm(points, axis=1, keepdims=True)
         weights, radius = rng.random(150), rng.uniform(25, 45) * DEG
         needed = rng.choice([0.8, 0.9, 0.95]) * weights.sum()
-        poses = np.concatenate([points, rng.normal(size=(17_000, 3))])
+        poses = np.concatenate([points, rng.normal(size=(6_000, 3))])
         poses /= np.linalg.norm(poses, axis=1, keepdims=True)
         serves = poses @ points.T >= np.cos(radius)
         found = greedy(serves, weights, needed)

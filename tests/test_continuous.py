@@ -51,7 +51,7 @@ def stage_for(mesh, light, *, tangent_deg=0.0, steep=(0.0, 0.0, 0.0), **workspac
     return scene, PlannedProjector("", light, eye, eye, rig.projector_device(), RADII)
 
 
-def bounded(mesh, light, share, count, effort=QUICK, n=800, **options):
+def bounded(mesh, light, share, count, effort=QUICK, n=400, **options):
     scene, template = stage_for(mesh, light, **options)
     rows = scene.target_samples(n, 3)
     required = int(np.ceil(share * n - 1e-9))
@@ -129,9 +129,15 @@ def position_holder(tree, offset):
     return inside
 
 
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("light", ["parallel", "diverging"])
-@pytest.mark.parametrize("tangent_deg", [0.0, 40.0])
+@pytest.mark.parametrize(
+    ("name", "light", "tangent_deg"),
+    [
+        ("ring", "parallel", 40.0),
+        ("ring", "diverging", 0.0),
+        ("box over a plate", "parallel", 0.0),
+        ("box over a plate", "diverging", 40.0),
+    ],
+)
 def test_no_pose_lights_what_its_cells_lack(name, light, tangent_deg):
     scene, template = stage_for(
         SHAPES[name], light, tangent_deg=tangent_deg, steep=(0.3, 0.2, 1.0)
@@ -289,15 +295,12 @@ def test_rooms_planes_and_keep_out_volumes_empty_cells_and_only_theirs(light):
     ("shape", "share", "count"),
     [
         # A cap of 60 degrees holds a quarter of a sphere.
-        (sphere(0.08, subdivisions=4), 0.24, 1),
         (sphere(0.08, subdivisions=4), 0.48, 2),
         (sphere(0.08, subdivisions=4), 0.62, 3),
         # From a corner three sides of a cube are met at 54.7 degrees.
-        (box((0.1, 0.1, 0.1), divisions=4), 0.5, 1),
         (box((0.1, 0.1, 0.1), divisions=4), 1.0, 2),
         # Of the side of a cylinder, 120 degrees around.
         (cylinder(0.05, 0.12, capped=False), 0.33, 1),
-        (cylinder(0.05, 0.12, capped=False), 0.66, 2),
         (cylinder(0.05, 0.12, capped=False), 0.75, 3),
     ],
 )
@@ -342,7 +345,9 @@ def test_devices_inside_the_object_cast_no_shadows_that_are_relied_on():
     """Where the shell cuts the object, something may stand behind the device."""
     mesh = SHAPES["box over a plate"]
     for light in ("parallel", "diverging"):
-        found = bounded(mesh, light, 0.3, 2, projector_radius_m=(0.05, 1.2), n=200)
+        effort = replace(QUICK, finest=4)
+        shell = {"projector_radius_m": (0.05, 1.2), "n": 100}
+        found = bounded(mesh, light, 0.3, 2, effort, **shell)
         assert not found.shadows
 
 
@@ -350,7 +355,7 @@ def test_the_entry_says_what_was_proved():
     ball = sphere(0.08, subdivisions=4)
     entry = bounded(ball, "parallel", 0.48, 2).entry()
     assert (entry["lower_bound"], entry["status"]) == (2, "proved")
-    assert (entry["n_samples"], entry["n_reached"]) == (800, 800)
+    assert (entry["n_samples"], entry["n_reached"]) == (400, 400)
     assert entry["occlusion"] is True
     assert entry["n_cells"] > 6
     # One projector lights a quarter of the ball at most, and less than is required.

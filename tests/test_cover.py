@@ -82,9 +82,9 @@ def visibility(n_e, n_s, *, seed=0, incidence=60.0):
     return lit & (points @ directions.T > -0.3), rng.uniform(0.5, 1.5, n_e)
 
 
-@pytest.mark.parametrize("first", range(0, 300, 50))
+@pytest.mark.parametrize("first", range(0, 120, 60))
 def test_equals_brute_force_whatever_the_budget(first):
-    for seed in range(first, first + 50):
+    for seed in range(first, first + 60):
         problem = random_problem(seed)
         best, most = brute_force(problem)
         for budget in (1e9, 1e4, 0.0):
@@ -140,7 +140,7 @@ def test_among_the_fewest_the_most_weight():
 
 def test_the_most_weight_is_left_out_on_request_and_nothing_else():
     lighter = 0
-    for seed in range(8):
+    for seed in range(4):
         covers, weights = visibility(200, 60, seed=seed)
         problem = CoverProblem(covers, weights, min_coverage=0.85)
         best = solve_cover(problem)
@@ -317,12 +317,12 @@ def test_pairs_are_proved_by_exhaustion(share):
 
 
 def test_permuted_rows_and_columns_need_as_many():
-    covers, weights = visibility(400, 150, seed=4)
+    covers, weights = visibility(300, 100, seed=4)
     rng = np.random.default_rng(0)
     reference = solve_cover(CoverProblem(covers, weights, min_coverage=0.95))
     assert reference.status is SolveStatus.OPTIMAL
-    for _ in range(3):
-        rows, columns = rng.permutation(400), rng.permutation(150)
+    for _ in range(2):
+        rows, columns = rng.permutation(300), rng.permutation(100)
         moved = CoverProblem(covers[rows][:, columns], weights[rows], min_coverage=0.95)
         solution = solve_cover(moved)
         assert solution.status is SolveStatus.OPTIMAL
@@ -369,7 +369,7 @@ def test_same_answer_twice():
     assert (once.lower_bound, once.proof) == (again.lower_bound, again.proof)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), scale=st.sampled_from([0.0, 0.3, 1.0, 50.0]))
 def test_bounds_hold_for_any_multipliers(seed, scale):
     rng = np.random.default_rng(seed)

@@ -35,7 +35,7 @@ brute = _benchmark()
 
 @pytest.mark.parametrize(("axes", "shape"), brute.MODES)
 def test_verdicts_agree_with_brute_force_in_every_mode(axes, shape):
-    ups, end, truth = brute.draw_set_ups(axes, shape, 300, np.random.default_rng(7))
+    ups, end, truth = brute.draw_set_ups(axes, shape, 150, np.random.default_rng(7))
     by_phi, by_d, _, slack = brute.predicted(ups, end)
     assert 0.2 < truth.mean() < 0.8  # Both answers are asked for.
     np.testing.assert_array_equal(by_phi, truth)
@@ -45,7 +45,7 @@ def test_verdicts_agree_with_brute_force_in_every_mode(axes, shape):
 
 def test_the_shorthand_fails_where_the_signed_form_does_not():
     ups, end, truth = brute.draw_set_ups(
-        "turned", "bent", 300, np.random.default_rng(7)
+        "turned", "bent", 150, np.random.default_rng(7)
     )
     by_phi, _, shorthand, _ = brute.predicted(ups, end)
     assert np.all(by_phi == truth)

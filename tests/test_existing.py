@@ -174,15 +174,15 @@ def shining(name, towards, aside=0.0):
 def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, idle):
     scene, template = ball_scene(existing)
     offset = (0.0, 0.0)
-    stage = plan_projectors(scene, template, 600, ring_offset=offset, rounds=1)
+    stage = plan_projectors(scene, template, 300, ring_offset=offset, rounds=1)
     assert stage.certificate["given"] == len(existing)
-    effort = Effort(finest=6, budget=1e9, shadows=np.inf)
+    effort = Effort(finest=6, budget=1e9, shadows=np.inf, most_samples=600)
     stage = prove_fewest(scene, stage, template, effort, ring_offset=offset)
     proof = stage.certificate
     assert (proof["count"], proof["status"]) == (count, "optimal")
     entry = proof["continuous"]
     assert (entry["lower_bound"], entry["status"]) == (count, "proved")
-    assert entry["n_reached"] == entry["n_samples"] == 2000
+    assert entry["n_reached"] == entry["n_samples"] >= 600
     assert (entry["n_cells"] == 0) == idle
     assert (proof["one_fewer"] is None) == idle
     if not idle:
@@ -200,7 +200,7 @@ def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, i
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory):
+def planned(tmp_path_factory, with_few_samples):
     """A plate, seen from both sides; a projector and a camera before it already."""
     path = tmp_path_factory.mktemp("rig") / "old.toml"
     path.write_text(
@@ -217,9 +217,10 @@ def planned(tmp_path_factory):
     )
     plate = box((0.1, 0.01, 0.1), divisions=4)
     try:
-        return plan_rig(
-            plate, load_rig(path), max_projectors=3, target="surface", check=False
-        )
+        with with_few_samples():
+            return plan_rig(
+                plate, load_rig(path), max_projectors=3, target="surface", check=False
+            )
     except RequirementError as missed:
         return missed.plan
 

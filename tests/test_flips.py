@@ -60,9 +60,9 @@ min_reachable = 0.1
 
 @pytest.fixture(scope="module", autouse=True)
 def fewer_samples():
-    """A flipped sign moves areas by far more than a third of the samples can hide."""
+    """A flipped sign moves areas by far more than a sixth of the samples can hide."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims, "N_SAMPLES", 4000)
+        patch.setattr(claims, "N_SAMPLES", 2000)
         yield
 
 
@@ -98,7 +98,7 @@ def made(scene, tmp_path_factory):
 
 
 def audited(plan):
-    return audit_plan(plan, n_samples=8000, seed=11)
+    return audit_plan(plan, n_samples=4000, seed=11)
 
 
 def written_again(made):

@@ -91,7 +91,7 @@ def planted(seed, *, n_e, n_s, n_parts):
     return covers[:, rng.permutation(n_s)]
 
 
-@pytest.mark.parametrize("first", range(0, 300, 60))
+@pytest.mark.parametrize("first", range(0, 120, 60))
 def test_equals_brute_force_and_bounds_hold_however_the_budget_cuts(first):
     for seed in range(first, first + 60):
         covers = random_rows(seed)

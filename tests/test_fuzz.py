@@ -7,7 +7,7 @@ from geometry.mesh import MeshError
 from geometry.readers import load_mesh
 
 SEED = 4
-COUNT = 200
+COUNT = 80
 
 
 def test_no_damaged_file_escapes(fuzzing) -> None:
@@ -17,7 +17,7 @@ def test_no_damaged_file_escapes(fuzzing) -> None:
     read = [answer for answer in answers if answer["read"]]
     # Both ends must be reached, or nothing was tried.
     assert COUNT / 10 < len(read) < COUNT / 2
-    assert sum(answer.get("curved", False) for answer in read) >= 3
+    assert sum(answer.get("curved", False) for answer in read) >= 1
 
 
 def test_the_undamaged_files_hold_the_same_ball(fuzzing, tmp_path) -> None:

@@ -237,7 +237,11 @@ def test_single_points_are_judged_like_the_whole() -> None:
         assert set(found.tolist()) == {expected}
 
 
-@pytest.mark.parametrize(("seed", "name"), list(enumerate(BODIES)))
+# At least one of each kind, walls thin, thick and none.
+MOVED = ("plate", "wider mouth", "hemisphere", "bubble", "sealed", "wide mouth", "cup")
+
+
+@pytest.mark.parametrize(("seed", "name"), list(enumerate(MOVED)))
 def test_nothing_depends_on_place_turn_or_scale(seed: int, name: str) -> None:
     mesh, shell = shell_of(name)
     rng = np.random.default_rng(seed)
@@ -273,8 +277,10 @@ def test_fragments_neither_hide_a_shell_nor_make_one() -> None:
         assert found.inside_m2 == pytest.approx(shell.inside_m2, rel=0.01)
 
 
-def test_the_number_of_threads_changes_nothing() -> None:
-    mesh, shell = shell_of("narrow mouth")
+def test_the_number_of_threads_changes_nothing(monkeypatch) -> None:
+    monkeypatch.setattr("geometry.hollow._SPOTS", 2000)
+    mesh = BODIES["narrow mouth"]
+    shell = measure_shell(RayCaster(mesh, threads=2))
     assert measure_shell(RayCaster(mesh, threads=1)) == shell
     np.testing.assert_array_equal(
         faces_inside(RayCaster(mesh, threads=1)), faces_inside(RayCaster(mesh))

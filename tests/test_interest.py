@@ -14,6 +14,7 @@ from geometry.primitives import box, sphere
 from geometry.readers import load_mesh
 from geometry.selected_regions import regions_of_faces
 from planning import RigPlan, load_rig, plan_rig, verify_plan
+from planning.audit import audit_plan
 from planning.cli import main
 from planning.errors import InputError
 from planning.interest import interest_of, read_selection, read_weight
@@ -293,14 +294,15 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
 
 
 @pytest.fixture(scope="module")
-def plan(mesh: TriangleMesh) -> RigPlan:
-    return plan_rig(
-        mesh,
-        load_rig("default"),
-        max_projectors=3,
-        select=read_selection("ply:painted", mesh),
-        check=False,
-    )
+def plan(mesh: TriangleMesh, with_few_samples) -> RigPlan:
+    with with_few_samples():
+        return plan_rig(
+            mesh,
+            load_rig("default"),
+            max_projectors=3,
+            select=read_selection("ply:painted", mesh),
+            check=False,
+        )
 
 
 def test_one_side_of_a_box_needs_one_projector(plan: RigPlan) -> None:
@@ -341,7 +343,7 @@ def test_a_plan_for_a_selection_verifies_and_a_changed_one_does_not(
     for key, value in (("n_faces", 31), ("area_m2", 0.0049), ("kind", "mood")):
         spoiled = surface | {"selection": surface["selection"] | {key: value}}
         document = plan.document | {"surface": spoiled}
-        found = verify_plan(RigPlan(document, plan.surface), check_pixels=False)
+        found = audit_plan(RigPlan(document, plan.surface), n_samples=1000)
         assert [f for f in found.failures if f.startswith(f"surface.selection.{key}")]
 
 
@@ -381,12 +383,14 @@ def test_exit_codes_and_one_line_errors(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("few_samples")
 def test_a_weight_on_the_command_line_ends_in_a_verified_plan(
     folder, tmp_path, monkeypatch, capsys
 ) -> None:
     monkeypatch.chdir(folder)
     base = ["--mesh", "box.ply", "--max-projectors", "2", "-o", tmp_path / "out"]
-    code, out, err = in_process(monkeypatch, capsys, *base, "--weight", "weight.txt")
+    words = ["--weight", "weight.txt", "--no-check"]
+    code, out, err = in_process(monkeypatch, capsys, *base, *words)
     assert code == 0, err
     assert "weight.txt: 32 of 192 triangles are the target, 23.1% of the area" in err
     document = json.loads((tmp_path / "out" / "plan.json").read_text())

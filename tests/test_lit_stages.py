@@ -7,6 +7,7 @@ from geometry.mesh import TriangleMesh
 from geometry.primitives import sphere
 from planning import lighting
 from planning.candidates import projector_candidates
+from planning.claims import Devices, _reachable_by_projectors
 from planning.plan import PlannedProjector
 from planning.projector_light import lit_stages
 from planning.rig import load_rig
@@ -44,3 +45,14 @@ def test_candidates_together_light_what_each_lights_alone(light):
     np.testing.assert_array_equal(together, np.column_stack(alone))
     assert (together == lighting.OCCLUDED).sum() > 300
     assert (together == lighting.LIT).sum() > 300
+    away = np.column_stack([lighting.faces_away(one, rows) for one in offered])
+    assert together[away].max() == lighting.INCIDENCE
+    assert away.mean() > 0.4
+    # Of few poses, so that some samples stay dark for each reason.
+    few = together[:, 20:26]
+    nothing = np.zeros(len(rows), dtype=bool)
+    devices = Devices((), (), tuple(offered[20:26]), ())
+    reachable, furthest = _reachable_by_projectors(scene, devices, rows, nothing)
+    np.testing.assert_array_equal(reachable, (few == lighting.LIT).any(axis=1))
+    np.testing.assert_array_equal(furthest, few.max(axis=1))
+    assert len(np.unique(furthest)) >= 3

@@ -86,7 +86,7 @@ def test_redundant_arcs_on_a_circle():
 
 
 def test_any_one_of_a_redundant_selection_may_fail():
-    for seed in range(4):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         covers = rng.random((40, 10)) < 0.5
         twice = CoverProblem(covers, min_coverage=0.9, needs=2)
@@ -203,7 +203,7 @@ def test_costs_under_a_limit_on_the_number():
     assert none.lower_bound <= 4.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 2**16),
     scale=st.sampled_from(
@@ -242,7 +242,7 @@ def test_bounds_hold_for_any_multipliers(seed, scale):
 @pytest.mark.parametrize("share", [0.4, 0.7, 1.0])
 def test_tuples_equal_brute_force(share):
     settled = 0
-    for seed in range(24):
+    for seed in range(12):
         problem = random_cover(seed, share=share, n_s=10)
         cover = reduce_problem(problem)
         found = met_by(problem)
@@ -258,12 +258,12 @@ def test_tuples_equal_brute_force(share):
             cut = any_tuple(cover, k, cover.weights, WorkBudget(1e6))
             if cut.complete:
                 assert (cut.selected is not None) is bool(found[k]), (seed, k)
-    assert settled > 10
+    assert settled > 5
 
 
 def test_exchanges_only_raise_the_worth_and_find_small_covers():
     found = 0
-    for seed in range(12):
+    for seed in range(6):
         problem = random_cover(seed, n_s=10)
         cover = reduce_problem(problem)
         fewest = min(k for k, ones in met_by(problem).items() if ones)
@@ -281,7 +281,7 @@ def test_exchanges_only_raise_the_worth_and_find_small_covers():
             best = heaviest_integer(cover, more, plenty(), n_sets=fewest)
             assert cover.weight_of(more) <= best.bound
             assert cover.weight_of(best.selected) == cover.weight_of(more)
-    assert found == 12
+    assert found == 6
 
 
 @pytest.mark.parametrize("n_sets", [None, 3])
@@ -335,7 +335,7 @@ def test_same_answer_with_one_and_two_threads(by_threads):
 
     def answers():
         found = []
-        for seed in (1, 4):
+        for seed in (1,):
             problem = random_cover(seed, n_e=100, n_s=30, share=0.8)
             s = solve_cover.__wrapped__(problem, budget=1e8)
             found.append((s.selected.tolist(), s.lower_bound, s.proof))

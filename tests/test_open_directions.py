@@ -70,7 +70,7 @@ def test_what_passes_is_in_an_open_cell(name, n):
     cube = CubeMap(n)
     samples, visibility, maps = maps_of(MESHES[name], cube)
     blocked = closed = 0
-    for row in range(0, POINTS, 2):
+    for row in range(0, POINTS, 4):
         asked = directions(600, seed=row)
         asked = asked[asked @ samples.normals[row] >= np.cos(FREE.max_incidence)]
         free = is_free(samples, visibility, row, asked)

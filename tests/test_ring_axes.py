@@ -52,9 +52,9 @@ def stages(scene):
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
     eye = np.eye(4)
     template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
-    projectors = plan_projectors(made, template, 300, ring_offset=(tilt, -np.pi / 2))
+    projectors = plan_projectors(made, template, 200, ring_offset=(tilt, -np.pi / 2))
     camera = PlannedCamera("", eye, rig.camera_device())
-    offered = offered_cameras(made, camera, 240)
+    offered = offered_cameras(made, camera, 160)
     cover = plan_cameras(made, projectors.projectors, offered)
     cameras = camera_stage(made, cover)
     return made, projectors, cameras, tilt

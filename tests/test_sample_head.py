@@ -70,7 +70,7 @@ def winding(mesh, inside):
     return angles.sum() / (4 * np.pi), angles.min()
 
 
-@pytest.mark.parametrize("n_faces", [500, 2_000, 24_000])
+@pytest.mark.parametrize("n_faces", [500, 2_000])
 def test_mesh_is_sound_at_every_resolution(n_faces):
     mesh = sample_head(n_faces=n_faces)
     assert n_faces <= len(mesh.faces) <= n_faces + 41 * np.sqrt(n_faces / 20)
@@ -78,6 +78,7 @@ def test_mesh_is_sound_at_every_resolution(n_faces):
 
 
 def test_no_face_cuts_another(head):
+    assert_sound(head)
     # Every face is counter-clockwise seen from one point, and together they wrap it
     # once: a surface over the sphere, which can't cut itself.
     turns, least = winding(head, np.array([0.0, 0.020, -0.004]))
@@ -116,10 +117,10 @@ def test_an_open_neck_has_one_level_border():
 
 
 def test_resolutions_agree_on_the_surface(head):
-    fine = sample_head(n_faces=100_000)
-    assert volume(head) == pytest.approx(volume(fine), rel=2e-3)
+    coarse = sample_head(n_faces=15_000)
+    assert volume(coarse) == pytest.approx(volume(head), rel=2e-3)
     x = np.linspace(-55, 55, 23)
-    assert np.abs(profile(head, x, 45.0) - profile(fine, x, 45.0)).max() < 0.2
+    assert np.abs(profile(coarse, x, 45.0) - profile(head, x, 45.0)).max() < 0.2
 
 
 def test_left_is_the_mirror_of_right(head):
@@ -183,27 +184,27 @@ def test_ears_are_the_widest_part_and_hollow(head, side):
 
 def test_parameters_move_what_they_name():
     base = HeadShape()
-    plain = sample_head(base, n_faces=4_000)
+    plain = sample_head(base, n_faces=2_500)
     size = np.ptp(plain.bounds, axis=0) * 1e3
     tip = -1e3 * plain.bounds[0, 1]
-    longer = sample_head(HeadShape(nose_projection=24.0), n_faces=4_000)
+    longer = sample_head(HeadShape(nose_projection=24.0), n_faces=2_500)
     assert -1e3 * longer.bounds[0, 1] - tip == pytest.approx(5.0, abs=0.5)
-    taller = sample_head(HeadShape(crown_height=123.0), n_faces=4_000)
+    taller = sample_head(HeadShape(crown_height=123.0), n_faces=2_500)
     assert 1e3 * (taller.bounds - plain.bounds)[1, 2] == pytest.approx(10.0, abs=0.5)
-    necked = sample_head(HeadShape(neck_length=32.0), n_faces=4_000)
+    necked = sample_head(HeadShape(neck_length=32.0), n_faces=2_500)
     assert 1e3 * (plain.bounds - necked.bounds)[0, 2] == pytest.approx(10.0, abs=0.5)
-    eared = sample_head(HeadShape(ear_standoff=22.0), n_faces=4_000)
+    eared = sample_head(HeadShape(ear_standoff=22.0), n_faces=2_500)
     assert np.ptp(eared.bounds, axis=0)[0] * 1e3 > size[0] + 6
-    twice = sample_head(HeadShape(scale=2.0), n_faces=4_000)
+    twice = sample_head(HeadShape(scale=2.0), n_faces=2_500)
     assert twice.vertices == pytest.approx(2.0 * plain.vertices)
     assert np.array_equal(twice.faces, plain.faces)
 
 
 def test_every_parameter_matters():
-    plain = sample_head(n_faces=800)
+    plain = sample_head(n_faces=500)
     for field in fields(HeadShape):
         near = float(field.default) * 1.05 + 0.5
-        other = sample_head(HeadShape(**{field.name: near}), n_faces=800)
+        other = sample_head(HeadShape(**{field.name: near}), n_faces=500)
         moved = np.linalg.norm(other.vertices - plain.vertices, axis=1).max()
         assert moved > 1e-4, field.name
 
@@ -215,7 +216,7 @@ def test_population_is_varied_and_sound():
     widths = np.array([h.width for h in heads])
     assert widths.mean() == pytest.approx(154.0, abs=1.5)
     assert widths.std() == pytest.approx(6.0, abs=1.0)
-    for shape in heads[:6]:
+    for shape in heads[:4]:
         mesh = sample_head(shape, n_faces=2_000)
         assert_sound(mesh)
         turns, least = winding(mesh, np.array([0.0, 0.020, -0.004]))

@@ -16,7 +16,7 @@ def brute(covers, required, count):
     )
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("share", [0.7, 0.9, 1.0])
 def test_count_bound_and_areas_against_brute_force(seed, share):
     rng = np.random.default_rng(seed)

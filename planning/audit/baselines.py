@@ -79,7 +79,7 @@ def _audit_row(
         ledger.number(f"{key}.{name}", claimed, value, _LENGTH_M, "m")
     ledger.number(f"{key}.phi", row.get("phi"), section.phi, _ANGLE, "rad")
     largest = plan.requirements.camera.max_incidence
-    room = min(section.field_slack(), section.incidence_slack(largest))
+    room = min(section.field_slack, section.incidence_slack(largest))
     ledger.number(
         f"{key}.phi_max", row.get("phi_max"), section.phi + room, _ANGLE, "rad"
     )
@@ -141,7 +141,7 @@ def _audit_seam(
         f"{key}.n_seam",
         f"{count!r} must be a positive whole number",
     )
-    ahead = section.incidence_slack(largest) - section.field_slack()
+    ahead = section.incidence_slack(largest) - section.field_slack
     first = _LIMITS[0] if ahead > 0.0 else _LIMITS[1]
     # Where both limits bind at once, rounding may name either.
     known = _LIMITS if abs(ahead) <= 2.0 * _ANGLE else (first,)

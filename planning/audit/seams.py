@@ -90,12 +90,12 @@ class Section:
         """Turn of the surface at E, convex positive [rad]."""
         return self._turn(self.normals[0], self.normals[1])
 
-    @property
+    @cached_property
     def half_field(self) -> tuple[float, float]:
         """b_1 and b_2: where each camera's image ends on the side of E [rad]."""
         beta1, beta2 = self.beta
         one = _room(self.camera1, self.to_first, -self.pole)
-        return beta1 + one, beta2 + self.field_slack()
+        return beta1 + one, beta2 + self.field_slack
 
     @property
     def standoffs(self) -> tuple[float, float]:
@@ -133,8 +133,9 @@ class Section:
         flat, other = (v - (v @ self.pole) * self.pole for v in (start, end))
         return float(np.arctan2(np.cross(flat, other) @ self.pole, flat @ other))
 
+    @cached_property
     def field_slack(self) -> float:
-        """Return b_2 - beta_2: how far E may turn until camera 2's image ends [rad].
+        """b_2 - beta_2: how far E may turn until camera 2's image ends [rad].
 
         Negative where E itself lies outside the image.
         """
@@ -149,9 +150,11 @@ def _room(
     Negative where E lies outside the image: how far it must turn back.
     """
     turns = np.linspace(0.0, np.pi, _STEPS + 1)
-    start = bool(_inside(camera, to_centre, pole, turns[:1])[0])
+    toward = -to_centre / np.linalg.norm(to_centre)
+    frame = np.stack([toward, np.cross(pole, toward)])
+    start = bool(_inside(camera, frame, turns[:1])[0])
     sense = 1.0 if start else -1.0
-    changed = _inside(camera, to_centre, pole, sense * turns) != start
+    changed = _inside(camera, frame, sense * turns) != start
     if not np.any(changed):
         return sense * np.pi
     high = float(turns[int(np.argmax(changed))])
@@ -159,7 +162,7 @@ def _room(
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
         at = np.array([sense * middle])
-        if bool(_inside(camera, to_centre, pole, at)[0]) == start:
+        if bool(_inside(camera, frame, at)[0]) == start:
             low = middle
         else:
             high = middle
@@ -168,14 +171,11 @@ def _room(
 
 def _inside(
     camera: PlannedCamera,
-    to_centre: NDArray[np.float64],
-    pole: NDArray[np.float64],
+    frame: NDArray[np.float64],
     turns: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Whether a camera has rays in its image that are turned on from E."""
-    toward = -to_centre / np.linalg.norm(to_centre)
-    aside = np.cross(pole, toward)
-    rays = np.cos(turns)[:, None] * toward + np.sin(turns)[:, None] * aside
+    """Whether a camera has rays in its image, turned in a frame: E's ray and aside."""
+    rays = np.cos(turns)[:, None] * frame[0] + np.sin(turns)[:, None] * frame[1]
     local = rays @ camera.world_from_device[:3, :3]
     ahead = local[:, 2] > 1e-9
     inside = np.zeros(len(turns), dtype=bool)
