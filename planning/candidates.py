@@ -249,11 +249,12 @@ def _projectors(
     poses: NDArray[np.float64],
     ring_offset: tuple[float, float],
 ) -> tuple[PlannedProjector, ...]:
+    device_from_ring = ring_frame(np.eye(4), template.device, *ring_offset)
     return tuple(
         replace(
             template,
             world_from_device=pose,
-            world_from_ring=ring_frame(pose, template.device, *ring_offset),
+            world_from_ring=pose @ device_from_ring,
             existing="",
         )
         for pose in poses
