@@ -238,6 +238,8 @@ def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     plan = caught.value.plan
     assert plan.document["truncated"] is True
     assert plan.document["reconstruction"] is None
+    # The whole surface of a plate is a target: all of its front is lit.
+    assert 0.009 < plan.coverage["target"]["lit_m2"] < 0.011
     assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
@@ -256,17 +258,10 @@ def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     assert "--no-check" not in text
 
 
-@pytest.mark.usefixtures("few_samples")
 def test_a_plate_without_curvature_has_no_dominant_region():
     plate = box((2.0, 2.0, 0.001), divisions=8)
     with pytest.raises(InputError, match="--target surface"):
         plan_rig(plate, load_rig("default"), max_projectors=3)
-    wall = box((0.3, 0.3, 0.01), divisions=6)
-    with pytest.raises(RequirementError) as caught:
-        plan_rig(
-            wall, load_rig("default"), max_projectors=1, target="surface", check=False
-        )
-    assert caught.value.plan.coverage["target"]["lit_m2"] > 0.08
 
 
 def test_impossible_accuracy_is_named_as_the_limit_that_forbids(quick):
