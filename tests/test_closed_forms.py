@@ -100,7 +100,7 @@ def test_box_takes_two_diagonals_three_edges_or_six_normals(incidence, count):
     assert (found.count, found.least) == (count, count)
 
 
-@pytest.mark.parametrize(("share", "count"), [(0.34, 2), (0.66, 3)])
+@pytest.mark.parametrize(("share", "count"), [(0.66, 3)])
 def test_sphere_takes_as_many_as_its_caps_hold(share, count):
     """A cap of theta holds (1 - cos theta)/2 of a sphere: a quarter at 60 degrees.
 
@@ -168,7 +168,7 @@ def facing_plates(gap):
     return joined(plate, other)
 
 
-@pytest.mark.parametrize(("share", "count"), [(0.80, 3), (0.95, 4)])
+@pytest.mark.parametrize(("share", "count"), [(0.95, 4)])
 def test_facing_plates_are_lit_through_the_gap_from_four_sides(share, count):
     """Plates of side w = 100 mm, g = 40 mm apart, lit on their inner sides.
 

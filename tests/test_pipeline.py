@@ -32,20 +32,12 @@ def head():
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])
-def plan(request, head, tmp_path_factory):
-    """In diverging light it is the plan that the README's library code makes.
-
-    In parallel light the head is seen from the front alone, which is planned sooner.
-    """
+def plan(request, head, tmp_path_factory, with_few_samples):
+    """In diverging light it is the plan that the README's library code makes."""
     if request.param == "parallel":
-        path = tmp_path_factory.mktemp("rig") / "half.toml"
-        path.write_text(
-            'base = "default"\nname = "half"\n[workspace]\nshape = "cone"\n'
-            "axis = [0.0, -1.0, 0.0]\nhalf_angle_deg = 50.0\n"
-            "[requirements]\nmin_reachable = 0.6\n"
-        )
-        rig = load_rig(path, light="parallel")
-        return plan_rig(head, rig, max_projectors=4)
+        rig = load_rig("default", light="parallel")
+        with with_few_samples():
+            return plan_rig(head, rig, max_projectors=4)
     (code,) = re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.S)
     folder = tmp_path_factory.mktemp("readme")
     shutil.copy(README.with_name("face.obj"), folder)
@@ -82,10 +74,9 @@ def quick(tmp_path_factory):
 def test_every_requirement_is_met_and_the_check_passed(plan):
     asked, areas = plan.requirements, plan.coverage["target"]
     assert len(plan.projectors) <= 4
-    least = 0.9 if plan.document["rig"]["light"] == "diverging" else 0.6
     assert areas["lit_m2"] >= 0.90 * areas["reachable_by_projectors_m2"]
     assert areas["measured_m2"] >= 0.95 * areas["reachable_by_cameras_m2"]
-    assert areas["reachable_by_projectors_m2"] >= least * areas["area_m2"]
+    assert areas["reachable_by_projectors_m2"] >= 0.90 * areas["area_m2"]
     check = plan.document["reconstruction"]
     assert check["passed"]
     assert check["failures"] == []
@@ -238,6 +229,8 @@ def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     plan = caught.value.plan
     assert plan.document["truncated"] is True
     assert plan.document["reconstruction"] is None
+    # The whole surface of a plate is a target: all of its front is lit.
+    assert 0.009 < plan.coverage["target"]["lit_m2"] < 0.011
     assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
@@ -256,17 +249,10 @@ def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     assert "--no-check" not in text
 
 
-@pytest.mark.usefixtures("few_samples")
 def test_a_plate_without_curvature_has_no_dominant_region():
     plate = box((2.0, 2.0, 0.001), divisions=8)
     with pytest.raises(InputError, match="--target surface"):
         plan_rig(plate, load_rig("default"), max_projectors=3)
-    wall = box((0.3, 0.3, 0.01), divisions=6)
-    with pytest.raises(RequirementError) as caught:
-        plan_rig(
-            wall, load_rig("default"), max_projectors=1, target="surface", check=False
-        )
-    assert caught.value.plan.coverage["target"]["lit_m2"] > 0.08
 
 
 def test_impossible_accuracy_is_named_as_the_limit_that_forbids(quick):
