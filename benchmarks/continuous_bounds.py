@@ -1,7 +1,7 @@
 """How many projectors: found, proved over candidates, proved over all poses.
 
-Usage: python benchmarks/continuous_bounds.py [--lights parallel diverging]
-       [--shares 0.9 0.95] [--tangents 0 40] [--prove] [--more N] [NAME ...]
+Usage: python benchmarks/continuous_bounds.py [NAME ...] [--lights parallel diverging]
+       [--shares 0.9 0.95] [--tangents 0 40] [--prove] [--more N]
 
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any):
 `count / bound over candidates / bound over all poses` for each light, required share

@@ -1,6 +1,6 @@
 """Does each constraint hold at every sample that a projector is said to light?
 
-Usage: python benchmarks/projector_claims.py [--lights parallel diverging] [NAME ...]
+Usage: python benchmarks/projector_claims.py [NAME ...] [--lights parallel diverging]
 
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
 at the default requirements: projectors as planned and posed, their poses rounded as

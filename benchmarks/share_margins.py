@@ -1,7 +1,7 @@
 """How squarely the required share is lit, and what turned ring axes win.
 
-Usage: python benchmarks/share_margins.py [--lights parallel diverging] [--axes]
-       [NAME ...]
+Usage: python benchmarks/share_margins.py [NAME ...] [--lights parallel diverging]
+       [--axes]
 
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
 at the default requirements: the margin at the required share (`planning.share_margin`,
