@@ -266,10 +266,11 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
         )
         scene = draft.scene.among((*final.projectors, *moved.cameras))
         rings = space_rings(
-            scene, final.projectors, moved.cameras, draft.order.rig.ring_spacing
-        )
-        rings = space_rings(
-            draft.scene, final.projectors, moved.cameras, draft.order.rig.ring_spacing
+            scene,
+            final.projectors,
+            moved.cameras,
+            draft.order.rig.ring_spacing,
+            final.stage.rows,
         )
     return replace(
         draft,

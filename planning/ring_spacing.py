@@ -79,9 +79,23 @@ def spaced_radii(limits: GapLimits, n_rings: int) -> NDArray[np.float64]:
     steps = np.arange(1, number + 1) * (counted[-1] / number)
     radii = np.interp(steps, counted, limits.edges)
     radii[-1] = limits.edges[-1]
-    # What lies inside the innermost ring is as near to it as to the next.
-    radii[0] = min(radii[0], 0.5 * radii[1])
-    return radii
+    return _with_centre(radii, limits)
+
+
+def _with_centre(radii: NDArray[np.float64], limits: GapLimits) -> NDArray[np.float64]:
+    """What lies inside the innermost ring is as near to it as it is to the next.
+
+    So that ring moves inwards, or where that would widen a gap beyond h_max, it gets
+    another one inside.
+    """
+    half = 0.5 * radii[1]
+    if radii[0] <= half:
+        return radii
+    begin, end = limits.edges[:-1], limits.edges[1:]
+    held = ~limits.free & (end > half) & (begin < radii[1])
+    if half <= limits.coarsest[held].min(initial=np.inf):
+        return np.concatenate([[half], radii[1:]])
+    return np.concatenate([[0.5 * radii[0]], radii])
 
 
 def _scale(limits: GapLimits, wanted: float) -> float:

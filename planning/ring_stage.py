@@ -1,10 +1,11 @@
 """Section 4 of the formulation: the rings of each projector, once cameras are known.
 
 Rings are as dense as sqrt(kappa) asks, never wider apart than the planner's even
-spacing where anything is lit, and never finer than the cameras and the projector
-separate. So what is measured stays measured, and what was proved with evenly spaced
-rings, that fewer cameras are too few, holds for the final ones: of a pair's limits only
-the pitch knows the gap, and a finer gap passes nothing that a wider one didn't.
+spacing where light was found, and never finer than the cameras and the projector
+separate. So what is measured stays measured. Light is found by rays on a grid, by
+samples, and by those for which the number of cameras was proved with evenly spaced
+rings: of a pair's limits only the pitch knows the gap, and a finer gap passes nothing
+that a wider one didn't, so fewer cameras are too few for the final rings, too.
 """
 
 from collections.abc import Sequence
@@ -62,6 +63,7 @@ def space_rings(
     projectors: Sequence[PlannedProjector],
     cameras: Sequence[PlannedCamera],
     spacing: Spacing,
+    proved: LitSamples | None = None,
 ) -> RingStage:
     """Return the projectors with rings spaced for the surface and the cameras.
 
@@ -72,10 +74,13 @@ def space_rings(
         projectors: As placed, with evenly spaced rings.
         cameras: As placed.
         spacing: `curvature`, or `uniform`: leave the rings, but report on them.
+        proved: Samples for which fewer cameras were proved too few; None: none.
     """
     even = tuple(projectors)
     creases = find_creases(scene.mesh, 0.5 * scene.mesh.mean_edge)
     beams = tuple(ring_beam(scene, projector, creases) for projector in even)
+    if proved is not None:
+        beams = tuple(b.with_lit(_lit_at(b, proved, p)) for p, b in enumerate(beams))
     final, kept, beams = _spaced(scene, even, cameras, beams)
     if spacing == "uniform":
         final, kept = even, frozenset[int]()

@@ -142,3 +142,25 @@ def test_the_innermost_ring_is_no_larger_than_the_gap_beyond_it():
     radii = spaced_radii(limits(kappa), 8)
     assert radii[0] <= radii[1] - radii[0] + 1e-15
     assert np.all(np.diff(radii) > 0)
+
+
+def test_a_dark_centre_widens_no_gap_that_is_lit():
+    """Light from 0.58 on: rings before it are few, and none of its gaps grows."""
+    c = np.linspace(0.0, 1.0, 401)
+    middle = 0.5 * (c[1:] + c[:-1])
+    dark = middle < 0.53
+    found = GapLimits(
+        c,
+        np.zeros(400),
+        np.where(dark, 1.3, 0.05),
+        np.where(dark, 1.3, 0.01),
+        dark,
+    )
+    radii = spaced_radii(found, 10)
+    gaps = np.diff(radii)
+    assert gaps[radii[1:] > 0.58].max() <= 0.05 + 1e-9
+    # A sample at the centre is no farther from a ring than half the gap to the next.
+    assert radii[0] <= 0.5 * radii[1] + 1e-12
+    lit = spaced_radii(limits(np.zeros(400), coarsest=0.05), 10)
+    assert np.diff(lit).max() <= 0.05 + 1e-9
+    assert lit[0] <= 0.5 * lit[1] + 1e-12
