@@ -180,14 +180,15 @@ def settle_others(
     """
     if not crowd.bodied:
         return others
-    by_count = dict(others.by_count)
+    by_count, most_rows = dict(others.by_count), dict(others.most_rows)
     for count, chosen in others.by_count.items():
         if count != taken:
             rows = int(covers[:, chosen].any(axis=1).sum())
             held = int(_HELD * rows)
             wanted = _Wanted(held, rows - held, count, given, seed)
-            by_count[count], _ = _settled(crowd, covers.shape[1], chosen, wanted)
-    return replace(others, by_count=by_count)
+            by_count[count], rows = _settled(crowd, covers.shape[1], chosen, wanted)
+            most_rows[count] = rows, most_rows[count][1]
+    return replace(others, by_count=by_count, most_rows=most_rows)
 
 
 @dataclass(frozen=True)

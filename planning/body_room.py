@@ -19,6 +19,8 @@ from .zones import Box
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 # Poses that are tried for each wanted, at most.
 _MOST_OFFERED = 20
+# Poses whose causes are told, about.
+_TOLD = 1000
 
 
 def lacks_room(scene: Scene, device: Device) -> str:
@@ -39,7 +41,12 @@ def lacks_room(scene: Scene, device: Device) -> str:
 
 def with_room(scene: Scene, devices: Sequence[_D]) -> tuple[_D, ...]:
     """Return the devices whose bodies have room among those that stand already."""
-    return tuple(device for device in devices if not lacks_room(scene, device))
+    kept: list[_D] = []
+    for device in devices:
+        scene.pulse()
+        if not lacks_room(scene, device):
+            kept.append(device)
+    return tuple(kept)
 
 
 def offered_with_room(
@@ -96,7 +103,10 @@ def check_existing_room(
 
 
 def _no_room(scene: Scene, candidates: Sequence[Device]) -> str:
-    causes = [lacks_room(scene, device) for device in candidates]
+    causes: list[str] = []
+    for device in candidates[:: max(1, len(candidates) // _TOLD)]:
+        scene.pulse()
+        causes.append(lacks_room(scene, device))
     kind = "projector" if isinstance(candidates[0], PlannedProjector) else "camera"
     named = ", ".join(
         f"{what} {100.0 * causes.count(what) / len(causes):.0f} %"
@@ -104,9 +114,16 @@ def _no_room(scene: Scene, candidates: Sequence[Device]) -> str:
     )
     return (
         f"no {kind} of {len(candidates)} poses has room for its body, which would "
-        f"touch or reach into {named}; make the body smaller, move that, or raise "
-        f"placement.standoff_mm"
+        f"touch or reach into {named}; make the body smaller, {_remedy(set(causes))}"
     )
+
+
+def _remedy(causes: set[str]) -> str:
+    if causes == {"the object"}:
+        return "or raise placement.standoff_mm"
+    if "the object" in causes:
+        return "move or widen the others, or change placement.standoff_mm"
+    return "or move or widen what is in its way"
 
 
 def _touches_object(scene: Scene, box: OrientedBox) -> bool:

@@ -1,7 +1,7 @@
 """Cameras among each other's bodies: what they measure then, and whose light they take.
 
-A camera's body may stand in a beam as well as in a view. One that alone keeps more
-light from the target than the projectors can spare isn't taken.
+A camera's body may stand in a beam as well as in a view. Cameras whose bodies keep a
+sample dark aren't taken: what is lit is what the number of cameras was proved for.
 """
 
 from collections.abc import Sequence
@@ -11,14 +11,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from . import lighting
 from .body_conflicts import settle
 from .cameras import CameraCover, LitSamples, measured_by
+from .errors import InfeasibleLimitsError
 from .plan import PlannedCamera, PlannedProjector
-from .projector_light import lit_stages
-from .projectors import ProjectorStage
 from .scene import Scene
-from .selection import required_rows
 from .standing import blocked_by, bodies_of, collide
 
 
@@ -32,7 +29,6 @@ class MeasuredCrowd:
         devices: The candidates.
         rows: Samples that the projectors light, were there no cameras.
         measured: Which candidate measures which, but for bodies of others, (n, m).
-        spare: Share of the lit samples that may go dark.
     """
 
     scene: Scene
@@ -40,7 +36,6 @@ class MeasuredCrowd:
     devices: Sequence[PlannedCamera]
     rows: LitSamples
     measured: NDArray[np.bool_]
-    spare: float
 
     @property
     def bodied(self) -> bool:
@@ -73,32 +68,28 @@ class MeasuredCrowd:
         return measured
 
     def stand_together(self, chosen: Sequence[int]) -> bool:
-        """Return whether no bodies collide and enough stays lit."""
+        """Return whether no bodies collide and all that is lit stays lit."""
         devices = [self.devices[i] for i in chosen]
         bodies = bodies_of(devices)
         if any(collide(device, bodies) for device in devices):
             return False
-        return self._dark(devices) <= self._most_dark
-
-    @property
-    def _most_dark(self) -> int:
-        return int(self.spare * len(self.rows.target))
+        return not self._darkens(devices)
 
     @cached_property
     def _shades(self) -> NDArray[np.bool_]:
-        """Whether each candidate alone takes more light than is to spare."""
+        """Whether each candidate alone keeps a sample dark."""
         return np.array(
             [
                 device.body is not None
                 and not device.existing
-                and self._dark([device]) > self._most_dark
+                and self._darkens([device])
                 for device in self.devices
             ]
         )
 
-    def _dark(self, cameras: Sequence[PlannedCamera]) -> int:
+    def _darkens(self, cameras: Sequence[PlannedCamera]) -> bool:
         lit = lit_among(self.projectors, self.rows, cameras)
-        return int((~lit.any(axis=1)).sum())
+        return not lit.any(axis=1).all()
 
 
 def lit_among(
@@ -141,7 +132,6 @@ def settled_cover(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
     cover: CameraCover,
-    spare: float,
 ) -> CameraCover:
     """Return a cover whose cameras bear each other's bodies, as `settle` says.
 
@@ -149,11 +139,13 @@ def settled_cover(
         scene: With the bodies of the projectors.
         projectors: As the cover was made for.
         cover: Chosen without regard to bodies of cameras.
-        spare: Share of what is lit that may go dark.
+
+    Raises:
+        InfeasibleLimitsError: If the body of every camera is in the way.
     """
     required = scene.requirements
     crowd = MeasuredCrowd(
-        scene, projectors, cover.offered.cameras, cover.rows, cover.measured, spare
+        scene, projectors, cover.offered.cameras, cover.rows, cover.measured
     )
     selection = settle(
         crowd,
@@ -163,15 +155,10 @@ def settled_cover(
         seed=scene.seed,
         given=len(required.existing_of("camera")),
     )
+    if not len(selection.chosen):
+        raise InfeasibleLimitsError(
+            f"each of {len(cover.offered.cameras)} camera bodies collides, or keeps "
+            f"something dark that the projectors light; make [camera.body] smaller, or "
+            f"let cameras stand elsewhere"
+        )
     return replace(cover, selection=selection, crowd=crowd)
-
-
-def light_to_spare(
-    scene: Scene, stage: ProjectorStage, projectors: Sequence[PlannedProjector]
-) -> float:
-    """Return the share of what projectors light that isn't required, at least 0."""
-    reached = np.any(stage.stages == lighting.LIT, axis=1)
-    required = required_rows(reached, scene.requirements.dominant_coverage)
-    lit = lit_stages(scene.among(projectors), projectors, stage.rows) == lighting.LIT
-    n_lit = int(lit.any(axis=1).sum())
-    return max(0.0, 1.0 - required / n_lit) if n_lit else 0.0

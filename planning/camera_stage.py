@@ -54,8 +54,6 @@ def place_cameras(
     template: PlannedCamera,
     n_candidates: int,
     tilt: float,
-    *,
-    spare_light: float = 0.0,
 ) -> CameraSolution:
     """Choose cameras and ring axes: azimuths of one tilt first, then any axis.
 
@@ -65,14 +63,11 @@ def place_cameras(
         template: Optics of the camera.
         n_candidates: Poses offered.
         tilt: Tilt of the ring axes, or their shift, to search azimuths of.
-        spare_light: Share of what is lit that bodies of cameras may keep dark.
     """
     scene = scene.among(projectors)
     offered = offered_cameras(scene, template, n_candidates)
-    turned, cover = choose_cameras(
-        scene, projectors, offered, tilt, spare_light=spare_light
-    )
-    moved, cover = move_axes(scene, turned, cover, spare_light=spare_light)
+    turned, cover = choose_cameras(scene, projectors, offered, tilt)
+    moved, cover = move_axes(scene, turned, cover)
     return CameraSolution(moved, camera_stage(scene, cover))
 
 
@@ -81,8 +76,6 @@ def choose_cameras(
     projectors: Sequence[PlannedProjector],
     offered: Sights,
     tilt: float,
-    *,
-    spare_light: float = 0.0,
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
     """Choose cameras, turn the ring axes for them, and choose again until it settles.
 
@@ -94,15 +87,14 @@ def choose_cameras(
         projectors: As planned.
         offered: Candidates, from `offered_cameras`.
         tilt: Tilt of the ring axes, or their shift.
-        spare_light: Share of what is lit that bodies of cameras may keep dark.
     """
     kept = tuple(projectors)
-    best = _cover(scene, kept, offered, spare_light)
+    best = _cover(scene, kept, offered)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
         if not _differ(turned, kept):
             break
-        cover = _cover(scene, turned, offered, spare_light)
+        cover = _cover(scene, turned, offered)
         if not _better(cover, best):
             break
         kept, best = turned, cover
@@ -113,8 +105,6 @@ def move_axes(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     cover: CameraCover,
-    *,
-    spare_light: float = 0.0,
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
     """Move the ring axes to where errors are smallest, and choose cameras again.
 
@@ -126,7 +116,6 @@ def move_axes(
         scene: With the bodies of the projectors.
         projectors: As planned.
         cover: Cameras chosen for these ring axes.
-        spare_light: As for `choose_cameras`.
     """
     kept = tuple(projectors)
     for _ in range(_ROUNDS):
@@ -134,7 +123,7 @@ def move_axes(
         moved = move_ring_axes(among, kept, cover.cameras, cover.rows)
         if not _differ(moved, kept):
             break
-        again = _cover(scene, moved, cover.offered, spare_light)
+        again = _cover(scene, moved, cover.offered)
         if _better(cover, again):
             break
         as_chosen = with_cameras(again, cover)
@@ -164,8 +153,6 @@ def follow_cameras(
     projectors: Sequence[PlannedProjector],
     cameras: Sequence[PlannedCamera],
     stage: CameraStage,
-    *,
-    spare_light: float = 0.0,
 ) -> CameraSolution:
     """Move the ring axes for cameras that have left the candidates' poses.
 
@@ -178,13 +165,12 @@ def follow_cameras(
         projectors: As planned, with even rings.
         cameras: As they stand.
         stage: Of these projectors; as many cameras as these.
-        spare_light: As for `choose_cameras`.
     """
     among = scene.among((*projectors, *cameras))
     moved = move_ring_axes(among, projectors, cameras, stage.rows)
     if _differ(moved, projectors):
         scene = scene.among(projectors)
-        cover = _cover(scene, moved, stage.offered, spare_light)
+        cover = _cover(scene, moved, stage.offered)
         if proves_as_much(cover.selection, stage.certificate, len(cameras)):
             return CameraSolution(moved, camera_stage(scene, cover))
     return CameraSolution(tuple(projectors), stage)
@@ -263,11 +249,10 @@ def _cover(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
     offered: Sights,
-    spare_light: float,
 ) -> CameraCover:
     """The fewest cameras for these ring axes, that bear each other's bodies."""
     cover = plan_cameras(scene, projectors, offered)
-    return settled_cover(scene, projectors, cover, spare_light)
+    return settled_cover(scene, projectors, cover)
 
 
 def _measured_among(

@@ -45,7 +45,7 @@ def build_existing(
 
 
 def check_existing(required: Requirements) -> None:
-    """Refuse more existing devices than are allowed at all.
+    """Refuse more existing devices than are allowed, and two where one can stand.
 
     Raises:
         InfeasibleLimitsError: It names the limit, both numbers and what to do.
@@ -60,6 +60,15 @@ def check_existing(required: Requirements) -> None:
                 f"max_{kind}s = {most} is less than the {n} {kind}s of [[existing]], "
                 f"which stay; raise --max-{kind}s or take one out of the rig file"
             )
+        places: dict[tuple[float, ...], str] = {}
+        for device in required.existing_of(kind):
+            place = tuple(row[3] for row in device.world_from_device[:3])
+            if place in places:
+                raise InfeasibleLimitsError(
+                    f"existing {kind}s {places[place]!r} and {device.name!r} stand at "
+                    f"the same place; take one out of the rig file or correct it"
+                )
+            places[place] = device.name
 
 
 def existing_projectors(

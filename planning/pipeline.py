@@ -11,7 +11,6 @@ from geometry.mesh import TriangleMesh
 from geometry.refinement import cut_for_curvature
 
 from .assemble import falls_short, write_plan
-from .camera_bodies import light_to_spare
 from .camera_stage import follow_cameras, place_cameras, spread
 from .cameras import CameraStage
 from .continuous import DEFAULT, PROVE, prove_fewest
@@ -185,28 +184,13 @@ def _placed(
         camera = PlannedCamera(
             "", np.eye(4), rig.camera_device(), body=rig.camera_body()
         )
-        spare = _spare_light(order, scene, stage, projectors)
-        solution = place_cameras(
-            scene, projectors, camera, n_cameras, tilt, spare_light=spare
-        )
+        solution = place_cameras(scene, projectors, camera, n_cameras, tilt)
         cameras = solution.stage
         clock.say(
             f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "
             f"least {cameras.certificate['candidates']['lower_bound']} are needed"
         )
     return solution.projectors, cameras
-
-
-def _spare_light(
-    order: Order,
-    scene: Scene,
-    stage: ProjectorStage,
-    projectors: tuple[PlannedProjector, ...],
-) -> float:
-    """Share of what is lit that bodies of cameras may keep dark."""
-    if order.rig.camera_body() is None:
-        return 0.0
-    return light_to_spare(scene, stage, projectors)
 
 
 def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
@@ -256,13 +240,7 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
             )
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
         final = follow_cameras(
-            draft.scene,
-            draft.projectors,
-            moved.cameras,
-            draft.camera_stage,
-            spare_light=_spare_light(
-                draft.order, draft.scene, draft.stage, draft.projectors
-            ),
+            draft.scene, draft.projectors, moved.cameras, draft.camera_stage
         )
         scene = draft.scene.among((*final.projectors, *moved.cameras))
         rings = space_rings(

@@ -245,7 +245,8 @@ def field_limit(scene: Scene, template: PlannedProjector) -> Lifted:
         lambda value: (
             f"a beam of {value:.0f} mm about its axis"
             if parallel
-            else f"an image that reaches {value:.0f} degrees off its middle"
+            else f"an image that reaches {value:.0f} degrees off its middle on every "
+            f"side"
         ),
         widened,
         scene.requirements.projector,

@@ -22,8 +22,11 @@ from .table_types import (
 )
 from .workspace_models import WorkspaceTable
 
+# Far beyond any device, and any table of poses and samples that memory holds.
+MOST_PIXELS, MOST_POSES = 100_000, 100_000
 Resolution = Annotated[
-    list[Annotated[int, Field(ge=2)]], Field(min_length=2, max_length=2)
+    list[Annotated[int, Field(ge=2, le=MOST_PIXELS)]],
+    Field(min_length=2, max_length=2),
 ]
 Five = Annotated[list[float], Field(min_length=5, max_length=5)]
 
@@ -155,10 +158,10 @@ class PlacementTable(Table):
 
     standoff_mm: Positive = 1000.0
     standoff_play_mm: Annotated[float, Field(ge=0.0)] = 50.0
-    n_candidate_projectors: Annotated[int, Field(ge=1)] = 640
-    n_candidate_cameras: Annotated[int, Field(ge=1)] = 480
-    n_reference_projectors: Annotated[int, Field(ge=600)] = 640
-    n_reference_cameras: Annotated[int, Field(ge=400)] = 480
+    n_candidate_projectors: Annotated[int, Field(ge=1, le=MOST_POSES)] = 640
+    n_candidate_cameras: Annotated[int, Field(ge=1, le=MOST_POSES)] = 480
+    n_reference_projectors: Annotated[int, Field(ge=600, le=MOST_POSES)] = 640
+    n_reference_cameras: Annotated[int, Field(ge=400, le=MOST_POSES)] = 480
 
     @model_validator(mode="after")
     def _check_play(self) -> Self:
@@ -182,7 +185,7 @@ class RingsTable(Table):
     """
 
     tilt_deg: Annotated[float, Field(ge=0.0, lt=45.0)] = 8.0
-    gap_mm: Positive | None = None
+    gap_mm: Annotated[float, Field(ge=0.01)] | None = None
     spacing: Literal["uniform", "curvature"] = "curvature"
 
 

@@ -61,12 +61,13 @@ class Marginals:
 
     Attributes:
         by_count: Best candidates found for 1, 2, ... k + `more` devices.
-        one_fewer_bound: Proven most rows that k - 1 candidates cover.
+        most_rows: Rows that these cover, and the proven most that as many candidates
+            cover.
         greedy: Candidates that the greedy cover takes.
     """
 
     by_count: dict[int, NDArray[np.int64]]
-    one_fewer_bound: int
+    most_rows: dict[int, tuple[int, int]]
     greedy: int
 
 
@@ -148,12 +149,13 @@ def marginals(
     problem = cover_problem(covers, selection.required, given)
     reduced = reduced_problem(problem)
     taken = len(selection.chosen)
-    bound = 0.0
     by_count: dict[int, NDArray[np.int64]] = {}
+    most_rows: dict[int, tuple[int, int]] = {}
     best = np.empty(0, dtype=np.int64)
     for count in range(max(1, given), min(taken + more, covers.shape[1]) + 1):
         if count == taken:
             best = selection.chosen
+            most_rows[count] = selection.best_rows, selection.best_rows_bound
         else:
             found = solve_max_coverage(
                 problem,
@@ -164,14 +166,14 @@ def marginals(
                 reduced=reduced,
             )
             best = found.selected
-            bound = found.upper_bound if count == taken - 1 else bound
+            bound = int(np.floor(found.upper_bound + 1e-6))
+            if count < selection.lower_bound:
+                # Where so many are proved too few, they fall short of the requirement.
+                bound = min(bound, selection.required - 1)
+            most_rows[count] = _rows(covers, best), bound
         by_count[count] = best
-    one_fewer = int(np.floor(bound + 1e-6))
-    if selection.lower_bound >= taken:
-        # Where fewer are proved too few, they fall short of what is required.
-        one_fewer = min(one_fewer, selection.required - 1)
     greedy = _greedy_count(covers, selection.required, given)
-    return Marginals(by_count, one_fewer, greedy)
+    return Marginals(by_count, most_rows, greedy)
 
 
 def cover_problem(
@@ -221,6 +223,14 @@ def certificate(
     """
     count = len(selection.chosen)
     bounded = min(selection.lower_bound, count)
+    by_count = [
+        {
+            "count": n,
+            "value_m2": rows * row_area_m2,
+            "upper_bound_m2": bound * row_area_m2,
+        }
+        for n, (rows, bound) in sorted(others.most_rows.items())
+    ]
     return {
         "count": count,
         "status": selection.status,
@@ -234,19 +244,30 @@ def certificate(
         "continuous": None,
         "greedy_count": others.greedy,
         "needed": {"count": selection.needed, "lower_bound": selection.lower_bound},
-        "best_area": {
-            "value_m2": selection.best_rows * row_area_m2,
-            "upper_bound_m2": selection.best_rows_bound * row_area_m2,
-        },
-        "one_fewer": {"upper_bound_m2": others.one_fewer_bound * row_area_m2}
-        if count > given
-        else None,
+        "by_count": by_count,
+        **_areas(by_count, count, given),
         **({"given": given} if given else {}),
         **(
             {"but_for_bodies": selection.but_for_bodies}
             if selection.but_for_bodies is not None
             else {}
         ),
+    }
+
+
+def _areas(by_count: list[dict[str, Any]], count: int, given: int) -> dict[str, Any]:
+    """What so many devices, and one fewer, cover at most among the candidates."""
+    table = {entry["count"]: entry for entry in by_count}
+    fewer = table.get(count - 1, {"upper_bound_m2": 0.0})
+    return {
+        "best_area": {key: table[count][key] for key in ("value_m2", "upper_bound_m2")}
+        | {"scope": "candidates"},
+        "one_fewer": {
+            "upper_bound_m2": fewer["upper_bound_m2"],
+            "scope": "candidates",
+        }
+        if count > given
+        else None,
     }
 
 
@@ -284,7 +305,16 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
         return None
     if len(stage.by_count[count]) < count:
         return None
-    needed = {**stage.certificate["needed"], "count": count}
-    changed = {"count": count, "status": "feasible", "needed": needed}
-    proof = stage.certificate | changed
+    before = stage.certificate
+    given = int(before.get("given", 0))
+    proof = before | {
+        "count": count,
+        "status": "feasible",
+        "needed": {**before["needed"], "count": count},
+        **_areas(before["by_count"], count, given),
+    }
+    if before["continuous"] is not None:
+        # It bounded one fewer than before.
+        unknown = {"one_fewer_upper_bound_m2": None}
+        proof["continuous"] = before["continuous"] | unknown
     return replace(stage, certificate=proof)  # type: ignore[type-var]

@@ -14,6 +14,8 @@ from .table_types import Axis, Name, PositivePair, Sides, Table, UpName
 
 # Cosine above which two directions span no plane.
 _PARALLEL = 1.0 - 1e-9
+# Length below which a vector is no direction.
+_NO_DIRECTION = 1e-9
 
 
 class KeepOutTable(Table):
@@ -57,7 +59,7 @@ class MountingTable(Table):
     def _check_directions(self) -> Self:
         for key in ("normal", "along"):
             value = getattr(self, key)
-            if value is not None and not any(value):
+            if value is not None and not np.linalg.norm(value) > _NO_DIRECTION:
                 raise ValueError(f"{key} = {value} must not be zero")
         if self.along is not None:
             lengths = np.linalg.norm(self.normal) * np.linalg.norm(self.along)
@@ -90,7 +92,7 @@ class WorkspaceTable(Table):
             raise ValueError("shape = 'cone' needs axis and half_angle_deg")
         if self.shape != "cone" and not neither:
             raise ValueError("axis and half_angle_deg need shape = 'cone'")
-        if self.axis is not None and not any(self.axis):
+        if self.axis is not None and not np.linalg.norm(self.axis) > _NO_DIRECTION:
             raise ValueError(f"axis = {self.axis} must not be zero")
         return self
 

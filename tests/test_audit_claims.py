@@ -492,6 +492,46 @@ def test_a_pose_with_a_projective_row_is_named(handmade):
     assert any("C1.world_from_device" in f and "rigid last row" in f for f in found)
 
 
+def test_what_other_numbers_cover_is_held_against_the_table(handmade):
+    """Claims for one, two and three candidates: true ones pass, each false is named."""
+
+    def planted(*, best=0.0, fewer=0.0, value=0.0, table=0.0):
+        def change(document):
+            areas = document["coverage"]["target"]
+            proof = document["certificates"]["projectors"]
+            marginal = {
+                row["n_projectors"]: row["lit_target_m2"]
+                for row in document["marginal"]["projectors"]
+            }
+            most = {1: marginal[1], 2: areas["reachable_by_projectors_m2"]}
+            proof["by_count"] = [
+                {
+                    "count": n,
+                    "value_m2": marginal[n] * (1.0 + value),
+                    "upper_bound_m2": most[n] * (1.0 - table * (n == 1)),
+                }
+                for n in (1, 2)
+            ]
+            if table:
+                proof["by_count"][0]["value_m2"] = 0.0
+            proof["best_area"]["upper_bound_m2"] = most[2] * (1.0 - best)
+            if best:
+                proof["best_area"]["value_m2"] = 0.0
+            least = proof["by_count"][0]["upper_bound_m2"]
+            proof["one_fewer"] = {"upper_bound_m2": least * (1.0 - fewer)}
+
+        return failures(handmade.tampered(handmade.build_plan(), change))
+
+    assert planted() == ()
+    (line,) = planted(best=0.01)
+    assert "best_area.upper_bound_m2: claimed" in line
+    (line,) = planted(fewer=0.01)
+    assert "one_fewer.upper_bound_m2: claimed" in line
+    assert "by_count: for 1: value_m2" in planted(value=0.01)[0]
+    (line,) = planted(table=0.5)
+    assert "are claimed for 1, but marginal has" in line
+
+
 def test_a_superfluous_device_refutes_the_bound(handmade):
     def change(document):
         document["certificates"]["projectors"]["candidates"]["lower_bound"] = 2

@@ -27,9 +27,9 @@ from planning.audit.samples import AuditSamples
 from planning.bodies import Body
 from planning.body_conflicts import LitCrowd, settle, settle_others
 from planning.body_room import check_existing_room, lacks_room, offered_with_room
-from planning.camera_bodies import MeasuredCrowd
+from planning.camera_bodies import MeasuredCrowd, settled_cover
 from planning.camera_stage import _measured_among
-from planning.cameras import lit_samples, measured_by
+from planning.cameras import CameraCover, lit_samples, measured_by
 from planning.draw_devices import device_figures
 from planning.errors import InfeasibleLimitsError, RigError
 from planning.plan import PlannedCamera, PlannedProjector
@@ -420,24 +420,21 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
     dark = np.all((points > low) & (points < high), axis=1)
     among = scene.among([lamp])
 
-    def crowd(spare):
-        return MeasuredCrowd(among, (lamp,), eyes, rows, measured, spare)
-
-    strict, lax = crowd(0.01), crowd(0.9)
-    assert not strict.stand_together([0, 1])
-    assert lax.stand_together([0, 1])
-    assert strict.covers([1], [0, 1]).sum(axis=0).tolist() == [0, len(dark)]
-    covers = lax.covers([0], [0, 1])
+    crowd = MeasuredCrowd(among, (lamp,), eyes, rows, measured)
+    assert not crowd.stand_together([0, 1])
+    assert crowd.stand_together([1, 3])
+    assert crowd.covers([1], [0, 1]).sum(axis=0).tolist() == [0, len(dark)]
+    covers = crowd.covers([0], [0, 1])
     assert not covers[dark].any()
     # What stays lit is measured anew where the light on it changed, else as before.
     assert covers[~dark].all()
     # The third is too near to the second; the first stands in the view of the fourth.
-    assert not lax.stand_together([1, 2])
-    assert lax.covers([1], [1, 2]).sum(axis=0).tolist() == [len(dark), 0]
+    assert not crowd.stand_together([1, 2])
+    assert crowd.covers([1], [1, 2]).sum(axis=0).tolist() == [len(dark), 0]
     body, aside = bodies_of(eyes[:1])[0].box, np.array(places[3])
     hidden = lines_cross(body, aside, rows.target.samples.points)
     assert 0 < (hidden & ~dark).sum() < len(dark)
-    assert np.array_equal(lax.covers([0], [3])[:, 0], ~hidden & ~dark)
+    assert np.array_equal(crowd.covers([0], [3])[:, 0], ~hidden & ~dark)
 
 
 def test_moves_into_anothers_body_or_beam_are_refused(scene):
@@ -551,3 +548,14 @@ def test_the_bodies_of_all_devices_but_ones_own_stand(scene):
     # Closed, and outwards: the divergence theorem gives both volumes.
     volume = np.linalg.det(mesh.corners).sum() / 6.0
     assert volume == pytest.approx(2 * 8 * np.prod(HOUSING.half_m))
+
+
+def test_where_every_camera_keeps_something_dark_the_bodies_are_blamed(scene):
+    lamp, eyes = projector(), [camera(0.02, 0.01, 0.6), camera(-0.02, 0.0, 0.6)]
+    rows = lit_samples(scene, [lamp], scene.target_samples(500, 9))
+    measured = np.ones((len(rows.target), len(eyes)), dtype=bool)
+    selection = select_fewest(measured, 0.95, max_count=None, seed=0)
+    offered = SimpleNamespace(cameras=eyes)
+    cover = CameraCover(offered, rows, measured, selection)  # type: ignore[arg-type]
+    with pytest.raises(InfeasibleLimitsError, match="each of 2 camera bodies"):
+        settled_cover(scene.among([lamp]), (lamp,), cover)

@@ -91,7 +91,7 @@ def test_bad_entries_are_refused(required_of, text, message):
 
 
 def test_more_devices_than_are_allowed_serve_nothing(required_of):
-    two = OLD + OLD.replace("old", "second")
+    two = OLD + OLD.replace("old", "second").replace("[100,", "[110,")
     assert len(required_of(two, max_projectors=2).existing) == 2
     with pytest.raises(
         InfeasibleLimitsError,
@@ -124,7 +124,17 @@ def test_covers_hold_what_is_given_and_are_the_fewest_that_do(seed, given):
     assert min(others.by_count) == given
     assert all(set(range(given)) <= set(c.tolist()) for c in others.by_count.values())
     assert others.greedy >= fewest
-    assert others.one_fewer_bound < found.required
+    assert all(others.most_rows[n][1] < found.required for n in range(given, fewest))
+
+
+def test_two_at_one_place_are_refused_with_their_names(required_of):
+    """Of bodies at one pose neither would be in the other's way; both can't stand."""
+    twin = OLD.replace("old projector", "its twin").replace("roll_deg = 15", "")
+    words = "'old projector' and 'its twin' stand at the same place"
+    with pytest.raises(InfeasibleLimitsError, match=words):
+        required_of(OLD + twin)
+    beside = twin.replace("[100, -1200, 300]", "[100, -1200, 301]")
+    assert len(required_of(OLD + beside).existing) == 2
 
 
 # ---- the bound over all poses
@@ -299,6 +309,14 @@ def test_they_stay_are_marked_and_the_audit_agrees(planned):
         (
             lambda d: d["requirements"]["existing"][1].pop("body"),
             "requirements.existing.1.body: None is claimed",
+        ),
+        (
+            lambda d: d["certificates"]["cameras"].pop("bounds_leave_out"),
+            "cameras.bounds_leave_out: is missing",
+        ),
+        (
+            lambda d: d["certificates"]["projectors"].update(but_for_bodies="many"),
+            "projectors.but_for_bodies: 'many' must be",
         ),
         (lambda d: _beside(d, 0.2), "P1.body: overlaps the body of P3"),
         (

@@ -33,8 +33,9 @@ def test_count_bound_and_areas_against_brute_force(seed, share):
     assert found.status == "optimal"
     assert found.best_rows == best[fewest] <= found.best_rows_bound
     others = marginals(covers, found, seed=0)
-    if fewest > 1:
-        assert best[fewest - 1] <= others.one_fewer_bound < required
+    for count, (rows, bound) in others.most_rows.items():
+        assert rows == best[count] <= bound
+        assert count >= fewest or bound < required
     assert list(others.by_count) == list(range(1, min(fewest + 2, 9) + 1))
     assert others.by_count[fewest].tolist() == found.chosen.tolist()
     for count, chosen in others.by_count.items():
@@ -51,13 +52,17 @@ def test_too_few_allowed_gives_the_best_of_them_and_what_would_be_needed():
     assert found.best_rows == found.best_rows_bound == 10
     assert (found.needed, found.lower_bound) == (4, 4)
     others = marginals(covers, found, seed=0)
-    assert others.one_fewer_bound == 5
+    assert others.most_rows == {1: (5, 5), 2: (10, 10), 3: (15, 15), 4: (20, 20)}
     assert covers[:, others.by_count[4]].any(axis=1).all()
     proof = certificate(found, others, n_rows=20, row_area_m2=0.5, n_candidates=4)
-    assert proof["one_fewer"] == {"upper_bound_m2": 2.5}
+    assert proof["one_fewer"] == {"upper_bound_m2": 2.5, "scope": "candidates"}
     assert proof["count"] == 2
     assert proof["needed"] == {"count": 4, "lower_bound": 4}
-    assert proof["best_area"] == {"value_m2": 5.0, "upper_bound_m2": 5.0}
+    assert proof["best_area"] == {
+        "value_m2": 5.0,
+        "upper_bound_m2": 5.0,
+        "scope": "candidates",
+    }
     assert proof["required_m2"] == 10.0
     assert proof["candidates"]["lower_bound"] <= proof["count"]
 

@@ -400,6 +400,25 @@ def test_false_zones_are_named(planned, key, place, value, sentence):
     assert any(sentence in failure for failure in found), found
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "sentence"),
+    [
+        ("floor_m", -2.5, "floor_m: -2.5 m, but rig.workspace states None m"),
+        ("camera_radius_m", [0.5, 2.4], "camera_radius_m: claimed"),
+        ("projector_radius_m", [0.5, 2.4], "projector_radius_m: claimed"),
+        ("camera_standoff_m", 0.4, "camera_standoff_m: 0.4 m, but rig.standoff_m"),
+    ],
+)
+def test_another_workspace_than_the_rigs_is_named(planned, key, value, sentence):
+    """What is proved over a workspace is proved of the rig's."""
+
+    def change(document):
+        document["requirements"]["workspace"][key] = value
+
+    found = _tampered(planned, change)
+    assert any(sentence in failure for failure in found), found
+
+
 def test_a_zone_that_was_left_out_is_named(planned):
     def change(document):
         del document["requirements"]["workspace"]["keep_out"]

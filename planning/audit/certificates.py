@@ -1,21 +1,21 @@
 """Claims of the certificates: counts, bounds and what the plan itself refutes."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.plan import RigPlan
+from planning.plan import PlannedCamera, PlannedProjector, RigPlan
 
 from .areas import ROUNDING
+from .counts import FEWEST_ROWS, audit_counts
 from .estimates import POINT, Estimator
 from .existing import droppable
 from .ledger import Ledger, as_number, square_centimetres
 from .recompute import Recomputed
 
 _STATUSES = ("optimal", "feasible", "infeasible")
-# Covers are chosen on fewer samples than areas are claimed from.
-_FEWEST_ROWS = 1000
 
 
 def audit_certificates(
@@ -58,6 +58,8 @@ def audit_certificates(
         _audit_continuous(key, claims, ledger)
         _audit_best_area(key, claims, reachable, estimator.target_m2, ledger)
         _audit_one_fewer(key, claims, len(covers), slack, ledger)
+        audit_counts(key, claims, kind, estimator.target_m2, ledger)
+        _audit_bodies(key, claims, devices, ledger)
         ledger.number(
             f"{key}.required_m2", claims.get("required_m2"), share * reachable, slack
         )
@@ -183,7 +185,7 @@ def _audit_best_area(
         f"value_m2 {square_centimetres(value)} exceeds upper_bound_m2 "
         f"{square_centimetres(upper)}",
     )
-    n = max(as_number(claims.get("n_samples")) or 0.0, _FEWEST_ROWS)
+    n = max(as_number(claims.get("n_samples")) or 0.0, FEWEST_ROWS)
     p = min(max(reachable / whole, 1.0 / n), 1.0 - 1.0 / n)
     slack = whole * (POINT + 3.0 * float(np.sqrt(p * (1.0 - p) / n)))
     ledger.holds(
@@ -216,6 +218,29 @@ def _audit_one_fewer(
         f"{square_centimetres(required)} required (tolerance "
         f"{square_centimetres(slack)}), but {count} are claimed to be the fewest",
     )
+
+
+def _audit_bodies(
+    key: str,
+    claims: dict[str, Any],
+    devices: Sequence[PlannedProjector] | Sequence[PlannedCamera],
+    ledger: Ledger,
+) -> None:
+    """Where planned devices have bodies the bounds must say that these are left out."""
+    bodied = any(d.body is not None and not d.existing for d in devices)
+    ledger.holds(
+        not bodied or "bounds_leave_out" in claims,
+        f"{key}.bounds_leave_out",
+        "is missing, but planned devices have bodies",
+    )
+    if "but_for_bodies" in claims:
+        number, count = as_number(claims["but_for_bodies"]), as_number(claims["count"])
+        ledger.holds(
+            bodied and number is not None and number >= 1.0 and number == int(number),
+            f"{key}.but_for_bodies",
+            f"{claims['but_for_bodies']!r} must be a number of devices with bodies "
+            f"(the plan has {count:g})",
+        )
 
 
 def _best_bound(claims: dict[str, Any]) -> float | None:

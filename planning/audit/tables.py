@@ -27,7 +27,7 @@ def audit_marginal(own: Recomputed, estimator: Estimator, ledger: Ledger) -> Non
         ("projectors", "lit", own.lit, len(own.light)),
         ("cameras", "measured", own.measured, len(own.measured_by)),
     ):
-        rows = _rows(ledger.read("marginal"), kind)
+        rows = marginal_rows(ledger.read("marginal"), kind)
         ledger.holds(len(rows) > 0, f"marginal.{kind}", "is missing")
         for part, within in wholes:
             whole = estimator.target_m2 if part == "target" else estimator.area_m2
@@ -48,8 +48,8 @@ def audit_marginal(own: Recomputed, estimator: Estimator, ledger: Ledger) -> Non
             )
 
 
-def _rows(marginal: object, kind: str) -> list[Mapping[str, Any]]:
-    """Rows of one kind of device: from a table for each, or from one common list."""
+def marginal_rows(marginal: object, kind: str) -> list[Mapping[str, Any]]:
+    """Return the rows of a kind: from a table for each, or from one common list."""
     table = marginal.get(kind) if isinstance(marginal, dict) else marginal
     return [
         row for row in entries(table) if as_number(row.get(f"n_{kind}")) is not None

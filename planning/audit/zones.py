@@ -10,7 +10,7 @@ from planning.plan import RigPlan
 from planning.requirements import Workspace
 from planning.zones import Box
 
-from .ledger import Ledger, entries
+from .ledger import Ledger, as_number, entries
 
 _ROUNDING = 1e-9
 
@@ -57,6 +57,43 @@ def audit_zones(plan: RigPlan, ledger: Ledger) -> None:
         for place, box in enumerate(boxes):
             _audit_box(f"{key}.{name}.{place}", box, ledger)
     _audit_stated(space, rig, ledger)
+    _audit_shell(space, rig, ledger)
+
+
+def _audit_shell(space: Workspace, rig: Mapping[str, Any], ledger: Ledger) -> None:
+    """Compare floor and radii with the rig's: s + R -+ p, side by side from s - p."""
+    key = "requirements.workspace"
+    floor = as_number(rig.get("floor_mm"))
+    stated = None if floor is None else floor * 1e-3
+    ledger.holds(
+        not rig
+        or (
+            (space.floor_m is None) == (stated is None)
+            and abs((space.floor_m or 0.0) - (stated or 0.0)) <= _ROUNDING
+        ),
+        f"{key}.floor_m",
+        f"{space.floor_m!r} m, but rig.workspace states {stated!r} m",
+    )
+    standoff, play = (
+        as_number(ledger.read("rig", name))
+        for name in ("standoff_m", "standoff_play_m")
+    )
+    if standoff is None or play is None:
+        return
+    middle = standoff + space.object_radius_m
+    for kind, radius, own in (
+        ("projector", space.projector_radius_m, space.projector_standoff_m),
+        ("camera", space.camera_radius_m, space.camera_standoff_m),
+    ):
+        low = middle if own is None else standoff
+        truth = np.array([low - play, middle + play])
+        name = f"{key}.{kind}_radius_m"
+        ledger.array(name, list(radius), truth, _ROUNDING, "by rig.standoff_m")
+        ledger.holds(
+            own is None or abs(own - standoff) <= _ROUNDING,
+            f"{key}.{kind}_standoff_m",
+            f"{own!r} m, but rig.standoff_m is {standoff:g} m",
+        )
 
 
 def _room_inside(box: Box, offsets: NDArray[np.float64]) -> NDArray[np.float64]:
