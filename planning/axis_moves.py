@@ -47,9 +47,9 @@ def move_ring_axes(
 
     Each projector in turn solves the axis program over samples that it lights; the
     whole way is tried, then a half and a quarter. A move counts only if no fewer
-    samples are measured, neither of the rows nor of fresh ones, all that is lit stays
-    inside the largest ring, and more are measured or the rms of s_N of each sample's
-    best pair falls.
+    samples are measured, neither of the rows nor of fresh ones, all that is lit of the
+    surface stays inside the largest ring, and more are measured or the rms of s_N of
+    each sample's best pair falls.
 
     Args:
         scene: Surface and requirements.
@@ -59,9 +59,12 @@ def move_ring_axes(
     """
     fresh = lit_samples(scene, projectors, scene.target_samples(_FRESH, _STREAM))
     judges = tuple(AxisJudge(scene, projectors, cameras, r) for r in (rows, fresh))
+    around = lit_samples(scene, projectors, scene.surface_samples(_FRESH, _STREAM + 1))
+    points = around.target.samples.points
+    held = [points[around.lit[:, p]] for p in range(len(projectors))]
     moved = list(projectors)
     for _ in range(_SWEEPS):
-        if not any([_move(judges, moved, p) for p in range(len(moved))]):
+        if not any([_move(judges, moved, p, held[p]) for p in range(len(moved))]):
             break
     return tuple(moved)
 
@@ -112,20 +115,30 @@ class AxisJudge:
 
     def holds(self, projector: PlannedProjector, p: int) -> bool:
         """Whether what a projector lights is inside its largest ring."""
-        lit = self.rows.target.samples.points[self.rows.lit[:, p]]
-        return bool(np.all(ring_coordinate(projector, lit) <= projector.ring_radii[-1]))
+        return inside(projector, self.rows.target.samples.points[self.rows.lit[:, p]])
 
 
-def _move(judges: tuple[AxisJudge, ...], moved: list[PlannedProjector], p: int) -> bool:
+def inside(projector: PlannedProjector, points: NDArray[np.float64]) -> bool:
+    """Return whether all points are inside the largest ring."""
+    return bool(np.all(ring_coordinate(projector, points) <= projector.ring_radii[-1]))
+
+
+def _move(
+    judges: tuple[AxisJudge, ...],
+    moved: list[PlannedProjector],
+    p: int,
+    held: NDArray[np.float64],
+) -> bool:
     """Move one axis if that is better; the judges keep what it then measures."""
     scene, projector = judges[0].scene, moved[p]
     scene.pulse()
     for axis in proposals(
-        axis_program(scene, moved, p, judges[0].rows, judges[0].views)
+        axis_program(scene, moved, p, judges[0].rows, judges[0].views, held)
     ):
         frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
         offered = replace(projector, world_from_ring=frame)
-        if not all(judge.holds(offered, p) for judge in judges):
+        lit = all(judge.holds(offered, p) for judge in judges)
+        if not (lit and inside(offered, held)):
             continue
         trials = [judge.with_axis(offered, p) for judge in judges]
         if better(trials, [judge.sigma for judge in judges]):
@@ -175,6 +188,7 @@ def axis_program(
     p: int,
     rows: LitSamples,
     views: Sequence[View],
+    held: NDArray[np.float64] | None = None,
 ) -> AxisProgram:
     """State the axis program of projector p.
 
@@ -184,6 +198,7 @@ def axis_program(
         p: Whose axis moves.
         rows: Lit samples.
         views: How each camera sees them.
+        held: More places that stay inside the largest ring, shape (n, 3) [m].
     """
     limits, projector = scene.requirements.triangulation, projectors[p]
     pose, device = projector.world_from_device, projector.device
@@ -192,6 +207,7 @@ def axis_program(
     lit = np.flatnonzero(rows.lit[:, p])
     chosen = lit[:: max(1, -(-len(lit) // _ROWS))]
     points = rows.target.samples.points
+    around = [] if held is None else [held]
     normals = rows.target.samples.normals[chosen]
     seen = [view.take(chosen) for view in views]
     rays = np.stack([view.rays for view in seen], axis=1)
@@ -214,7 +230,7 @@ def axis_program(
         placement_m=(limits.ring_sigma_m or 0.0) * np.abs(facing),
         facing=np.abs(facing) / distances,
         others=_scores_of(scene, projectors, rest, rows, chosen, seen),
-        held=transform(into, points[lit]),
+        held=transform(into, np.concatenate([points[lit], *around])),
         start=ring_axis(pose, device, projector.world_from_ring),
         ring_radius=_RING_SHARE * float(projector.ring_radii[-1]),
         gap=float(projector.ring_radii[1] - projector.ring_radii[0]),

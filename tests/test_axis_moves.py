@@ -163,6 +163,24 @@ def test_fresh_samples_stay_inside_the_last_ring_too(ball):
     assert np.array_equal(lit_samples(scene, after, lit.target).lit, lit.lit)
 
 
+def test_what_is_lit_beside_the_target_stays_lit_too(ball):
+    """The target is a cap; rings end just behind all else that is lit."""
+    whole, projectors, cover = ball
+    towards = whole.mesh.face_normals @ [0.8, 0.6, 0.0]
+    required = replace(whole.requirements, target="dominant")
+    region = np.where(towards > 0.9, 0, -1)
+    scene = replace(whole, region=region, requirements=required)
+    around = lit_samples(scene, projectors, scene.surface_samples(4000, 251))
+    points = around.target.samples.points
+    tight = [
+        _with_last_ring(p, points[around.lit[:, i]]) for i, p in enumerate(projectors)
+    ]
+    rows = lit_samples(scene, tight, scene.target_samples(500, 9))
+    after = move_ring_axes(scene, tight, cover.cameras, rows)
+    assert any(new is not old for new, old in zip(after, tight, strict=True))
+    assert np.array_equal(lit_samples(scene, after, around.target).lit, around.lit)
+
+
 def test_the_best_proposal_is_tried_first(ball):
     """Near or far: from a start that blind curves close in, far is better."""
     scene, projectors, cover = ball

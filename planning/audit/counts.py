@@ -55,7 +55,9 @@ def audit_counts(
         return
     for field, at in (("best_area", int(count)), ("one_fewer", int(count) - 1)):
         table = claims.get(field)
-        upper = as_number(table.get("upper_bound_m2")) if _is_table(table) else None
+        if not isinstance(table, Mapping):
+            continue
+        upper = as_number(table.get("upper_bound_m2"))
         if upper is not None and at in bounds:
             ledger.number(
                 f"{key}.{field}.upper_bound_m2",
@@ -95,7 +97,3 @@ def _audit_table(
             f"marginal has {square_centimetres(area)} (tolerance "
             f"{square_centimetres(slack)})",
         )
-
-
-def _is_table(value: object) -> bool:
-    return isinstance(value, Mapping)
