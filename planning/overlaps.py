@@ -4,8 +4,9 @@ A ring code is read from how bright a pixel is in a sequence of images. Where a 
 projector shines while it runs, the images hold the sum of two codes, and neither can be
 read. So it counts where light *falls*, not where it is good enough to measure with: an
 incidence of 80 degrees or a blurred ring spoils another's code as well. Light falls on
-a point that lies inside the image (or beam) and the outermost ring, faces the projector
-and isn't in shadow. Light that grazes it at over 89 degrees is left out.
+a point that lies inside the image (or beam), no more than one gap beyond the outermost
+ring (the annulus around it is drawn, too), faces the projector and isn't in shadow.
+Light that grazes it at over 89 degrees is left out.
 
 Two projectors overlap if any sample, of the target or of the whole surface, gets light
 from both. Those that don't may fire in one go. The fewest goes are the fewest colours
@@ -76,10 +77,12 @@ def light_falls(
 ) -> NDArray[np.bool_]:
     """Return on which samples any light of a projector falls, shape (n,)."""
     anywhere = replace(projector.device, range_m=(0.0, np.inf))
+    radii = projector.ring_radii
+    drawn = np.append(radii, radii[-1] + np.diff(radii, prepend=0.0)[-1])
     # No steep direction: along it, light is poor, but it is light.
     plain = replace(target, steep=np.zeros_like(target.steep))
     stages = lighting.first_failure(
-        replace(projector, device=anywhere),
+        replace(projector, device=anywhere, ring_radii=drawn),
         plain,
         _ANY_LIGHT,
         scene.visibility,

@@ -13,8 +13,9 @@ from planning.audit import audit_plan
 from planning.audit.estimates import Estimator
 from planning.audit.ledger import Ledger
 from planning.audit.occlusion import Shadow
-from planning.audit.overlaps import audit_overlaps
-from planning.audit.samples import draw_samples
+from planning.audit.overlaps import audit_overlaps, light_falls
+from planning.audit.predicates import Lamp
+from planning.audit.samples import AuditSamples, draw_samples
 from planning.audit.schedule import audit_schedule
 from planning.candidates import aimed_poses
 from planning.firing import schedule_line
@@ -117,6 +118,34 @@ def test_narrow_beams_share_a_lens_and_the_outer_two_of_three_fire_together():
     assert areas["P1", "P3"] == 0.0
     assert found["firing_schedule"]["groups"] == [["P1", "P3"], ["P2"]]
     assert found["firing_schedule"]["clique"] == ["P2", "P3"]
+
+
+def test_what_is_drawn_beyond_the_last_ring_spoils_codes_too():
+    """Last rings of 20 mm, a gap of 10: light falls within 30 mm; axes are 50 apart."""
+    scene = scene_of(grid(0.16, 0.16, divisions=(4, 4)))
+    r, d = 0.03, 0.05
+    at = [(k * d, 0.0, 1.0) for k in (0, 1)]
+    aims = [(k * d, 0.0, 0.0) for k in (0, 1)]
+    rings = np.array([0.01, 0.02])
+    pair = [replace(p, ring_radii=rings) for p in beams(*at, aims=aims)]
+    (entry,) = overlap_entries(scene, pair)["overlaps"]
+    lens = 2 * r**2 * np.arccos(d / (2 * r)) - d / 2 * np.sqrt(4 * r**2 - d**2)
+    assert entry["surface_m2"] == pytest.approx(lens, rel=0.15)
+    # The audit's own predicate says the same.
+    own = scene.surface_samples(20_000, 3).samples
+    n = len(own.points)
+    steep, ones = np.zeros((n, 3)), np.ones(n)
+    samples = AuditSamples(
+        own.points, own.normals, own.faces, steep, ones.astype(int), ones > 0, ones
+    )
+    lamps = [
+        Lamp(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
+        for p in pair
+    ]
+    shadow = Shadow(scene.mesh, threads=2)
+    both = [light_falls(lamp, samples, shadow) for lamp in lamps]
+    found = scene.mesh.area * float(np.all(both, axis=0).mean())
+    assert found == pytest.approx(lens, rel=0.15)
 
 
 def test_shadow_is_no_light():

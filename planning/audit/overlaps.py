@@ -1,6 +1,7 @@
 """Claims about the area on which light of two projectors falls."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -61,8 +62,13 @@ def audit_overlaps(
 
 
 def light_falls(lamp: Lamp, samples: AuditSamples, shadow: Shadow) -> NDArray[np.bool_]:
-    """Return on which samples any light of a projector falls, shape (n,)."""
-    falls = in_beam(lamp, samples.points)
+    """Return on which samples any light of a projector falls, shape (n,).
+
+    Its last annulus ends one gap beyond its last ring.
+    """
+    before, last = (0.0, *lamp.radii)[-2:]
+    outer = replace(lamp, radii=np.array([last, last + (last - before)]))
+    falls = in_beam(outer, samples.points)
     chosen = np.flatnonzero(falls)
     along, length = light_of(lamp, samples.points[chosen])
     facing = -np.einsum("ij,ij->i", samples.normals[chosen], along)
