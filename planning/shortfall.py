@@ -6,6 +6,8 @@ from typing import Any
 
 from .requirements import Requirements
 
+# Areas below this are told in mm² [m²].
+_SMALL_M2 = 1e-4
 _CAUSE_WORDS = {
     "projector_beam": "outside the beam or the image of every projector",
     "projector_range": "out of the projectors' range",
@@ -167,4 +169,6 @@ def _down(share: float) -> str:
 
 
 def _cm2(area_m2: float) -> str:
+    if area_m2 < _SMALL_M2:
+        return f"{1e6 * area_m2:.3g} mm²"
     return f"{1e4 * area_m2:.1f} cm²"

@@ -13,6 +13,8 @@ from .ring_entries import rings_lines
 from .shortfall import causes_line
 
 _AXES = "xyz"
+# Surfaces below this are told in mm² [m²].
+_SMALL_M2 = 1e-3
 
 
 def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
@@ -352,7 +354,10 @@ def _own(plan: RigPlan) -> dict[str, Any] | None:
 
 def _cell(areas: dict[str, float], key: str) -> str:
     share = 100.0 * areas[key] / areas["area_m2"]
-    return f"{1e4 * areas[key]:9.1f} cm² {share:6.1f} %"
+    area, unit = 1e4 * areas[key], "cm²"
+    if areas["area_m2"] < _SMALL_M2:
+        area, unit = 1e6 * areas[key], "mm²"
+    return f"{area:9.1f} {unit} {share:6.1f} %"
 
 
 def _ratio(part: float, whole: float) -> str:

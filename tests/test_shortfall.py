@@ -5,7 +5,8 @@ import dataclasses
 
 import pytest
 
-from planning.shortfall import shortfalls
+from planning.shortfall import _cm2, shortfalls
+from planning.summary import _cell
 
 
 @pytest.fixture
@@ -93,3 +94,17 @@ def test_a_failed_check_lists_its_own_sentences(plan):
     document = copy.deepcopy(plan.document)
     document["reconstruction"] = {"passed": False, "failures": ["rms too large"]}
     assert "rms too large" in shortfalls(document, plan.requirements)
+
+
+def test_areas_of_tiny_parts_are_told_in_square_millimetres():
+    assert [_cm2(area) for area in (2.5e-6, 9.9e-5, 1.2e-4)] == [
+        "2.5 mm²",
+        "99 mm²",
+        "1.2 cm²",
+    ]
+    areas = {"area_m2": 4e-6, "lit_m2": 3e-6}
+    assert _cell(areas, "lit_m2").split() == ["3.0", "mm²", "75.0", "%"]
+    assert _cell({"area_m2": 0.4, "lit_m2": 0.3}, "lit_m2").split()[:2] == [
+        "3000.0",
+        "cm²",
+    ]
