@@ -133,7 +133,7 @@ def _move(
     scene, projector = judges[0].scene, moved[p]
     scene.pulse()
     for axis in proposals(
-        axis_program(scene, moved, p, judges[0].rows, judges[0].views, held)
+        axis_program(scene, moved, p, judges[0].rows, judges[0].views)
     ):
         frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
         offered = replace(projector, world_from_ring=frame)
@@ -188,7 +188,6 @@ def axis_program(
     p: int,
     rows: LitSamples,
     views: Sequence[View],
-    held: NDArray[np.float64] | None = None,
 ) -> AxisProgram:
     """State the axis program of projector p.
 
@@ -198,7 +197,6 @@ def axis_program(
         p: Whose axis moves.
         rows: Lit samples.
         views: How each camera sees them.
-        held: More places that stay inside the largest ring, shape (n, 3) [m].
     """
     limits, projector = scene.requirements.triangulation, projectors[p]
     pose, device = projector.world_from_device, projector.device
@@ -207,7 +205,6 @@ def axis_program(
     lit = np.flatnonzero(rows.lit[:, p])
     chosen = lit[:: max(1, -(-len(lit) // _ROWS))]
     points = rows.target.samples.points
-    around = [] if held is None else [held]
     normals = rows.target.samples.normals[chosen]
     seen = [view.take(chosen) for view in views]
     rays = np.stack([view.rays for view in seen], axis=1)
@@ -230,7 +227,7 @@ def axis_program(
         placement_m=(limits.ring_sigma_m or 0.0) * np.abs(facing),
         facing=np.abs(facing) / distances,
         others=_scores_of(scene, projectors, rest, rows, chosen, seen),
-        held=transform(into, np.concatenate([points[lit], *around])),
+        held=transform(into, points[lit]),
         start=ring_axis(pose, device, projector.world_from_ring),
         ring_radius=_RING_SHARE * float(projector.ring_radii[-1]),
         gap=float(projector.ring_radii[1] - projector.ring_radii[0]),
