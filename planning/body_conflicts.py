@@ -19,7 +19,7 @@ from solvers.cover import solve_max_coverage
 from .lighting import Target
 from .plan import PlannedProjector
 from .selection import MORE, Marginals, Selection, cover_problem
-from .standing import blocked_by, bodies_of, collide
+from .standing import blocked_by, bodies_of, collide, moves_bodies
 
 # Counted work of each completion, of which no proof is asked.
 _BUDGET = 1e8
@@ -72,7 +72,7 @@ class LitCrowd:
     @property
     def bodied(self) -> bool:
         """Whether any candidate that isn't given has a body."""
-        return any(d.body is not None and not d.existing for d in self.devices)
+        return moves_bodies(self.devices)
 
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]

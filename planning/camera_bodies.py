@@ -16,7 +16,7 @@ from .cameras import CameraCover, LitSamples, measured_by
 from .errors import InfeasibleLimitsError
 from .plan import PlannedCamera, PlannedProjector
 from .scene import Scene
-from .standing import blocked_by, bodies_of, collide
+from .standing import blocked_by, bodies_of, collide, moves_bodies
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class MeasuredCrowd:
     @property
     def bodied(self) -> bool:
         """Whether any candidate that isn't given has a body."""
-        return any(d.body is not None and not d.existing for d in self.devices)
+        return moves_bodies(self.devices)
 
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]

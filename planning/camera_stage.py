@@ -27,6 +27,7 @@ from .scene import Scene
 from .selection import Selection
 from .sights import Sights
 from .spread_problem import RingsOnTarget, SpreadLimits
+from .standing import moves_bodies
 
 _ROUNDS = 3
 _SPREAD_ROWS = 6000
@@ -271,7 +272,7 @@ def _measured_among(
         rows: Samples lit, were there no cameras.
         spared: How many must stay lit.
     """
-    if all(camera.body is None or camera.existing for camera in cameras):
+    if not moves_bodies(cameras):
         return measured_by(scene, cameras, rows)
     among = scene.among((*projectors, *cameras))
     lit = lit_among(projectors, rows, cameras)

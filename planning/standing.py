@@ -71,6 +71,11 @@ def bodies_of(devices: Iterable[Device]) -> tuple[Standing, ...]:
     )
 
 
+def moves_bodies(devices: Iterable[Device]) -> bool:
+    """Return whether any device that doesn't stand already has a body."""
+    return any(d.body is not None and not d.existing for d in devices)
+
+
 def existing_bodies(required: Requirements) -> tuple[Standing, ...]:
     """Return the bodies of the devices that stand already."""
     poses = [np.array(device.world_from_device) for device in required.existing]

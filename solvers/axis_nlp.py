@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis_program import INSET, PITCH_POWER, AxisProgram, Light
+from .ipopt import slots_for, strict_solver
 from .status import interruptible
 
 _COLUMNS = 16
@@ -89,7 +90,7 @@ def axis_parameters(
     Rows beyond the pairs, and points beyond the held, fill the slots: pairs of weight
     0, and points that are held already.
     """
-    slots, places = _slots(len(pairs), _SLOTS), _slots(len(held), _HELD_SLOTS)
+    slots, places = slots_for(len(pairs), _SLOTS), slots_for(len(held), _HELD_SLOTS)
     rows = np.resize(pairs, (slots, 2))
     at, camera = rows[:, 0], rows[:, 1]
     weight = np.where(np.arange(slots) < len(pairs), 1.0 / len(program.points), 0.0)
@@ -138,7 +139,7 @@ def run_ipopt(
         reach: Largest change of each coordinate, in units of the largest ring.
         max_iterations: Limit of the run.
     """
-    slots, places = _slots(len(pairs), _SLOTS), _slots(len(held), _HELD_SLOTS)
+    slots, places = slots_for(len(pairs), _SLOTS), slots_for(len(held), _HELD_SLOTS)
     solver = _solver(program.light, slots, places, max_iterations)
     with interruptible():
         result = solver(
@@ -163,26 +164,7 @@ def _scaled(program: AxisProgram, points: NDArray[np.float64]) -> NDArray[np.flo
     return points * [1.0, 1.0, 0.0] / program.ring_radius
 
 
-def _slots(n: int, sizes: tuple[int, ...]) -> int:
-    """Return the smallest size that holds n, so that few programs are built."""
-    return n if n == 0 else next((m for m in sizes if m >= n), n)
-
-
 @lru_cache(maxsize=16)
 def _solver(light: Light, slots: int, places: int, max_iterations: int) -> Any:  # noqa: ANN401
-    """Return the compiled program; the linear solver is MUMPS, the only safe one."""
-    nlp = build_axis_nlp(light, slots, places)
-    options = {
-        "print_time": False,
-        "show_eval_warnings": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.linear_solver": "mumps",
-        "ipopt.max_iter": max_iterations,
-        "ipopt.tol": 1e-9,
-        "ipopt.constr_viol_tol": 1e-9,
-        "ipopt.bound_relax_factor": 0.0,
-        "ipopt.mu_strategy": "adaptive",
-    }
-    parts = {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}
-    return ca.nlpsol("axis", "ipopt", parts, options)
+    """Return the compiled program for so many slots."""
+    return strict_solver("axis", build_axis_nlp(light, slots, places), max_iterations)

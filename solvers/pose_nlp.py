@@ -19,6 +19,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from .ipopt import slots_for, strict_solver
 from .pose_program import INSET, Light, PoseProgram, pose_margins
 from .status import interruptible
 
@@ -250,7 +251,7 @@ def run_ipopt(
         start: Pose to start from, shape (4, 4).
         max_iterations: Limit of the run.
     """
-    slots = next((m for m in _SLOTS if m >= active.size), active.size)
+    slots = slots_for(active.size, _SLOTS)
     index = np.resize(active, slots)
     p, lower = pose_parameters(program, index)
     solver = _solver(program.light, slots, max_iterations, n_planes_of(program))
@@ -303,22 +304,9 @@ def variables_of(
 
 @lru_cache(maxsize=16)
 def _solver(light: Light, slots: int, max_iterations: int, n_planes: int) -> Any:  # noqa: ANN401
-    """Return the compiled program; the linear solver is MUMPS, the only safe one."""
+    """Return the compiled program for so many slots."""
     nlp = build_pose_nlp(light, slots, n_planes)
-    options = {
-        "print_time": False,
-        "show_eval_warnings": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.linear_solver": "mumps",
-        "ipopt.max_iter": max_iterations,
-        "ipopt.tol": 1e-9,
-        "ipopt.constr_viol_tol": 1e-9,
-        "ipopt.bound_relax_factor": 0.0,
-        "ipopt.mu_strategy": "adaptive",
-    }
-    parts = {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}
-    return ca.nlpsol("pose", "ipopt", parts, options)
+    return strict_solver("pose", nlp, max_iterations)
 
 
 def _gibbs(s: Any) -> Any:  # noqa: ANN401
