@@ -1,12 +1,15 @@
 """Section III of the paper: the fewest projectors that light the dominant regions."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers import solve_cover
+from solvers.cover import DEFAULT_BUDGET
 
 from . import lighting
 from .body_conflicts import LitCrowd, settle, settle_others
@@ -34,10 +37,14 @@ from .share_margin import widest_selection
 _ROWS = 2000
 _CHECK_ROWS = 4000
 _ROUNDS = 3
+# Times the candidates of a lattice from which one projector fewer is looked for.
+_FINER = 4
 # Streams of random samples: rows of the cover, then a fresh check set for each round.
 _STREAM = 100
 # Counted work of the cover about which more candidates are offered.
 _SEEDS_BUDGET = 2e8
+# Counted work of the cover whose count is kept, where less left it unproved.
+_PROOF_BUDGET = 1e10
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +122,18 @@ def plan_projectors(
     around = with_room(scene, around)
     stages = np.concatenate([stages, lit_stages(scene, around, rows)], axis=1)
     candidates += around
+    given = _n_given(scene)
+
+    def finer(rows: Target) -> Offer:
+        more = offered_with_room(scene, _FINER * n_candidates, lattice)
+        more = candidates[:given] + more
+        return Offer(more, lit_stages(scene, more, rows))
+
     attempt = 0
     while True:
         attempt += 1
         offer = Offer(candidates, stages)
-        offer, selection = _fewer(scene, rows, offer, n_lattice, ring_offset)
+        offer, selection = _fewer(scene, rows, offer, n_lattice, finer, ring_offset)
         candidates, stages = offer.projectors, offer.stages
         fresh = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh_stages = lit_stages(scene, candidates, fresh)
@@ -163,17 +177,21 @@ def _fewer(
     rows: Target,
     offer: Offer,
     n_lattice: int,
+    finer: Callable[[Target], Offer],
     ring_offset: tuple[float, float],
 ) -> tuple[Offer, Selection]:
     """Return the fewest of the poses, others offered as long as they save one."""
     selection = _fewest(scene, offer.stages)
     lattice = offer.take(np.arange(n_lattice))
     given = _n_given(scene)
+    more = cache(lambda: finer(rows))
     while selection.needed > given + 1:
         moved = one_fewer(
             scene,
             lattice,
             selection.needed - 1,
+            finer=more,
+            reached=np.any(offer.stages == lighting.LIT, axis=1),
             stages_of=lambda projectors: lit_stages(scene, projectors, rows),
             given=given,
             ring_offset=ring_offset,
@@ -188,6 +206,11 @@ def _fewer(
         if again.needed >= selection.needed:
             break
         selection = again
+    if selection.lower_bound < selection.needed:
+        # Only a count that is kept is worth a longer proof.
+        selection = _fewest(
+            scene, offer.stages, selection.smallest, budget=_PROOF_BUDGET
+        )
     return offer, selection
 
 
@@ -219,7 +242,11 @@ def _good_cover(scene: Scene, stages: NDArray[np.int8]) -> NDArray[np.int64]:
 
 
 def _fewest(
-    scene: Scene, stages: NDArray[np.int8], known: NDArray[np.int64] | None = None
+    scene: Scene,
+    stages: NDArray[np.int8],
+    known: NDArray[np.int64] | None = None,
+    *,
+    budget: float = DEFAULT_BUDGET,
 ) -> Selection:
     required = scene.requirements
     return select_fewest(
@@ -229,6 +256,7 @@ def _fewest(
         seed=scene.seed,
         known=known,
         given=_n_given(scene),
+        budget=budget,
     )
 
 

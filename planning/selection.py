@@ -79,6 +79,7 @@ def select_fewest(
     seed: int,
     known: NDArray[np.int64] | None = None,
     given: int = 0,
+    budget: float = DEFAULT_BUDGET,
 ) -> Selection:
     """Return the fewest candidates that cover a share of what all of them cover.
 
@@ -91,11 +92,14 @@ def select_fewest(
         seed: Of the heuristics.
         known: Candidates that may cover as much with fewer than the search finds.
         given: First candidates that are taken whatever they cover.
+        budget: Counted work of the search for the fewest.
     """
     required = required_rows(np.any(covers, axis=1), share)
     problem = cover_problem(covers, required, given)
     reduced = reduced_problem(problem)
-    solution = solve_cover(problem, seed=seed, heaviest=False, reduced=reduced)
+    solution = solve_cover(
+        problem, seed=seed, budget=budget, heaviest=False, reduced=reduced
+    )
     smallest = solution.selected
     if known is not None and len(known) < len(smallest):
         smallest = known if _rows(covers, known) >= required else smallest

@@ -91,15 +91,22 @@ class CountLedger:
             self.selected = prune(self.cover, fewer)
 
     def by_exact_search(
-        self, tuples: TupleSearch, budget: WorkBudget, share: float = 1.0
+        self,
+        tuples: TupleSearch,
+        budget: WorkBudget,
+        share: float = 1.0,
+        groups: TupleSearch | None = None,
     ) -> None:
         """Exhaust tuples and branch and bound, in the order that suits the count.
 
         Args:
             tuples: Search over K sets.
             budget: Work.
-            share: Part of what is left that each of the two may spend.
+            share: Part of what is left that each of them may spend.
+            groups: Search over groups of alike sets, which goes first.
         """
+        if groups is not None and not self.settled:
+            self._by_tuples(groups, budget.part(share * budget.remaining))
         for exhaust in (True, False) if self.lower < _LARGE_COUNT else (False, True):
             part = budget.part(share * budget.remaining)
             if self.settled:

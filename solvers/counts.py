@@ -1,9 +1,11 @@
 """Fewest sets, and most weight of K sets: the order in which the methods are tried.
 
 From above: greedy, swaps, large-neighbourhood search. From below: Lagrangian bound,
-then exact search over K-tuples. Each spends a share of one counted budget.
+then exact search, over groups of alike sets and over K-tuples. Each spends a share of
+one counted budget.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +15,7 @@ from .answers import NONE, CountAnswer, WeightAnswer, cut_short
 from .count_ledger import CountLedger
 from .exact_cover import TupleSearch, best_tuple
 from .full_cover import fewest_full
+from .group_branching import GroupSearch, best_by_groups
 from .neighbourhood import greedy, most_coverage, prune
 from .reductions import ReducedCover
 from .relaxation import coverage_bounds, tighten
@@ -21,6 +24,10 @@ from .status import SolveStatus, WorkBudget
 # Moves before a bound is asked whether more are worth it; after that, for each set.
 _FIRST_MOVES = 60
 _MOVES_A_SET = 50
+# Pairs are exhausted by a matrix product; groups are for more sets.
+_LEAST_GROUPED = 3
+# Share of an exact search's work that goes to groups of alike sets.
+_GROUPED = 0.8
 # Work after which the first bounds are asked whether more search is worth it.
 _FIRST_UNITS = 4e8
 
@@ -82,7 +89,22 @@ def fewest_sets(
         proof = _tuple_proof(n_sets, search) if search.complete else None
         return search.selected, proof
 
-    ledger.by_exact_search(tuples, budget, share=0.8)
+    def groups(
+        n_sets: int, part: WorkBudget
+    ) -> tuple[NDArray[np.int64] | None, str | None]:
+        if n_sets < _LEAST_GROUPED:
+            return tuples(n_sets, part)
+        search = best_by_groups(
+            cover,
+            n_sets,
+            target=cover.required,
+            multipliers=multipliers,
+            budget=part,
+            first=True,
+        )
+        return search.selected, _group_proof(n_sets) if search.complete else None
+
+    ledger.by_exact_search(tuples, budget, share=0.8, groups=groups)
     again = seed
     while not ledger.settled and not budget.exhausted:
         again += 1
@@ -133,20 +155,24 @@ def most_weight(
         weight = cover.weight_of(best)
     if upper < weight + least:
         return WeightAnswer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
-    search = best_tuple(
-        cover,
-        n_sets,
-        target=weight + least,
-        multipliers=step.multipliers,
-        budget=budget.part(budget.remaining),
-    )
-    if search.selected is not None:
-        best, weight = search.selected, search.weight
-    if search.complete:
-        return WeightAnswer(
-            SolveStatus.OPTIMAL, best, weight, _tuple_proof(n_sets, search)
+    searches: list[Callable[..., GroupSearch | TupleSearch]] = [best_tuple]
+    if n_sets >= _LEAST_GROUPED:
+        searches.insert(0, best_by_groups)
+    for search in searches:
+        share = _GROUPED if search is best_by_groups else 1.0
+        found = search(
+            cover,
+            n_sets,
+            target=weight + least,
+            multipliers=step.multipliers,
+            budget=budget.part(share * budget.remaining),
         )
-    upper = max(weight, min(upper, search.upper_bound))
+        if found.selected is not None:
+            best, weight = found.selected, found.weight
+        upper = max(weight, min(upper, found.upper_bound))
+        if found.complete:
+            proof = _proof_by(n_sets, found)
+            return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
     proof = cut_short("Lagrangian bound", budget)
     return WeightAnswer(SolveStatus.FEASIBLE, best, upper, proof)
 
@@ -166,6 +192,16 @@ def _improve(ledger: CountLedger, budget: WorkBudget, seed: int) -> None:
         )
 
     ledger.improve(cover.weight_of, search)
+
+
+def _proof_by(n_sets: int, search: GroupSearch | TupleSearch) -> str:
+    if isinstance(search, GroupSearch):
+        return _group_proof(n_sets)
+    return _tuple_proof(n_sets, search)
+
+
+def _group_proof(n_sets: int) -> str:
+    return f"sets of {n_sets} by branching on groups of alike sets"
 
 
 def _tuple_proof(n_sets: int, search: TupleSearch) -> str:

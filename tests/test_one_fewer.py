@@ -62,6 +62,8 @@ def moved(lattice, n_projectors, given=0):
         scene,
         offer,
         n_projectors,
+        finer=lambda: offer,
+        reached=(offer.stages == lighting.LIT).any(axis=1),
         stages_of=stages_of,
         given=given,
         ring_offset=OFFSET,
