@@ -113,21 +113,7 @@ class CubeMap:
         Args:
             directions: Not zero, of any length, shape (m, 3).
         """
-        # Column by column: rows of three are too short for numpy's loops.
-        flat = np.ascontiguousarray(directions, dtype=np.float64).ravel()
-        x, y, z = (np.abs(flat[k::3]) for k in range(3))
-        axis = np.where((x >= y) & (x >= z), 0, np.where(y >= z, 1, 2))
-        first = np.arange(0, flat.size, 3)
-        along = flat[first + axis]
-        face = 2 * axis + (along < 0)
-        length = np.abs(along)
-        i, j = (self._steps(flat[first + _AXES[face, k]] / length) for k in (0, 1))
-        return (face * self.n + j) * self.n + i
-
-    def _steps(self, gnomonic: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Column or row of cells that a gnomonic coordinate falls into, shape (m,)."""
-        steps = (np.arctan(gnomonic) * (4.0 / np.pi) + 1.0) / 2.0
-        return np.clip((steps * self.n).astype(np.int64), 0, self.n - 1)
+        return located(directions, self.n)
 
     def halved(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Return for each cell of the map of n/2 the rows of its four cells, joined.
@@ -148,6 +134,40 @@ class CubeMap:
             for own, value in zip(_AXES[face], (x, y, _SIGNS[face]), strict=True):
                 found[face, :, :, own] = value / length
         return found
+
+
+def located(
+    directions: NDArray[np.float64], n: NDArray[np.int64] | int
+) -> NDArray[np.int64]:
+    """Return the cell that each direction lies in, on a map of its own, shape (m,).
+
+    Args:
+        directions: Not zero, of any length, shape (m, 3).
+        n: Cells along an edge of each one's map, shape (m,), or of all.
+    """
+    # Column by column: rows of three are too short for numpy's loops.
+    flat = np.ascontiguousarray(directions, dtype=np.float64).ravel()
+    x, y, z = (np.ascontiguousarray(flat[k::3]) for k in range(3))
+    of_x, of_y, of_z = np.abs(x), np.abs(y), np.abs(z)
+    first = (of_x >= of_y) & (of_x >= of_z)
+    second = ~first & (of_y >= of_z)
+    # As `_AXES` has them.
+    along = np.where(first, x, np.where(second, y, z))
+    across = np.where(first, y, np.where(second, z, x))
+    upwards = np.where(first, z, np.where(second, x, y))
+    face = np.where(first, 0, np.where(second, 2, 4)) + (along < 0)
+    length = np.abs(along)
+    i, j = _steps(across / length, n), _steps(upwards / length, n)
+    return (face * n + j) * n + i
+
+
+def _steps(
+    gnomonic: NDArray[np.float64], n: NDArray[np.int64] | int
+) -> NDArray[np.int64]:
+    """Column or row of cells that a gnomonic coordinate falls into, shape (m,)."""
+    steps = (np.arctan(gnomonic) * (4.0 / np.pi) + 1.0) / 2.0
+    # No coordinate lies below -1, so none is less than the first cell's.
+    return np.minimum((steps * n).astype(np.int64), n - 1)
 
 
 def quarters(level: NDArray[np.int64], cells: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -5,32 +5,14 @@ answers for all directions within k times the map's clearance. Coarser maps, wid
 likewise, answer for larger angles.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from .cube_map import CubeMap
+from .cube_map import CubeMap, located
 
 # Rounds of widening: the finest map, then the others.
 _FINEST = (1, 2, 3)
 _COARSER = (2, 3)
-
-
-@dataclass(frozen=True, eq=False)
-class WidenedMap:
-    """One map.
-
-    Attributes:
-        cube: Its cells.
-        angle: Angle within which it answers [rad].
-        rows: Samples with an open direction there, bits as `numpy.packbits` leaves
-            them along the samples, shape (cube.size, n_bytes).
-    """
-
-    cube: CubeMap
-    angle: float
-    rows: NDArray[np.uint8]
 
 
 class WidenedMaps:
@@ -43,19 +25,25 @@ class WidenedMaps:
     """
 
     def __init__(self, rows: NDArray[np.uint64], cube: CubeMap) -> None:
-        self._maps: list[WidenedMap] = []
+        made: list[NDArray[np.uint64]] = []
+        angles: list[float] = []
+        cells: list[int] = []
         rounds = _FINEST
         while True:
             wide = rows
             for k in range(1, max(rounds) + 1):
                 wide = _widened(wide, cube)
                 if k in rounds:
-                    own = wide.view(np.uint8)
-                    self._maps.append(WidenedMap(cube, k * cube.clearance, own))
+                    made.append(wide)
+                    angles.append(k * cube.clearance)
+                    cells.append(cube.n)
             if cube.n <= 2:
                 break
             rows, cube, rounds = cube.halved(rows), CubeMap(cube.n // 2), _COARSER
-        self._angles = np.array([m.angle for m in self._maps])
+        self._angles, self._cells = np.array(angles), np.array(cells)
+        # All maps one below the other, so that one look answers from all of them.
+        self._rows = np.concatenate(made).view(np.uint8)
+        self._first = np.cumsum([0, *(len(own) for own in made[:-1])])
 
     def open(
         self,
@@ -68,19 +56,19 @@ class WidenedMaps:
         More may be called open than is, never less.
 
         Args:
-            directions: Unit directions, shape (m, 3).
+            directions: Of any length, not zero unless no map answers, shape (m, 3).
             angles: In [rad], shape (m,).
             samples: Number of each sample, shape (m,).
         """
         level = np.searchsorted(self._angles, angles)
         found = np.ones(len(angles), dtype=bool)
-        counts = np.bincount(level, minlength=len(self._maps))
-        for k in np.flatnonzero(counts[: len(self._maps)]):
-            own = self._maps[k]
-            some = np.flatnonzero(level == k)
-            cell, sample = own.cube.locate(directions[some]), samples[some]
-            bits = own.rows[cell, sample // 8] >> (7 - sample % 8).astype(np.uint8)
-            found[some] = (bits & 1).astype(bool)
+        # Beyond the widest map's angle anything may be open.
+        some = np.flatnonzero(level < self._angles.size)
+        level, sample = level[some], samples[some]
+        cell = located(directions.take(some, axis=0), self._cells[level])
+        byte = (self._first[level] + cell) * self._rows.shape[1] + sample // 8
+        bits = self._rows.ravel().take(byte) >> (7 - sample % 8).astype(np.uint8)
+        found[some] = (bits & 1).view(np.bool_)
         return found
 
 

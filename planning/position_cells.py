@@ -21,13 +21,15 @@ from numpy.typing import NDArray
 from geometry.cube_map import FACES, CubeMap, angle_between, middles, quarters
 from geometry.lengths import lengths
 from geometry.widened_maps import WidenedMaps
-from solvers.bit_rows import GrowingArray, words_for
+from solvers.bit_rows import GrowingArray, parts, words_for
 from solvers.cells import CellBatch
 
 from .requirements import Workspace
 from .zone_limits import may_hold
 
 _ROUNDING = 1e-9
+# Pairs of cell and sample that are looked at at a time: they stay in the cache.
+_PAIRS = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,32 @@ class ShellCells:
         """Return some of the cells."""
         return ShellCells(
             self.level[some], self.cell[some], self.low_m[some], self.high_m[some]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where cells are, relative to the centre of the workspace.
+
+    Attributes:
+        outwards: Direction of their middles, shape (n, 3).
+        middle: Their middles in [m], shape (n, 3).
+        half: Half their interval of radii [m], shape (n,).
+        side: Farthest that a position is from the interval's middle line [m], (n,).
+    """
+
+    outwards: NDArray[np.float64]
+    middle: NDArray[np.float64]
+    half: NDArray[np.float64]
+    side: NDArray[np.float64]
+
+    def take(self, some: NDArray[np.int64]) -> "_Places":
+        """Return some of them, the same one several times if need be."""
+        return _Places(
+            self.outwards.take(some, axis=0),
+            self.middle.take(some, axis=0),
+            self.half.take(some),
+            self.side.take(some),
         )
 
 
@@ -105,9 +133,9 @@ class PositionTree:
         new = np.array([c for c in cells if int(c) not in self._made], dtype=np.int64)
         if new.size:
             self._split(new)
-        parts = [self._made[int(cell)] for cell in cells]
-        parents = np.repeat(np.arange(cells.size), [part.size for part in parts])
-        names = np.concatenate([np.empty(0, dtype=np.int64), *parts])
+        own = [self._made[int(cell)] for cell in cells]
+        parents = np.repeat(np.arange(cells.size), [part.size for part in own])
+        names = np.concatenate([np.empty(0, dtype=np.int64), *own])
         return CellBatch(names, parents, self._rows.values[names])
 
     def spread_cells(self) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
@@ -139,11 +167,11 @@ class PositionTree:
         deep = along > cells.high_m * angle
         wide = ~deep & (cells.level < self._finest)
         four, two = np.flatnonzero(wide), np.flatnonzero(deep)
-        parts = [_quartered(cells.take(four)), _halved(cells.take(two))]
+        made = _quartered(cells.take(four)), _halved(cells.take(two))
         owner = np.concatenate([np.repeat(four, 4), np.repeat(two, 2)])
         order = np.argsort(owner, kind="stable")
         owner = owner[order]
-        every = _joined(*parts).take(order)
+        every = _joined(*made).take(order)
         given = self._rows.values[names[owner]]
         may = np.unpackbits(given.view(np.uint8), axis=1, count=self.n_rows)
         found = self._append(every, may.view(np.bool_))
@@ -153,68 +181,80 @@ class PositionTree:
 
     def _append(self, cells: ShellCells, may: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Keep cells, with the samples of those given that each may light."""
-        first = self._level.size
-        served = np.zeros((len(may), words_for(self.n_rows) * 64), dtype=bool)
-        for k in range(len(may)):
-            rows = np.flatnonzero(may[k])
-            served[k, rows] = self._served(cells.take(np.array([k])), rows)
+        first, n_cells = self._level.size, len(may)
+        places, angle = self._places(cells)
+        may = may & self._admissible(cells, places.outwards, angle)[:, None]
+        pairs = np.flatnonzero(may)
+        width = words_for(self.n_rows) * 64
+        served = np.zeros(n_cells * width, dtype=bool)
+        for part in parts(pairs.size, _PAIRS):
+            own, rows = np.divmod(pairs[part], self.n_rows)
+            served[own * width + rows] = self._served(places.take(own), rows)
         self._level.append(cells.level)
         self._cell.append(cells.cell)
         self._low.append(cells.low_m)
         self._high.append(cells.high_m)
-        self._rows.append(np.packbits(served, axis=1).view(np.uint64))
-        return np.arange(first, first + len(may))
+        packed = np.packbits(served).reshape(n_cells, width // 8)
+        self._rows.append(packed.view(np.uint64))
+        return np.arange(first, first + n_cells)
 
-    def _served(self, cell: ShellCells, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which of some samples a projector in a cell may light."""
-        cube = self._cubes[cell.level[0]]
-        outwards, angle = cube.centres[cell.cell[0]], cube.radii[cell.cell[0]]
-        low, high = cell.low_m[0], cell.high_m[0]
-        if not self._admissible(outwards, angle, low, high):
-            return np.zeros(rows.size, dtype=bool)
-        half = 0.5 * (high - low)
-        towards = 0.5 * (low + high) * outwards - self._points[rows]
+    def _places(self, cells: ShellCells) -> tuple["_Places", NDArray[np.float64]]:
+        """Return where cells are, and the angle about their middles' directions."""
+        outwards, angle = np.empty((cells.level.size, 3)), np.empty(cells.level.size)
+        for level in np.unique(cells.level):
+            some, cube = cells.level == level, self._cubes[level]
+            outwards[some] = cube.centres[cells.cell[some]]
+            angle[some] = cube.radii[cells.cell[some]]
+        low, high = cells.low_m, cells.high_m
+        middle, side = 0.5 * (low + high), 2.0 * high * np.sin(0.5 * angle)
+        return _Places(
+            outwards, middle[:, None] * outwards, 0.5 * (high - low), side
+        ), angle
+
+    def _served(self, places: "_Places", rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return whether a projector in each cell may light the sample beside it."""
+        towards = places.middle - self._points.take(rows, axis=0)
         distance = lengths(towards)
-        side = 2.0 * high * np.sin(0.5 * angle)
-        extent = half + side + _ROUNDING
+        extent = places.half + places.side + _ROUNDING
         near, far = self._range
         served = (distance - extent <= far) & (distance + extent >= near)
-        psi = _spread(towards, distance, outwards, half, side)
-        # A sample in the middle of a cell has no direction; any is open to it there.
-        directions = towards / np.where(distance > 0.0, distance, 1.0)[:, None]
-        served[served] = self._maps.open(directions[served], psi[served], rows[served])
+        psi = _spread(towards, distance, places.outwards, places.half, places.side)
+        # A sample in the middle of a cell has no direction, and psi is pi there.
+        some = np.flatnonzero(served)
+        served[some] = self._maps.open(
+            towards.take(some, axis=0), psi.take(some), rows.take(some)
+        )
         return served
 
     def _admissible(
         self,
+        cells: ShellCells,
         outwards: NDArray[np.float64],
-        angle: float,
-        low: float,
-        high: float,
-    ) -> bool:
-        """Return whether a cell may hold a position that all limits allow."""
-        space = self._workspace
+        angle: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Return which cells may hold a position that all limits allow."""
+        space, low, high = self._workspace, cells.low_m, cells.high_m
         axis, up = np.array(space.axis), np.array(space.up)
-        least = max(0.0, float(angle_between(outwards, axis)) - angle)
-        if not least <= space.half_angle + _ROUNDING:
-            return False
-        if not may_hold(space, outwards[None], angle, low, high)[0]:
-            return False
-        if space.floor_m is None:
-            return True
-        rise = np.cos(max(0.0, float(angle_between(outwards, up)) - angle))
-        return bool(rise * (high if rise > 0 else low) >= space.floor_m - _ROUNDING)
+        least = np.maximum(0.0, angle_between(outwards, axis) - angle)
+        allowed = least <= space.half_angle + _ROUNDING
+        allowed &= may_hold(space, outwards, angle, low, high)
+        if space.floor_m is not None:
+            rise = np.cos(np.maximum(0.0, angle_between(outwards, up) - angle))
+            highest = rise * np.where(rise > 0, high, low)
+            allowed &= highest >= space.floor_m - _ROUNDING
+        return allowed
 
 
 def _spread(
     towards: NDArray[np.float64],
     distance: NDArray[np.float64],
     outwards: NDArray[np.float64],
-    half: float,
-    side: float,
+    half: NDArray[np.float64] | float,
+    side: NDArray[np.float64] | float,
 ) -> NDArray[np.float64]:
-    """Return psi of a cell for each sample, shape (n,)."""
-    along = towards @ outwards
+    """Return psi of one cell, or of a cell each, for samples, shape (n,)."""
+    x, y, z = (towards * outwards).T
+    along = x + y + z
     across = np.sqrt(np.maximum(distance**2 - along**2, 0.0))
     # The end of the interval that lies nearer turns by more.
     turn = np.arctan2(half * across, distance**2 - half * np.abs(along))

@@ -44,8 +44,8 @@ def may_hold(
     workspace: Workspace,
     outwards: _Array,
     angle: _Array | float,
-    low_m: float,
-    high_m: float,
+    low_m: _Array | float,
+    high_m: _Array | float,
 ) -> NDArray[np.bool_]:
     """Return which cells of the shell may hold a position that zones allow.
 
@@ -58,10 +58,10 @@ def may_hold(
         workspace: Its zones alone count.
         outwards: Unit directions, shape (n, 3).
         angle: Angle about them [rad], shape (n,) or one number.
-        low_m: Least radius [m].
-        high_m: Largest radius [m].
+        low_m: Least radius [m], shape (n,) or one number.
+        high_m: Largest radius [m], likewise.
     """
-    middles = 0.5 * (low_m + high_m) * outwards
+    middles = np.asarray(0.5 * (low_m + high_m))[..., None] * outwards
     half_turn = np.minimum(0.5 * np.asarray(angle), 0.5 * np.pi)
     reach = 0.5 * (high_m - low_m) + 2.0 * high_m * np.sin(half_turn) + _ROUNDING
     allowed = np.ones(len(outwards), dtype=bool)
