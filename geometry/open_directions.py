@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from .cube_map import CubeMap
 from .cube_segments import mark_segments
+from .map_pieces import pieces
 from .rays import CHUNK, equal_parts
 from .silhouettes import Silhouettes
 from .visibility import Visibility
@@ -36,8 +36,8 @@ _SINGLE = 1e-4
 _SLACKS = 16.0
 # How near, in shares of the mesh's size, faces are that are looked at alone.
 _NEAR = (0.04, 0.16)
-_IN_PLANE = np.zeros((3, 3, 3), dtype=bool)
-_IN_PLANE[1] = [[False, True, False], [True, True, True], [False, True, False]]
+# Samples whose caps are laid over all cells at a time: they stay in the cache.
+_CAPS = 4
 
 
 @dataclass(frozen=True)
@@ -102,18 +102,17 @@ class OpenDirections:
         cells = self._within_incidence(normals)
         cells &= ~self._along_steep(steep)
         if self._edges is not None:
-            sides = self._edges.sides(points, normals)
-            blocked = np.zeros(cells.shape, dtype=bool)
+            # Rays leave out what is within the slack of a sample, as the planner's do.
+            slack = _SLACKS * self._visibility.slack
+            sides = self._edges.sides(points, normals, slack)
+            blocked, among = np.zeros(cells.shape, dtype=bool), None
             for reach in (np.inf, *self._near):
-                among = None
                 if reach < np.inf:
                     among = self._edges.faces_within(sides, reach)
                 crossing = self._edges.seen_from(sides, self._cone, among)
                 asked = cells & ~blocked
                 blocked |= self._blocked(crossing, points, normals, asked, reach)
-            # Rays leave out what is within the slack of a sample, as the planner's do.
-            reach = _SLACKS * self._visibility.slack
-            doubtful = self._edges.touched(sides, faces, reach, self._cone)
+            doubtful = self._edges.touched(sides, faces, slack, self._cone, among)
             doubtful |= self._narrow[faces]
             cells &= ~blocked | doubtful[:, None]
         return cells
@@ -121,10 +120,15 @@ class OpenDirections:
     def _within_incidence(self, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return the cells that the cap about each normal meets."""
         cube, limit = self._cube, self._limits.max_incidence
-        cosine = normals @ cube.centres.T
-        within = cosine >= np.cos(limit)
-        near = ~within & (cosine >= np.cos(np.minimum(limit + cube.radii, np.pi)))
-        row, cell = np.nonzero(near)
+        within = np.empty((len(normals), cube.size), dtype=bool)
+        near = np.empty_like(within)
+        reached = np.cos(np.minimum(limit + cube.radii, np.pi))
+        for part in equal_parts(len(normals), _CAPS):
+            cosine = normals[part] @ cube.centres.T
+            within[part] = cosine >= np.cos(limit)
+            near[part] = cosine >= reached
+        near &= ~within
+        row, cell = np.divmod(np.flatnonzero(near), cube.size)
         meets = _arcs_come_within(cube, normals[row], cell, np.cos(limit) - _ROUNDING)
         within[row[meets], cell[meets]] = True
         within[np.arange(len(normals)), cube.locate(normals)] = True
@@ -133,16 +137,14 @@ class OpenDirections:
     def _along_steep(self, steep: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return the cells that lie in a cap about +T1 or -T1 as a whole."""
         cube, n = self._cube, self._cube.n
-        cosine = (steep @ cube.corners.reshape(-1, 3).T).reshape(-1, 6, n + 1, n + 1)
         least = np.cos(self._limits.min_tangent_angle) + _ROUNDING
         whole = np.zeros((len(steep), 6, n, n), dtype=bool)
-        for inside in (cosine > least, cosine < -least):
-            whole |= (
-                inside[:, :, :-1, :-1]
-                & inside[:, :, :-1, 1:]
-                & inside[:, :, 1:, :-1]
-                & inside[:, :, 1:, 1:]
-            )
+        corners = cube.corners.reshape(-1, 3).T
+        for part in equal_parts(len(steep), _CAPS):
+            cosine = (steep[part] @ corners).reshape(-1, 6, n + 1, n + 1)
+            for inside in (cosine > least, cosine < -least):
+                pairs = inside[:, :, :-1] & inside[:, :, 1:]
+                whole[part] |= pairs[..., :-1] & pairs[..., 1:]
         return whole.reshape(len(steep), -1)
 
     def _blocked(
@@ -162,17 +164,10 @@ class OpenDirections:
             # Silhouettes below the horizon weren't asked for: nothing hangs together
             # across it.
             touched |= normals @ cube.centres.T <= np.sin(cube.radii)
-        plain = (cells & ~touched).reshape(-1, cube.n, cube.n)
-        labels = np.empty(plain.shape, dtype=np.int32)
-        n_parts = int(ndimage.label(plain, structure=_IN_PLANE, output=labels))  # type: ignore[arg-type]
-        labels = labels.reshape(cells.shape)
-        place = np.flatnonzero(labels.ravel())
-        first = np.empty(n_parts + 1, dtype=np.int64)
-        first[labels.ravel()[place[::-1]]] = place[::-1]
-        row, cell = np.divmod(first[1:], cube.size)
-        answer = np.zeros(n_parts + 1, dtype=bool)
-        answer[1:] = self._meets(points[row], normals[row], cube.centres[cell], reach)
-        return answer[labels]
+        found = pieces(cells & ~touched, cube.n)
+        row, cell = np.divmod(found.first, cube.size)
+        answer = self._meets(points[row], normals[row], cube.centres[cell], reach)
+        return found.cells(answer)
 
     def _meets(
         self,
