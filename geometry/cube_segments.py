@@ -33,6 +33,8 @@ def mark_segments(
         marks: What is marked, in place, shape (n_owners, cube.size).
     """
     flat = marks.reshape(-1)
+    # Column by column: rows of three are too short for numpy's loops.
+    starts, ends = (np.ascontiguousarray(own.T).T for own in (starts, ends))
     for face in range(FACES):
         first, second, met = _clipped(starts, ends, face)
         if not met.size:
@@ -50,8 +52,10 @@ def _clipped(
     A part lies on the face where |x| <= z and |y| <= z: four half spaces.
     """
     met = _may_meet(starts, ends, face)
-    a = np.stack(face_coordinates(starts[met], face))
-    b = np.stack(face_coordinates(ends[met], face))
+    a, b = (
+        np.stack([own.take(met) for own in face_coordinates(vectors, face)])
+        for vectors in (starts, ends)
+    )
     low, high = np.zeros(met.size), np.ones(met.size)
     for axis in (0, 1):
         for sign in (1.0, -1.0):
@@ -64,7 +68,7 @@ def _clipped(
             high = np.where(change < 0, np.minimum(high, cut), high)
             high = np.where((change == 0) & (inside < 0), -1.0, high)
     kept = np.flatnonzero(low <= high + _MARGIN)
-    a, b, met = a[:, kept], b[:, kept], met[kept]
+    a, b, met = a.take(kept, axis=1), b.take(kept, axis=1), met[kept]
     ends_met = []
     for t in (low[kept], high[kept]):
         point = a + t * (b - a)

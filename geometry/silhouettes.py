@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .lengths import lengths
 from .mesh import TriangleMesh
 from .product_signs import WORD, ProductSigns, packed
 from .topology import face_pairs
@@ -67,6 +68,7 @@ class Silhouettes:
         pairs, shared = face_pairs(edges)
         self._middle = mesh.bounds.mean(axis=0)
         self._vertices = mesh.vertices - self._middle
+        self._columns = np.ascontiguousarray(self._vertices.T)
         single = edges.n_faces != 2
         self._single_ends = edges.ends[single]
         sides_of_single = np.flatnonzero(single[edges.of_face.ravel()])
@@ -187,9 +189,15 @@ class Silhouettes:
         more, singles = _unpacked(alone, n)
         ends = np.concatenate([self._ends[edges], self._single_ends[singles]])
         owners = np.concatenate([owners, more])
-        begin, end = (self._vertices[ends[:, k]] - sides.local[owners] for k in (0, 1))
-        near = _may_cross(begin, end, sides.normals[owners], half_angle)
-        return owners[near], begin[near], end[near]
+        # Column by column: rows of three are too short for numpy's loops.
+        from_points = [own.take(owners) for own in sides.local.T]
+        begin, end = (
+            np.stack([v.take(e) for v in self._columns]) - from_points
+            for e in np.ascontiguousarray(ends.T)
+        )
+        axes = np.stack([own.take(owners) for own in sides.normals.T])
+        near = np.flatnonzero(_may_cross(begin, end, axes, half_angle))
+        return owners[near], begin.take(near, axis=1).T, end.take(near, axis=1).T
 
     def touched(
         self,
@@ -261,13 +269,13 @@ def _may_cross(
     axes: NDArray[np.float64],
     half_angle: float,
 ) -> NDArray[np.bool_]:
-    """Return which segments the ball about their middle lets into a cone."""
+    """Return which segments the ball about their middle lets into a cone; (3, m)."""
     middle = begin + end
-    distance = np.linalg.norm(middle, axis=1)
-    size = np.linalg.norm(end - begin, axis=1)
+    distance, size = lengths(middle.T), lengths((end - begin).T)
     around = size >= distance
     apart = np.where(around, 1.0, distance)
-    cosine = np.einsum("ij,ij->i", middle, axes) / apart
+    x, y, z = middle * axes
+    cosine = (x + y + z) / apart
     spread = np.arcsin(np.where(around, 0.0, size) / apart)
     off = np.arccos(np.clip(cosine, -1.0, 1.0))
     return around | (off - spread <= half_angle + _ANGLE)
