@@ -5,24 +5,24 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.rays import equal_parts
 from geometry.visibility_matrix import visibility_matrix
 
 from . import lighting
 from .lighting import Target
+from .open_stages import SampleColumns, open_stages
 from .plan import PlannedProjector
 from .scene import Scene
+
+# Projectors that a thread takes on at a time.
+_SHARED = 32
 
 
 def lit_stages(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.int8]:
     """Return the first failing limit of each sample (row) and projector (column)."""
-    stages = np.empty((len(target), len(projectors)), dtype=np.int8)
-    for column, projector in enumerate(projectors):
-        scene.pulse()
-        stages[:, column] = lighting.first_failure_in_the_open(
-            projector, target, scene.requirements.projector
-        )
+    stages = _in_the_open(scene, projectors, target)
     for light in ("diverging", "parallel"):
         alike = [i for i, p in enumerate(projectors) if p.light == light]
         if alike:
@@ -33,6 +33,23 @@ def lit_stages(
             stages[:, column], projector, target.samples.points, scene.standing
         )
     return stages
+
+
+def _in_the_open(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.int8]:
+    """Return the stages of projectors, were nothing in between."""
+    samples, limits = SampleColumns.of(target), scene.requirements.projector
+    found = np.empty((len(projectors), len(target)), dtype=np.int8)
+
+    def fill(part: slice) -> None:
+        scene.pulse()
+        for own in range(part.start, part.stop):
+            found[own] = open_stages(projectors[own], samples, limits)
+
+    parts = equal_parts(len(projectors), _SHARED)
+    scene.visibility.caster.share(fill, parts)
+    return np.ascontiguousarray(found.T)
 
 
 def _with_shadows(
