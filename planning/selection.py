@@ -10,10 +10,10 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from solvers import CoverProblem, SolveStatus, solve_cover
 from solvers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
+from solvers.dense_rows import sparse_rows
 
 MORE = 2
 # What a certificate says where chosen devices have bodies.
@@ -192,7 +192,7 @@ def cover_problem(
     """
     reachable = covers[covers.any(axis=1)]
     return CoverProblem(
-        sparse.csr_array(reachable),
+        sparse_rows(reachable),
         required_weight=np.array([required]),
         fixed=np.arange(given),
     )

@@ -20,6 +20,7 @@ from scipy import sparse
 
 from .bit_rows import pack_shuffled
 from .cover_problem import CoverProblem
+from .dense_rows import sparse_rows
 
 WEIGHT_SLACK = 1e-12
 _SKETCH_WORDS = 4
@@ -158,7 +159,7 @@ def reduce_problem(
     dense = np.unpackbits(rows.bits, axis=1, count=costs.size).astype(bool)
     merged = rows.sum(whole[live])
     kept, stand_in = _undominated(dense, merged, needs[live][rows.first], costs)
-    by_row = sparse.csr_array(sparse.csr_array(dense[:, kept]), dtype=np.float64)
+    by_row = sparse.csr_array(sparse_rows(dense[:, kept]), dtype=np.float64)
     return ReducedCover(
         problem=problem,
         by_set=sparse.csr_array(by_row.T),
@@ -267,7 +268,8 @@ def _undominated(
     The first are column numbers, increasing; the second count among these.
     """
     n_sets = dense.shape[1]
-    gains = sparse.csr_array(dense.T) @ weights
+    # Weights are whole numbers: their sums don't depend on the order.
+    gains = sparse_rows(dense).T @ weights
     # A superset weighs more, so only earlier columns of this order can dominate.
     order = np.lexsort((np.arange(n_sets), costs, -gains))
     order = order[gains[order] > 0]

@@ -49,6 +49,9 @@ class Swaps:
         self.regain: NDArray[np.float64] = np.zeros((0, cover.n_sets))
         self._cover = cover
         self._budget = budget
+        self._unit = _exact_unit(cover.weights)
+        exact = np.float64 if self._unit is None else np.float32
+        self._weights = (cover.weights / (self._unit or 1.0)).astype(exact)
         self._serves = cover.by_row.astype(bool).toarray()
         self._counts = np.zeros(cover.weights.size, dtype=np.int64)
         # Sum of 1 + s over the sets that cover a row: its owner, where there's but one.
@@ -126,9 +129,19 @@ class Swaps:
         for start in range(0, rows.size, step):
             part = slice(start, start + step)
             few = np.arange(owner[part][0], owner[part][-1] + 1)
-            factors = (few[:, None] == owner[part]) * self._cover.weights[rows[part]]
-            serves = self._serves[rows[part]].astype(np.float64)
+            factors = (few[:, None] == owner[part]) * self._weights[rows[part]]
+            serves = self._serves.take(rows[part], axis=0).astype(factors.dtype)
             total[few] += factors @ serves
             self._budget.spend(serves.size * (1.0 + _PRODUCT_UNIT * few.size))
         self._budget.spend(total.size + _CALL_UNITS)
-        return total
+        return total if self._unit is None else total * self._unit
+
+
+def _exact_unit(weights: NDArray[np.float64]) -> float | None:
+    """Return a power of two in which sums of weights are exact in single precision.
+
+    None where there is none: weights are integers, but may be as large as 2^52.
+    """
+    unit = float(np.gcd.reduce(weights.astype(np.int64), initial=0)) or 1.0
+    unit = float(np.gcd(int(unit), 1 << 62))
+    return unit if float(weights.sum()) / unit < 2.0**24 else None

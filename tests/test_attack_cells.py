@@ -172,3 +172,25 @@ def test_seen_from_a_sample_no_place_of_a_cell_is_beyond_its_angle():
         slack += (psi - seen)[psi < np.pi].tolist()
     # It is no wider than it has to be.
     assert np.quantile(slack, 0.1) < 0.002
+
+
+def test_cells_asked_for_together_have_the_rows_that_each_has_alone(attack_cells):
+    """Pairs of cell and sample are looked at by the thousand: none takes another's."""
+    tree, alone = (
+        made(SHAPES["notched box"], "diverging", attack_cells)[3] for _ in range(2)
+    )
+    together = tree.roots()
+    own = dict(zip(together.cells.tolist(), alone.roots().cells, strict=True))
+    for _ in range(4):
+        names = together.cells
+        together = tree.children(names)
+        parts = {
+            int(name): alone.children(np.array([own[int(name)]])) for name in names
+        }
+        own = {}
+        for name in names:
+            found, mine = parts[int(name)], names[together.parents] == name
+            np.testing.assert_array_equal(together.rows[mine], found.rows)
+            own |= dict(zip(together.cells[mine].tolist(), found.cells, strict=True))
+    assert len(own) > 300
+    assert np.bitwise_count(together.rows).sum() > len(own)

@@ -310,6 +310,21 @@ def test_worth_of_swaps_is_kept_to_the_bit_as_sets_come_and_go(block, monkeypatc
             assert_worths_are_true(cover, kept)
 
 
+def test_weights_that_single_precision_would_round_are_summed_exactly():
+    """Odd numbers of 23 bits: each is exact in single precision, no sum of them is."""
+    rng = np.random.default_rng(5)
+    covers = rng.random((60, 12)) < 0.4
+    weights = 2.0 * rng.integers(2**21, 2**22, 60) + 1.0
+    total = weights[covers.any(axis=1)].sum()
+    cover = reduced_cover(
+        sparse.csr_array(covers), weights, np.ones(12), float(np.floor(0.9 * total))
+    )
+    kept = Swaps(cover, [3, 0, 7], plenty())
+    kept.drop(1)
+    kept.add(5)
+    assert_worths_are_true(cover, kept)
+
+
 def test_moves_leave_local_optima():
     """Over many instances, moves that lose weight find what a descent misses."""
     first = last = 0.0

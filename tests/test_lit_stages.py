@@ -1,15 +1,22 @@
 """The matrix of what candidates light is the loop over them, bit for bit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from geometry.mesh import TriangleMesh
+from geometry.poses import transform
 from geometry.primitives import sphere
+from geometry.sampling import SurfaceSamples
 from planning import lighting
 from planning.candidates import projector_candidates
 from planning.claims import Devices, _reachable_by_projectors
+from planning.open_stages import SampleColumns, open_stages
 from planning.plan import PlannedProjector
 from planning.projector_light import lit_stages
+from planning.requirements import ProjectorLimits
 from planning.rig import load_rig
 from planning.rings import uniform_radii
 from planning.scene import Scene
@@ -56,3 +63,47 @@ def test_candidates_together_light_what_each_lights_alone(light):
     np.testing.assert_array_equal(reachable, (few == lighting.LIT).any(axis=1))
     np.testing.assert_array_equal(furthest, few.max(axis=1))
     assert len(np.unique(furthest)) >= 3
+
+
+@pytest.mark.parametrize("light", ["diverging", "parallel"])
+def test_the_quick_way_says_what_one_projector_alone_is_told(light):
+    """Turned rings, a round beam, a lens that distorts, steep directions: all limits.
+
+    Points lie on all sides of the device and beyond its range.
+    """
+    rng = np.random.default_rng(3)
+    n = 4000
+    normals, steep = rng.normal(size=(2, n, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    steep -= np.einsum("ij,ij->i", steep, normals)[:, None] * normals
+    steep /= np.linalg.norm(steep, axis=1)[:, None]
+    steep[::5] = 0.0
+    local = rng.uniform(-1.0, 1.0, (n, 3)) * [0.12, 0.12, 0.4]
+    if light == "diverging":
+        local[:, :2] *= 3.0 * local[:, 2:]
+    rig = load_rig("default", light=light)
+    device = rig.projector_device()
+    device = (
+        replace(device, distortion=(0.1, -0.02, 0.01, 0.02, 0.0), range_m=(0.05, 0.3))
+        if light == "diverging"
+        else replace(device, beam_radius=0.11, range_m=(0.05, 0.3))
+    )
+    limits = ProjectorLimits(np.radians(70.0), np.radians(60.0))
+    seen = []
+    for _ in range(12):
+        pose, turn = np.eye(4), np.eye(4)
+        pose[:3, :3] = Rotation.random(rng=rng).as_matrix()
+        pose[:3, 3] = 0.05 * rng.normal(size=3)
+        turn[:3, :3] = Rotation.from_rotvec(0.1 * rng.normal(size=3)).as_matrix()
+        turn[:3, 3] = 0.01 * rng.normal(size=3)
+        radii = np.array([0.01, 0.3 if light == "diverging" else 0.1])
+        one = PlannedProjector("", light, pose, pose @ turn, device, radii)
+        points = transform(pose, local)
+        samples = SurfaceSamples(points, normals, np.arange(n), 1.0 / n)
+        target = lighting.Target(samples, steep)
+        found = open_stages(one, SampleColumns.of(target), limits)
+        expected = lighting.first_failure_in_the_open(one, target, limits)
+        np.testing.assert_array_equal(found, expected)
+        seen.append(found)
+    kinds = np.bincount(np.concatenate(seen), minlength=lighting.LIT + 1)
+    assert (kinds[[0, 1, 2, 3, lighting.LIT]] > 50).all()
