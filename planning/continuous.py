@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 
 from geometry.cube_map import CubeMap
 from geometry.devices import ParallelModel
-from geometry.open_directions import DirectionLimits, OpenDirections
-from geometry.silhouettes import POINTS
 from geometry.widened_maps import WidenedMaps
-from solvers.bit_rows import BitSum, words_for
+from solvers.bit_rows import BitSum
 from solvers.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cell_problem import CellProblem
 
@@ -26,12 +24,14 @@ from .candidates import projectors_towards
 from .direction_cells import DirectionTree
 from .given_bound import enough, given_on
 from .lighting import LIT, Target
+from .open_rows import open_rows
 from .plan import PlannedProjector
 from .position_cells import PositionTree
+from .projector_light import lit_stages
 from .projectors import ProjectorStage, with_more
 from .requirements import Workspace
 from .scene import Scene
-from .selection import required_rows
+from .selection import fewest_count, required_rows
 from .zone_limits import may_hold
 
 
@@ -132,12 +132,27 @@ def prove_fewest(
             site=scene.site("projector", template.device),
         )
         found = with_room(scene, found)
-        better = with_more(scene, stage, found) if found else stage
+        fewer = bool(found) and _saves(scene, stage, found)
+        better = with_more(scene, stage, found) if fewer else stage
         if better is stage:
             return replace(stage, certificate=_joined(stage.certificate, bound.entry()))
         stage = better
     entry = enough(stage.certificate, np.any(stage.stages == LIT, axis=1))
     return replace(stage, certificate=stage.certificate | {"continuous": entry})
+
+
+def _saves(
+    scene: Scene, stage: ProjectorStage, more: tuple[PlannedProjector, ...]
+) -> bool:
+    """Return whether fewer do with more candidates: mostly they don't, and are gone."""
+    stages = np.concatenate([stage.stages, lit_stages(scene, more, stage.rows)], axis=1)
+    count = fewest_count(
+        stages == LIT,
+        scene.requirements.dominant_coverage,
+        seed=scene.seed,
+        given=stage.certificate.get("given", 0),
+    )
+    return count < stage.certificate["needed"]["count"]
 
 
 def _joined(certificate: dict[str, Any], bound: dict[str, Any]) -> dict[str, Any]:
@@ -221,12 +236,12 @@ def bound_projectors(
         aside = reach + min(width, device.beam_radius or np.inf)
         depth = np.sqrt(max(0.0, near**2 - aside**2))
         shadows = shadows and bool(depth >= reach)
-        opened = _open_rows(scene, rows, cube, shadows=shadows)
+        opened = open_rows(scene, rows, cube, shadows=shadows)
         opened[~_within(cube, workspace, aside)] = 0
         tree = DirectionTree.over(opened, len(rows))
     else:
         shadows = shadows and bool(near >= reach)
-        opened = _open_rows(scene, rows, cube, shadows=shadows)
+        opened = open_rows(scene, rows, cube, shadows=shadows)
         tree = PositionTree(
             workspace,
             device.range_m,
@@ -280,44 +295,3 @@ def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.boo
         above = np.arccos(np.clip(cube.centres @ np.array(workspace.up), -1.0, 1.0))
         kept &= above <= np.arccos(np.clip(lowest, -1.0, 1.0)) + slack
     return kept & may_hold(workspace, cube.centres, slack, near, far)
-
-
-def _open_rows(
-    scene: Scene, rows: Target, cube: CubeMap, *, shadows: bool
-) -> NDArray[np.uint64]:
-    """Return for each cell the samples to which it is open, as bit rows."""
-    limits = scene.requirements.projector
-    maps = OpenDirections(
-        scene.visibility,
-        DirectionLimits(limits.max_incidence, limits.min_tangent_angle),
-        cube,
-        occlusion=shadows,
-    )
-    found = np.zeros((cube.size, words_for(len(rows))), dtype=np.uint64)
-    bytes_of = found.view(np.uint8).reshape(cube.size, -1, 8)
-    points, normals = rows.samples.points, rows.samples.normals
-
-    def fill(part: slice) -> None:
-        scene.pulse()
-        marks = maps.maps(
-            points[part], normals[part], rows.steep[part], rows.samples.faces[part]
-        )
-        packed = _packed_columns(marks)
-        bytes_of[:, part.start // POINTS, : len(packed)] = packed.T
-
-    parts = [slice(b, b + POINTS) for b in range(0, len(rows), POINTS)]
-    scene.visibility.caster.share(fill, parts)
-    return found
-
-
-def _packed_columns(marks: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return what `numpy.packbits` does along the first axis, ten times as fast.
-
-    Whole rows are joined, eight at a time: columns are what it is slow at.
-    """
-    n_bytes = -(-len(marks) // 8)
-    packed = np.zeros((n_bytes, marks.shape[1]), dtype=np.uint8)
-    for k in range(8):
-        own = marks[k::8].view(np.uint8)
-        packed[: len(own)] |= own << np.uint8(7 - k)
-    return packed

@@ -18,41 +18,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cube_map import FACES, CubeMap, angle_between, middles, quarters
+from geometry.cube_map import FACES, CubeMap, angle_between, middles
 from geometry.lengths import lengths
 from geometry.widened_maps import WidenedMaps
 from solvers.bit_rows import GrowingArray, parts, words_for
 from solvers.cells import CellBatch
 
 from .requirements import Workspace
+from .shell_cells import ShellCells, halved, joined, quartered
 from .zone_limits import may_hold
 
 _ROUNDING = 1e-9
 # Pairs of cell and sample that are looked at at a time: they stay in the cache.
 _PAIRS = 1 << 13
-
-
-@dataclass(frozen=True, eq=False)
-class ShellCells:
-    """Cells of a shell.
-
-    Attributes:
-        level: Cube map of 2^level cells an edge, shape (n,).
-        cell: Cell of it, shape (n,).
-        low_m: Least radius [m], shape (n,).
-        high_m: Largest radius [m], shape (n,).
-    """
-
-    level: NDArray[np.int64]
-    cell: NDArray[np.int64]
-    low_m: NDArray[np.float64]
-    high_m: NDArray[np.float64]
-
-    def take(self, some: NDArray[np.int64] | NDArray[np.bool_]) -> "ShellCells":
-        """Return some of the cells."""
-        return ShellCells(
-            self.level[some], self.cell[some], self.low_m[some], self.high_m[some]
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,11 +145,11 @@ class PositionTree:
         deep = along > cells.high_m * angle
         wide = ~deep & (cells.level < self._finest)
         four, two = np.flatnonzero(wide), np.flatnonzero(deep)
-        made = _quartered(cells.take(four)), _halved(cells.take(two))
+        made = quartered(cells.take(four)), halved(cells.take(two))
         owner = np.concatenate([np.repeat(four, 4), np.repeat(two, 2)])
         order = np.argsort(owner, kind="stable")
         owner = owner[order]
-        every = _joined(*made).take(order)
+        every = joined(*made).take(order)
         given = self._rows.values[names[owner]]
         may = np.unpackbits(given.view(np.uint8), axis=1, count=self.n_rows)
         found = self._append(every, may.view(np.bool_))
@@ -263,30 +241,3 @@ def _spread(
     share = side / np.where(reached, nearest, 1.0)
     psi = turn + np.arcsin(np.where(reached, share, 0.0)) + _ROUNDING
     return np.where(reached, psi, np.pi)
-
-
-def _quartered(cells: ShellCells) -> ShellCells:
-    four = cells.take(np.repeat(np.arange(cells.cell.size), 4))
-    parts = quarters(cells.level, cells.cell).ravel()
-    return ShellCells(four.level + 1, parts, four.low_m, four.high_m)
-
-
-def _halved(cells: ShellCells) -> ShellCells:
-    two = np.repeat(np.arange(cells.cell.size), 2)
-    taken, outer = cells.take(two), np.arange(two.size) % 2 == 1
-    middle = 0.5 * (taken.low_m + taken.high_m)
-    return ShellCells(
-        taken.level,
-        taken.cell,
-        np.where(outer, middle, taken.low_m),
-        np.where(outer, taken.high_m, middle),
-    )
-
-
-def _joined(a: ShellCells, b: ShellCells) -> ShellCells:
-    return ShellCells(
-        np.concatenate([a.level, b.level]),
-        np.concatenate([a.cell, b.cell]),
-        np.concatenate([a.low_m, b.low_m]),
-        np.concatenate([a.high_m, b.high_m]),
-    )

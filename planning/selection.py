@@ -128,6 +128,22 @@ def select_fewest(
     )
 
 
+def fewest_count(
+    covers: NDArray[np.bool_], share: float, *, seed: int, given: int = 0
+) -> int:
+    """Return how many candidates `select_fewest` takes, and spend nothing on which.
+
+    Args:
+        covers: As there.
+        share: As there.
+        seed: As there.
+        given: As there.
+    """
+    required = required_rows(np.any(covers, axis=1), share)
+    problem = cover_problem(covers, required, given)
+    return len(solve_cover(problem, seed=seed, heaviest=False).selected)
+
+
 def required_rows(reached: NDArray[np.bool_], share: float) -> int:
     """Return how many rows a share of those that any candidate serves is."""
     return int(np.ceil(share * int(reached.sum()) - 1e-9))
