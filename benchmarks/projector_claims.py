@@ -31,8 +31,9 @@ from planning.errors import InfeasibleLimitsError
 from planning.lighting import Target
 from planning.prepare import Prepared
 from planning.projector_light import lit_stages
-from planning.projector_poses import moved_to, widen_margins
+from planning.projector_poses import widen_margins
 from planning.projectors import plan_projectors
+from planning.rings import moved_to
 from planning.rounding import rounded_pose
 from planning.share_margin import margin_at_share
 

@@ -1,7 +1,6 @@
 """The pose program of section III: each projector moves to the largest margins."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +13,16 @@ from solvers.pose_program import PoseProgram, pose_margins, pose_slack, solve_po
 from . import lighting
 from .body_room import lacks_room
 from .lighting import Target
+from .margin_search import widest_between
 from .plan import PlannedProjector
 from .projector_light import lit_margins, lit_stages
 from .projectors import ProjectorStage
 from .requirements import Workspace
+from .rings import moved_to
 from .scene import Scene
 from .selection import required_rows
 from .share_margin import enough_lit, margin_at_share
+from .standing import moves_bodies
 from .zone_limits import half_spaces
 from .zone_positions import is_zoned
 
@@ -37,10 +39,11 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     """Return the projectors at the poses where what counts is lit with most margin.
 
     What counts are the samples that have the margin at the required share
-    (`share_margin`). Each projector in turn solves the pose program over those of them
-    that it serves. Occlusion isn't part of that program, so rays decide after every
-    move: the whole way is tried, then half, then a quarter, and a move that lowers the
-    margin at the share isn't taken, nor one that leaves too few samples lit.
+    (`share_margin`). First poses between the candidates are offered
+    (`margin_search`). Then each projector in turn solves the pose program over those
+    of them that it serves. Occlusion isn't part of that program, so rays decide after
+    every move: the whole way is tried, then half, then a quarter, and a move that
+    lowers the margin at the share isn't taken, nor one that leaves too few samples lit.
 
     Args:
         scene: Surface and requirements.
@@ -55,6 +58,12 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     required = min(required, lit)
     if required == 0:
         return stage.projectors
+    if not moves_bodies(state.projectors):
+        # What bodies stand in the way of was settled for the poses chosen.
+        between = widest_between(
+            scene, stage.projectors, state.margins, required, len(stage.reference)
+        )
+        state = _Lit(scene, rows, list(between))
     for _ in range(_SWEEPS):
         moved = [
             _improve(state, p, required, lit)
@@ -177,18 +186,6 @@ def _held_in(
     centre = np.array(workspace.centre)
     normals, offsets = half_spaces(workspace, position - centre)
     return np.column_stack([normals, offsets + normals @ centre])
-
-
-def moved_to(
-    projector: PlannedProjector, world_from_device: NDArray[np.float64]
-) -> PlannedProjector:
-    """Return a projector at another pose; its ring frame moves along."""
-    device_from_ring = inverse(projector.world_from_device) @ projector.world_from_ring
-    return replace(
-        projector,
-        world_from_device=world_from_device,
-        world_from_ring=world_from_device @ device_from_ring,
-    )
 
 
 def _part_of_the_way(

@@ -4,6 +4,8 @@ The ring axis need not be the device's axis. Turned aside (parallel light: shift
 moves the curves on which a camera is blind (|r.m| = 0) off the object.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
 from solvers.axis_program import axis_direction
 
+from .plan import PlannedProjector
 from .requirements import TriangulationLimits
 
 _MIN_GAP_PROJECTOR_PX = 3.0
@@ -160,3 +163,15 @@ def uniform_radii(outer: float, gap: float) -> NDArray[np.float64]:
     """
     n = max(2, int(np.ceil(outer / gap)))
     return outer * np.arange(1, n + 1) / n
+
+
+def moved_to(
+    projector: PlannedProjector, world_from_device: NDArray[np.float64]
+) -> PlannedProjector:
+    """Return a projector at another pose; its ring frame moves along."""
+    device_from_ring = inverse(projector.world_from_device) @ projector.world_from_ring
+    return replace(
+        projector,
+        world_from_device=world_from_device,
+        world_from_ring=world_from_device @ device_from_ring,
+    )

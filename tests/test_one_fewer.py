@@ -13,13 +13,15 @@ import pytest
 from geometry.primitives import sphere
 from planning import lighting
 from planning.candidates import projector_candidates
+from planning.margin_search import widest_between
 from planning.one_fewer import Offer, one_fewer
 from planning.plan import PlannedProjector
-from planning.projector_light import lit_stages
+from planning.projector_light import lit_margins, lit_stages
 from planning.rig import load_rig
 from planning.rings import uniform_radii
 from planning.scene import Scene
 from planning.selection import select_fewest
+from planning.share_margin import margin_at_share
 
 OFFSET = (0.0, 0.0)
 
@@ -94,3 +96,65 @@ def test_what_stands_already_counts_and_is_not_offered_again(lattice):
 
 def test_what_no_poses_can_do_is_given_up(lattice):
     assert moved(lattice, 5) is None
+
+
+@pytest.mark.parametrize(("count", "near"), [(5, False), (6, True)])
+def test_a_finer_lattice_is_asked_for_where_it_comes_near(lattice, count, near):
+    scene, offer, stages_of = lattice
+    # Of what the lattice reaches: six caps light a little less, five far less.
+    beyond = replace(scene.requirements, dominant_coverage=0.898)
+    asked = []
+    found = one_fewer(
+        replace(scene, requirements=beyond),
+        offer,
+        count,
+        finer=lambda: asked.append(count) or offer,
+        reached=(offer.stages == lighting.LIT).any(axis=1),
+        stages_of=stages_of,
+        given=0,
+        ring_offset=OFFSET,
+    )
+    assert found is None
+    assert bool(asked) is near
+
+
+def test_what_any_known_pose_reaches_is_asked_for(lattice):
+    scene, offer, stages_of = lattice
+    # One pose reaches what it lights, and 0.875 of that is lit by it alone.
+    one = offer.take(np.arange(1))
+    lit = (one.stages == lighting.LIT).any(axis=1)
+    for reached, enough in ((lit, True), (np.ones_like(lit), False)):
+        found = one_fewer(
+            scene,
+            one,
+            1,
+            finer=lambda: one,
+            reached=reached,
+            stages_of=stages_of,
+            given=0,
+            ring_offset=OFFSET,
+        )
+        assert (found is not None) is enough
+
+
+def test_margins_grow_between_the_poses_of_a_lattice(lattice):
+    scene, offer, _ = lattice
+    rows = scene.target_samples(2000, 100)
+
+    def margins(projectors):
+        lit = lit_stages(scene, projectors, rows) == lighting.LIT
+        return lit_margins(scene, projectors, rows, lit)
+
+    start = offer.projectors[:3]
+    required = int((margins(start) > -np.inf).any(axis=1).sum())
+    before = margin_at_share(margins(start), required)
+    moved = widest_between(scene, start, margins, required, len(offer.projectors))
+    after = margin_at_share(margins(moved), required)
+    assert len(moved) == 3
+    assert after > before + np.radians(1.0)
+    stands = replace(start[0], existing="P0")
+    kept = widest_between(
+        scene, (stands, *start[1:]), margins, required, len(offer.projectors)
+    )
+    assert kept[0] is stands
+    assert all(not projector.existing for projector in kept[1:])
