@@ -99,11 +99,15 @@ def test_what_no_poses_can_do_is_given_up(lattice):
 
 
 @pytest.mark.parametrize(("count", "near"), [(5, False), (6, True)])
-def test_a_finer_lattice_is_asked_for_where_it_comes_near(lattice, count, near):
+def test_a_finer_lattice_is_asked_for_where_it_comes_near(
+    lattice, count, near, monkeypatch
+):
+    # So coarse a lattice begins farther off than those that are planned with.
+    monkeypatch.setattr("planning.one_fewer._SHORT", 0.1)
     scene, offer, stages_of = lattice
     reached = (offer.stages == lighting.LIT).any(axis=1)
-    # Six caps light 0.879 of the ball, about 1,790 of these; five light far less.
-    share = 1805 / int(reached.sum())
+    # Six caps light 0.879 of the ball, about 1,800 of these; five light far less.
+    share = 1815 / int(reached.sum())
     beyond = replace(scene.requirements, dominant_coverage=share)
     asked = []
     found = one_fewer(
