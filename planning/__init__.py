@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .interest import read_weight as read_weight
     from .pipeline import plan_rig as plan_rig
     from .plan import RigPlan as RigPlan
+    from .ranges import RangedBody as RangedBody
+    from .ranges import read_ranges as read_ranges
     from .rig import Rig as Rig
     from .rig import load_rig as load_rig
     from .verification import Verification as Verification
@@ -25,12 +27,14 @@ _EXPORTS = {
     "InputError": "planning.errors",
     "PlanningError": "planning.errors",
     "RequirementError": "planning.errors",
+    "RangedBody": "planning.ranges",
     "Rig": "planning.rig",
     "RigPlan": "planning.plan",
     "Verification": "planning.verification",
     "load_mesh": "geometry.readers",
     "load_rig": "planning.rig",
     "plan_rig": "planning.pipeline",
+    "read_ranges": "planning.ranges",
     "read_selection": "planning.interest",
     "read_weight": "planning.interest",
     "verify_plan": "planning.verification",
@@ -38,6 +42,7 @@ _EXPORTS = {
 __all__ = [
     "InputError",
     "PlanningError",
+    "RangedBody",
     "RequirementError",
     "Rig",
     "RigPlan",
@@ -45,6 +50,7 @@ __all__ = [
     "load_mesh",
     "load_rig",
     "plan_rig",
+    "read_ranges",
     "read_selection",
     "read_weight",
     "verify_plan",

@@ -15,6 +15,7 @@ from .marginal import camera_table, projector_table
 from .overlaps import overlap_entries
 from .plan import FORMAT, VERSION, RigPlan
 from .progress import Stopwatch
+from .range_entries import ranges_entry, with_spread
 from .relaxations import reachability_relaxations
 from .requirements import Requirements
 from .ring_axes import widest_gap
@@ -130,6 +131,19 @@ def _document(
         for region, entry in zip(draft.regions, claims.regions, strict=True)
     ]
     greedy = draft.camera_stage.certificate["greedy_count"]
+    baselines = baseline_rows(
+        devices.cameras,
+        samples.points,
+        samples.normals,
+        claims.measured_by,
+        samples.weight,
+        requirements.camera.max_incidence,
+    )
+    ranges: dict[str, Any] = {}
+    if draft.order.ranges is not None:
+        body, guard = draft.order.ranges
+        ranges = {"ranges": ranges_entry(body, guard)}
+        baselines = with_spread(baselines, devices.cameras, body.ball, guard)
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -165,14 +179,8 @@ def _document(
             "projectors": draft.stage.certificate,
             "cameras": draft.camera_stage.certificate,
         },
-        "baselines": baseline_rows(
-            devices.cameras,
-            samples.points,
-            samples.normals,
-            claims.measured_by,
-            samples.weight,
-            requirements.camera.max_incidence,
-        ),
+        "baselines": baselines,
+        **ranges,
         "camera_groups": [
             [devices.cameras[c].id for c in group]
             for group in overlap_components(claims.measured_by, samples.weight)

@@ -121,17 +121,9 @@ def check_seam(
     here, beyond = normals[seam.points], normals[seam.beyond]
     smooth = np.einsum("ij,ij->i", here, beyond) > _CREASE_COSINE
     beyond = np.where(smooth[:, None], here, beyond)
-    angles = seam_angles(
-        points[seam.points],
-        seam.onward,
-        centres=(one.world_from_device[:3, 3], two.world_from_device[:3, 3]),
-        axes=(one.world_from_device[:3, 2], two.world_from_device[:3, 2]),
-        normals=(here, beyond),
+    angles, half1, half2 = angles_and_fields(
+        one, two, points[seam.points], seam.onward, (here, beyond)
     )
-    # Seen from camera 1, E leaves the axis towards camera 2's stretch, and vice versa.
-    half1 = _field_beyond(one, angles, -angles.iota1, angles.beta1, -1.0)
-    bearing2 = angles.iota2 + angles.delta_surface
-    half2 = _field_beyond(two, angles, bearing2, angles.beta2, 1.0)
     return SeamTest(
         seam,
         points[seam.points],
@@ -142,6 +134,36 @@ def check_seam(
         half2,
         angles.largest(half2, camera_max_incidence),
     )
+
+
+def angles_and_fields(
+    one: PlannedCamera,
+    two: PlannedCamera,
+    points: _Array,
+    onward: _Array,
+    normals: tuple[_Array, _Array],
+) -> tuple[SeamAngles, _Array, _Array]:
+    """Return the signed angles at seam points, and b_1 and b_2 there [rad].
+
+    Args:
+        one: Camera 1.
+        two: Camera 2.
+        points: E in [m], shape (n, 3).
+        onward: From camera 1's stretch into camera 2's, shape (3,) or (n, 3).
+        normals: Unit normals on camera 1's and camera 2's side, (n, 3) each.
+    """
+    angles = seam_angles(
+        points,
+        onward,
+        centres=(one.world_from_device[:3, 3], two.world_from_device[:3, 3]),
+        axes=(one.world_from_device[:3, 2], two.world_from_device[:3, 2]),
+        normals=normals,
+    )
+    # Seen from camera 1, E leaves the axis towards camera 2's stretch, and vice versa.
+    half1 = _field_beyond(one, angles, -angles.iota1, angles.beta1, -1.0)
+    bearing2 = angles.iota2 + angles.delta_surface
+    half2 = _field_beyond(two, angles, bearing2, angles.beta2, 1.0)
+    return angles, half1, half2
 
 
 def half_field(

@@ -194,7 +194,11 @@ def proves_as_much(new: Selection, old: dict[str, Any], count: int) -> bool:
 
 
 def spread(
-    scene: Scene, projectors: Sequence[PlannedProjector], stage: CameraStage
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    stage: CameraStage,
+    *,
+    spare_field: float = 0.0,
 ) -> CameraSpread:
     """Slide the cameras apart; no move that loses coverage is taken.
 
@@ -205,6 +209,7 @@ def spread(
         scene: Surface and requirements.
         projectors: As planned, with their rings.
         stage: Cameras from the cover.
+        spare_field: What is kept free of the half fields beyond seams [rad].
     """
     required, scene = scene.requirements, scene.among(projectors)
     rows = lit_samples(scene, projectors, scene.target_samples(_SPREAD_ROWS, _STREAM))
@@ -230,6 +235,7 @@ def spread(
             scene.safe_workspace,
             required.triangulation.min_ring_pitch_px,
             required.triangulation.max_sigma_m,
+            spare_field,
         ),
         rings=RingsOnTarget(
             np.stack([rings.normals for rings in rows.rings]),

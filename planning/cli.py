@@ -104,9 +104,14 @@ def commands() -> None:
     "--mesh",
     "meshes",
     multiple=True,
-    required=True,
     metavar="FILE",
     help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.",
+)
+@click.option(
+    "--ranges",
+    metavar="FILE.csv",
+    help="Instead of --mesh: a few points of the object, as seen or measured from "
+    "trial views; plans for the least-squares body.",
 )
 @click.option(
     "--max-projectors",
@@ -160,9 +165,7 @@ def commands() -> None:
 @click.option(
     "--target",
     type=click.Choice(["dominant", "surface"]),
-    default="dominant",
-    show_default=True,
-    help="What must be covered.",
+    help="What must be covered [default: dominant; with --ranges surface].",
 )
 @click.option(
     "--select",
@@ -232,9 +235,10 @@ def commands() -> None:
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
 @click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
 def rig_command(**options: Any) -> None:  # noqa: ANN401
-    """Plan a rig for a mesh (the default command)."""
+    """Plan a rig for a mesh, or for ranges (the default command)."""
     from .commands import plan_command
 
+    _check_source(options)
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     _check_target(options)
@@ -242,14 +246,46 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
         raise click.UsageError(
             f"--pattern {options['pattern']} isn't built yet: use rings"
         )
-    if not options["meshes"][0]:
+    _run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
+
+
+def _check_source(options: dict[str, Any]) -> None:
+    meshes, ranges = options["meshes"], options["ranges"]
+    if ranges is None and not meshes:
+        raise click.UsageError("give --mesh FILE, or --ranges FILE.csv without a mesh")
+    if ranges is not None:
+        _check_ranges(options)
+        return
+    if not meshes[0]:
         raise click.UsageError("--mesh '' names no file")
     # os.path answers for names that the system refuses; Path raises.
-    if len(options["meshes"]) > 1 or os.path.isdir(options["meshes"][0]):
+    if len(meshes) > 1 or os.path.isdir(meshes[0]):
         raise click.UsageError(
             "several meshes on one rig aren't built yet: give one file"
         )
-    _run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
+
+
+def _check_ranges(options: dict[str, Any]) -> None:
+    if not options["ranges"]:
+        raise click.UsageError("--ranges '' names no file")
+    if options["meshes"]:
+        raise click.UsageError(
+            "give --mesh or --ranges, not both: a mesh says where the object is, and "
+            "placing a mesh by observations isn't built"
+        )
+    for name, why in (
+        ("unit", "the file is in millimetres"),
+        ("size_mm", "the file is in millimetres"),
+        ("select", "the body of ranges has no faces to select"),
+        ("weight", "the body of ranges has no vertices to weigh"),
+    ):
+        if options[name] is not None:
+            raise click.UsageError(f"--{name.replace('_', '-')} with --ranges: {why}")
+    if options["target"] == "dominant":
+        raise click.UsageError(
+            "--target dominant with --ranges: a sphere has no dominant region; the "
+            "target is its whole surface"
+        )
 
 
 def _check_target(options: dict[str, Any]) -> None:

@@ -27,6 +27,8 @@ from .pattern_files import remove_patterns, write_patterns
 from .pipeline import plan_rig
 from .plan import RigPlan
 from .progress import Report
+from .range_entries import ranges_lines
+from .ranges import read_ranges
 from .rig import list_presets, load_rig
 from .sample_head import HeadShape, write_sample
 from .summary import summary
@@ -37,20 +39,25 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan, write the output folder, print the result; return the exit code."""
     begin = time.monotonic()
     report = _report(quiet=options["quiet"])
-    path = Path(options["meshes"][0])
+    path = Path(options["ranges"] or options["meshes"][0])
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
     with _writable(folder):
         rig = load_rig(options["rig_name"], light=options["light"])
         if report is not None:
             report(f"reading {path}")
-        mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
-        _say_size(report, mesh)
-        selection, weight = _interest(options, mesh, report)
+        selection = weight = None
+        if options["ranges"] is not None:
+            surface = read_ranges(path)
+            _say_lines(report, ranges_lines(surface))
+        else:
+            surface = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
+            _say_size(report, surface)
+            selection, weight = _interest(options, surface, report)
         missed: tuple[str, ...] = ()
         code = 0
         try:
             plan = plan_rig(
-                mesh,
+                surface,
                 rig,
                 max_projectors=options["max_projectors"],
                 max_cameras=options["max_cameras"],
@@ -181,6 +188,12 @@ def _say_size(report: Report | None, mesh: Any) -> None:  # noqa: ANN401
     )
     for repair in source.repairs:
         report(f"  repaired: {repair.kind}, {repair.count}")
+
+
+def _say_lines(report: Report | None, lines: Sequence[str]) -> None:
+    if report is not None:
+        for line in lines:
+            report(line)
 
 
 @contextmanager

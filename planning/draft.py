@@ -10,6 +10,8 @@ from .cameras import CameraStage
 from .interest import Interest
 from .plan import PlannedCamera, PlannedProjector
 from .projectors import ProjectorStage
+from .range_guard import Guard
+from .ranges import RangedBody
 from .rig import Rig
 from .ring_stage import RingStage
 from .scene import Scene
@@ -28,6 +30,8 @@ class Order:
         command: Words of the command line, for the record.
         interest: The user's own target; None: the dominant regions by curvature.
         prove: Whether more work is spent on the bounds over all poses.
+        ranges: The body whose sphere the mesh is, and what the rig's limits keep free
+            for it; None: the mesh was known.
     """
 
     mesh: TriangleMesh
@@ -38,6 +42,7 @@ class Order:
     command: tuple[str, ...]
     interest: Interest | None = None
     prove: bool = False
+    ranges: tuple[RangedBody, Guard] | None = None
 
 
 @dataclass(frozen=True, eq=False)

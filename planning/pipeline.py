@@ -28,6 +28,8 @@ from .prepare import first_projectors, prepared
 from .progress import Report, Stopwatch
 from .projector_poses import widen_margins
 from .projectors import ProjectorStage
+from .range_guard import Guard, guarded
+from .ranges import RangedBody
 from .rig import Rig
 from .ring_stage import space_rings
 from .scene import Scene
@@ -37,12 +39,12 @@ from .verification import verify_plan
 
 
 def plan_rig(
-    mesh: TriangleMesh | Sequence[TriangleMesh],
+    mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
     rig: Rig,
     *,
     max_projectors: int,
     max_cameras: int | None = None,
-    target: Literal["dominant", "surface"] = "dominant",
+    target: Literal["dominant", "surface"] | None = None,
     select: Select | None = None,
     weight: Weight | None = None,
     dominant_coverage: float | None = None,
@@ -61,11 +63,13 @@ def plan_rig(
     """Plan the projectors and cameras that measure a surface, and check the plan.
 
     Args:
-        mesh: The surface, in metres; one for now.
+        mesh: The surface, in metres; one for now. Or the body that `read_ranges` found:
+            then limits are tightened by what isn't known of it.
         rig: Devices and limits, from `load_rig`.
         max_projectors: Projectors at most.
         max_cameras: Cameras at most; None: as many as the coverage needs.
-        target: The `dominant` regions, or the whole `surface`.
+        target: The `dominant` regions, or the whole `surface`; None: the former, and
+            the latter of a body known by its ranges.
         select: Faces that are the target instead of the dominant regions: one bool a
             face of the mesh, or face indices, or from `read_selection`.
         weight: Of each vertex of the mesh, at least 0, or from `read_weight`: takes the
@@ -92,7 +96,13 @@ def plan_rig(
         RequirementError: If a requirement is missed; it carries the best plan.
         TimeLimitError: If the time limit came before any plan.
     """
+    ranges: tuple[RangedBody, Guard] | None = None
+    if isinstance(mesh, RangedBody):
+        target = _whole(target, select is None and weight is None)
+        rig, guard = guarded(rig, mesh)
+        mesh, ranges = mesh.mesh, (mesh, guard)
     surface = _single(mesh)
+    target = target or "dominant"
     if target == "surface" and not (select is None and weight is None):
         raise InputError("the whole surface and a selection both are targets: give one")
     interest = interest_of(surface, select, weight)
@@ -116,6 +126,7 @@ def plan_rig(
         tuple(command),
         None if interest is None else interest.on_parts(parent),
         prove,
+        ranges,
     )
     clock = Stopwatch(progress, time_limit=time_limit)
     if len(cut.faces) > len(surface.faces):
@@ -232,7 +243,13 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
 def _polish(draft: Draft, clock: Stopwatch) -> Draft:
     """Section VI: cameras slide apart while the coverage holds; then their rings."""
     with clock.stage("baselines", "baselines: cameras slide apart"):
-        moved = spread(draft.scene, draft.projectors, draft.camera_stage)
+        ranges = draft.order.ranges
+        moved = spread(
+            draft.scene,
+            draft.projectors,
+            draft.camera_stage,
+            spare_field=0.0 if ranges is None else ranges[1].angle_rad,
+        )
         if moved.smallest_before_m is not None and moved.smallest_after_m is not None:
             clock.say(
                 f"  smallest baseline {1e3 * moved.smallest_before_m:.0f} -> "
@@ -291,6 +308,16 @@ def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:
         "cost": cost_entry(plan.cameras, greedy, seconds),
     }
     return RigPlan(document, plan.surface)
+
+
+def _whole(target: str | None, unselected: bool) -> Literal["surface"]:
+    """The target of a body of which only ranges are known: all of it."""
+    if target == "dominant" or not unselected:
+        raise InputError(
+            "of a body that is known by its ranges alone the target is the whole "
+            "surface: it has no dominant region and no faces to select"
+        )
+    return "surface"
 
 
 def _single(mesh: TriangleMesh | Sequence[TriangleMesh]) -> TriangleMesh:

@@ -87,6 +87,8 @@ class SpreadLimits:
         workspace: Where cameras may stand.
         min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
         max_sigma_m: Largest s_N [m].
+        spare_field: What seams keep free of the half fields [rad], at least that by
+            which proposals stay inside their limits.
     """
 
     max_incidence: float
@@ -94,6 +96,7 @@ class SpreadLimits:
     workspace: Workspace
     min_ring_pitch_px: float | None = None
     max_sigma_m: float | None = None
+    spare_field: float = 0.0
 
 
 def camera_shell(workspace: Workspace) -> Shell:
@@ -195,7 +198,7 @@ def _seam_points(
                     test.angles.outward[rows],
                     test.angles.onward[rows],
                     test.angles.delta_surface[rows],
-                    fields[rows] - _SPARE_FIELD,
+                    fields[rows] - max(_SPARE_FIELD, limits.spare_field),
                 )
             )
     if not parts:

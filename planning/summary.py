@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .firing import schedule_line
 from .plan import PlannedCamera, PlannedProjector, RigPlan
+from .range_entries import summary_lines
 from .requirements import Workspace
 from .ring_entries import rings_lines
 from .shortfall import causes_line
@@ -30,6 +31,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         _devices(plan),
         _proofs(plan),
         _coverage(plan),
+        *_ranges(plan),
         *_rings(plan),
         _marginal(plan),
         _check(plan),
@@ -362,6 +364,11 @@ def _cell(areas: dict[str, float], key: str) -> str:
 
 def _ratio(part: float, whole: float) -> str:
     return f"{100.0 * part / whole:.1f} %" if whole > 0 else "undefined"
+
+
+def _ranges(plan: RigPlan) -> list[str]:
+    lines = summary_lines(plan.document)
+    return ["\n" + "\n".join(lines)] if lines else []
 
 
 def _rings(plan: RigPlan) -> list[str]:

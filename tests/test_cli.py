@@ -213,6 +213,31 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
             "coverage",
         ),
         (["--mesh", "FACE", "--max-projectors", 3, "--rig", "x.toml"], 3, "x.toml"),
+        (["--max-projectors", 3], 2, "give --mesh FILE, or --ranges"),
+        (["--mesh", "", "--max-projectors", 3], 2, "names no file"),
+        (["--ranges", "", "--max-projectors", 3], 2, "names no file"),
+        (
+            ["--mesh", "FACE", "--ranges", "o.csv", "--max-projectors", 3],
+            2,
+            "not both: a mesh says where",
+        ),
+        (["--ranges", "o.csv", "--max-projectors", 3], 3, "o.csv: no such file"),
+        (["--ranges", "FACE", "--max-projectors", 3], 3, "line 4: the header lacks"),
+        (
+            ["--ranges", "o.csv", "--max-projectors", 3, "--unit", "mm"],
+            2,
+            "--unit with --ranges: the file is in millimetres",
+        ),
+        (
+            ["--ranges", "o.csv", "--max-projectors", 3, "--select", "f.txt"],
+            2,
+            "no faces to select",
+        ),
+        (
+            ["--ranges", "o.csv", "--max-projectors", 3, "--target", "dominant"],
+            2,
+            "no dominant region",
+        ),
         (
             ["--mesh", "FACE", "--max-projectors", 3, "-o", "FACE/x"],
             2,

@@ -23,6 +23,7 @@ from .inside import audit_inside
 from .ledger import Ledger, as_number
 from .occlusion import Shadow
 from .overlaps import audit_overlaps
+from .ranges import audit_ranges
 from .recompute import Reach, Recomputed, reach_of, recompute
 from .regions import audit_regions
 from .rings import audit_rings
@@ -103,6 +104,7 @@ def audit_plan(
     audit_workspace(plan, ledger)
     audit_zones(plan, ledger)
     audit_existing(plan, ledger)
+    audit_ranges(plan, ledger)
     audit_bodies(plan, ledger)
     audit_room(plan, shadow, ledger)
     audit_areas(own, reach, estimator, ledger)

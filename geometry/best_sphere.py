@@ -1,0 +1,143 @@
+"""The sphere through measured points, and how well they fix it.
+
+With c the centre, rho the radius, n_i = (X_i - c)/|X_i - c| and S_i the covariance of a
+point::
+
+    minimise  sum_i (|X_i - c| - rho)^2 / v_i,      v_i = n_i^T S_i n_i + tau^2
+
+tau is how far the body itself strays from a sphere: the least tau >= 0 at which the sum
+is no more than its degrees of freedom, n - 4 (Paule and Mandel, 1982). So a body that
+isn't round makes centre and radius uncertain, as it should.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[np.float64]
+
+_UNKNOWNS = 4
+_ROUNDS = 200
+_SETTLED = 1e-12
+_HALVINGS = 60
+# Spread of the points about their best plane, as a share of their extent, below which
+# rounding decides on which side of it the centre lies.
+_FLAT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class BestSphere:
+    """A least-squares sphere.
+
+    Attributes:
+        centre: c in [m], shape (3,).
+        radius: rho in [m].
+        covariance: Of (c, rho) to first order in [m^2], shape (4, 4).
+        shape_sigma: tau, standard deviation of the body from the sphere in [m].
+        residuals: |X_i - c| - rho in [m], shape (n,).
+        chi_square: The sum of squares at tau.
+    """
+
+    centre: _Array
+    radius: float
+    covariance: _Array
+    shape_sigma: float
+    residuals: _Array
+    chi_square: float
+
+    def point_covariances(self, outward: _Array) -> _Array:
+        """Return the covariance of surface points c + rho u, shape (n, 3, 3) [m^2].
+
+        ::
+
+            [I u] C [I u]^T + tau^2 u u^T
+
+        Args:
+            outward: Unit directions u, shape (n, 3).
+        """
+        jacobian = np.empty((len(outward), 3, _UNKNOWNS))
+        jacobian[:, :, :3], jacobian[:, :, 3] = np.eye(3), outward
+        of_fit = np.einsum("nij,jk,nlk->nil", jacobian, self.covariance, jacobian)
+        bumps = self.shape_sigma**2 * np.einsum("ni,nj->nij", outward, outward)
+        return of_fit + bumps
+
+
+def fit_sphere(points: _Array, covariances: _Array) -> BestSphere:
+    """Return the sphere through points, weighted by what is known of each.
+
+    Args:
+        points: In [m], shape (n, 3); at least 5, so that one is left to judge by.
+        covariances: Of each in [m^2], shape (n, 3, 3).
+
+    Raises:
+        ValueError: If there are too few points, they lie in a plane, or the iteration
+            doesn't settle on a sphere.
+    """
+    if not len(points) > _UNKNOWNS:
+        raise ValueError(f"{len(points)} points; a sphere takes {_UNKNOWNS + 1}")
+    start = _algebraic(points)
+    n_free = len(points) - _UNKNOWNS
+    fitted = _weighted(points, covariances, start, 0.0)
+    low, high = 0.0, 0.0
+    if fitted.chi_square > n_free:
+        high = float(np.abs(fitted.residuals).max())
+        while _weighted(points, covariances, start, high).chi_square > n_free:
+            low, high = high, 2.0 * high
+    for _ in range(_HALVINGS if high > 0.0 else 0):
+        middle = 0.5 * (low + high)
+        trial = _weighted(points, covariances, start, middle)
+        low, high = (middle, high) if trial.chi_square > n_free else (low, middle)
+    return fitted if high == 0.0 else _weighted(points, covariances, start, high)
+
+
+def _algebraic(points: _Array) -> _Array:
+    """Centre and radius from |X|^2 = 2 c.X + rho^2 - |c|^2, which is linear, (4,)."""
+    mean = points.mean(axis=0)
+    offsets = points - mean
+    spread = np.linalg.svd(offsets, compute_uv=False)
+    if not spread[2] > _FLAT * spread[0]:
+        raise ValueError("the points lie in a plane, which fixes no sphere")
+    scale = float(np.linalg.norm(offsets, axis=1).max())
+    unit = offsets / scale
+    rows = np.column_stack([2.0 * unit, np.ones(len(unit))])
+    found = np.linalg.lstsq(rows, np.sum(unit**2, axis=1), rcond=None)[0]
+    radius = np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0))
+    return np.append(mean + scale * found[:3], scale * radius)
+
+
+def _weighted(
+    points: _Array, covariances: _Array, start: _Array, shape_sigma: float
+) -> BestSphere:
+    """The least-squares sphere for one tau, by Gauss-Newton."""
+    state = start.copy()
+    for _ in range(_ROUNDS):
+        jacobian, residuals, weights = _linear(points, covariances, state, shape_sigma)
+        information = jacobian.T @ (weights[:, None] * jacobian)
+        step = np.linalg.solve(information, jacobian.T @ (weights * residuals))
+        state = state - step
+        if not (np.all(np.isfinite(state)) and state[3] > 0.0):
+            break
+        if np.abs(step).max() <= _SETTLED * state[3]:
+            _, residuals, weights = _linear(points, covariances, state, shape_sigma)
+            return BestSphere(
+                state[:3],
+                float(state[3]),
+                np.asarray(np.linalg.inv(information), dtype=np.float64),
+                shape_sigma,
+                residuals,
+                float(np.sum(weights * residuals**2)),
+            )
+    raise ValueError("no sphere fits the points: they show too little of it")
+
+
+def _linear(
+    points: _Array, covariances: _Array, state: _Array, shape_sigma: float
+) -> tuple[_Array, _Array, _Array]:
+    """Jacobian by (c, rho), residuals and weights at a state."""
+    offsets = points - state[:3]
+    reach = np.linalg.norm(offsets, axis=1)
+    outward = offsets / reach[:, None]
+    variance = np.einsum("ni,nij,nj->n", outward, covariances, outward)
+    jacobian = np.column_stack([-outward, -np.ones(len(points))])
+    return jacobian, reach - state[3], 1.0 / (variance + shape_sigma**2)
