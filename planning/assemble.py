@@ -185,7 +185,7 @@ def _document(
             [devices.cameras[c].id for c in group]
             for group in overlap_components(claims.measured_by, samples.weight)
         ],
-        "cost": cost_entry(devices.cameras, greedy, clock.seconds),
+        "cost": cost_entry(devices.cameras, greedy, clock.processor),
         "members": [
             {
                 "mesh": 0,

@@ -300,7 +300,7 @@ def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:
         entry["failures"] = [*false, *entry["failures"]]
         entry["passed"] = entry["passed"] and not false
     greedy = draft.camera_stage.certificate["greedy_count"]
-    seconds = clock.seconds | ({} if found is None else found.seconds)
+    seconds = clock.processor | ({} if found is None else found.seconds)
     document = plan.document | {
         "reconstruction": entry,
         "members": [plan.document["members"][0] | {"reconstruction": entry}],

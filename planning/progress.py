@@ -15,6 +15,10 @@ class Stopwatch:
     Args:
         report: Receives one line when a stage begins; None for silence.
         time_limit: Wall time in [s] after which `check` raises; None for no limit.
+
+    Attributes:
+        seconds: Wall time of each stage [s].
+        processor: Processor time of each stage, over all threads [s].
     """
 
     def __init__(
@@ -24,6 +28,7 @@ class Stopwatch:
         self._begin = time.monotonic()
         self._limit = time_limit
         self.seconds: dict[str, float] = {}
+        self.processor: dict[str, float] = {}
 
     @contextmanager
     def stage(self, name: str, line: str) -> Generator[None]:
@@ -34,12 +39,15 @@ class Stopwatch:
         """
         self.check()
         self.say(line)
-        begin = time.monotonic()
+        begin, worked = time.monotonic(), time.process_time()
         try:
             yield
         finally:
-            spent = time.monotonic() - begin
-            self.seconds[name] = round(self.seconds.get(name, 0.0) + spent, 3)
+            for times, spent in (
+                (self.seconds, time.monotonic() - begin),
+                (self.processor, time.process_time() - worked),
+            ):
+                times[name] = round(times.get(name, 0.0) + spent, 3)
 
     def say(self, line: str) -> None:
         """Report one line of progress."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .cost import cost_lines
 from .firing import schedule_line
 from .plan import PlannedCamera, PlannedProjector, RigPlan
 from .range_entries import summary_lines
@@ -35,6 +36,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *_rings(plan),
         _marginal(plan),
         _check(plan),
+        *cost_lines(plan.document["cost"]),
         *(f"MISSED   {line}" for line in missed),
         *(f"files    {name}" for name in files[:1]),
         *(f"         {name}" for name in files[1:]),

@@ -652,6 +652,7 @@ def _claim_tables(
             "n_samples": document["coverage"]["samples"],
             "candidates": {"lower_bound": 1, "n_candidates": candidates},
             "continuous": None,
+            "greedy_count": 3,
             "needed": {"count": 2, "lower_bound": 1},
             "best_area": {"value_m2": target[have], "upper_bound_m2": target[of]},
             "one_fewer": {"upper_bound_m2": target[of]},

@@ -380,6 +380,8 @@ FALSE = {
     ),
     "C": (_at("cost", "C", 5.0), "cost.C: claimed 5 s"),
     "C before": (_at("cost", "C_before", 5.0), "cost.C_before: claimed 5 s"),
+    "cameras before": (_at("cost", "n_cameras_before", 4), "greedy_count is 3"),
+    "greedy": (_at("certificates", "cameras", "greedy_count", 2), "n_cameras_before"),
     "times": (_at("cost", "t3", None), "cost.C: is claimed with the times"),
     "pixels": (_at("cost", "pixels", 12), "cost.pixels: claimed 12"),
     "share": (_at("surface", "dominant_share", 0.5), "surface.dominant_share: claimed"),

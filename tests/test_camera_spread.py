@@ -25,6 +25,7 @@ from planning.spread_problem import (
     SampledTarget,
     SpreadLimits,
     best_rings,
+    spread_problem,
 )
 from planning.zones import Box
 
@@ -257,6 +258,29 @@ def test_rings_hold_the_conditioning_that_the_caller_demands():
     spread = ball.spread(cameras, rings=rings)
     assert spread.n_accepted > 0
     assert _weight(ball, spread.cameras) >= before
+
+
+def test_seams_keep_free_what_is_asked_of_the_half_fields(pair):
+    ball, cameras, _ = pair
+    poses = np.stack([camera.world_from_device for camera in cameras])
+    near = adjacency(ball.points, ball.normals)
+    n = len(ball.points)
+    target = SampledTarget(ball.points, ball.normals, np.ones(n), near, None)
+    plain, spared = (
+        spread_problem(
+            cameras,
+            np.zeros((2, 3)),
+            ball.measure(poses),
+            [(0, 1)],
+            target,
+            SpreadLimits(THETA, 0.1, _workspace(), spare_field=spare),
+            demanded=np.zeros((0, 2), dtype=np.int64),
+            max_step=0.1,
+        ).seams.half_fields
+        for spare in (0.0, 0.02)
+    )
+    assert len(plain)
+    np.testing.assert_allclose(plain - spared, 0.02 - np.radians(0.1))
 
 
 def test_what_rings_ask_is_what_measurability_says():

@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.best_sphere import fit_sphere
+from geometry.best_sphere import BestSphere, fit_sphere
 from geometry.sight_lines import SightLines, locate
 from planning.audit.ledger import Ledger
 from planning.audit.ranges import audit_ranges
+from planning.camera_stage import spread
 from planning.errors import InfeasibleLimitsError, InputError
 from planning.pipeline import plan_rig
 from planning.plan import RigPlan
-from planning.range_entries import limits_at, summary_lines
+from planning.range_entries import limits_at, summary_lines, with_spread
 from planning.range_file import read_range_file
 from planning.range_guard import guarded
 from planning.ranges import read_ranges
@@ -286,6 +287,18 @@ def test_where_two_sights_disagree_the_point_goes(tmp_path):
     assert len(body.points) == 13
 
 
+def test_where_any_row_may_be_the_wrong_one_the_point_goes(tmp_path):
+    """Three sights in one plane: whichever is left out, the others meet."""
+    rows = sights()
+    point = CENTRE + RADIUS * directions(14)[0]
+    for k, aim in enumerate((0.0, 0.0, 0.02)):
+        origin = point + np.array([0.4 * (k - 1), -0.9, 0.0])
+        ray = point + [aim, 0.0, 0.0] - origin
+        rows[k] = ("p0", origin, ray / np.linalg.norm(ray))
+    body = read_ranges(write(tmp_path / "o.csv", rows))
+    assert [(one.name, one.lines) for one in body.refused] == [("p0", (2, 3, 4))]
+
+
 def test_noise_of_the_stated_size_is_not_refused(tmp_path):
     for seed in range(5):
         body = read_ranges(write(tmp_path / "o.csv", sights(seed=seed)))
@@ -305,7 +318,7 @@ def test_seen_from_one_side_the_far_one_is_known_worst(tmp_path):
 @pytest.fixture(scope="module")
 def body(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ranges")
-    return read_ranges(write(folder / "o.csv", sights(seed=2)))
+    return read_ranges(write(folder / "o.csv", sights(seed=5)))
 
 
 def test_the_surface_is_the_sphere_in_the_axes_of_the_file(body):
@@ -320,6 +333,19 @@ def test_position_sigma_bounds_every_surface_point(body):
     spread = np.sqrt(np.linalg.eigvalsh(body.ball.point_covariances(u))[:, 2])
     assert spread.max() <= 1.001 * body.position_sigma_m
     assert spread.max() > 0.98 * body.position_sigma_m
+
+
+def test_surface_points_vary_as_centre_radius_and_bumps_do():
+    rng = np.random.default_rng(8)
+    root = 1e-3 * np.tril(rng.normal(size=(4, 4)))
+    ball = BestSphere(CENTRE, RADIUS, root @ root.T, 2e-3, np.zeros(5), 0.0)
+    u = directions(7)[4]
+    state = rng.normal(size=(40_000, 4)) @ root.T
+    bumps = 2e-3 * rng.normal(size=(40_000, 1))
+    drawn = np.cov((state[:, :3] + (state[:, 3:] + bumps) * u).T)
+    np.testing.assert_allclose(
+        ball.point_covariances(u[None])[0], drawn, atol=0.03 * np.abs(drawn).max()
+    )
 
 
 def test_two_sigma_are_kept_free_of_every_limit(body):
@@ -363,8 +389,17 @@ def plan(body, with_few_samples, tmp_path_factory):
         "n_reference_cameras = 400\n[requirements]\nmin_reachable = 0.1\n"
         '[workspace]\nshape = "cone"\naxis = [0, -1, 0]\nhalf_angle_deg = 22\n'
     )
-    with with_few_samples():
-        return plan_rig(body, load_rig(rig), max_projectors=8, check=False)
+    spared: list[float] = []
+
+    def noted(*words, spare_field):
+        spared.append(spare_field)
+        return spread(*words, spare_field=spare_field)
+
+    with with_few_samples(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr("planning.pipeline.spread", noted)
+        made = plan_rig(body, load_rig(rig), max_projectors=8, check=False)
+    assert set(spared) == {made.document["ranges"]["guard_rad"]}
+    return made
 
 
 def test_the_plan_carries_points_sphere_and_guard(plan, body):
@@ -403,6 +438,24 @@ def test_rows_keep_two_sigma_of_d_max(plan, body):
         assert row["d_max_sigma"] == pytest.approx(np.std(drawn), rel=0.1)
 
 
+def test_d_max_of_a_row_is_that_of_the_incidence_as_stated(plan, body):
+    row = plan.document["baselines"][0]
+    _, guard = guarded(load_rig("default"), body)
+    stated = {"camera.max_incidence": row["iota"][1] + 0.05}
+    (found,) = with_spread(
+        [row], plan.cameras, body.ball, replace(guard, stated=stated)
+    )
+    d1, d2 = row["D1"], row["D2"]
+    square = d1**2 + d2**2 - 2.0 * d1 * d2 * np.cos(row["phi"] + 0.05)
+    assert found["d_max_stated"] == pytest.approx(np.sqrt(square), rel=1e-9)
+    stated = {"camera.max_incidence": row["iota"][1] + 1e-5}
+    (tight,) = with_spread(
+        [row], plan.cameras, body.ball, replace(guard, stated=stated)
+    )
+    assert row["d"] < tight["d_max_stated"]
+    assert tight["covered_at_2_sigma"] is False
+
+
 def audited(plan, document):
     ledger = Ledger(document)
     audit_ranges(RigPlan(document, plan.surface), ledger)
@@ -415,6 +468,9 @@ def test_the_audit_finds_nothing_in_a_true_plan(plan):
 
 SPOILED = {
     "position_m": lambda r: r["points"][3]["position_m"].__setitem__(0, 0.2),
+    "viewpoint": lambda r: r["observations"][7].update(
+        direction=[-x for x in r["observations"][7]["direction"]]
+    ),
     "a little off": lambda r: r["points"][3]["position_m"].__setitem__(
         2, r["points"][3]["position_m"][2] + 5e-6
     ),

@@ -1,13 +1,16 @@
 """Angles as a designer reads them off the printout, and eq. (8)."""
 
+import time
+
 import numpy as np
 import pytest
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
 from planning.candidates import aimed_poses
-from planning.cost import cost_entry
+from planning.cost import cost_entry, cost_lines
 from planning.plan import PlannedCamera
+from planning.progress import Stopwatch
 from planning.summary import aim_angles
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -81,18 +84,56 @@ def test_eq_8_before_and_after_the_number_of_cameras_was_minimised():
         "render": 6.0,
         "decode": 3.0,
         "merge": 0.5,
-        "projectors": 2,
-        "cameras": 4,
+        "regions": 0.25,
+        "projectors": 1,
+        "bounds": 0.25,
+        "projector_poses": 0.25,
+        "rings": 0.25,
+        "cameras": 3,
+        "baselines": 1,
+        "claims": 90,
+        "check": 90,
     }
     cost = cost_entry(cameras, 3, seconds)
     assert cost["pixels"] == 2 * 2000 * 1500
     assert cost["t1"] * cost["pixels"] == pytest.approx(6.0)
     assert cost["t2"] * cost["pixels"] == pytest.approx(3.0)
+    assert (cost["t3"], cost["t4"], cost["t5"]) == (0.5, 2.0, 4.0)
+    assert cost["n_cameras_before"] == 3
     assert cost["C"] == pytest.approx(6.0 + 3.0 + 0.5 + 2.0 + 4.0)
     assert cost["C_before"] == pytest.approx(1.5 * 9.0 + 0.5 + 2.0 + 4.0)
+
+
+def test_eq_8_is_told_with_its_terms_in_microseconds_a_pixel():
+    seconds = {
+        "render": 6.0,
+        "decode": 3.0,
+        "merge": 0.5,
+        "projectors": 2,
+        "cameras": 4,
+    }
+    cameras = [looking([0.0, -1.0, 0.0]), looking([1.0, 0.0, 0.0])]
+    now, before = cost_lines(cost_entry(cameras, 3, seconds))
+    assert "6.0 Mpx x (1.00 + 0.50) us + 0.5 + 2.0 + 4.0 s = 15.5 s" in now
+    assert "the 3 cameras of a greedy cover" in before
+    assert before.endswith("20.0 s")
 
 
 def test_eq_8_is_unknown_without_a_check():
     cost = cost_entry([looking([0.0, -1.0, 0.0])], 1, {"projectors": 2, "cameras": 4})
     assert cost["C"] is None
     assert cost["t4"] == 2
+    assert cost_lines(cost) == []
+
+
+def test_stages_are_timed_on_the_wall_and_on_the_processor():
+    clock = Stopwatch()
+    for _ in range(2):
+        with clock.stage("nap", "sleeps"):
+            time.sleep(0.06)
+        with clock.stage("work", "works"):
+            begin = time.process_time()
+            while time.process_time() - begin < 0.06:
+                pass
+    assert clock.seconds["nap"] >= 0.12 > 0.06 > clock.processor["nap"]
+    assert clock.processor["work"] >= 0.12

@@ -129,6 +129,13 @@ def _audit_cost(plan: RigPlan, ledger: Ledger) -> None:
     if cost.get("C") is not None:
         _audit_total("C", cost, pixels, ledger)
     before = as_number(cost.get("n_cameras_before"))
+    greedy = ledger.read("certificates", "cameras", "greedy_count")
+    ledger.holds(
+        before is None or before == as_number(greedy),
+        "cost.n_cameras_before",
+        f"{cost.get('n_cameras_before')!r} is claimed, but "
+        f"certificates.cameras.greedy_count is {greedy!r}",
+    )
     if cost.get("C_before") is not None and before is not None and sizes:
         _audit_total("C_before", cost, pixels * before / len(sizes), ledger)
 
