@@ -4,10 +4,11 @@ The edge noise s_0 is measured on a plane square to the light, seen near the opt
 axis; nothing is fitted on the objects under test. Off-axis views turn the cameras
 until the object stands as far off the axis as the table says.
 
-    python benchmarks/sigma_deciles.py
+    python benchmarks/sigma_deciles.py [focal length in px, default 3478]
 """
 
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 
 import numpy as np
 from from_tests import load
@@ -98,18 +99,18 @@ class Errors:
         return np.array([_rms(ratio[part]) for part in np.array_split(order, 10)])
 
 
-def projector(light: str) -> dict:
+def projector(light: str, gap: float = GAP) -> dict:
     """Return the one projector, 1 m away."""
     make = RIGS.diverging if light == "diverging" else RIGS.parallel
-    return make("P1", RIGS.direction(-15.0, 5.0), 0.07, GAP)
+    return make("P1", RIGS.direction(-15.0, 5.0), 0.07, gap)
 
 
-def cameras(off_axis_deg: float, views: tuple = VIEWS) -> list[dict]:
+def cameras(off_axis_deg: float, focal: float = FOCAL) -> list[dict]:
     """Return cameras 1 m away that have the object so far off their axes."""
     made = []
-    for index, (azimuth, elevation, turn) in enumerate(views, 1):
+    for index, (azimuth, elevation, turn) in enumerate(VIEWS, 1):
         position = RIGS.direction(azimuth, elevation)
-        entry = RIGS.camera(f"C{index}", position, focal=FOCAL)
+        entry = RIGS.camera(f"C{index}", position, focal=focal)
         pose = look_at(position, np.zeros(3), _UP)
         about = np.cos(turn) * pose[:3, 0] + np.sin(turn) * pose[:3, 1]
         aside = Rotation.from_rotvec(np.radians(off_axis_deg) * about).as_matrix()
@@ -128,10 +129,12 @@ def plane_before(source: dict) -> TriangleMesh:
     return TriangleMesh(sheet.vertices @ turn[:3, :3].T, sheet.faces)
 
 
-def measured(mesh: TriangleMesh, source: dict, views: list[dict]) -> Errors:
+def measured(
+    mesh: TriangleMesh, source: dict, views: list[dict], light: Photometry = LIGHT
+) -> Errors:
     """Render, decode and triangulate an object; return errors and predictions."""
     plan = RIGS.plan_of(mesh, [source], views)
-    cloud = reconstruct_plan(plan, seed=0, threads=1, photometry=LIGHT).everything
+    cloud = reconstruct_plan(plan, seed=0, threads=1, photometry=light).everything
     parts = [
         _of_camera(mesh, cloud.take(cloud.camera == c), plan.projectors[0], camera)
         for c, camera in enumerate(plan.cameras)
@@ -197,17 +200,25 @@ def objects() -> dict[str, tuple[TriangleMesh, float]]:
     }
 
 
-def main() -> None:
+def main(focal: float) -> None:
     """Print the table."""
+    # As many pixels between rings, whatever the focal length, but no wider than 6 mm.
+    gap = min(GAP * FOCAL / focal, 6e-3)
+    print(f"f = {focal:g} px, rings {1e3 * gap:.1f} mm apart")
     print("rms of error / s_N in each decile of |r.m|; s_N with the edge noise s_px")
     print("by law 1: s_0 / (-N.L), as for planning; by law 2: blur and shot noise too")
     for light in ("diverging", "parallel"):
-        source = projector(light)
-        flat = measured(plane_before(source), source, cameras(0.0))
+        source = projector(light, gap)
+        plane, views = plane_before(source), cameras(0.0, focal)
+        flat = measured(plane, source, views)
         scales = {law: flat.scale(law) for law in ("plain", "by_blur")}
-        print(f"\n{light} light: s_0 = {scales['plain']:.4f} px, on a plane")
+        clean = measured(plane, source, views, replace(LIGHT, noisy=False))
+        print(
+            f"\n{light} light: s_0 = {scales['plain']:.4f} px, on a plane; "
+            f"{clean.scale('plain'):.4f} px of it without any pixel noise"
+        )
         for name, (mesh, off) in objects().items():
-            found = measured(mesh, source, cameras(off))
+            found = measured(mesh, source, cameras(off, focal))
             far = np.degrees(found.off_axis.max())
             print(f"{name} (to {far:.1f} deg), {len(found.error)} points")
             cut = np.quantile(found.conditioning, np.linspace(0.1, 1.0, 10))
@@ -232,4 +243,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else FOCAL)
