@@ -33,6 +33,8 @@ _STEPS = (1.0, 0.5, 0.25)
 # A pixel of the image border stays free, so that rounding the pose loses nothing.
 _PIXEL_MARGIN = 1.0
 _MAX_MOVE_M = 0.3
+# Of the samples that candidates reach: so many others a pose may light.
+_STRAY = 0.002
 
 
 def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector, ...]:
@@ -43,16 +45,18 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     (`margin_search`). Then each projector in turn solves the pose program over those
     of them that it serves. Occlusion isn't part of that program, so rays decide after
     every move: the whole way is tried, then half, then a quarter, and a move that
-    lowers the margin at the share isn't taken, nor one that leaves too few samples lit.
+    lowers the margin at the share isn't taken, nor one that leaves too few samples lit,
+    nor one that reaches what no candidate does: what is required, and was proved, is a
+    share of what they reach.
 
     Args:
         scene: Surface and requirements.
         stage: Projectors from the cover, and its rows.
     """
     rows = stage.rows
-    state = _Lit(scene, rows, list(stage.projectors))
-    lit = int(np.isfinite(state.margin).any(axis=1).sum())
     reached = np.any(stage.stages == lighting.LIT, axis=1)
+    state = _Lit(scene, rows, list(stage.projectors), reached)
+    lit = int(np.isfinite(state.margin).any(axis=1).sum())
     required = required_rows(reached, scene.requirements.dominant_coverage)
     # With too few devices, what they light is what counts.
     required = min(required, lit)
@@ -63,7 +67,7 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
         between = widest_between(
             scene, stage.projectors, state.margins, required, len(stage.reference)
         )
-        state = _Lit(scene, rows, list(between))
+        state = _Lit(scene, rows, list(between), reached)
     for _ in range(_SWEEPS):
         moved = [
             _improve(state, p, required, lit)
@@ -79,13 +83,27 @@ class _Lit:
     """Projectors as they stand, and the margin of what each lights."""
 
     def __init__(
-        self, scene: Scene, rows: Target, projectors: list[PlannedProjector]
+        self,
+        scene: Scene,
+        rows: Target,
+        projectors: list[PlannedProjector],
+        reached: NDArray[np.bool_],
     ) -> None:
         self.scene, self.rows, self.projectors = scene, rows, projectors
-        self.margin = self.margins(projectors)
+        self._reached = reached
+        self.margin = self._margins(projectors)
 
     def margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
-        """Margin of each row and projector in [rad], -inf where unlit."""
+        """Margin of each row and projector in [rad], -inf where unlit.
+
+        Those that stray light nothing.
+        """
+        margin = self._margins(projectors)
+        beyond = np.isfinite(margin[~self._reached]).sum(axis=0)
+        margin[:, beyond > _STRAY * self._reached.sum()] = -np.inf
+        return margin
+
+    def _margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
         scene = self.scene.among(projectors)
         lit = lit_stages(scene, projectors, self.rows) == lighting.LIT
         return lit_margins(scene, projectors, self.rows, lit)

@@ -1,16 +1,18 @@
 """A projector moves to more margin, but never into a shadow."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geometry.mesh import TriangleMesh
-from geometry.primitives import box
+from geometry.primitives import box, sphere
 from planning import lighting
 from planning.candidates import aimed_poses
 from planning.plan import PlannedProjector
 from planning.projector_light import lit_margins, lit_stages
 from planning.projector_poses import widen_margins
-from planning.projectors import ProjectorStage
+from planning.projectors import ProjectorStage, plan_projectors
 from planning.rig import load_rig
 from planning.rings import ring_frame, uniform_radii
 from planning.scene import Scene
@@ -70,3 +72,34 @@ def test_no_move_ends_in_shadow(shaded):
     assert np.isfinite(after).mean() >= 0.9
     gained = margin_at_share(after, 720) - margin_at_share(before, 720)
     assert gained > np.radians(2.0)
+
+
+def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
+    """Parallel light from a cone of 40 degrees: turned beams would reach round a ball.
+
+    Such light has more margin, but what is required would then be a share of more.
+    """
+    mesh = sphere(0.06, subdivisions=3)
+    rig = load_rig("default", light="parallel")
+    required = rig.requirements(
+        mesh.centre, mesh.radius, max_projectors=4, target="surface", tau_m=0.004
+    )
+    cone = replace(
+        required.workspace, axis=(0.0, -1.0, 0.0), half_angle=float(np.radians(40.0))
+    )
+    required = replace(required, workspace=cone, dominant_coverage=0.85)
+    n = len(mesh.faces)
+    scene = Scene(mesh, np.zeros(n, dtype=int), np.zeros((n, 3)), required, 0, 1)
+    eye = np.eye(4)
+    template = PlannedProjector(
+        "", "parallel", eye, eye, rig.projector_device(), uniform_radii(0.2, 0.0035)
+    )
+    stage = plan_projectors(scene, template, 400, ring_offset=(0.14, -1.57), rounds=1)
+    moved = widen_margins(scene, stage)
+    before = margins(scene, stage, stage.projectors)
+    after = margins(scene, stage, moved)
+    reached = (stage.stages == lighting.LIT).any(axis=1)
+    beyond = np.isfinite(after[~reached]).sum(axis=0)
+    assert np.all(beyond <= 0.002 * reached.sum())
+    share = int(np.ceil(0.85 * reached.sum()))
+    assert margin_at_share(after, share) > margin_at_share(before, share)
