@@ -7,24 +7,25 @@ projectors than were found can't be refuted, the cells that are left say where t
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.cube_map import CubeMap
 from geometry.devices import ParallelModel
+from geometry.open_directions import DirectionLimits
 from geometry.widened_maps import WidenedMaps
 from solvers.bit_rows import BitSum
 from solvers.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cell_problem import CellProblem
 
+from .all_poses import ContinuousBound, joined
 from .body_room import with_room
 from .candidates import projectors_towards
 from .direction_cells import DirectionTree
 from .given_bound import enough, given_on
 from .lighting import LIT, Target
-from .open_rows import open_rows
+from .open_rows import mesh_reach, open_rows
 from .plan import PlannedProjector
 from .position_cells import PositionTree
 from .projector_light import lit_stages
@@ -57,48 +58,6 @@ class Effort:
 
 DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8, most_samples=2000)
 PROVE = Effort(finest=7, budget=6e10, shadows=np.inf, offers=150)
-
-
-@dataclass(frozen=True, eq=False)
-class ContinuousBound:
-    """What was proved over all poses of the workspace.
-
-    Attributes:
-        found: Answer of the search over cells.
-        shadows: Whether occlusion took part.
-        directions: Unit directions from the centre of the workspace, or towards the
-            light, of cells in which one projector fewer may be enough, shape (k, 3).
-        n_samples: Samples of the target from which the rows are.
-        row_area_m2: Area that a sample stands for.
-        given: Projectors that stand already.
-        n_free: Rows that they light, which the search over cells left out.
-    """
-
-    found: CellBound
-    shadows: bool
-    directions: NDArray[np.float64]
-    n_samples: int
-    row_area_m2: float
-    given: int = 0
-    n_free: int = 0
-
-    def entry(self) -> dict[str, Any]:
-        """Return the plan's `continuous` of a certificate."""
-        found = self.found
-        most = found.most_weight
-        if found.status is CellStatus.PROVED:
-            # Fewer fall short of what is required, by a sample at least.
-            most = min(most, float(found.problem.required_weight[0]) - 1.0)
-        return {
-            "lower_bound": int(found.lower_bound) + self.given,
-            "status": found.status.name.lower(),
-            "proof": found.proof,
-            "occlusion": self.shadows,
-            "n_samples": self.n_samples,
-            "n_reached": len(found.problem.weights) + self.n_free,
-            "n_cells": found.cells_used,
-            "one_fewer_upper_bound_m2": (most + self.n_free) * self.row_area_m2,
-        }
 
 
 def prove_fewest(
@@ -135,7 +94,7 @@ def prove_fewest(
         fewer = bool(found) and _saves(scene, stage, found)
         better = with_more(scene, stage, found) if fewer else stage
         if better is stage:
-            return replace(stage, certificate=_joined(stage.certificate, bound.entry()))
+            return replace(stage, certificate=joined(stage.certificate, bound.entry()))
         stage = better
     entry = enough(stage.certificate, np.any(stage.stages == LIT, axis=1))
     return replace(stage, certificate=stage.certificate | {"continuous": entry})
@@ -153,25 +112,6 @@ def _saves(
         given=stage.certificate.get("given", 0),
     )
     return count < stage.certificate["needed"]["count"]
-
-
-def _joined(certificate: dict[str, Any], bound: dict[str, Any]) -> dict[str, Any]:
-    """Return a certificate with a bound over all poses: it holds for some of them."""
-    needed, candidates = certificate["needed"], certificate["candidates"]
-    joined = certificate | {"continuous": bound}
-    least = bound["lower_bound"]
-    other_samples = bound["n_samples"] != certificate["n_samples"]
-    if other_samples or least <= needed["lower_bound"]:
-        return joined
-    count = certificate["count"]
-    joined["needed"] = needed | {"lower_bound": least}
-    joined["candidates"] = candidates | {
-        "lower_bound": min(least, count),
-        "proof": f"over all poses: {bound['proof']}",
-    }
-    if certificate["status"] == "feasible" and least >= count:
-        joined["status"] = "optimal"
-    return joined
 
 
 def _bound_of(
@@ -221,12 +161,13 @@ def bound_projectors(
         n_samples: Samples of the target, reached or not, for the record.
         row_area_m2: Area that each stands for.
     """
-    reach = _mesh_reach(scene)
+    reach = mesh_reach(scene)
     if count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, shadows=0.0)
     shadows = bool(len(rows) * len(scene.mesh.faces) <= effort.shadows)
-    cube = CubeMap(1 << effort.finest)
+    cube, asked = CubeMap(1 << effort.finest), scene.requirements.projector
+    limits = DirectionLimits(asked.max_incidence, asked.min_tangent_angle)
     workspace, device = scene.requirements.workspace, template.device
     near = workspace.projector_radius_m[0]
     tree: DirectionTree | PositionTree
@@ -236,14 +177,15 @@ def bound_projectors(
         aside = reach + min(width, device.beam_radius or np.inf)
         depth = np.sqrt(max(0.0, near**2 - aside**2))
         shadows = shadows and bool(depth >= reach)
-        opened = open_rows(scene, rows, cube, shadows=shadows)
+        opened = open_rows(scene, limits, rows, cube, shadows=shadows)
         opened[~_within(cube, workspace, aside)] = 0
         tree = DirectionTree.over(opened, len(rows))
     else:
         shadows = shadows and bool(near >= reach)
-        opened = open_rows(scene, rows, cube, shadows=shadows)
+        opened = open_rows(scene, limits, rows, cube, shadows=shadows)
         tree = PositionTree(
             workspace,
+            workspace.projector_radius_m,
             device.range_m,
             rows.samples.points,
             WidenedMaps(opened, cube),
@@ -272,12 +214,6 @@ def _promising(
     if found.survivor is not None:
         dear = np.concatenate([np.unique(found.survivor), dear])
     return tree.directions(dear) if dear.size else np.empty((0, 3))
-
-
-def _mesh_reach(scene: Scene) -> float:
-    """Return the distance of the farthest vertex from the middle of the workspace."""
-    mesh, centre = scene.mesh, np.array(scene.requirements.workspace.centre)
-    return float(np.linalg.norm(mesh.corners.reshape(-1, 3) - centre, axis=1).max())
 
 
 def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.bool_]:

@@ -12,13 +12,25 @@ from .lighting import Target
 from .scene import Scene
 
 
+def mesh_reach(scene: Scene) -> float:
+    """Return the distance of the farthest vertex from the middle of the workspace."""
+    mesh, centre = scene.mesh, np.array(scene.requirements.workspace.centre)
+    return float(np.linalg.norm(mesh.corners.reshape(-1, 3) - centre, axis=1).max())
+
+
 def open_rows(
-    scene: Scene, rows: Target, cube: CubeMap, *, shadows: bool
+    scene: Scene,
+    limits: DirectionLimits,
+    rows: Target,
+    cube: CubeMap,
+    *,
+    shadows: bool,
 ) -> NDArray[np.uint64]:
     """Return for each cell the samples to which it is open, as bit rows.
 
     Args:
-        scene: Surface and requirements.
+        scene: Surface.
+        limits: On the direction from a sample to a device.
         rows: The samples.
         cube: The map of directions from a sample to a device.
         shadows: Whether occlusion closes cells.
@@ -26,13 +38,7 @@ def open_rows(
     Returns:
         Shape (cube.size, n_words).
     """
-    limits = scene.requirements.projector
-    maps = OpenDirections(
-        scene.visibility,
-        DirectionLimits(limits.max_incidence, limits.min_tangent_angle),
-        cube,
-        occlusion=shadows,
-    )
+    maps = OpenDirections(scene.visibility, limits, cube, occlusion=shadows)
     found = np.zeros((cube.size, words_for(len(rows))), dtype=np.uint64)
     bytes_of = found.view(np.uint8).reshape(cube.size, -1, 8)
     points, normals = rows.samples.points, rows.samples.normals

@@ -10,12 +10,12 @@ import pytest
 
 from geometry.mesh import TriangleMesh
 from geometry.primitives import sphere
-from planning import position_cells
 from planning.direction_cells import DirectionTree
 from planning.plan import PlannedProjector
 from planning.position_cells import PositionTree
 from planning.rig import load_rig
 from planning.scene import Scene
+from planning.shell_cells import spread
 from solvers.bit_rows import pack_rows, unpack_rows
 
 POSES = 2000
@@ -157,7 +157,7 @@ def test_seen_from_a_sample_no_place_of_a_cell_is_beyond_its_angle():
         towards = middle * outwards - points
         distance = np.linalg.norm(towards, axis=1)
         side = 2.0 * high * np.sin(0.5 * angle)
-        psi = position_cells._spread(towards, distance, outwards, half, side)
+        psi = spread(towards, distance, outwards, half, side)
         # Places at the rim of the cell: any turn by its angle, both ends and between.
         turn = np.cross(outwards, rng.normal(size=(40, 3)))
         turn /= np.linalg.norm(turn, axis=1)[:, None]
