@@ -38,6 +38,7 @@ from geometry.mesh import TriangleMesh
 from geometry.readers import load_mesh
 from geometry.refinement import cut_for_curvature
 from planning import load_rig
+from planning.aim_cells import AimTree
 from planning.continuous import Effort, bound_projectors
 from planning.direction_cells import DirectionTree
 from planning.draft import Order
@@ -52,7 +53,7 @@ from planning.scene import Scene
 ROOT = Path(__file__).resolve().parents[1]
 LIGHTS = ("parallel", "diverging")
 FITS = ("default", "close")
-Tree = DirectionTree | PositionTree
+Tree = DirectionTree | PositionTree | AimTree
 # Rays start this high above a sample's face, in half diagonals of the mesh: far over
 # the roundings of float32, and well under what the planner lets no ray decide.
 _HEIGHT = 1e-5
@@ -306,18 +307,38 @@ def lies_in(
     Args:
         tree: The cells.
         names: Cells, shape (m, k).
-        keys: One for each row, shape (m, 1, 3).
+        keys: One for each row, shape (m, 1, 3); of cameras the aim follows.
     """
+    own = np.broadcast_to(keys, (*names.shape, keys.shape[2]))
+    if isinstance(tree, AimTree):
+        place, level, aim = (
+            part.reshape(names.shape) for part in tree.cells(names.ravel())
+        )
+        looks = level < 0
+        looks |= in_direction_cell(np.maximum(level, 0), aim, own[:, :, 3:])
+        return looks & lies_in(tree.positions, place, keys)
+    own = own[:, :, :3]
     if isinstance(tree, DirectionTree):
         flat, cell = tree.place(names.ravel())
         low, high = np.zeros(flat.size), np.full(flat.size, np.inf)
     else:
         found = tree.cells(names.ravel())
         flat, cell, low, high = found.level, found.cell, found.low_m, found.high_m
-    n = 1 << flat.reshape(names.shape)
-    face, rest = np.divmod(cell.reshape(names.shape), n * n)
+    inside = in_direction_cell(
+        flat.reshape(names.shape), cell.reshape(names.shape), own
+    )
+    radius = np.linalg.norm(own, axis=2)
+    inside &= radius >= low.reshape(names.shape)
+    return inside & (radius <= high.reshape(names.shape))
+
+
+def in_direction_cell(
+    level: NDArray[np.int64], cell: NDArray[np.int64], own: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether directions lie in cells of cube maps, shape (m, k)."""
+    n = 1 << level
+    face, rest = np.divmod(cell, n * n)
     axis, sign = face // 2, 1.0 - 2.0 * (face % 2)
-    own = np.broadcast_to(keys, (*names.shape, 3))
     x, y, z = (
         np.take_along_axis(own, ((axis + s) % 3)[:, :, None], axis=2)[:, :, 0]
         for s in (1, 2, 0)
@@ -326,9 +347,7 @@ def lies_in(
     for across, index in ((x, rest % n), (y, rest // n)):
         step = (np.arctan2(across, sign * z) / (0.25 * np.pi) + 1.0) * 0.5 * n
         inside &= (step >= index - 1e-9) & (step <= index + 1 + 1e-9)
-    radius = np.linalg.norm(own, axis=2)
-    inside &= radius >= low.reshape(names.shape)
-    return inside & (radius <= high.reshape(names.shape))
+    return inside
 
 
 def tree_of(

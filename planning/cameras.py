@@ -79,12 +79,13 @@ class CameraStage:
     """What the camera stage found; the attributes are those of `ProjectorStage`.
 
     `offered` keeps what the reference cameras see, to prove the count again after ring
-    axes have moved.
+    axes have moved; `measured`, which of them measures which row, (n, m).
     """
 
     cameras: tuple[PlannedCamera, ...]
     offered: Sights
     rows: LitSamples
+    measured: NDArray[np.bool_]
     by_count: dict[int, tuple[PlannedCamera, ...]]
     certificate: dict[str, Any]
 
@@ -242,6 +243,7 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
         cover.cameras,
         cover.offered,
         cover.rows,
+        cover.measured,
         {
             number: tuple(candidates[i] for i in chosen)
             for number, chosen in others.by_count.items()

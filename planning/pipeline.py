@@ -10,7 +10,9 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh import TriangleMesh
 from geometry.refinement import cut_for_curvature
 
+from . import camera_bound
 from .assemble import falls_short, write_plan
+from .camera_bound import bound_stage
 from .camera_stage import follow_cameras, place_cameras, spread
 from .cameras import CameraStage
 from .continuous import DEFAULT, PROVE, prove_fewest
@@ -149,9 +151,11 @@ def _plan(order: Order, clock: Stopwatch, *, check: bool) -> RigPlan:
     draft = _first_draft(order, clock)
     try:
         draft = _polish(draft, clock)
+        draft = _bounded(draft, clock)
         plan = write_plan(draft, clock)
         while (more := _one_more(draft, plan, clock)) is not None:
             draft = _polish(more, clock)
+            draft = _bounded(draft, clock)
             plan = write_plan(draft, clock)
         return _checked(plan, draft, clock) if check else plan
     except (KeyboardInterrupt, TimeLimitError) as cut:
@@ -274,6 +278,23 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
         cameras=moved.cameras,
         rings=rings,
     )
+
+
+def _bounded(draft: Draft, clock: Stopwatch) -> Draft:
+    """The cameras' bound over all poses, for the ring axes that were kept.
+
+    One that stands already belongs to the same projectors and axes: other axes come
+    with another certificate.
+    """
+    stage = draft.camera_stage
+    if stage.certificate["continuous"] is not None:
+        return draft
+    with clock.stage("camera_bounds", "bounds over all poses of the cameras"):
+        effort = camera_bound.PROVE if draft.order.prove else camera_bound.DEFAULT
+        stage = bound_stage(draft.scene, stage, draft.order.rig.camera_device(), effort)
+        proof = stage.certificate["continuous"]
+        clock.say(f"  cameras: at least {proof['lower_bound']}, {proof['proof']}")
+    return replace(draft, camera_stage=stage)
 
 
 def _interrupted(

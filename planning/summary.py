@@ -207,9 +207,10 @@ def _proofs(plan: RigPlan) -> str:
     proofs = plan.document["certificates"]
     lines = [
         _proof("projector", proofs["projectors"], asked.dominant_coverage, "light"),
-        _continuous(plan, proofs["projectors"]),
+        _continuous(proofs["projectors"], _freedom(plan)),
         _proof("camera", proofs["cameras"], asked.coverage, "measure")
         + " (given these projectors)",
+        _continuous(proofs["cameras"], "position, aim and roll"),
         f"         {_regions(plan)}",
         *_excluded(proofs["projectors"]),
     ]
@@ -265,11 +266,15 @@ def _given(proof: dict[str, Any]) -> str:
     return f", given {proof['given']} existing" if "given" in proof else ""
 
 
-def _continuous(plan: RigPlan, proof: dict[str, Any]) -> str:
+def _freedom(plan: RigPlan) -> str:
+    """Return what of a projector's pose counts for its light."""
+    parallel = plan.projectors[0].light == "parallel"
+    return "direction" if parallel else "position and aim"
+
+
+def _continuous(proof: dict[str, Any], poses: str) -> str:
     """Return what was proved over all poses of the workspace, in a line."""
     bound = proof["continuous"]
-    parallel = plan.projectors[0].light == "parallel"
-    poses = "direction" if parallel else "position and aim"
     if bound is None:
         return f"         nothing is proved over every {poses} in the workspace"
     scope = (

@@ -223,6 +223,27 @@ FALSE = {
         _at("certificates", "projectors", "continuous", {"lower_bound": 2}),
         "2 is claimed over all poses, but only 1 over the candidates",
     ),
+    "continuous of cameras beyond candidates": (
+        _at("certificates", "cameras", "continuous", {"lower_bound": 2}),
+        "cameras.continuous.lower_bound: 2 is claimed over all poses, but only 1 over",
+    ),
+    "continuous area": (
+        _at(
+            "certificates",
+            "cameras",
+            lambda claims: (
+                claims
+                | {
+                    "continuous": {"lower_bound": 1, "one_fewer_upper_bound_m2": 0.001},
+                    "by_count": [
+                        {"count": 1, "value_m2": 0.002, "upper_bound_m2": 0.003},
+                        {"count": 2, "value_m2": 0.004, "upper_bound_m2": 0.005},
+                    ],
+                }
+            ),
+        ),
+        "10.00 cm² is claimed over all poses, but 1 of the candidates cover 20.00 cm²",
+    ),
     "optimal": (
         _at("certificates", "projectors", "status", "optimal"),
         "2 devices stand against a bound of 1",

@@ -109,14 +109,30 @@ def test_counts_bounds_and_candidates_are_stated(plan):
         assert 1 <= proof["candidates"]["lower_bound"] <= proof["count"]
         assert proof["candidates"]["n_candidates"] >= least
         continuous = proof["continuous"]
-        if kind == "projectors":
-            assert 1 <= continuous["lower_bound"] <= proof["candidates"]["lower_bound"]
-            assert continuous["status"] in ("proved", "survived", "cut")
-            assert continuous["n_reached"] <= continuous["n_samples"]
-        else:
-            assert continuous is None
+        assert 1 <= continuous["lower_bound"] <= proof["candidates"]["lower_bound"]
+        assert continuous["status"] in ("proved", "survived", "cut")
+        assert continuous["n_reached"] <= continuous["n_samples"]
+        assert continuous["n_samples"] <= proof["n_samples"]
         met = proof["candidates"]["lower_bound"] == proof["count"]
         assert proof["status"] == ("optimal" if met else "feasible")
+
+
+def test_bounds_over_all_poses_are_told_each_after_its_count(plan):
+    lines = summary(plan, [], ()).splitlines()
+    proofs = plan.document["certificates"]
+    parallel = plan.projectors[0].light == "parallel"
+    for kind, poses in (
+        ("projector", "direction in" if parallel else "position and aim in"),
+        ("camera", "position, aim and roll in"),
+    ):
+        head = rf"(PROVED|BOUND) +(at least )?\d+ {kind}"
+        (at,) = [i for i, line in enumerate(lines) if re.match(head, line)]
+        bound, needed = (proofs[f"{kind}s"][key] for key in ("continuous", "needed"))
+        said = lines[at + 1]
+        assert f"over every {poses} the workspace, for {bound['n_samples']} " in said
+        proved = bound["lower_bound"] >= needed["count"]
+        least = f"at least {bound['lower_bound']} are needed"
+        assert ("fewer are too few" if proved else least) in said
 
 
 def test_pairs_that_each_inequality_excluded_are_told_and_add_up(plan):

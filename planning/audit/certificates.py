@@ -12,7 +12,7 @@ from .areas import ROUNDING
 from .counts import FEWEST_ROWS, audit_counts
 from .estimates import POINT, Estimator
 from .existing import droppable
-from .ledger import Ledger, as_number, square_centimetres
+from .ledger import Ledger, as_number, entries, square_centimetres
 from .recompute import Recomputed
 
 _STATUSES = ("optimal", "feasible", "infeasible")
@@ -159,6 +159,28 @@ def _audit_continuous(key: str, claims: dict[str, Any], ledger: Ledger) -> None:
             f"{key}.continuous.lower_bound",
             f"{everywhere:g} is claimed over all poses, but only {here:g} over the "
             f"candidates, which are some of them",
+        )
+    if same:
+        _audit_fewer_anywhere(key, claims, table, ledger)
+
+
+def _audit_fewer_anywhere(
+    key: str, claims: dict[str, Any], table: dict[str, Any], ledger: Ledger
+) -> None:
+    """What one fewer covers anywhere at most, no candidates exceed."""
+    upper = as_number(table.get("one_fewer_upper_bound_m2"))
+    needed = as_number(claims["needed"].get("count"))
+    if upper is None or needed is None:
+        return
+    for row in entries(claims.get("by_count")):
+        value = as_number(row.get("value_m2"))
+        if row.get("count") != needed - 1 or value is None:
+            continue
+        ledger.holds(
+            value <= upper * (1.0 + ROUNDING),
+            f"{key}.continuous.one_fewer_upper_bound_m2",
+            f"{square_centimetres(upper)} is claimed over all poses, but "
+            f"{needed - 1:g} of the candidates cover {square_centimetres(value)}",
         )
 
 
