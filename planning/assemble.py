@@ -20,6 +20,7 @@ from .relaxations import reachability_relaxations
 from .requirements import Requirements
 from .ring_axes import widest_gap
 from .ring_entries import evenly_ringed, lost_to_rings_m2, with_rings
+from .routes import routes_entry
 from .seams import overlap_components
 from .surface import Surface
 from .wider_field import wider_field
@@ -177,7 +178,8 @@ def _document(
         "marginal": marginal,
         "certificates": {
             "projectors": draft.stage.certificate,
-            "cameras": draft.camera_stage.certificate,
+            "cameras": draft.camera_stage.certificate
+            | routes_entry(draft.camera_stage.routes),
         },
         "baselines": baselines,
         **ranges,

@@ -17,6 +17,7 @@ from solvers.baseline_problem import BaselineProblem, smallest_baseline
 from solvers.baseline_program import solve_baseline
 
 from .plan import PlannedCamera
+from .requirements import Workspace
 from .seams import adjacency, neighbouring_pairs, overlap_components
 from .spread_problem import (
     RingsOnTarget,
@@ -76,6 +77,7 @@ def spread_cameras(
     rings: RingsOnTarget | None = None,
     min_overlap_share: float = 0.01,
     max_evaluations: int = 48,
+    max_programs: int | None = None,
 ) -> CameraSpread:
     """Raise the smallest baseline of neighbouring cameras without losing coverage.
 
@@ -95,6 +97,7 @@ def spread_cameras(
         rings: Rings of each projector on the samples; None: no rings.
         min_overlap_share: Overlap or contact that makes neighbours.
         max_evaluations: Calls of `measure` at most.
+        max_programs: Programs solved at most; None: no limit of their own.
     """
     n = len(points)
     target = SampledTarget(
@@ -107,7 +110,7 @@ def spread_cameras(
     search = _Search(
         list(cameras), measure, target, limits, min_overlap_share, max_evaluations
     )
-    return search.run(required)
+    return search.run(required, max_programs)
 
 
 class _Search:
@@ -124,21 +127,22 @@ class _Search:
     ) -> None:
         self.cameras, self.target, self.limits = cameras, target, limits
         self._measure, self._share, self._budget = measure, share, max_evaluations
-        self.spent = self.accepted = 0
+        self.spent = self.accepted = self.solved = 0
         self.poses = np.stack([camera.world_from_device for camera in cameras])
         self.measured = self._evaluate(self.poses)
-        self.aims = _aims(self.poses, self.measured, target, limits)
-        self.rolls = _rolls(self.poses, self.aims, np.array(limits.workspace.up))
+        self.aims = aims_of(self.poses, self.measured, target.points, limits.workspace)
+        self.rolls = rolls_of(self.poses, self.aims, np.array(limits.workspace.up))
         self.pairs = self._neighbours(self.measured)
         self._groups = self._count_groups(self.measured)
         self._free = np.array([not camera.existing for camera in cameras])
 
-    def run(self, required: float) -> CameraSpread:
+    def run(self, required: float, max_programs: int | None) -> CameraSpread:
         before = self._smallest(self.poses)
+        self._programs = np.inf if max_programs is None else max_programs
         self._floor = max(required, self._weight(self.measured))
         reach = _REACH * self.limits.workspace.camera_radius_m[1]
         least = _MIN_REACH * self.limits.workspace.camera_radius_m[1]
-        while self.pairs and self.spent < self._budget and reach >= least:
+        while self.pairs and self._affords() and reach >= least:
             if not self._free.any():
                 break
             taken, proposed = self._improve(reach)
@@ -153,11 +157,17 @@ class _Search:
             self.spent,
         )
 
+    def _affords(self) -> bool:
+        return self.spent < self._budget and self.solved < self._programs
+
     def _improve(self, reach: float) -> tuple[bool, float]:
         """Whether a proposal within reach was taken, whole or in part; its reach."""
         demanded = np.zeros((0, 2), dtype=np.int64)
         proposals: list[_Array] = []
         for _ in range(_REPEATS):
+            if not self._affords():
+                break
+            self.solved += 1
             solution = solve_baseline(self._problem(demanded, reach))
             if not (solution.status.has_point and self._gains(solution.centres)):
                 break
@@ -321,25 +331,25 @@ class _Search:
         return smallest_baseline(poses[:, :3, 3], index)
 
 
-def _aims(
+def aims_of(
     poses: _Array,
     measured: NDArray[np.bool_],
-    target: SampledTarget,
-    limits: SpreadLimits,
+    points: _Array,
+    workspace: Workspace,
 ) -> _Array:
-    """Points on the axes at the mean depth of what each camera measures."""
-    centre = np.array(limits.workspace.centre)
+    """Return points on the axes at the mean depth of what each camera measures."""
+    centre = np.array(workspace.centre)
     aims = np.empty((len(poses), 3))
     for c, pose in enumerate(poses):
         mine = measured[:, c]
-        looked = target.points[mine].mean(axis=0) if mine.any() else centre
+        looked = points[mine].mean(axis=0) if mine.any() else centre
         depth = (looked - pose[:3, 3]) @ pose[:3, 2]
         aims[c] = pose[:3, 3] + depth * pose[:3, 2]
     return aims
 
 
-def _rolls(poses: _Array, aims: _Array, up: _Array) -> _Array:
-    """Turn of each device about its axis against `look_at` without roll."""
+def rolls_of(poses: _Array, aims: _Array, up: _Array) -> _Array:
+    """Return the turn of each device about its axis against `look_at` without roll."""
     level = look_at(poses[:, :3, 3], aims, up)
     x = poses[:, :3, 0]
     return np.arctan2(

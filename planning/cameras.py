@@ -1,6 +1,6 @@
 """Section VI of the paper: the fewest cameras that measure what is lit."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,19 +17,21 @@ from .lighting import Light, Target
 from .measurability import Rings
 from .plan import PlannedCamera, PlannedProjector
 from .projector_light import lit_stages, merged
+from .routes import Routes
 from .scene import Scene
 from .selection import (
     BODIES_LEFT_OUT,
     Selection,
     certificate,
     marginals,
+    others_instead,
     select_fewest,
 )
 from .sights import Sight, Sights, sights_of, view_of
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
-_ROUNDS = 3
+ROUNDS = 3
 _STREAM = 200
 
 
@@ -60,6 +62,8 @@ class CameraCover:
         measured: Which candidate measures which sample, shape (n, m).
         selection: Candidates taken, and what was proved of their number.
         crowd: The candidates among each other's bodies, where they have any.
+        by_count: Candidates for each number of them, where a route of its own found
+            them; None: the best there are.
     """
 
     offered: Sights
@@ -67,6 +71,7 @@ class CameraCover:
     measured: NDArray[np.bool_]
     selection: Selection
     crowd: Crowd | None = None
+    by_count: Mapping[int, NDArray[np.int64]] | None = None
 
     @property
     def cameras(self) -> tuple[PlannedCamera, ...]:
@@ -79,7 +84,8 @@ class CameraStage:
     """What the camera stage found; the attributes are those of `ProjectorStage`.
 
     `offered` keeps what the reference cameras see, to prove the count again after ring
-    axes have moved; `measured`, which of them measures which row, (n, m).
+    axes have moved; `measured`, which of them measures which row, (n, m); `routes` says
+    what either route needs.
     """
 
     cameras: tuple[PlannedCamera, ...]
@@ -88,6 +94,7 @@ class CameraStage:
     measured: NDArray[np.bool_]
     by_count: dict[int, tuple[PlannedCamera, ...]]
     certificate: dict[str, Any]
+    routes: Routes | None = None
 
     @property
     def reference(self) -> tuple[PlannedCamera, ...]:
@@ -184,6 +191,7 @@ def plan_cameras(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     offered: Sights,
+    known: NDArray[np.int64] | None = None,
 ) -> CameraCover:
     """Choose the fewest cameras that measure the required share of what is lit.
 
@@ -191,16 +199,15 @@ def plan_cameras(
         scene: Surface and requirements.
         projectors: As planned, with their rings.
         offered: Candidates, from `offered_cameras`; what they saw they see again.
+        known: Candidates that may do with fewer than the search finds.
 
     Raises:
         InfeasibleLimitsError: If no candidate measures any lit sample.
     """
-    required, candidates = scene.requirements, offered.cameras
-    target = scene.target_samples(_ROWS, _STREAM)
-    rows = lit_samples(scene, projectors, target)
-    measured = measured_by(scene, candidates, rows, offered.on(rows.target))
-    if not measured.any():
-        raise InfeasibleLimitsError(_nothing_measured(scene, candidates, rows))
+    required = scene.requirements
+    target = first_target(scene)
+    rows, measured = rows_for(scene, projectors, offered, target)
+    refuse_unmeasured(scene, offered, rows, measured)
     attempt = 0
     while True:
         attempt += 1
@@ -209,25 +216,87 @@ def plan_cameras(
             required.coverage,
             max_count=required.max_cameras,
             seed=scene.seed,
-            given=_n_given(scene),
+            known=known,
+            given=n_given(scene),
         )
-        fresh_target = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
-        fresh = lit_samples(scene, projectors, fresh_target)
-        seen = measured_by(scene, candidates, fresh, offered.on(fresh.target))
-        covered = seen[:, selection.chosen].any(axis=1).sum()
-        confirmed = covered >= required.coverage * seen.any(axis=1).sum()
-        if confirmed or selection.status == "infeasible" or attempt == _ROUNDS:
+        fresh = fresh_target(scene, attempt)
+        _, seen = rows_for(scene, projectors, offered, fresh)
+        if (
+            selection.status == "infeasible"
+            or confirms(seen, selection.chosen, required.coverage)
+            or attempt == ROUNDS
+        ):
             break
-        target = merged(target, fresh_target)
+        target = merged(target, fresh)
         rows = lit_samples(scene, projectors, target)
         measured = np.concatenate([measured, seen])
     return CameraCover(offered, rows, measured, selection)
 
 
+def first_target(scene: Scene) -> Target:
+    """Return the samples of the target to plan cameras on."""
+    return scene.target_samples(_ROWS, _STREAM)
+
+
+def fresh_target(scene: Scene, attempt: int) -> Target:
+    """Return samples that no attempt, counted from 1, has seen before."""
+    return scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
+
+
+def rows_for(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    offered: Sights,
+    target: Target,
+) -> tuple[LitSamples, NDArray[np.bool_]]:
+    """Return the samples that are lit, and which candidate measures which.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with their rings.
+        offered: Candidates.
+        target: Samples.
+    """
+    rows = lit_samples(scene, projectors, target)
+    return rows, measured_by(scene, offered.cameras, rows, offered.on(rows.target))
+
+
+def refuse_unmeasured(
+    scene: Scene, offered: Sights, rows: LitSamples, measured: NDArray[np.bool_]
+) -> None:
+    """Refuse to plan where no candidate measures any lit sample.
+
+    Args:
+        scene: Surface and requirements.
+        offered: Candidates.
+        rows: Lit samples.
+        measured: Which candidate measures which, shape (n, m).
+
+    Raises:
+        InfeasibleLimitsError: It names the limits that stop most samples.
+    """
+    if not measured.any():
+        raise InfeasibleLimitsError(_nothing_measured(scene, offered.cameras, rows))
+
+
+def confirms(seen: NDArray[np.bool_], chosen: NDArray[np.int64], share: float) -> bool:
+    """Return whether candidates measure a share of what all of them do.
+
+    Args:
+        seen: Which candidate measures which fresh sample, shape (n, m).
+        chosen: Candidates taken.
+        share: In (0, 1].
+    """
+    covered = seen[:, chosen].any(axis=1).sum()
+    return bool(covered >= share * seen.any(axis=1).sum())
+
+
 def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     """Return what the stage found, with the best cameras for every other count."""
-    given = _n_given(scene)
+    given = n_given(scene)
     others = marginals(cover.measured, cover.selection, seed=scene.seed, given=given)
+    if cover.by_count is not None:
+        others = others_instead(others, cover.by_count, cover.measured)
     bodied = cover.crowd is not None and cover.crowd.bodied
     if cover.crowd is not None:
         others = settle_others(
@@ -260,7 +329,8 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     )
 
 
-def _n_given(scene: Scene) -> int:
+def n_given(scene: Scene) -> int:
+    """Return how many cameras stand already."""
     return len(scene.requirements.existing_of("camera"))
 
 

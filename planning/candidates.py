@@ -146,12 +146,9 @@ def projectors_towards(
         ring_offset: As for `projector_candidates`.
         site: As for `projector_candidates`.
     """
-    shell, device = _about_ball(workspace.projector_radius_m, site), template.device
-    rolls = rolls_for(device, workspace.object_radius_m, 0.5 * (shell[0] + shell[1]))
-    offsets = _offsets(directions, workspace, shell)
-    poses = _aimed(np.array(workspace.centre) + offsets, device, workspace, rolls)
-    if site is not None:
-        poses = np.concatenate([poses, tiled_poses(site, directions, rolls)[0]])
+    poses = _towards(
+        template.device, workspace, workspace.projector_radius_m, directions, site
+    )
     return _projectors(template, poses, ring_offset)
 
 
@@ -209,7 +206,7 @@ def _offsets(
     workspace: Workspace,
     shell_m: tuple[float, float],
 ) -> NDArray[np.float64]:
-    """Admissible positions of projectors in given directions, from the centre."""
+    """Admissible positions of devices in given directions, from the centre."""
     if is_zoned(workspace):
         return along_rays(workspace, shell_m, directions)
     near, far = shell_m
@@ -270,6 +267,52 @@ def camera_candidates(
     """
     poses = _poses(template.device, workspace, workspace.camera_radius_m, n, site)
     return tuple(replace(template, world_from_device=pose) for pose in poses)
+
+
+def cameras_towards(
+    template: PlannedCamera,
+    workspace: Workspace,
+    directions: NDArray[np.float64],
+    site: Site | None = None,
+) -> tuple[PlannedCamera, ...]:
+    """Return cameras in given directions from the centre, those that are admissible.
+
+    The arguments are those of `projectors_towards`.
+    """
+    poses = _towards(
+        template.device, workspace, workspace.camera_radius_m, directions, site
+    )
+    return tuple(
+        replace(template, world_from_device=pose, existing="") for pose in poses
+    )
+
+
+def middle_radius_m(radius_m: tuple[float, float], site: Site | None) -> float:
+    """Return how far from the centre offered devices stand where nothing is in the way.
+
+    Args:
+        radius_m: Least and largest distance of this kind of device.
+        site: What they stand over side by side; None: all look at the centre.
+    """
+    near, far = _about_ball(radius_m, site)
+    return 0.5 * (near + far)
+
+
+def _towards(
+    device: PinholeModel | ParallelModel,
+    workspace: Workspace,
+    radius_m: tuple[float, float],
+    directions: NDArray[np.float64],
+    site: Site | None,
+) -> NDArray[np.float64]:
+    """Poses in given directions, those that are admissible, shape (m, 4, 4)."""
+    shell = _about_ball(radius_m, site)
+    rolls = rolls_for(device, workspace.object_radius_m, 0.5 * (shell[0] + shell[1]))
+    offsets = _offsets(directions, workspace, shell)
+    poses = _aimed(np.array(workspace.centre) + offsets, device, workspace, rolls)
+    if site is not None:
+        poses = np.concatenate([poses, tiled_poses(site, directions, rolls)[0]])
+    return poses
 
 
 def _poses(

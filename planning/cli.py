@@ -203,6 +203,13 @@ def commands() -> None:
     help="Largest standard deviation along the normal [default: 0.3].",
 )
 @click.option(
+    "--cameras-by",
+    type=click.Choice(["cover", "paper", "both"]),
+    default="both",
+    show_default=True,
+    help="Fewest of the candidates, the paper's largest baselines, or what is better.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),

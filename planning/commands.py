@@ -73,6 +73,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 threads=options["threads"] or _cores(),
                 check=not options["no_check"],
                 prove=options["prove"],
+                cameras_by=options["cameras_by"],
                 time_limit=_left(options["time_limit"], begin),
                 progress=report,
                 command=("plan", *command),

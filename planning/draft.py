@@ -14,6 +14,7 @@ from .range_guard import Guard
 from .ranges import RangedBody
 from .rig import Rig
 from .ring_stage import RingStage
+from .routes import CamerasBy
 from .scene import Scene
 
 
@@ -32,6 +33,7 @@ class Order:
         prove: Whether more work is spent on the bounds over all poses.
         ranges: The body whose sphere the mesh is, and what the rig's limits keep free
             for it; None: the mesh was known.
+        cameras_by: Route to the cameras.
     """
 
     mesh: TriangleMesh
@@ -43,6 +45,7 @@ class Order:
     interest: Interest | None = None
     prove: bool = False
     ranges: tuple[RangedBody, Guard] | None = None
+    cameras_by: CamerasBy = "both"
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,8 @@ from geometry.refinement import cut_for_curvature
 from . import camera_bound
 from .assemble import falls_short, write_plan
 from .camera_bound import bound_stage
-from .camera_stage import follow_cameras, place_cameras, spread
+from .camera_routes import slide_routes
+from .camera_stage import follow_cameras, place_cameras
 from .cameras import CameraStage
 from .continuous import DEFAULT, PROVE, prove_fewest
 from .cost import cost_entry
@@ -34,6 +35,7 @@ from .range_guard import Guard, guarded
 from .ranges import RangedBody
 from .rig import Rig
 from .ring_stage import space_rings
+from .routes import CamerasBy
 from .scene import Scene
 from .selection import larger
 from .shortfall import shortfalls
@@ -58,6 +60,7 @@ def plan_rig(
     threads: int = 2,
     check: bool = True,
     prove: bool = False,
+    cameras_by: CamerasBy = "both",
     time_limit: float | None = None,
     progress: Report | None = None,
     command: Sequence[str] = (),
@@ -85,6 +88,8 @@ def plan_rig(
         threads: Worker threads; no result depends on it.
         check: Whether the plan is audited and reconstructed from pixels.
         prove: Whether more work is spent on the bounds over all poses.
+        cameras_by: Route to the cameras: the smallest `cover` of candidates, the
+            largest baselines of the `paper`, or the better of `both`.
         time_limit: Wall time in [s] that cuts the run; the plan is then `truncated`.
         progress: Receives a line when a stage begins.
         command: Words of the command line, for the record.
@@ -129,6 +134,7 @@ def plan_rig(
         None if interest is None else interest.on_parts(parent),
         prove,
         ranges,
+        cameras_by,
     )
     clock = Stopwatch(progress, time_limit=time_limit)
     if len(cut.faces) > len(surface.faces):
@@ -199,7 +205,9 @@ def _placed(
         camera = PlannedCamera(
             "", np.eye(4), rig.camera_device(), body=rig.camera_body()
         )
-        solution = place_cameras(scene, projectors, camera, n_cameras, tilt)
+        solution = place_cameras(
+            scene, projectors, camera, n_cameras, tilt, order.cameras_by
+        )
         cameras = solution.stage
         clock.say(
             f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "
@@ -248,7 +256,7 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
     """Section VI: cameras slide apart while the coverage holds; then their rings."""
     with clock.stage("baselines", "baselines: cameras slide apart"):
         ranges = draft.order.ranges
-        moved = spread(
+        stage, moved = slide_routes(
             draft.scene,
             draft.projectors,
             draft.camera_stage,
@@ -261,7 +269,11 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
             )
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
         final = follow_cameras(
-            draft.scene, draft.projectors, moved.cameras, draft.camera_stage
+            draft.scene,
+            draft.projectors,
+            moved.cameras,
+            stage,
+            draft.order.cameras_by,
         )
         scene = draft.scene.among((*final.projectors, *moved.cameras))
         rings = space_rings(

@@ -196,6 +196,23 @@ def marginals(
     return Marginals(by_count, most_rows, greedy)
 
 
+def others_instead(
+    others: Marginals,
+    by_count: Mapping[int, NDArray[np.int64]],
+    covers: NDArray[np.bool_],
+) -> Marginals:
+    """Return marginals with other candidates for each count, and the same bounds.
+
+    Args:
+        others: The best for each count, as found.
+        by_count: Candidates to tell of instead; counts without any are left out.
+        covers: As for `marginals`.
+    """
+    kept = {n: by_count[n] for n in others.by_count if n in by_count}
+    rows = {n: (_rows(covers, kept[n]), others.most_rows[n][1]) for n in kept}
+    return replace(others, by_count=kept, most_rows=rows)
+
+
 def cover_problem(
     covers: NDArray[np.bool_], required: int, given: int = 0
 ) -> CoverProblem:

@@ -94,6 +94,13 @@ class Sights:
     def __init__(self, scene: Scene, cameras: Sequence[PlannedCamera]) -> None:
         self._scene, self.cameras = scene, tuple(cameras)
         self._known: list[tuple[NDArray[np.float64], tuple[Sight, ...]]] = []
+        self._first: Sights | None = None
+
+    def joined(self, more: Sequence[PlannedCamera]) -> "Sights":
+        """Return the sights of these cameras, then of more; what is known is kept."""
+        both = Sights(self._scene, (*self.cameras, *more))
+        both._first = self
+        return both
 
     def on(self, target: Target) -> tuple[Sight, ...]:
         """Return what each camera sees of samples."""
@@ -101,7 +108,9 @@ class Sights:
         for known, found in self._known:
             if np.array_equal(known, points):
                 return found
-        found = sights_of(self._scene, self.cameras, target)
+        first = () if self._first is None else self._first.on(target)
+        rest = self.cameras[len(first) :]
+        found = first + (sights_of(self._scene, rest, target) if rest else ())
         self._known.append((points, found))
         return found
 

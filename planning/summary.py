@@ -211,10 +211,28 @@ def _proofs(plan: RigPlan) -> str:
         _proof("camera", proofs["cameras"], asked.coverage, "measure")
         + " (given these projectors)",
         _continuous(proofs["cameras"], "position, aim and roll"),
+        *_routes(proofs["cameras"]),
         f"         {_regions(plan)}",
         *_excluded(proofs["projectors"]),
     ]
     return "\n" + "\n".join(lines)
+
+
+def _routes(proof: dict[str, Any]) -> list[str]:
+    """Return how many cameras either route needs and which is taken, in a line."""
+    routes = proof.get("routes")
+    if routes is None:
+        return []
+    names = {"cover": "the cover", "paper": "the paper's largest baselines"}
+    counts = [
+        f"{'none' if routes[kind] is None else routes[kind]} by {name}"
+        for kind, name in names.items()
+        if routes["asked"] in (kind, "both")
+    ]
+    told = f"ROUTES   cameras: {', '.join(counts)}"
+    if routes["asked"] != "both":
+        return [told]
+    return [f"{told}; taken {names[routes['taken']]}: {routes['why']}"]
 
 
 def _excluded(proof: dict[str, Any]) -> list[str]:

@@ -28,7 +28,7 @@ from planning.bodies import Body
 from planning.body_conflicts import LitCrowd, settle, settle_others
 from planning.body_room import check_existing_room, lacks_room, offered_with_room
 from planning.camera_bodies import MeasuredCrowd, settled_cover
-from planning.camera_stage import _measured_among
+from planning.camera_slides import measured_among
 from planning.cameras import CameraCover, lit_samples, measured_by
 from planning.draw_devices import device_figures
 from planning.errors import InfeasibleLimitsError, RigError
@@ -452,7 +452,7 @@ def test_moves_into_anothers_body_or_beam_are_refused(scene):
 
     def measure(x, y, spared):
         eyes = [camera(x, y, 0.8), camera(-0.5, 0.5, 0.8)]
-        return _measured_among(scene.among(lamps), tuple(lamps), eyes, lit, spared)
+        return measured_among(scene.among(lamps), tuple(lamps), eyes, lit, spared)
 
     n = len(lit.target)
     eyes = [camera(0.5, 0.5, 0.8), camera(-0.5, 0.5, 0.8)]

@@ -1,0 +1,130 @@
+"""Slides a plan's cameras apart: rays, bodies and rings for `camera_spread`."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .body_room import lacks_room
+from .camera_bodies import lit_among
+from .camera_spread import CameraSpread, spread_cameras
+from .cameras import LitSamples, lit_samples, measured_by
+from .plan import PlannedCamera, PlannedProjector
+from .scene import Scene
+from .spread_problem import RingsOnTarget, SpreadLimits
+from .standing import moves_bodies
+
+_ROWS = 6000
+_STREAM = 300
+
+
+def rows_to_slide_on(
+    scene: Scene, projectors: Sequence[PlannedProjector]
+) -> LitSamples:
+    """Return lit samples that no cover ever saw.
+
+    On a cover's own rows, to which its cameras are fitted, a move seems to lose less
+    than it does.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned, with their rings.
+    """
+    return lit_samples(scene, projectors, scene.target_samples(_ROWS, _STREAM))
+
+
+def slide_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    *,
+    max_evaluations: int = 48,
+    max_programs: int | None = None,
+    spare_field: float = 0.0,
+) -> CameraSpread:
+    """Slide cameras apart; no move that loses coverage on the rows is taken.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned, with their rings.
+        cameras: As they stand.
+        rows: Samples on which coverage is held.
+        max_evaluations: Times that coverage is evaluated, at most.
+        max_programs: Baseline programs at most; None: no limit of their own.
+        spare_field: What is kept free of the half fields beyond seams [rad].
+    """
+    samples = rows.target.samples
+
+    def measure(poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        moved = [
+            replace(camera, world_from_device=pose)
+            for camera, pose in zip(cameras, poses, strict=True)
+        ]
+        return measured_among(scene, tuple(projectors), moved, rows, spared)
+
+    spared = int(lit_among(projectors, rows, cameras).any(axis=1).sum())
+    return spread_cameras(
+        cameras,
+        measure,
+        points=samples.points,
+        normals=samples.normals,
+        weights=samples.weight,
+        limits=spread_limits(scene, spare_field),
+        rings=rings_on(scene, rows),
+        max_evaluations=max_evaluations,
+        max_programs=max_programs,
+    )
+
+
+def spread_limits(scene: Scene, spare_field: float = 0.0) -> SpreadLimits:
+    """Return what binds a camera that slides; `spare_field` as for `slide_cameras`."""
+    required = scene.requirements
+    return SpreadLimits(
+        required.camera.max_incidence,
+        required.triangulation.min_conditioning,
+        scene.safe_workspace,
+        required.triangulation.min_ring_pitch_px,
+        required.triangulation.max_sigma_m,
+        spare_field,
+    )
+
+
+def rings_on(scene: Scene, rows: LitSamples) -> RingsOnTarget:
+    """Return the rings of every projector on samples."""
+    noise = scene.requirements.triangulation.noise_px
+    return RingsOnTarget(
+        np.stack([rings.normals for rings in rows.rings]),
+        np.stack([rings.spacing for rings in rows.rings]),
+        np.stack(
+            [noise / np.maximum(light.incidence_cos, 1e-9) for light in rows.lights]
+        ),
+        rows.lit,
+    )
+
+
+def measured_among(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    spared: int,
+) -> NDArray[np.bool_]:
+    """Return which camera measures which sample; none where their bodies don't fit.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned.
+        cameras: As they are to stand.
+        rows: Samples lit, were there no cameras.
+        spared: How many must stay lit.
+    """
+    if not moves_bodies(cameras):
+        return measured_by(scene, cameras, rows)
+    among = scene.among((*projectors, *cameras))
+    lit = lit_among(projectors, rows, cameras)
+    fits = not any(lacks_room(among, camera) for camera in cameras)
+    if not fits or lit.any(axis=1).sum() < spared:
+        return np.zeros((len(rows.target), len(cameras)), dtype=bool)
+    return measured_by(among, cameras, replace(rows, lit=lit))
