@@ -225,8 +225,8 @@ def _compared(
         why = "fewer; its cameras stand between the candidates and joined them"
         return Routes("both", cover, paper, "paper", why)
     if paper < kept:
-        why = "with so few as the paper's, fresh samples fall short"
-        return Routes("both", kept, paper, "cover", why)
+        why = f"with the {paper} of the paper's route fresh samples fall short"
+        return Routes("both", kept, None, "cover", why)
     if paper > kept:
         why = (
             f"fewer; without one of its {paper} the paper's route was found to measure "

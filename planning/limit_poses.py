@@ -26,6 +26,8 @@ _Array = NDArray[np.float64]
 # are past it wherever the camera stands.
 GIVEN_UP = (0.0, 0.1, 0.3)
 _BISECTIONS = 14
+# Samples of a seam that are looked at, at most.
+_SEAM = 64
 # Nearer to camera 1, or to the other side of the object, than this isn't looked at.
 _LEAST_TURN = np.radians(2.0)
 
@@ -77,11 +79,17 @@ def limit_poses(
         if cameras[second].existing or only not in (None, second):
             continue
         seam = find_seam(first, second, parts.points, parts.measured_by, parts.adjacent)
+        seam = _thinned(seam)
         if len(seam.points) and seam.shares_border:
             arc = _Arc.through(cameras, first, second, limits)
             moved = arc.camera(aims[second], float(rolls[second]))
             found += _at_limit(cameras, parts, seam, arc, moved, limits, given_up)
     return found
+
+
+def _thinned(seam: Seam) -> Seam:
+    step = max(1, -(-len(seam.points) // _SEAM))
+    return replace(seam, points=seam.points[::step], beyond=seam.beyond[::step])
 
 
 @dataclass(frozen=True, eq=False)

@@ -376,4 +376,4 @@ def _fill(ground: Ground, stand: Stand, by_count: dict[int, Cameras]) -> None:
         if more is None:
             break
         stand = more
-        by_count.setdefault(len(stand.cameras), stand.cameras)
+        by_count[len(stand.cameras)] = stand.cameras

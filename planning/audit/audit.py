@@ -27,6 +27,7 @@ from .ranges import audit_ranges
 from .recompute import Reach, Recomputed, reach_of, recompute
 from .regions import audit_regions
 from .rings import audit_rings
+from .routes import audit_routes
 from .samples import AuditSamples, draw_samples
 from .schedule import audit_schedule
 from .serving import audit_margins
@@ -116,6 +117,7 @@ def audit_plan(
     audit_regions(plan, own, estimator, shadow, ledger)
     audit_marginal(own, estimator, ledger)
     audit_certificates(plan, own, estimator, ledger)
+    audit_routes(ledger)
     audit_baselines(plan, ledger)
     audit_groups(plan, own, estimator.n_claimed, ledger)
     audit_overlaps(plan, shadow, estimator, ledger)

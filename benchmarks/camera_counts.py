@@ -1,0 +1,226 @@
+"""Count the cameras of both routes, and what the baseline program gains.
+
+Usage: python benchmarks/camera_counts.py [--check] [NAME ...]   (ringrig installed, from
+a checkout)
+
+Plans the sample and the twelve meshes in `../shared/data/meshes` (those named, if any)
+with the default rig and up to three projectors, each in the unit or size that
+`tests/shared_meshes.py` states. For the same projectors it prints
+
+- by default: cameras, the bound over the candidates, what either route needs and which
+  was taken; the smallest baseline of neighbours and the measured share before and after
+  the cameras slide apart, on fresh samples;
+- with `--cameras-by paper`, as a plan of its own: cameras, measured share as claimed,
+  false claims that the audit finds and, with --check, the check from pixels.
+
+Shares are of what is reachable by cameras. Last come the two figures over all meshes.
+"""
+
+import os
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from from_tests import load
+
+from geometry.mesh import TriangleMesh
+from geometry.refinement import cut_for_curvature
+from planning import RigPlan, load_mesh, load_rig
+from planning.audit import audit_plan
+from planning.camera_routes import slide_routes
+from planning.camera_stage import CameraSolution, place_cameras
+from planning.cameras import lit_samples, measured_by
+from planning.draft import Order
+from planning.errors import RequirementError
+from planning.pipeline import plan_rig
+from planning.plan import PlannedCamera, PlannedProjector
+from planning.prepare import first_projectors, prepared
+from planning.progress import Stopwatch
+from planning.projector_poses import widen_margins
+from planning.scene import Scene
+
+ROOT = Path(__file__).resolve().parents[1]
+_PROJECTORS = 3
+# Samples that neither cover nor slides saw.
+_FRESH, _STREAM = 12_000, 900
+_HEAD = (
+    "mesh",
+    "cameras",
+    "bound",
+    "cover",
+    "paper",
+    "taken",
+    "smallest baseline [mm]",
+    "gain",
+    "measured before",
+    "after",
+    "`--cameras-by paper`",
+    "measured",
+    "false claims",
+    "check",
+    "CPU [s]",
+)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one mesh gave.
+
+    Attributes:
+        cells: Of its row.
+        paper_above: Cameras that the paper's route needs above the cover's.
+        gain: Ratio of the smallest baselines; None without neighbours.
+        lost: Measured share that the slides cost.
+    """
+
+    cells: tuple[str, ...]
+    paper_above: float
+    gain: float | None
+    lost: float
+
+
+def main() -> int:
+    """Print the table."""
+    names = [word for word in sys.argv[1:] if word != "--check"]
+    print(
+        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
+        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
+    )
+    print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}")
+    found: list[Found] = []
+    for name, mesh, up in _meshes(names):
+        begin = time.process_time()
+        by_default = _by_default(mesh, up)
+        by_paper = _by_paper(mesh, up, check="--check" in sys.argv)
+        spent = f"{time.process_time() - begin:.0f}"
+        found.append(by_default)
+        cells = (name, *by_default.cells, *by_paper, spent)
+        print(f"| {' | '.join(cells)} |", flush=True)
+    _print_totals(found)
+    return 0
+
+
+def _print_totals(found: list[Found]) -> None:
+    near = sum(f.paper_above <= 1 for f in found)
+    gains = [f.gain for f in found if f.gain is not None]
+    print(
+        f"\nThe paper's route needs at most one camera more on {near} of {len(found)}."
+    )
+    if gains:
+        print(
+            f"The smallest baseline grows by {statistics.median(gains) - 1:.1%} in the "
+            f"median of {len(gains)}; the measured share falls by at most "
+            f"{100 * max(f.lost for f in found):.2f} points."
+        )
+
+
+def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh, str | None]]:
+    if not names or "face.obj" in names:
+        yield "face.obj", load_mesh(ROOT / "face.obj"), None
+    table = load("shared_meshes")
+    for mesh in table.MESHES if table.FOLDER.is_dir() else ():
+        if not names or mesh.path.name in names:
+            words = mesh.words
+            up = words[words.index("--up") + 1] if "--up" in words else None
+            yield mesh.path.name, load_mesh(mesh.path, **mesh.options), up
+
+
+def _by_default(mesh: TriangleMesh, up: str | None) -> Found:
+    """The routes for one set of projectors, as far as the slides."""
+    scene, solution = _placed(mesh, up)
+    before = solution.stage
+    after, slid = slide_routes(scene, solution.projectors, before)
+    routes, proof = after.routes, after.certificate
+    assert routes is not None
+    rows = lit_samples(
+        scene, solution.projectors, scene.target_samples(_FRESH, _STREAM)
+    )
+    reached = measured_by(scene, before.reference, rows).any(axis=1)
+    shares = [
+        measured_by(scene, cameras, rows)[reached].any(axis=1).mean()
+        for cameras in (before.cameras, slid.cameras)
+    ]
+    apart = (slid.smallest_before_m, slid.smallest_after_m)
+    if after is not before:
+        # The paper's cameras slid along their route: what the cover's began with counts.
+        apart = (_smallest(scene, solution), slid.smallest_after_m)
+    gain = apart[1] / apart[0] if apart[0] and apart[1] else None
+    told = "no neighbours" if gain is None else " -> ".join(_mm(a) for a in apart)
+    cells = (
+        str(len(after.cameras)),
+        str(proof["candidates"]["lower_bound"]),
+        _count(routes.cover),
+        _count(routes.paper),
+        routes.taken,
+        told,
+        "" if gain is None else f"{gain - 1:+.1%}",
+        *(f"{share:.2%}" for share in shares),
+    )
+    above = np.inf if routes.paper is None else routes.paper - (routes.cover or 0)
+    return Found(cells, above, gain, float(shares[0] - shares[1]))
+
+
+def _placed(mesh: TriangleMesh, up: str | None) -> tuple[Scene, CameraSolution]:
+    rig = load_rig("default")
+    cut, _ = cut_for_curvature(mesh)
+    asked = dict.fromkeys(
+        ("max_cameras", "dominant_coverage", "coverage", "min_reachable", "accuracy_mm")
+    ) | {"max_projectors": _PROJECTORS, "target": "dominant", "up": up}
+    clock = Stopwatch(None)
+    ready = prepared(Order(cut, rig, asked, 0, 2, ()), clock)
+    projectors: tuple[PlannedProjector, ...] = widen_margins(
+        ready.scene, first_projectors(ready, clock)
+    )
+    camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
+    n = max(rig.n_candidate_cameras, rig.n_reference_cameras)
+    placed = place_cameras(ready.scene, projectors, camera, n, ready.tilt)
+    return ready.scene, placed
+
+
+def _smallest(scene: Scene, solution: CameraSolution) -> float | None:
+    """Smallest baseline of the cover's cameras before they slide."""
+    stage = replace(solution.stage, routes=None)
+    return slide_routes(scene, solution.projectors, stage)[1].smallest_before_m
+
+
+def _by_paper(mesh: TriangleMesh, up: str | None, *, check: bool) -> tuple[str, ...]:
+    """The plan of the paper's route alone, and what the audit says of it."""
+    try:
+        plan = plan_rig(
+            mesh,
+            load_rig("default"),
+            max_projectors=_PROJECTORS,
+            up=up,
+            check=check,
+            cameras_by="paper",
+        )
+    except RequirementError as error:
+        plan = error.plan
+    false = audit_plan(plan, seed=20_261_122).failures
+    areas = plan.coverage["target"]
+    measured = areas["measured_m2"] / areas["reachable_by_cameras_m2"]
+    return str(len(plan.cameras)), f"{measured:.2%}", str(len(false)), _checked(plan)
+
+
+def _checked(plan: RigPlan) -> str:
+    check = plan.document["reconstruction"]
+    if check is None:
+        return "not made"
+    return "passed" if check["passed"] else "failed"
+
+
+def _count(number: int | None) -> str:
+    return "none" if number is None else str(number)
+
+
+def _mm(length_m: float | None) -> str:
+    return f"{1e3 * (length_m or 0.0):.0f}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
