@@ -1,7 +1,7 @@
 """Count the cameras of both routes, and what the baseline program gains.
 
-Usage: python benchmarks/camera_counts.py [--check] [NAME ...]   (ringrig installed, from
-a checkout)
+Usage: python benchmarks/camera_counts.py [--check] [NAME ...]
+(ringrig installed, from a checkout)
 
 Plans the sample and the twelve meshes in `../shared/data/meshes` (those named, if any)
 with the default rig and up to three projectors, each in the unit or size that
@@ -147,7 +147,7 @@ def _by_default(mesh: TriangleMesh, up: str | None) -> Found:
     ]
     apart = (slid.smallest_before_m, slid.smallest_after_m)
     if after is not before:
-        # The paper's cameras slid along their route: what the cover's began with counts.
+        # The paper's slid along their route: what the cover's began with counts.
         apart = (_smallest(scene, solution), slid.smallest_after_m)
     gain = apart[1] / apart[0] if apart[0] and apart[1] else None
     told = "no neighbours" if gain is None else " -> ".join(_mm(a) for a in apart)
