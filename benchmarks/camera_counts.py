@@ -11,7 +11,8 @@ with the default rig and up to three projectors, each in the unit or size that
   was taken; the smallest baseline of neighbours and the measured share before and after
   the cameras slide apart, on fresh samples;
 - with `--cameras-by paper`, as a plan of its own: cameras, measured share as claimed,
-  false claims that the audit finds and, with --check, the check from pixels.
+  false claims that the audit finds and, with --check, the check from pixels; what
+  either finds goes to standard error.
 
 Shares are of what is reachable by cameras. Last come the two figures over all meshes.
 """
@@ -202,6 +203,9 @@ def _by_paper(mesh: TriangleMesh, up: str | None, *, check: bool) -> tuple[str, 
     except RequirementError as error:
         plan = error.plan
     false = audit_plan(plan, seed=20_261_122).failures
+    check = plan.document["reconstruction"] or {"failures": []}
+    for sentence in (*false, *check["failures"]):
+        print(f"  {sentence}", file=sys.stderr, flush=True)
     areas = plan.coverage["target"]
     measured = areas["measured_m2"] / areas["reachable_by_cameras_m2"]
     return str(len(plan.cameras)), f"{measured:.2%}", str(len(false)), _checked(plan)

@@ -25,7 +25,7 @@ _Array = NDArray[np.float64]
 # Share of the seam that may be past the limit: on a rough surface the tightest samples
 # are past it wherever the camera stands.
 GIVEN_UP = (0.0, 0.1, 0.3)
-_BISECTIONS = 14
+BISECTIONS = 14
 # Samples of a seam that are looked at, at most.
 _SEAM = 64
 # Nearer to camera 1, or to the other side of the object, than this isn't looked at.
@@ -56,6 +56,7 @@ def limit_poses(
     *,
     only: int | None = None,
     given_up: Sequence[float] = GIVEN_UP,
+    bisections: int = BISECTIONS,
 ) -> list[PlannedCamera]:
     """Return cameras at d_max from a neighbour, in both orders of every pair.
 
@@ -68,6 +69,7 @@ def limit_poses(
         limits: What binds.
         only: The camera to move; None: every one.
         given_up: Shares of the seam that may be past the limit, a pose for each.
+        bisections: Halvings of the angle between the cameras.
     """
     weights = np.ones(len(parts.points))
     pairs = neighbouring_pairs(parts.measured_by, weights, parts.adjacent)
@@ -83,7 +85,9 @@ def limit_poses(
         if len(seam.points) and seam.shares_border:
             arc = _Arc.through(cameras, first, second, limits)
             moved = arc.camera(aims[second], float(rolls[second]))
-            found += _at_limit(cameras, parts, seam, arc, moved, limits, given_up)
+            found += _at_limit(
+                cameras, parts, seam, arc, moved, limits, given_up, bisections
+            )
     return found
 
 
@@ -144,6 +148,7 @@ def _at_limit(
     moved: Callable[[float], PlannedCamera],
     limits: SpreadLimits,
     given_up: Sequence[float],
+    bisections: int,
 ) -> list[PlannedCamera]:
     """Camera 2 where it reaches all of the seam just so, and where most of it."""
     pair = list(cameras)
@@ -156,7 +161,7 @@ def _at_limit(
     found: list[PlannedCamera] = []
     for share in given_up:
         rank = int(share * (len(seam.points) - 1))
-        turn = _last_turn(lambda at, k=rank: float(slack(at)[k]), arc.turn)
+        turn = _last_turn(lambda at, k=rank: float(slack(at)[k]), arc.turn, bisections)
         if turn is None:
             continue
         camera = moved(turn)
@@ -167,14 +172,16 @@ def _at_limit(
     return found
 
 
-def _last_turn(slack: Callable[[float], float], now: float) -> float | None:
+def _last_turn(
+    slack: Callable[[float], float], now: float, bisections: int
+) -> float | None:
     """Return the turn next to the present one at which the slack is used up."""
     if not _LEAST_TURN < now < np.pi - _LEAST_TURN:
         return None
     low, high = (now, np.pi - _LEAST_TURN) if slack(now) >= 0.0 else (_LEAST_TURN, now)
     if not (slack(low) >= 0.0 > slack(high)):
         return None
-    for _ in range(_BISECTIONS):
+    for _ in range(bisections):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if slack(middle) >= 0.0 else (low, middle)
     return low

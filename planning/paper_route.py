@@ -29,16 +29,18 @@ _Array = NDArray[np.float64]
 _Measured = NDArray[np.bool_]
 Cameras = tuple[PlannedCamera, ...]
 
-# Seeds that are grown where they must and thinned; the best of them slides.
-_SEEDS = 4
+# Rings that are grown where they must, of either rank.
+_SEEDS = 2
 # Directions looked at for a camera that is added, over what is left.
 _OVER_LEFT = 12
+_TRIED = 4
 # Turns about the centre by which cameras close a gap [rad].
 _TURNS = np.radians([3.0, 8.0, 18.0])
 _AZIMUTHS = 6
 _SWEEPS = 3
 # Share of a seam that may be past the limit where a camera moves to it.
 _GIVEN_UP = (0.1,)
+_BISECTIONS = 8
 # A gap wider than this share of what is required isn't closed by turns like these.
 _CLOSABLE = 0.2
 # Counts beyond the final one for which cameras are wanted.
@@ -138,11 +140,8 @@ def paper_route(ground: Ground) -> PaperRoute:
         nothing more helps.
     """
     by_count: dict[int, Cameras] = {}
-    stand = _best_seed(ground, by_count)
-    while True:
-        stand, best_without_one = _fewest(ground, stand, by_count)
-        if len(stand.cameras) == len(ground.given):
-            break
+    stand, best_without_one = _best_start(ground, by_count)
+    while len(stand.cameras) > len(ground.given):
         slid = ground.slide(stand.cameras)
         stand = Stand(slid.cameras, slid.measured_by)
         by_count[len(stand.cameras)] = stand.cameras
@@ -150,10 +149,29 @@ def paper_route(ground: Ground) -> PaperRoute:
         best_without_one = max(best_without_one, 0 if fewer is None else fewer.rows)
         if fewer is None or fewer.rows < ground.required:
             break
-        stand = fewer
+        stand, best_without_one = _fewest(ground, fewer, by_count)
+        stand = _swept(ground, stand)
     _fill(ground, stand, by_count)
+    by_count.pop(0, None)
     met = stand.rows >= ground.required
     return PaperRoute(stand, by_count, met, best_without_one)
+
+
+def _best_start(ground: Ground, by_count: dict[int, Cameras]) -> tuple[Stand, int]:
+    """What is left of the best ring, when none can go; and what one fewer measured.
+
+    The ring that measures most isn't always the one that can spare a camera.
+    """
+    seeds = _seeds(ground)
+    most = min(seeds, key=lambda seed: _rank(ground, seed))
+    spare = min(seeds, key=lambda seed: _rank_by_spare(ground, seed))
+    found, trail = _fewest(ground, most, by_count), {}
+    if spare is not most:
+        other = _fewest(ground, spare, trail)
+        if _rank(ground, other[0])[:2] < _rank(ground, found[0])[:2]:
+            by_count.update(trail)
+            found = other
+    return _swept(ground, found[0]), found[1]
 
 
 def _fewest(
@@ -168,17 +186,12 @@ def _fewest(
         stand = fewer
 
 
-def _best_seed(ground: Ground, by_count: dict[int, Cameras]) -> Stand:
-    """The ring that needs fewest cameras, once grown and thinned."""
-    best, trail = None, {}
-    for seed in _rings(ground):
-        sets: dict[int, Cameras] = {}
-        thin = _thinned(ground, _grown(ground, _bearing(ground, seed)), sets)
-        if best is None or _rank(ground, thin) < _rank(ground, best):
-            best, trail = thin, sets
-    assert best is not None
-    by_count.update(trail)
-    return best
+def _seeds(ground: Ground) -> list[Stand]:
+    """Rings that promise most, grown and thinned."""
+    return [
+        _thinned(ground, _grown(ground, _bearing(ground, ring)))
+        for ring in _rings(ground)
+    ]
 
 
 def _rings(ground: Ground) -> list[Stand]:
@@ -195,9 +208,12 @@ def _rings(ground: Ground) -> list[Stand]:
     )
     given = Stand(ground.given, ground.measure(ground.given))
     stands = [given, *_stood(ground, rings, given)]
-    thinned = [_thinned(ground, stand, {}) for stand in stands]
-    order = sorted(range(len(stands)), key=lambda i: (_rank(ground, thinned[i]), i))
-    return [thinned[i] for i in order[:_SEEDS]]
+    thinned = [_thinned(ground, stand) for stand in stands]
+    best: dict[int, None] = {}
+    for rank in (_rank, _rank_by_spare):
+        ranks = [rank(ground, stand) for stand in thinned]
+        best |= dict.fromkeys(sorted(range(len(ranks)), key=ranks.__getitem__)[:_SEEDS])
+    return [thinned[i] for i in best]
 
 
 def _stood(ground: Ground, rings: Sequence[Ring], given: Stand) -> list[Stand]:
@@ -223,6 +239,13 @@ def _rank(ground: Ground, stand: Stand) -> tuple[int, int, int]:
     """Least for what meets the requirement with fewest, then for most measured."""
     short = max(ground.required - stand.rows, 0)
     return short, len(stand.cameras), -stand.rows
+
+
+def _rank_by_spare(ground: Ground, stand: Stand) -> tuple[int, int, int]:
+    """The same, but last for what most is measured of with one camera fewer."""
+    short, count, rows = _rank(ground, stand)
+    free = _least_missed(ground, stand)
+    return short, count, -stand.without(free[0]).rows if free else rows
 
 
 def _bearing(ground: Ground, stand: Stand) -> Stand:
@@ -258,7 +281,7 @@ def _one_more(ground: Ground, stand: Stand) -> Stand | None:
     if not len(left) or not offered:
         return None
     gain = ground.measure(offered)[left].sum(axis=0)
-    for i in np.argsort(-gain, kind="stable")[:_SEEDS]:
+    for i in np.argsort(-gain, kind="stable")[:_TRIED]:
         cameras = (*stand.cameras, offered[int(i)])
         more = Stand(cameras, ground.together(cameras))
         if gain[i] and more.rows > stand.rows:
@@ -283,16 +306,14 @@ def _over(ground: Ground, left: NDArray[np.int64]) -> _Array:
     return places / np.linalg.norm(places, axis=1, keepdims=True)
 
 
-def _thinned(ground: Ground, stand: Stand, sets: dict[int, Cameras]) -> Stand:
-    """Drop cameras as long as the rest measures enough; note the sets on the way."""
-    sets[len(stand.cameras)] = stand.cameras
+def _thinned(ground: Ground, stand: Stand) -> Stand:
+    """Drop cameras as long as the rest measures enough."""
     enough = min(ground.required, stand.rows)
     while len(stand.cameras) > len(ground.given):
         fewer = stand.without(_least_missed(ground, stand)[0])
         if fewer.rows < enough:
             break
         stand = fewer
-        sets[len(stand.cameras)] = stand.cameras
     return stand
 
 
@@ -319,50 +340,72 @@ def _one_fewer(ground: Ground, stand: Stand, most: int = 3) -> Stand | None:
 
 
 def _closed(ground: Ground, stand: Stand) -> Stand:
-    """Move one camera at a time over the gap, by turns and to the limit (10)."""
-    for _ in range(_SWEEPS):
+    """Move cameras over the gap until enough is measured, or too little helps."""
+    for sweep in range(_SWEEPS):
         short = ground.required - stand.rows
+        if short <= 0:
+            break
         before = stand.rows
-        for camera in range(len(ground.given), len(stand.cameras)):
-            stand = _moved(ground, stand, camera)
+        stand = _swept(ground, stand, to_limit=sweep == 0)
         # Less than half of what is missing won't do in what is left of the sweeps.
-        if stand.rows == before or 2 * (stand.rows - before) < short:
+        if 2 * (stand.rows - before) < short:
             break
     return stand
 
 
-def _moved(ground: Ground, stand: Stand, camera: int) -> Stand:
-    """Return the stand with a camera where all together measure most."""
-    offered = _places(ground, stand, camera)
+def _swept(ground: Ground, stand: Stand, *, to_limit: bool = False) -> Stand:
+    """Move one camera after the other to where all together measure most."""
+    for camera in range(len(ground.given), len(stand.cameras)):
+        offered = _turned(ground, stand, camera)
+        if to_limit:
+            offered += _to_limit(ground, stand, camera)
+        stand = _moved(ground, stand, camera, offered)
+    return stand
+
+
+def _moved(ground: Ground, stand: Stand, camera: int, offered: Cameras) -> Stand:
+    """Return the stand with a camera at the best of its poses, or as it was."""
     if not offered:
         return stand
     others = stand.without(camera).measured.any(axis=1)
     gain = ground.measure(offered)[~others].sum(axis=0)
     best = int(np.argmax(gain))
+    if gain[best] <= stand.rows - int(others.sum()):
+        return stand
     cameras = list(stand.cameras)
     cameras[camera] = offered[best]
     moved = Stand(tuple(cameras), ground.together(cameras))
     return moved if moved.rows > stand.rows else stand
 
 
-def _places(ground: Ground, stand: Stand, camera: int) -> Cameras:
+def _turned(ground: Ground, stand: Stand, camera: int) -> Cameras:
+    """Poses around one, turned about the centre."""
     centre = np.array(ground.limits.workspace.centre)
     pose = stand.cameras[camera].world_from_device
     outwards = pose[:3, 3] - centre
     outwards = outwards / np.linalg.norm(outwards)
-    # Across the line to the centre; the device's own x may lie along it side by side.
+    # Side by side a device's own x may lie along the line to the centre.
     x = pose[:3, 0] - (pose[:3, 0] @ outwards) * outwards
     x = x / np.linalg.norm(x)
     y = np.cross(outwards, x)
     azimuth = 2.0 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
     aside = np.cos(azimuth)[:, None] * x + np.sin(azimuth)[:, None] * y
     turned = [np.cos(t) * outwards + np.sin(t) * aside for t in _TURNS]
-    around = ground.stand(np.concatenate(turned))
+    return ground.stand(np.concatenate(turned))
+
+
+def _to_limit(ground: Ground, stand: Stand, camera: int) -> Cameras:
+    """Poses of one at d_max from its neighbours."""
     parts = ground.parts(stand.measured)
-    limit = limit_poses(
-        stand.cameras, parts, ground.limits, only=camera, given_up=_GIVEN_UP
+    found = limit_poses(
+        stand.cameras,
+        parts,
+        ground.limits,
+        only=camera,
+        given_up=_GIVEN_UP,
+        bisections=_BISECTIONS,
     )
-    return (*around, *limit)
+    return tuple(found)
 
 
 def _fill(ground: Ground, stand: Stand, by_count: dict[int, Cameras]) -> None:

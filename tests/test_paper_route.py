@@ -1,0 +1,308 @@
+"""The paper's route to the cameras on bodies whose fewest cameras have a closed form."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.devices import PinholeModel
+from geometry.poses import look_at
+from geometry.primitives import sphere
+from planning import RigPlan
+from planning.audit import audit_plan
+from planning.camera_routes import better_route, cover_by_cover, slide_routes
+from planning.camera_spread import spread_cameras
+from planning.cameras import camera_stage, measured_by
+from planning.coverage_triangle import (
+    cylinder_limit,
+    round_body_limit,
+    sphere_band_limit,
+)
+from planning.limit_poses import Parts, limit_poses
+from planning.paper_cameras import cover_by_paper, cover_of, route_among
+from planning.paper_route import Ground, paper_route
+from planning.plan import PlannedCamera, PlannedProjector
+from planning.projectors import plan_projectors
+from planning.requirements import Workspace
+from planning.rig import load_rig
+from planning.ring_seeds import ring_seeds
+from planning.rings import uniform_radii
+from planning.sample_head import write_sample
+from planning.scene import Scene
+from planning.seams import adjacency
+from planning.sights import Sights
+from planning.spread_problem import SpreadLimits
+from planning.zones import Box
+
+THETA = np.radians(60.0)
+RADIUS, RING = 0.1, 1.0
+UP = np.array([0.0, 0.0, 1.0])
+# So wide that incidence alone decides.
+DEVICE = PinholeModel(
+    np.array([[300.0, 0, 319.5], [0, 300.0, 239.5], [0, 0, 1]]), (640, 480), (0.1, 3.0)
+)
+ETA = round_body_limit(RADIUS, RING, THETA).half_angle
+
+
+def workspace(**changes):
+    values = {
+        "centre": (0.0, 0.0, 0.0),
+        "object_radius_m": RADIUS,
+        "up": (0.0, 0.0, 1.0),
+        "axis": (0.0, 0.0, 1.0),
+        "half_angle": np.pi,
+        "projector_radius_m": (RING, RING),
+        "camera_radius_m": (RING, RING),
+        "floor_m": None,
+        "n_reference_projectors": 1,
+        "n_reference_cameras": 1,
+        "reference_ring_radius": 1.0,
+        **changes,
+    }
+    return Workspace(**values)
+
+
+def camera_at(direction):
+    pose = look_at(RING * np.asarray(direction, dtype=np.float64), np.zeros(3), UP)
+    return PlannedCamera("", pose, DEVICE)
+
+
+def at(azimuth):
+    return camera_at([np.cos(azimuth), np.sin(azimuth), 0.0])
+
+
+def azimuths(cameras):
+    centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras])
+    return np.sort(np.arctan2(centres[:, 1], centres[:, 0]))
+
+
+class Body:
+    """Samples of a convex body: nothing hides behind anything else."""
+
+    def __init__(self, points, normals):
+        self.points, self.normals = points, normals
+        self.near = adjacency(points, normals)
+
+    def measure(self, cameras):
+        found = np.zeros((len(self.points), len(cameras)), dtype=bool)
+        for column, camera in enumerate(cameras):
+            ray = self.points - camera.world_from_device[:3, 3]
+            facing = -np.einsum("ij,ij->i", ray, self.normals)
+            found[:, column] = facing >= np.cos(THETA) * np.linalg.norm(ray, axis=1)
+        return found
+
+    def parts(self, cameras):
+        return Parts(self.points, self.normals, self.near, self.measure(cameras))
+
+    def ground(self, share=1.0, space=None, **changes):
+        limits = SpreadLimits(THETA, 0.0, space or workspace())
+
+        def slide(cameras):
+            return spread_cameras(
+                cameras,
+                lambda poses: self.measure(
+                    [
+                        replace(c, world_from_device=p)
+                        for c, p in zip(cameras, poses, strict=True)
+                    ]
+                ),
+                points=self.points,
+                normals=self.normals,
+                weights=1.0,
+                limits=limits,
+                max_evaluations=12,
+                max_programs=3,
+            )
+
+        values = {
+            "points": self.points,
+            "normals": self.normals,
+            "measure": self.measure,
+            "together": self.measure,
+            "stand": lambda directions: tuple(camera_at(d) for d in directions),
+            "slide": slide,
+            "device": DEVICE,
+            "ring_radius": RING,
+            "limits": limits,
+            "required": int(np.ceil(share * len(self.points))),
+            **changes,
+        }
+        return Ground(**values)
+
+
+def around(z, n=150, span=np.pi):
+    """Azimuths and heights of a grid about the vertical, both (n * len(z),)."""
+    azimuth = np.linspace(-span, span, n, endpoint=span < np.pi)
+    return (a.ravel() for a in np.meshgrid(azimuth, z))
+
+
+def band(latitude, *, n=150, span=np.pi):
+    azimuth, lift = around(np.linspace(-latitude, latitude, 7), n, span)
+    flat = np.cos(lift)
+    normals = np.column_stack(
+        [flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(lift)]
+    )
+    return Body(RADIUS * normals, normals)
+
+
+def side(half_height):
+    azimuth, z = around(np.linspace(-half_height, half_height, 7))
+    normals = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros(len(z))])
+    return Body(RADIUS * normals + z[:, None] * UP, normals)
+
+
+@pytest.mark.parametrize(("latitude", "count"), [(10.0, 4), (42.0, 5)])
+def test_a_sphere_band_takes_as_many_as_its_closed_form_says(latitude, count):
+    latitude = np.radians(latitude)
+    assert sphere_band_limit(RADIUS, RING, THETA, latitude).n_min == count
+    body = band(latitude)
+    route = paper_route(body.ground())
+    assert route.met
+    assert len(route.stand.cameras) == count
+    assert body.measure(route.stand.cameras).any(axis=1).all()
+    assert route.best_without_one < len(body.points)
+
+
+@pytest.mark.parametrize(("half_height", "count"), [(0.02, 4), (0.9, 5)])
+def test_an_upright_cylinder_takes_as_many_as_its_closed_form_says(half_height, count):
+    assert cylinder_limit(RADIUS, RING, THETA, half_height).n_min == count
+    route = paper_route(side(half_height).ground())
+    assert route.met
+    assert len(route.stand.cameras) == count
+
+
+def test_a_part_of_the_turn_lets_cameras_go_and_the_rest_slide_to_the_limit():
+    """Two of the ring's four do for 200 degrees, at most 2 eta = 110 degrees apart."""
+    body = band(np.radians(5.0), span=np.radians(100.0))
+    route = paper_route(body.ground())
+    assert route.met
+    first, last = azimuths(route.stand.cameras)
+    assert 2.0 * (np.radians(100.0) - ETA) < last - first < 2.0 * ETA
+    assert 2.0 * np.sin((last - first) / 2) == pytest.approx(
+        round_body_limit(RADIUS, RING, THETA).d_max, rel=0.04
+    )
+    # On the way it passed others, and one alone measures what one can.
+    assert set(route.by_count) >= {1, 2}
+    one = body.measure(route.by_count[1]).any(axis=1).mean()
+    assert one == pytest.approx(np.degrees(2 * ETA) / 200.0, abs=0.06)
+
+
+def test_half_of_the_turn_takes_half_of_the_ring():
+    """A share of the requirement is what must be measured, no more."""
+    route = paper_route(band(np.radians(5.0)).ground(share=0.58))
+    assert route.met
+    assert len(route.stand.cameras) == 2
+
+
+def test_a_seed_that_misses_a_part_grows_a_camera_over_it():
+    """Far arms beyond the ring's reach: on the pole, which no camera on a ring sees."""
+    ring, pole = band(np.radians(5.0)), np.array([[0.0, 0.0, 1.0]])
+    several = np.repeat(pole, 40, axis=0)
+    body = Body(
+        np.concatenate([ring.points, RADIUS * several]),
+        np.concatenate([ring.normals, several]),
+    )
+    route = paper_route(body.ground())
+    assert route.met
+    # An upright ring of four sees both poles and all of the equator but its nodes' sides
+    # or the level ring takes a fifth over the pole: never fewer than the equator's four.
+    assert len(route.stand.cameras) in (4, 5)
+    assert body.measure(route.stand.cameras)[-1].any()
+
+
+def test_what_no_camera_can_measure_ends_the_route_short():
+    body = band(np.radians(5.0))
+    blind = replace(body.ground(), measure=body.measure, required=len(body.points) + 1)
+    route = paper_route(blind)
+    assert not route.met
+    assert route.stand.rows == len(body.points)
+    nothing = body.ground(stand=lambda directions: ())
+    assert paper_route(nothing).by_count == {}
+
+
+def test_cameras_that_stand_already_stay_and_count():
+    body = band(np.radians(5.0))
+    given = replace(at(0.3), existing="old")
+    route = paper_route(body.ground(given=(given,)))
+    assert route.met
+    assert len(route.stand.cameras) == 4
+    np.testing.assert_array_equal(
+        route.stand.cameras[0].world_from_device, given.world_from_device
+    )
+
+
+def test_ring_seeds_stand_at_the_pitch_of_the_section():
+    body = band(np.radians(20.0))
+    rings = list(ring_seeds(body.points, workspace(), DEVICE, RING, THETA))
+    upright = [ring for ring in rings if np.allclose(ring.axis, UP)]
+    assert [len(ring.directions) for ring in upright] == [4, 4, 5, 5, 6, 6]
+    for ring in rings:
+        apart = np.arccos(ring.directions[0] @ ring.directions[1])
+        assert apart == pytest.approx(2.0 * np.pi / len(ring.directions))
+        assert apart <= 2.0 * ring.limit.half_angle
+        np.testing.assert_allclose(ring.directions @ ring.axis, 0.0, atol=1e-12)
+    # A field of 3 degrees sees less of the disc than incidence does.
+    narrow = PinholeModel(
+        np.array([[9000.0, 0, 319.5], [0, 9000.0, 239.5], [0, 0, 1]]),
+        (640, 480),
+        (0, 3),
+    )
+    more = next(ring_seeds(body.points, workspace(), narrow, RING, THETA))
+    assert more.limit.n_min > 4
+
+
+def test_a_pose_at_the_limit_just_reaches_the_seam():
+    """d = 2 S sin(eta) on a round body; a degree beyond leaves a gap, within none."""
+    body = band(np.radians(2.0), n=1441, span=np.radians(110.0))
+    limits = SpreadLimits(THETA, 0.0, workspace())
+    for apart in (1.2, 1.7):
+        pair = [at(-apart / 2), at(apart / 2)]
+        found = limit_poses(pair, body.parts(pair), limits, only=1, given_up=(0.0,))
+        (moved,) = found
+        d = np.linalg.norm((moved.world_from_device - pair[0].world_from_device)[:3, 3])
+        assert d == pytest.approx(2.0 * np.sin(ETA), rel=3e-3)
+        turn = azimuths([moved])[0]
+        inside = np.abs(np.arctan2(body.points[:, 1], body.points[:, 0])) < 0.8
+        for beyond, whole in ((-np.radians(1.0), True), (np.radians(1.0), False)):
+            seen = body.measure([pair[0], at(turn + beyond)]).any(axis=1)
+            assert seen[inside].all() == whole
+
+
+def test_a_pose_at_the_limit_keeps_the_workspace_and_what_stands_already():
+    body = band(np.radians(2.0), span=np.radians(110.0))
+    pair = [at(-0.6), at(0.6)]
+    parts = body.parts(pair)
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    wall = Box("wall", (0.0, 1.0, 0.0), (2.0, 0.3, 2.0), axes)
+    barred = SpreadLimits(THETA, 0.0, workspace(keep_out=(wall,)))
+    free = SpreadLimits(THETA, 0.0, workspace())
+    assert len(limit_poses(pair, parts, free, given_up=(0.0,))) == 2
+    (one,) = limit_poses(pair, parts, barred, given_up=(0.0,))
+    assert azimuths([one])[0] < 0.0
+    fixed = [replace(pair[0], existing="old"), pair[1]]
+    (other,) = limit_poses(fixed, parts, free, given_up=(0.0,))
+    assert azimuths([other])[0] > 0.0
+
+
+@pytest.fixture(scope="module")
+def lit_ball():
+    """A ball, most of it lit, and candidates too coarse to stand at the limit."""
+    ball = sphere(RADIUS, subdivisions=4)
+    rig = load_rig("default")
+    required = rig.requirements(
+        ball.centre,
+        ball.radius,
+        max_projectors=6,
+        target="surface",
+        tau_m=0.004,
+        dominant_coverage=0.6,
+    )
+    n = len(ball.faces)
+    scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
+    eye = np.eye(4)
+    radii = uniform_radii(0.3, 0.0035)
+    template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
+    offset = (rig.ring_tilt_rad, -np.pi / 2)
+    stage = plan_projectors(scene, template, 120, ring_offset=offset, rounds=1)
+    return scene, stage.projectors, PlannedCamera("", eye, rig.camera_device())
