@@ -10,7 +10,7 @@ with the default rig and up to three projectors, each in the unit or size that
 - by default: cameras, the bound over the candidates, what either route needs and which
   was taken; the smallest baseline of neighbours and the measured share before and after
   the cameras slide apart, on fresh samples;
-- with `--cameras-by paper`, as a plan of its own: cameras, measured share as claimed,
+- with `--cameras-by paper`, written as a plan: cameras, measured share as claimed,
   false claims that the audit finds and, with --check, the check from pixels; what
   either finds goes to standard error.
 
@@ -31,18 +31,20 @@ from from_tests import load
 
 from geometry.mesh import TriangleMesh
 from geometry.refinement import cut_for_curvature
-from planning import RigPlan, load_mesh, load_rig
+from planning import load_mesh, load_rig, verify_plan
+from planning.assemble import write_plan
 from planning.audit import audit_plan
 from planning.camera_routes import slide_routes
 from planning.camera_stage import CameraSolution, place_cameras
 from planning.cameras import lit_samples, measured_by
-from planning.draft import Order
-from planning.errors import RequirementError
-from planning.pipeline import plan_rig
+from planning.draft import Draft, Order
+from planning.pipeline import _polish
 from planning.plan import PlannedCamera, PlannedProjector
-from planning.prepare import first_projectors, prepared
+from planning.prepare import Prepared, first_projectors, prepared
 from planning.progress import Stopwatch
 from planning.projector_poses import widen_margins
+from planning.projectors import ProjectorStage
+from planning.routes import CamerasBy
 from planning.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -96,8 +98,9 @@ def main() -> int:
     found: list[Found] = []
     for name, mesh, up in _meshes(names):
         begin = time.process_time()
-        by_default = _by_default(mesh, up)
-        by_paper = _by_paper(mesh, up, check="--check" in sys.argv)
+        job = _job(mesh, up)
+        by_default = _by_default(job)
+        by_paper = _by_paper(job, check="--check" in sys.argv)
         spent = f"{time.process_time() - begin:.0f}"
         found.append(by_default)
         cells = (name, *by_default.cells, *by_paper, spent)
@@ -131,9 +134,43 @@ def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh, str | None]]:
             yield mesh.path.name, load_mesh(mesh.path, **mesh.options), up
 
 
-def _by_default(mesh: TriangleMesh, up: str | None) -> Found:
-    """The routes for one set of projectors, as far as the slides."""
-    scene, solution = _placed(mesh, up)
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One mesh with its projectors, as far as the cameras."""
+
+    order: Order
+    ready: Prepared
+    stage: ProjectorStage
+    projectors: tuple[PlannedProjector, ...]
+    clock: Stopwatch
+
+    def place(self, by: CamerasBy) -> CameraSolution:
+        """Place the cameras."""
+        rig, ready = self.order.rig, self.ready
+        body = rig.camera_body()
+        camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=body)
+        n = max(rig.n_candidate_cameras, rig.n_reference_cameras)
+        with self.clock.stage("cameras", "cameras"):
+            return place_cameras(
+                ready.scene, self.projectors, camera, n, ready.tilt, by
+            )
+
+
+def _job(mesh: TriangleMesh, up: str | None) -> Job:
+    cut, _ = cut_for_curvature(mesh)
+    asked = dict.fromkeys(
+        ("max_cameras", "dominant_coverage", "coverage", "min_reachable", "accuracy_mm")
+    ) | {"max_projectors": _PROJECTORS, "target": "dominant", "up": up}
+    order = Order(cut, load_rig("default"), asked, 0, 2, ())
+    clock = Stopwatch(None)
+    ready = prepared(order, clock)
+    stage = first_projectors(ready, clock)
+    return Job(order, ready, stage, widen_margins(ready.scene, stage), clock)
+
+
+def _by_default(job: Job) -> Found:
+    """The better route, as far as the slides."""
+    scene, solution = job.ready.scene, job.place("both")
     before = solution.stage
     after, slid = slide_routes(scene, solution.projectors, before)
     routes, proof = after.routes, after.certificate
@@ -166,56 +203,38 @@ def _by_default(mesh: TriangleMesh, up: str | None) -> Found:
     return Found(cells, above, gain, float(shares[0] - shares[1]))
 
 
-def _placed(mesh: TriangleMesh, up: str | None) -> tuple[Scene, CameraSolution]:
-    rig = load_rig("default")
-    cut, _ = cut_for_curvature(mesh)
-    asked = dict.fromkeys(
-        ("max_cameras", "dominant_coverage", "coverage", "min_reachable", "accuracy_mm")
-    ) | {"max_projectors": _PROJECTORS, "target": "dominant", "up": up}
-    clock = Stopwatch(None)
-    ready = prepared(Order(cut, rig, asked, 0, 2, ()), clock)
-    projectors: tuple[PlannedProjector, ...] = widen_margins(
-        ready.scene, first_projectors(ready, clock)
-    )
-    camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
-    n = max(rig.n_candidate_cameras, rig.n_reference_cameras)
-    placed = place_cameras(ready.scene, projectors, camera, n, ready.tilt)
-    return ready.scene, placed
-
-
 def _smallest(scene: Scene, solution: CameraSolution) -> float | None:
     """Smallest baseline of the cover's cameras before they slide."""
     stage = replace(solution.stage, routes=None)
     return slide_routes(scene, solution.projectors, stage)[1].smallest_before_m
 
 
-def _by_paper(mesh: TriangleMesh, up: str | None, *, check: bool) -> tuple[str, ...]:
+def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:
     """The plan of the paper's route alone, and what the audit says of it."""
-    try:
-        plan = plan_rig(
-            mesh,
-            load_rig("default"),
-            max_projectors=_PROJECTORS,
-            up=up,
-            check=check,
-            cameras_by="paper",
-        )
-    except RequirementError as error:
-        plan = error.plan
+    ready, placed, clock = job.ready, job.place("paper"), job.clock
+    draft = Draft(
+        replace(job.order, cameras_by="paper"),
+        ready.scene,
+        ready.regions,
+        ready.curvature_radius_m,
+        ready.tilt,
+        job.stage,
+        placed.projectors,
+        placed.stage,
+        placed.stage.cameras,
+    )
+    plan = write_plan(_polish(draft, clock), clock)
+    found = verify_plan(plan) if check else None
     false = audit_plan(plan, seed=20_261_122).failures
-    check = plan.document["reconstruction"] or {"failures": []}
-    for sentence in (*false, *check["failures"]):
+    pixels = None if found is None else found.reconstruction
+    for sentence in (*false, *(() if pixels is None else pixels.failures)):
         print(f"  {sentence}", file=sys.stderr, flush=True)
     areas = plan.coverage["target"]
     measured = areas["measured_m2"] / areas["reachable_by_cameras_m2"]
-    return str(len(plan.cameras)), f"{measured:.2%}", str(len(false)), _checked(plan)
-
-
-def _checked(plan: RigPlan) -> str:
-    check = plan.document["reconstruction"]
-    if check is None:
-        return "not made"
-    return "passed" if check["passed"] else "failed"
+    told = "not made"
+    if pixels is not None:
+        told = "failed" if pixels.failures else "passed"
+    return str(len(plan.cameras)), f"{measured:.2%}", str(len(false)), told
 
 
 def _count(number: int | None) -> str:

@@ -7,7 +7,7 @@ Where both need as many, the cover's cameras stay, unless the paper's stand clea
 farther apart and measure no less.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +30,11 @@ from .seams import adjacency, overlap_components
 from .selection import cover_problem
 from .sights import Sights
 
-Chooser = Callable[[Scene, tuple[PlannedProjector, ...], Sights], CameraCover]
+# Of a scene, projectors, candidates, and those that a route passed under other axes.
+ByCount = Mapping[int, NDArray[np.int64]]
+Chooser = Callable[
+    [Scene, tuple[PlannedProjector, ...], Sights, ByCount | None], CameraCover
+]
 
 # A smallest baseline counts as clearly larger from this ratio on.
 _CLEARLY = 1.1
@@ -54,7 +58,26 @@ def cover_by_cover(
 
 def chooser(by: CamerasBy) -> Chooser:
     """Return what chooses cameras for projectors: the cover, or the paper's route."""
-    return cover_by_paper if by == "paper" else cover_by_cover
+    return cover_by_paper if by == "paper" else _chosen_anew
+
+
+def _chosen_anew(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    offered: Sights,
+    by_count: ByCount | None = None,
+) -> CameraCover:
+    """The cover; a cover leaves nothing to keep."""
+    return cover_by_cover(scene, projectors, offered)
+
+
+def passed_by(stage: CameraStage) -> ByCount:
+    """Return the candidates for each number of cameras of a stage."""
+    place = {id(camera): i for i, camera in enumerate(stage.offered.cameras)}
+    return {
+        n: np.array([place[id(camera)] for camera in cameras], dtype=np.int64)
+        for n, cameras in stage.by_count.items()
+    }
 
 
 def better_route(
@@ -72,6 +95,7 @@ def better_route(
         by: What was asked.
     """
     if by == "paper":
+        cover = _once_more(scene, projectors, cover)
         needed = cover.selection.needed
         met = cover.selection.best_rows >= cover.selection.required
         count = needed if met or needed > len(cover.cameras) else None
@@ -86,6 +110,16 @@ def better_route(
     if by == "both":
         why = "the paper's route found no camera that measures anything"
     return again, Routes(by, again.selection.needed, None, "cover", why)
+
+
+def _once_more(
+    scene: Scene, projectors: tuple[PlannedProjector, ...], cover: CameraCover
+) -> CameraCover:
+    """Take the paper's route under the final ring axes, if fewer aren't ruled out."""
+    if cover.selection.lower_bound >= cover.selection.needed:
+        return cover
+    again = cover_by_paper(scene, projectors, cover.offered)
+    return again if again.selection.needed < cover.selection.needed else cover
 
 
 def slide_routes(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .axis_moves import move_ring_axes
-from .camera_routes import Chooser, better_route, chooser, cover_by_cover
+from .camera_routes import better_route, chooser, passed_by
 from .cameras import (
     CameraCover,
     CameraStage,
@@ -57,10 +57,10 @@ def place_cameras(
         tilt: Tilt of the ring axes, or their shift, to search azimuths of.
         by: Route to the cameras.
     """
-    scene, choose = scene.among(projectors), chooser(by)
+    scene = scene.among(projectors)
     offered = offered_cameras(scene, template, n_candidates)
-    turned, cover = choose_cameras(scene, projectors, offered, tilt, choose)
-    moved, cover = move_axes(scene, turned, cover, choose)
+    turned, cover = choose_cameras(scene, projectors, offered, tilt, by)
+    moved, cover = move_axes(scene, turned, cover, by)
     cover, routes = better_route(scene, moved, cover, by)
     stage = replace(camera_stage(scene, cover), routes=routes)
     return CameraSolution(moved, stage)
@@ -71,7 +71,7 @@ def choose_cameras(
     projectors: Sequence[PlannedProjector],
     offered: Sights,
     tilt: float,
-    choose: Chooser = cover_by_cover,
+    by: CamerasBy = "cover",
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
     """Choose cameras, turn the ring axes for them, and choose again until it settles.
 
@@ -83,15 +83,16 @@ def choose_cameras(
         projectors: As planned.
         offered: Candidates, from `offered_cameras`.
         tilt: Tilt of the ring axes, or their shift.
-        choose: Chooses cameras for ring axes.
+        by: Route to the cameras.
     """
     kept = tuple(projectors)
-    best = choose(scene, kept, offered)
+    choose = chooser(by)
+    best = choose(scene, kept, offered, None)
     for _ in range(_ROUNDS):
         turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
         if not _differ(turned, kept):
             break
-        cover = choose(scene, turned, offered)
+        cover = choose(scene, turned, best.offered, best.by_count)
         if not _better(cover, best):
             break
         kept, best = turned, cover
@@ -102,7 +103,7 @@ def move_axes(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     cover: CameraCover,
-    choose: Chooser = cover_by_cover,
+    by: CamerasBy = "cover",
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
     """Move the ring axes to where errors are smallest, and choose cameras again.
 
@@ -114,7 +115,7 @@ def move_axes(
         scene: With the bodies of the projectors.
         projectors: As planned.
         cover: Cameras chosen for these ring axes.
-        choose: Chooses cameras for others.
+        by: Route to the cameras.
     """
     kept = tuple(projectors)
     for _ in range(_ROUNDS):
@@ -122,7 +123,7 @@ def move_axes(
         moved = move_ring_axes(among, kept, cover.cameras, cover.rows)
         if not _differ(moved, kept):
             break
-        again = choose(scene, moved, cover.offered)
+        again = chooser(by)(scene, moved, cover.offered, cover.by_count)
         if _better(cover, again):
             break
         as_chosen = with_cameras(again, cover)
@@ -171,7 +172,7 @@ def follow_cameras(
     moved = move_ring_axes(among, projectors, cameras, stage.rows)
     if _differ(moved, projectors):
         scene = scene.among(projectors)
-        cover = chooser(by)(scene, moved, stage.offered)
+        cover = chooser(by)(scene, moved, stage.offered, passed_by(stage))
         if proves_as_much(cover.selection, stage.certificate, len(cameras)):
             proved = replace(camera_stage(scene, cover), routes=stage.routes)
             return CameraSolution(moved, proved)

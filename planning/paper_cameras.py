@@ -79,7 +79,10 @@ class Routed:
 
 
 def cover_by_paper(
-    scene: Scene, projectors: tuple[PlannedProjector, ...], offered: Sights
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    offered: Sights,
+    by_count: Mapping[int, NDArray[np.int64]] | None = None,
 ) -> CameraCover:
     """Choose the cameras by the paper's route alone, confirmed on fresh samples.
 
@@ -88,6 +91,8 @@ def cover_by_paper(
         projectors: As planned, with their rings.
         offered: Candidates: they say what is reachable, and what is proved is proved
             over them and the cameras of the route.
+        by_count: Candidates that the route passed under other ring axes: they are kept
+            and only measured anew; None: the route is taken.
 
     Raises:
         InfeasibleLimitsError: If no candidate, or no camera of the route, measures any
@@ -97,6 +102,9 @@ def cover_by_paper(
     target = first_target(scene)
     rows, measured = rows_for(scene, projectors, offered, target)
     refuse_unmeasured(scene, offered, rows, measured)
+    if by_count is not None:
+        kept = _judged(scene, offered, measured, by_count, 1, 0.0)
+        return cover_of(scene, projectors, rows, kept)
     attempt = 0
     while True:
         attempt += 1
@@ -147,15 +155,27 @@ def route_among(
     sights = joined.on(rows.target)[len(offered.cameras) :]
     theirs = measured_by(scene, more, rows, sights)
     measured = np.concatenate([measured, theirs], axis=1)
-    reached = np.any(measured, axis=1)
+    without = route.best_without_one / max(1, int(measured[some].any(axis=1).sum()))
+    least = len(route.stand.cameras)
+    return _judged(scene, joined, measured, by_count, least, without)
+
+
+def _judged(
+    scene: Scene,
+    offered: Sights,
+    measured: NDArray[np.bool_],
+    by_count: Mapping[int, NDArray[np.int64]],
+    least: int,
+    without: float,
+) -> Routed:
+    """Say with how many of its cameras, at least so many, the route is enough."""
+    required = required_rows(np.any(measured, axis=1), scene.requirements.coverage)
     enough = [
         n
         for n, chosen in sorted(by_count.items())
-        if n >= len(route.stand.cameras)
-        and measured[:, chosen].any(axis=1).sum() >= required_rows(reached, share)
+        if n >= least and measured[:, chosen].any(axis=1).sum() >= required
     ]
-    without = route.best_without_one / max(1, int(measured[some].any(axis=1).sum()))
-    return Routed(joined, measured, by_count, enough[0] if enough else None, without)
+    return Routed(offered, measured, by_count, enough[0] if enough else None, without)
 
 
 def _ground(
