@@ -32,7 +32,8 @@ from .cameras import (
 from .candidates import cameras_towards, middle_radius_m
 from .errors import InfeasibleLimitsError
 from .existing import movable
-from .paper_route import Cameras, Ground, PaperRoute, paper_route
+from .paper_ground import Cameras, Ground
+from .paper_route import PaperRoute, paper_route
 from .plan import PlannedCamera, PlannedProjector
 from .projector_light import merged
 from .scene import Scene

@@ -14,7 +14,9 @@ from planning.coverage_triangle import (
     sphere_band_limit,
 )
 from planning.limit_poses import Parts, limit_poses
-from planning.paper_route import Ground, Stand, _grown, paper_route
+from planning.paper_ground import Ground, Stand
+from planning.paper_route import paper_route
+from planning.paper_seeds import grown
 from planning.plan import PlannedCamera
 from planning.requirements import Workspace
 from planning.ring_seeds import ring_seeds
@@ -194,10 +196,10 @@ def test_a_ring_that_misses_a_part_grows_a_camera_over_it():
     level = tuple(at(azimuth) for azimuth in np.arange(4) * np.pi / 2)
     short = Stand(level, body.measure(level))
     assert short.rows == len(ring.points)
-    grown = _grown(ground, short)
-    assert len(grown.cameras) == 5
-    assert grown.rows == len(body.points)
-    outwards = grown.cameras[4].world_from_device[:3, 3]
+    more = grown(ground, short)
+    assert len(more.cameras) == 5
+    assert more.rows == len(body.points)
+    outwards = more.cameras[4].world_from_device[:3, 3]
     assert outwards[2] > np.cos(ETA)
 
 
