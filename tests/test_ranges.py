@@ -11,7 +11,7 @@ from geometry.best_sphere import BestSphere, fit_sphere
 from geometry.sight_lines import SightLines, locate
 from planning.audit.ledger import Ledger
 from planning.audit.ranges import audit_ranges
-from planning.camera_stage import spread
+from planning.camera_routes import slide_routes
 from planning.errors import InfeasibleLimitsError, InputError
 from planning.pipeline import plan_rig
 from planning.plan import RigPlan
@@ -393,10 +393,10 @@ def plan(body, with_few_samples, tmp_path_factory):
 
     def noted(*words, spare_field):
         spared.append(spare_field)
-        return spread(*words, spare_field=spare_field)
+        return slide_routes(*words, spare_field=spare_field)
 
     with with_few_samples(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planning.pipeline.spread", noted)
+        patch.setattr("planning.pipeline.slide_routes", noted)
         made = plan_rig(body, load_rig(rig), max_projectors=8, check=False)
     assert set(spared) == {made.document["ranges"]["guard_rad"]}
     return made
