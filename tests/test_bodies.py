@@ -440,7 +440,7 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
 def test_moves_into_anothers_body_or_beam_are_refused(scene):
     lamps = [projector(body=HOUSING), projector(0.3, body=HOUSING, name="P2")]
     rows = scene.target_samples(500, 10)
-    state = _Lit(scene, rows, lamps)
+    state = _Lit(scene, rows, lamps, np.ones(len(rows), dtype=bool))
     beside = state.with_moved(1, projector(0.11, body=HOUSING))
     assert np.isfinite(beside).all()
     assert state.with_moved(1, projector(0.09, body=HOUSING)) is None

@@ -154,6 +154,8 @@ def test_two_beams_that_leave_a_gap_are_moved_together():
         scene,
         lattice,
         2,
+        finer=lambda: lattice,
+        reached=np.any(lattice.stages == LIT, axis=1),
         stages_of=lambda projectors: lit_stages(scene, projectors, rows),
         given=0,
         ring_offset=offset,
