@@ -118,15 +118,15 @@ class _Tree:
         most = _MAX_OPEN // (4 * self.cover.weights.size + 5 * self.cover.n_sets)
         while self._promising and not (self.first and self.selected is not None):
             if self.budget.exhausted or len(self._open) > most:
-                grain = self.cover.grain
-                upper = max(self.weight, -self._open[0][0] // grain * grain)
+                # What the clock cut before it was bounded may cover everything.
+                left = min(-self._open[0][0], self.cover.total)
+                upper = max(self.weight, left // self.cover.grain * self.cover.grain)
                 return GroupSearch(self.selected, self.weight, upper, complete=False)
             split: list[Part] = []
             while self._promising and len(split) < _BATCH:
                 split += self._children(heapq.heappop(self._open)[2])
             self._take(split, _STEPS)
-        upper = self.weight if self.selected is not None else self._refuted
-        return GroupSearch(self.selected, self.weight, upper, complete=True)
+        return GroupSearch(self.selected, self.weight, self._refuted, complete=True)
 
     @property
     def _promising(self) -> bool:
@@ -141,19 +141,29 @@ class _Tree:
 
     def _take(self, parts: list[Part], steps: int) -> None:
         """Bound parts, look at what they would take, and keep those still open."""
-        bounded = self.bounds.lowered(parts, steps)
-        for part in bounded:
+        still: list[Part] = []
+        for part in self.bounds.lowered(parts, steps):
+            only = self._only(part)
+            if only is not None:
+                self._offer(only)
+                continue
             if part.dearest.size:
                 self._offer(part.dearest)
-        for part in bounded:
-            if part.bound >= self.target and not self._settled(part):
+            still.append(part)
+        for part in still:
+            if part.bound >= self.target:
                 heapq.heappush(self._open, (-part.bound, next(self._names), part))
 
-    def _settled(self, part: Part) -> bool:
-        """Whether a part holds one selection, which was looked at."""
-        return len(part.groups) == self.n_sets and all(
-            group.size == 1 for group in part.groups
-        )
+    def _only(self, part: Part) -> NDArray[np.int64] | None:
+        """Return the selection that covers all that a part's can, if it is one."""
+        if any(group.size > 1 for group in part.groups):
+            return None
+        taken = np.concatenate([NONE, *part.groups])
+        if taken.size == self.n_sets:
+            return taken
+        others = np.setdiff1d(np.flatnonzero(~part.closed), taken)
+        left = self.n_sets - taken.size
+        return np.concatenate([taken, others]) if others.size <= left else None
 
     def _offer(self, chosen: NDArray[np.int64]) -> None:
         weight = self.bounds.weight_of(chosen)

@@ -115,7 +115,7 @@ def test_children_share_out_the_selections_of_a_part(seed):
     parts = [tree.bounds.whole(np.ones(cover.weights.size))]
     assert np.all(held(parts[0]))
     for _ in range(4):
-        split = [part for part in parts if not tree._settled(part)]
+        split = [part for part in parts if tree._only(part) is None]
         parts = []
         for part in tree.bounds.lowered(split, 10):
             children = tree._children(part)
@@ -135,6 +135,40 @@ def test_a_cut_search_says_what_is_left_open():
     )
     assert not found.complete
     assert found.weight <= most.covered_weight / cover.unit <= found.upper_bound
+
+
+def test_a_search_cut_before_its_first_bound_claims_nothing():
+    cover = alike_covers(3, n_places=12, n_each=6, n_rows=200)
+
+    class Late(WorkBudget):
+        """The clock has run out, though work is left."""
+
+        @property
+        def exhausted(self):
+            return True
+
+    found = best_by_groups(
+        cover, 5, target=1.0, multipliers=cover.weights, budget=Late(1e10)
+    )
+    assert not found.complete
+    assert found.upper_bound == cover.total
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_weights_of_all_sizes_leave_single_selections(seed):
+    """Rows of 1e-9 to 1e9: multipliers of the light ones never become exact."""
+    rng = np.random.default_rng(seed)
+    n_rows, n_sets = int(rng.integers(15, 60)), int(rng.integers(8, 13))
+    covers = rng.random((n_rows, n_sets)) < 0.2
+    weights = 10.0 ** rng.uniform(-9, 9, n_rows)
+    problem = CoverProblem(sparse.csr_array(covers), weights)
+    found = solve_max_coverage(problem, 5)
+    most = max(
+        problem.covered_weight(np.array(chosen))
+        for chosen in itertools.combinations(range(n_sets), 5)
+    )
+    assert found.status is SolveStatus.OPTIMAL
+    assert found.covered_weight == pytest.approx(most, rel=1e-10)
 
 
 def test_caps_of_a_ball_are_proved_where_the_relaxation_is_short():
