@@ -72,6 +72,7 @@ def one_fewer(
     stages_of: Callable[[tuple[PlannedProjector, ...]], NDArray[np.int8]],
     given: int,
     ring_offset: tuple[float, float],
+    thorough: bool = True,
 ) -> Offer | None:
     """Return poses that light what is required, with those given; None if none do.
 
@@ -87,7 +88,9 @@ def one_fewer(
         stages_of: The stages of other poses.
         given: First poses of the lattice that are taken whatever they light, and stay.
         ring_offset: As for `projector_candidates`.
+        thorough: Whether near misses are worth every scale, and more places to begin.
     """
+    near = _NEAR if thorough else 0.0
     site = scene.site("projector", lattice.projectors[0].device)
     n_lattice, nearest = len(lattice.projectors), np.inf
     for start in range(_MOST_STARTS):
@@ -104,7 +107,7 @@ def one_fewer(
             gain, short = short - missing, missing
             nearest = min(nearest, missing / required)
             hopeful = missing <= min(_SHORT * required, _GAINS * gain)
-            if scale is None or not (hopeful or missing <= _NEAR * required):
+            if scale is None or not (hopeful or missing <= near * required):
                 break
             offer, best = _without_idle(offer, best, given)
             between = projectors_around(
@@ -118,7 +121,7 @@ def one_fewer(
             between = with_room(scene, between)
             # They join the others: the best may be of both.
             offer = offer.joined(Offer(between, stages_of(between)))
-        if nearest > _NEAR and start + 1 >= _STARTS:
+        if nearest > near and start + 1 >= _STARTS:
             break
     return None
 

@@ -133,7 +133,9 @@ def plan_projectors(
     while True:
         attempt += 1
         offer = Offer(candidates, stages)
-        offer, selection = _fewer(scene, rows, offer, n_lattice, finer, ring_offset)
+        offer, selection = _fewer(
+            scene, rows, offer, n_lattice, finer, ring_offset, thorough=attempt == 1
+        )
         candidates, stages = offer.projectors, offer.stages
         fresh = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh_stages = lit_stages(scene, candidates, fresh)
@@ -179,8 +181,14 @@ def _fewer(
     n_lattice: int,
     finer: Callable[[Target], Offer],
     ring_offset: tuple[float, float],
+    *,
+    thorough: bool,
 ) -> tuple[Offer, Selection]:
-    """Return the fewest of the poses, others offered as long as they save one."""
+    """Return the fewest of the poses, others offered as long as they save one.
+
+    Near misses are pursued on the first rows only: where fresh ones have joined them,
+    a cover so tight has failed already.
+    """
     selection = _fewest(scene, offer.stages)
     lattice = offer.take(np.arange(n_lattice))
     given = _n_given(scene)
@@ -195,6 +203,7 @@ def _fewer(
             stages_of=lambda projectors: lit_stages(scene, projectors, rows),
             given=given,
             ring_offset=ring_offset,
+            thorough=thorough,
         )
         if moved is None:
             break
