@@ -88,9 +88,10 @@ def one_fewer(
         stages_of: The stages of other poses.
         given: First poses of the lattice that are taken whatever they light, and stay.
         ring_offset: As for `projector_candidates`.
-        thorough: Whether near misses are worth every scale, and more places to begin.
+        thorough: Whether to begin in more places than one, and to follow near misses
+            at every scale.
     """
-    near = _NEAR if thorough else 0.0
+    near, starts = (_NEAR, _STARTS) if thorough else (0.0, 1)
     site = scene.site("projector", lattice.projectors[0].device)
     n_lattice, nearest = len(lattice.projectors), np.inf
     for start in range(_MOST_STARTS):
@@ -121,7 +122,7 @@ def one_fewer(
             between = with_room(scene, between)
             # They join the others: the best may be of both.
             offer = offer.joined(Offer(between, stages_of(between)))
-        if nearest > near and start + 1 >= _STARTS:
+        if nearest > near and start + 1 >= starts:
             break
     return None
 

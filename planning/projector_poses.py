@@ -33,6 +33,8 @@ _STEPS = (1.0, 0.5, 0.25)
 # A pixel of the image border stays free, so that rounding the pose loses nothing.
 _PIXEL_MARGIN = 1.0
 _MAX_MOVE_M = 0.3
+# Samples on which poses between the candidates are compared; all of them decide.
+_SEARCHED = 2000
 # Of the samples that candidates reach: so many others a pose may light.
 _STRAY = 0.002
 
@@ -64,10 +66,7 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
         return stage.projectors
     if not moves_bodies(state.projectors):
         # What bodies stand in the way of was settled for the poses chosen.
-        between = widest_between(
-            scene, stage.projectors, state.margins, required, len(stage.reference)
-        )
-        state = _Lit(scene, rows, list(between), reached)
+        state = _between(state, required, lit, len(stage.reference))
     for _ in range(_SWEEPS):
         moved = [
             _improve(state, p, required, lit)
@@ -77,6 +76,25 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
         if not any(moved):
             break
     return tuple(state.projectors)
+
+
+def _between(state: "_Lit", required: int, lit: int, n_lattice: int) -> "_Lit":
+    """Projectors at poses between the candidates, if what counts has more margin."""
+    some = np.arange(0, len(state.rows), -(-len(state.rows) // _SEARCHED))
+    part = state.on(some)
+    among = int(np.isfinite(part.margin).any(axis=1).sum())
+    offered = widest_between(
+        state.scene,
+        tuple(state.projectors),
+        part.margins,
+        max(1, min(among, required * len(some) // len(state.rows))),
+        n_lattice,
+    )
+    moved = state.with_all(list(offered))
+    wider = margin_at_share(moved.margin, required) > margin_at_share(
+        state.margin, required
+    )
+    return moved if wider and enough_lit(moved.margin, required, lit) else state
 
 
 class _Lit:
@@ -102,6 +120,15 @@ class _Lit:
         beyond = np.isfinite(margin[~self._reached]).sum(axis=0)
         margin[:, beyond > _STRAY * self._reached.sum()] = -np.inf
         return margin
+
+    def on(self, some: NDArray[np.int64]) -> "_Lit":
+        """The same projectors, on some of the rows."""
+        rows, reached = self.rows.take(some), self._reached[some]
+        return _Lit(self.scene, rows, self.projectors, reached)
+
+    def with_all(self, projectors: list[PlannedProjector]) -> "_Lit":
+        """Other projectors, on the same rows."""
+        return _Lit(self.scene, self.rows, projectors, self._reached)
 
     def _margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
         scene = self.scene.among(projectors)
