@@ -116,8 +116,9 @@ class _Tree:
         whole = self.bounds.whole(multipliers / self.cover.weights)
         self._take([whole], _FIRST_STEPS)
         most = _MAX_OPEN // (4 * self.cover.weights.size + 5 * self.cover.n_sets)
-        while self._promising and not (self.first and self.selected is not None):
-            if self.budget.exhausted or len(self._open) > most:
+        while self._promising:
+            enough = self.first and self.selected is not None
+            if enough or self.budget.exhausted or len(self._open) > most:
                 # What the clock cut before it was bounded may cover everything.
                 left = min(-self._open[0][0], self.cover.total)
                 upper = max(self.weight, left // self.cover.grain * self.cover.grain)

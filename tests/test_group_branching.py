@@ -137,6 +137,23 @@ def test_a_cut_search_says_what_is_left_open():
     assert found.weight <= most.covered_weight / cover.unit <= found.upper_bound
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_first_selection_that_will_do_bounds_no_other(seed):
+    cover = alike_covers(seed)
+    most = max(weight_of(cover, chosen) for chosen in every_selection(cover, 3))
+    found = best_by_groups(
+        cover,
+        3,
+        target=0.8 * most,
+        multipliers=cover.weights,
+        budget=plenty(),
+        first=True,
+    )
+    assert 0.8 * most <= weight_of(cover, found.selected) == found.weight
+    assert found.upper_bound >= most
+    assert not found.complete or found.weight == most
+
+
 def test_a_search_cut_before_its_first_bound_claims_nothing():
     cover = alike_covers(3, n_places=12, n_each=6, n_rows=200)
 
