@@ -13,8 +13,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers import solve_cover
-
 from .body_room import with_room
 from .camera_bodies import settled_cover, taken
 from .camera_slides import rows_to_slide_on, slide_cameras, spread_limits
@@ -27,7 +25,7 @@ from .plan import PlannedCamera, PlannedProjector
 from .routes import CamerasBy, Routes
 from .scene import Scene
 from .seams import adjacency, overlap_components
-from .selection import cover_problem
+from .selection import fewest_count
 from .sights import Sights
 
 # Of a scene, projectors, candidates, and those that a route passed under other axes.
@@ -203,8 +201,15 @@ def _with_more(
     known = None
     if routed is not None and (routed.needed or needed) < needed:
         known = routed.by_count[routed.needed or 0]
-    if known is None and not _saves(scene, measured, needed):
-        return cover
+    if known is None:
+        count = fewest_count(
+            measured,
+            scene.requirements.coverage,
+            seed=scene.seed,
+            given=n_given(scene),
+        )
+        if count >= needed:
+            return cover
     again = cover_by_cover(scene, projectors, offered, known)
     if again.selection.needed < needed:
         return again
@@ -213,14 +218,6 @@ def _with_more(
         # Completed from the cover's side they were in each other's way, but not so.
         return cover_of(scene, projectors, cover.rows, routed)
     return cover
-
-
-def _saves(scene: Scene, measured: NDArray[np.bool_], needed: int) -> bool:
-    """Whether fewer candidates than that measure what is required."""
-    share = scene.requirements.coverage
-    required = int(np.ceil(share * int(measured.any(axis=1).sum()) - 1e-9))
-    problem = cover_problem(measured, required, n_given(scene))
-    return len(solve_cover(problem, seed=scene.seed, heaviest=False).selected) < needed
 
 
 def _at_limit(scene: Scene, cover: CameraCover) -> tuple[PlannedCamera, ...]:

@@ -28,11 +28,10 @@ from .lighting import LIT, Target
 from .open_rows import mesh_reach, open_rows
 from .plan import PlannedProjector
 from .position_cells import PositionTree
-from .projector_light import lit_stages
 from .projectors import ProjectorStage, with_more
 from .requirements import Workspace
 from .scene import Scene
-from .selection import fewest_count, required_rows
+from .selection import required_rows
 from .zone_limits import may_hold
 
 
@@ -91,27 +90,12 @@ def prove_fewest(
             site=scene.site("projector", template.device),
         )
         found = with_room(scene, found)
-        fewer = bool(found) and _saves(scene, stage, found)
-        better = with_more(scene, stage, found) if fewer else stage
+        better = with_more(scene, stage, found) if found else stage
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.entry()))
         stage = better
     entry = enough(stage.certificate, np.any(stage.stages == LIT, axis=1))
     return replace(stage, certificate=stage.certificate | {"continuous": entry})
-
-
-def _saves(
-    scene: Scene, stage: ProjectorStage, more: tuple[PlannedProjector, ...]
-) -> bool:
-    """Return whether fewer do with more candidates: mostly they don't, and are gone."""
-    stages = np.concatenate([stage.stages, lit_stages(scene, more, stage.rows)], axis=1)
-    count = fewest_count(
-        stages == LIT,
-        scene.requirements.dominant_coverage,
-        seed=scene.seed,
-        given=stage.certificate.get("given", 0),
-    )
-    return count < stage.certificate["needed"]["count"]
 
 
 def _bound_of(

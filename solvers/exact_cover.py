@@ -10,12 +10,12 @@ over the open rows::
 Integer-valued weights make it exact, whatever the BLAS and its threads.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .incumbent import Incumbent
 from .reductions import ReducedCover
 from .relaxation import rounding, tighten
 from .status import WorkBudget
@@ -86,18 +86,15 @@ def best_tuple(
     )
 
 
-class _Search:
-    """Depth-first search; holds the incumbent."""
+class _Search(Incumbent[list[int]]):
+    """Depth-first search; it is its own incumbent."""
 
     def __init__(
         self, cover: ReducedCover, target: float, budget: WorkBudget, first: bool
     ) -> None:
+        super().__init__(cover, target, first=first)
         self.cover = cover
-        self.target = target
         self.budget = budget
-        self.first = first
-        self.selected: list[int] | None = None
-        self.weight = 0.0
         self.cut = False
         self.nodes = 0
         self.dense = cover.by_set.astype(bool).toarray()
@@ -105,25 +102,7 @@ class _Search:
         servers = np.diff(cover.by_row.indptr)
         self.row_order = np.argsort(servers, kind="stable")
         self._total = cover.total
-        # Improvements below this share of the total are rounding, not weight.
         self._rounding = rounding(cover.weights.size)
-        self._least = max(cover.grain, np.floor(self._total * self._rounding))
-
-    def offer(self, chosen: list[int], weight: float) -> None:
-        """Keep a selection that reaches the target, and ask for more from then on."""
-        if weight >= self.target:
-            self.selected, self.weight = chosen, weight
-            self.target = weight + self._least
-
-    @property
-    def refuted(self) -> float:
-        """Most weight that a sum may have below the target, where all is pruned."""
-        grain = int(self.cover.grain)
-        return float((math.ceil(self.target) - 1) // grain * grain)
-
-    @property
-    def done(self) -> bool:
-        return self.first and self.selected is not None
 
     def branch(
         self,

@@ -13,7 +13,6 @@ References:
 """
 
 import heapq
-import math
 from dataclasses import dataclass, replace
 from itertools import count
 
@@ -22,8 +21,8 @@ from numpy.typing import NDArray
 
 from .answers import NONE
 from .group_bounds import Part, PartBounds
+from .incumbent import Incumbent
 from .reductions import ReducedCover
-from .relaxation import rounding
 from .status import WorkBudget
 
 # Larger covers aren't searched: the dense copy takes four bytes an entry, the table
@@ -88,8 +87,8 @@ def best_by_groups(
     return _Tree(cover, n_sets, target, budget, first=first).run(multipliers)
 
 
-class _Tree:
-    """Search over groups; see `best_by_groups`."""
+class _Tree(Incumbent[NDArray[np.int64]]):
+    """Search over groups; see `best_by_groups`. It is its own incumbent."""
 
     def __init__(
         self,
@@ -100,13 +99,8 @@ class _Tree:
         *,
         first: bool,
     ) -> None:
+        super().__init__(cover, target, first=first)
         self.cover, self.n_sets, self.budget = cover, n_sets, budget
-        self.target, self.first = target, first
-        self.selected: NDArray[np.int64] | None = None
-        self.weight = 0.0
-        self._least = max(
-            cover.grain, np.floor(cover.total * rounding(cover.weights.size))
-        )
         self._names = count()
         self._open: list[tuple[float, int, Part]] = []
         self.bounds = PartBounds(cover, n_sets, target, budget)
@@ -117,8 +111,7 @@ class _Tree:
         self._take([whole], _FIRST_STEPS)
         most = _MAX_OPEN // (4 * self.cover.weights.size + 5 * self.cover.n_sets)
         while self._promising:
-            enough = self.first and self.selected is not None
-            if enough or self.budget.exhausted or len(self._open) > most:
+            if self.done or self.budget.exhausted or len(self._open) > most:
                 # What the clock cut before it was bounded may cover everything.
                 left = min(-self._open[0][0], self.cover.total)
                 upper = max(self.weight, left // self.cover.grain * self.cover.grain)
@@ -127,18 +120,12 @@ class _Tree:
             while self._promising and len(split) < _BATCH:
                 split += self._children(heapq.heappop(self._open)[2])
             self._take(split, _STEPS)
-        return GroupSearch(self.selected, self.weight, self._refuted, complete=True)
+        return GroupSearch(self.selected, self.weight, self.refuted, complete=True)
 
     @property
     def _promising(self) -> bool:
         """Whether a part is open that may reach the target."""
         return bool(self._open) and -self._open[0][0] >= self.target
-
-    @property
-    def _refuted(self) -> float:
-        """Most weight that a sum may have below the target, where all is pruned."""
-        grain = int(self.cover.grain)
-        return float((math.ceil(self.target) - 1) // grain * grain)
 
     def _take(self, parts: list[Part], steps: int) -> None:
         """Bound parts, look at what they would take, and keep those still open."""
@@ -146,10 +133,11 @@ class _Tree:
         for part in self.bounds.lowered(parts, steps):
             only = self._only(part)
             if only is not None:
-                self._offer(only)
+                self.offer(np.sort(only), self.bounds.weight_of(only))
                 continue
             if part.dearest.size:
-                self._offer(part.dearest)
+                dearest = np.sort(part.dearest)
+                self.offer(dearest, self.bounds.weight_of(dearest))
             still.append(part)
         for part in still:
             if part.bound >= self.target:
@@ -165,12 +153,6 @@ class _Tree:
         others = np.setdiff1d(np.flatnonzero(~part.closed), taken)
         left = self.n_sets - taken.size
         return np.concatenate([taken, others]) if others.size <= left else None
-
-    def _offer(self, chosen: NDArray[np.int64]) -> None:
-        weight = self.bounds.weight_of(chosen)
-        if weight >= self.target:
-            self.selected, self.weight = np.sort(chosen), weight
-            self.target = weight + self._least
 
     def _children(self, part: Part) -> list[Part]:
         """Return the part without a group, and with at least one of it."""

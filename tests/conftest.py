@@ -108,9 +108,25 @@ def cap_trees() -> ModuleType:
     return _load("cap_trees")
 
 
+@pytest.fixture(scope="session")
+def benchmark_module() -> Callable[[str], ModuleType]:
+    """Loads a benchmark by its name; it finds the others beside it."""
+    folder = Path(__file__).resolve().parents[1] / "benchmarks"
+
+    def load(name: str) -> ModuleType:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(str(folder))
+            return _executed(f"ringrig_{name}", folder / f"{name}.py")
+
+    return load
+
+
 def _load(name: str) -> ModuleType:
-    path = Path(__file__).with_name(f"{name}.py")
-    spec = importlib.util.spec_from_file_location(f"ringrig_tests_{name}", path)
+    return _executed(f"ringrig_tests_{name}", Path(__file__).with_name(f"{name}.py"))
+
+
+def _executed(name: str, path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -1,9 +1,6 @@
 """The attack on cells in small, and a cell that lacks a sample: the attack sees it."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,19 +19,8 @@ POSES = 2000
 
 
 @pytest.fixture(scope="module")
-def attack_cells():
-    folder = Path(__file__).resolve().parents[1] / "benchmarks"
-    sys.path.insert(0, str(folder))
-    try:
-        spec = importlib.util.spec_from_file_location(
-            "ringrig_attack_cells", folder / "attack_cells.py"
-        )
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        spec.loader.exec_module(module)
-    finally:
-        sys.path.remove(str(folder))
-    return module
+def attack_cells(benchmark_module):
+    return benchmark_module("attack_cells")
 
 
 def notched_box(side=0.03):

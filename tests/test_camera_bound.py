@@ -1,9 +1,6 @@
 """The cameras' bound over all poses: supersets under attack, and counts known."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,19 +43,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @pytest.fixture(scope="module")
-def attack_cameras():
-    folder = Path(__file__).resolve().parents[1] / "benchmarks"
-    sys.path.insert(0, str(folder))
-    try:
-        spec = importlib.util.spec_from_file_location(
-            "ringrig_attack_cameras", folder / "attack_cameras.py"
-        )
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        spec.loader.exec_module(module)
-    finally:
-        sys.path.remove(str(folder))
-    return module
+def attack_cameras(benchmark_module):
+    return benchmark_module("attack_cameras")
 
 
 def scene_of(mesh, *, existing=(), coverage=None, limits=None, **workspace):

@@ -1,24 +1,11 @@
 """Eq. (10) at image level: a millimetre beyond d'_max opens a hole, none inside it."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import pytest
-
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
 
 @pytest.fixture(scope="module")
-def wall():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        path = BENCHMARKS / "seam_gap.py"
-        spec = importlib.util.spec_from_file_location("_seam_gap", path)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        spec.loader.exec_module(module)
-    return module
+def wall(benchmark_module):
+    return benchmark_module("seam_gap")
 
 
 def test_d_max_of_two_images_is_their_width_on_the_wall(wall):

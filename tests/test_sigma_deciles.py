@@ -1,28 +1,15 @@
 """s_N and pitch against rendered images, off the axis too; edge noise from a plane."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from geometry.primitives import sphere
 from planning.edge_noise import EdgeNoise
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
-
 
 @pytest.fixture(scope="module")
-def table():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        path = BENCHMARKS / "sigma_deciles.py"
-        spec = importlib.util.spec_from_file_location("_sigma_deciles", path)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        spec.loader.exec_module(module)
-    return module
+def table(benchmark_module):
+    return benchmark_module("sigma_deciles")
 
 
 @pytest.fixture(scope="module")
