@@ -11,7 +11,7 @@ from planning import lighting
 from planning.candidates import aimed_poses
 from planning.plan import PlannedProjector
 from planning.projector_light import lit_margins, lit_stages
-from planning.projector_poses import widen_margins
+from planning.projector_poses import _between, widen_margins
 from planning.projectors import ProjectorStage, plan_projectors
 from planning.rig import load_rig
 from planning.rings import ring_frame, uniform_radii
@@ -103,3 +103,37 @@ def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     assert np.all(beyond <= 0.002 * reached.sum())
     share = int(np.ceil(0.85 * reached.sum()))
     assert margin_at_share(after, share) > margin_at_share(before, share)
+
+
+@pytest.mark.parametrize(
+    ("offered", "taken"),
+    [
+        (np.where(np.arange(1000) < 940, 0.3, -np.inf), True),
+        # Wider for the 900 that count, but fresh samples may fall short of them.
+        (np.where(np.arange(1000) < 905, 0.3, -np.inf), False),
+        (np.where(np.arange(1000) < 940, 0.1, -np.inf), False),
+    ],
+)
+def test_poses_between_are_taken_if_wider_with_light_to_spare(
+    offered, taken, monkeypatch
+):
+    class State:
+        """Margins of 1,000 samples by one projector."""
+
+        scene, projectors, rows, margins = None, ["P"], np.arange(1000), None
+
+        def __init__(self, margin):
+            self.margin = margin[:, None]
+
+        def on(self, some):
+            return State(self.margin[some, 0])
+
+        def with_all(self, projectors):
+            return State(offered)
+
+    monkeypatch.setattr(
+        "planning.projector_poses.widest_between", lambda *given: ("Q",)
+    )
+    state = State(np.where(np.arange(1000) < 940, 0.2, -np.inf))
+    found = _between(state, 900, 940, 640)
+    assert (found is not state) is taken
