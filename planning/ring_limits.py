@@ -20,6 +20,9 @@ _AZIMUTHS = 360
 CELLS = 4
 # Where nothing is lit few rings remain, for an object that stands a little aside.
 _UNLIT = 4.0
+# Least kappa on lit surface as a share of the largest: rings that curvature leaves over
+# go to flat and creased pieces, whose ribs and pins may be narrower than a gap.
+_LEAST_KAPPA = 0.01
 _MIN_PITCH_PX = 6.0
 
 
@@ -81,7 +84,8 @@ class RingBeam:
         even = self.even_gap
         lit = _widened(self.lit.astype(np.float64), CELLS) > 0.0
         kappa = ring_curvature(self.errors, self.counted, even)
-        kappa = np.where(lit, _widened(kappa, CELLS // 2), 0.0)
+        least = _LEAST_KAPPA * float(kappa.max(initial=0.0)) or 1.0
+        kappa = np.where(lit, np.maximum(_widened(kappa, CELLS // 2), least), 0.0)
         return GapLimits(
             self.edges,
             kappa,

@@ -8,7 +8,7 @@ import pytest
 from geometry.devices import PinholeModel
 from geometry.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import sphere
+from geometry.primitives import box, sphere
 from planning import measurability, ring_pitch
 from planning.beam_profile import cast_beam
 from planning.cameras import lit_samples, measured_by
@@ -105,6 +105,16 @@ def test_what_even_rings_measure_stays_measured(bench, spaced):
     assert np.count_nonzero(before & ~after) <= 0.002 * before.sum()
     # A finer gap passes nothing that a wider one didn't.
     assert not np.any(after & ~before)
+
+
+def test_rings_to_spare_go_to_flat_surface_too():
+    """A cube has no curvature between its creases; frames are paid for all the same."""
+    scene, even, cameras = made("diverging", tilt_deg=8.0, mesh=box((0.1, 0.1, 0.1)))
+    final = space_rings(scene, [even], cameras, "curvature").projectors[0]
+    assert len(final.ring_radii) <= len(even.ring_radii)
+    target = scene.target_samples(2000, 78)
+    gap = {p: widest_gap(scene, [p], target) for p in (even, final)}
+    assert gap[final] < 0.9 * gap[even]
 
 
 def test_gaps_on_lit_samples_lie_between_their_limits(bench, spaced):

@@ -27,6 +27,9 @@ _LEVEL = 0.99
 _DEVIATIONS = 4.0
 # Beside sampling: of a share of chords, and of a quantile of their errors.
 _SHARE, _RELATIVE = 0.004, 0.05
+# The largest hundredth of fewer chords is a chord or two, where a few lie together
+# between creases: nothing to hold a claim against.
+_LEAST_CHORDS = 200
 # On a plane errors are roundings, and no claim.
 _FLAT_M = 1e-9
 
@@ -142,7 +145,7 @@ def _audit_quantile(
 ) -> None:
     """Check that 99 % of the errors are no larger than claimed, and no 99.x % are."""
     n, value = len(errors), as_number(claimed)
-    if n == 0 or (claimed is None and float(errors.max()) <= _FLAT_M):
+    if n < _LEAST_CHORDS or (claimed is None and float(errors.max()) <= _FLAT_M):
         # On flat surface the plan may have met no chord at all.
         return
     noise = _SHARE / 2.0 + _DEVIATIONS * float(np.sqrt(_LEVEL * (1.0 - _LEVEL) / n))
