@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .check_lines import check_lines
 from .cost import cost_lines
 from .firing import schedule_line
 from .plan import PlannedCamera, PlannedProjector, RigPlan
@@ -35,7 +36,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *_ranges(plan),
         *_rings(plan),
         _marginal(plan),
-        _check(plan),
+        check_lines(plan),
         *cost_lines(plan.document["cost"]),
         *(f"MISSED   {line}" for line in missed),
         *(f"files    {name}" for name in files[:1]),
@@ -420,30 +421,4 @@ def _marginal(plan: RigPlan) -> str:
     return (
         "\nMARGINAL what one more or fewer would change (* as planned)\n"
         + "\n".join(lines)
-    )
-
-
-def _check(plan: RigPlan) -> str:
-    check = plan.document["reconstruction"]
-    if check is None:
-        why = "the run was cut" if plan.document["truncated"] else "--no-check"
-        return f"\nNOT CHECKED ({why}): no reconstruction from pixels was made"
-    if check["n_merged"] == 0:
-        return "\nCHECK    FAILED: no point was measured in the rendered pixels"
-    limits = plan.requirements.check
-    whole = [
-        f"{100 * c['fraction']:.1f} % within {1e3 * c['threshold_m']:.1f} mm"
-        for c in check["completeness"]
-    ]
-    verdict = "passed" if check["passed"] else "FAILED"
-    return (
-        f"\nCHECK    {verdict}: reconstructed from rendered pixels, "
-        f"{check['n_merged']} points of {check['n_points']}\n"
-        f"         rms {1e3 * check['accuracy_rms_m']:.3f} mm (limit "
-        f"{1e3 * limits.max_rms_m:g}), p95 {1e3 * check['accuracy_p95_m']:.3f} "
-        f"({1e3 * limits.max_p95_m:g}), bias {1e3 * check['accuracy_bias_m']:+.3f} "
-        f"({1e3 * limits.max_bias_m:g})\n"
-        f"         of the target predicted measured: {', '.join(whole)}; "
-        f"{100 * check['predicted_missing']:.2f} % missing "
-        f"({100 * limits.max_predicted_missing:g} %)"
     )

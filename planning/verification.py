@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,11 @@ from .audit.figures import compare_figures, contradictions
 from .plan import RigPlan
 
 if TYPE_CHECKING:
+    from geometry.sampling import SurfaceSamples
+
+    from .audit.samples import AuditSamples
     from .reconstruction.check import Reconstruction
+    from .reconstruction.comparison import Prediction
 
 _MM = 1e3
 _MESH_SAMPLES = 2000
@@ -175,24 +179,52 @@ def _reconstruct(
     threads: int,
     say: Callable[[str], None],
 ) -> Reconstruction:
-    """Run the check from pixels on the audit's own samples of the target."""
-    from geometry.sampling import SurfaceSamples
-
+    """Run the check from pixels on the audit's own samples."""
     from .reconstruction.check import reconstruct_plan
+    from .reconstruction.comparison import compare
 
     inside, predicted = audit.in_target()
-    samples = SurfaceSamples(
-        inside.points, inside.normals, inside.faces, float(inside.weights[0])
-    )
-    return reconstruct_plan(
+    found = reconstruct_plan(
         plan,
         seed=seed,
         threads=threads,
         truth=truth,
-        samples=samples,
+        samples=_bare(inside),
         predicted=predicted,
         progress=lambda done, total: say(f"pixels: pair {done} of {total}"),
     )
+    comparison = compare(
+        _prediction(plan, audit, threads),
+        found.everything,
+        found.accuracy,
+        plan.surface.region,
+        plan.requirements.check.tau_m,
+    )
+    return replace(found, comparison=comparison)
+
+
+def _prediction(plan: RigPlan, audit: Audit, threads: int) -> Prediction:
+    """What the audit recomputed, by the plan's limits and at the physical floors."""
+    from .audit.floors import possible_at_floors
+    from .reconstruction.comparison import Prediction
+
+    samples = audit.samples
+    return Prediction(
+        _bare(samples),
+        samples.weights,
+        samples.in_target,
+        samples.region,
+        np.array([camera.world_from_device[:3, 3] for camera in plan.cameras]),
+        audit.predicted_by,
+        possible_at_floors(plan, samples, threads=threads),
+    )
+
+
+def _bare(samples: AuditSamples) -> SurfaceSamples:
+    from geometry.sampling import SurfaceSamples
+
+    weight = float(samples.weights[0]) if len(samples) else 0.0
+    return SurfaceSamples(samples.points, samples.normals, samples.faces, weight)
 
 
 def _apart(mesh: TriangleMesh, other: TriangleMesh, threads: int) -> float:

@@ -43,6 +43,29 @@ def test_pixels_judge_the_audits_own_samples(verified):
     assert not np.any(missing & ~predicted)
 
 
+def test_what_is_measured_is_what_physics_was_predicted_to_allow(verified):
+    tables = verified[0].reconstruction.comparison.tables["surface"]
+    # Here ranges of the devices bind, and the simulated ones are sharp beyond them.
+    assert tables["floors"].agreement >= 0.94
+    assert tables["floors"].agreement > tables["floors"].trivial + 0.02
+    assert tables["floors"].missing <= 0.01
+    # The plan's limits are the stricter ones: more is measured, hardly any less.
+    assert tables["limits"].missing <= 0.002
+    assert tables["limits"].unexpected > tables["floors"].unexpected
+
+
+def test_a_false_confusion_table_is_named(handmade, verified):
+    figures = verified[0].reconstruction.to_document()
+    figures = json.loads(json.dumps(figures))
+    figures["confusion"]["target"]["floors"]["agreement"] -= 0.05
+    figures["whole_surface"]["measured"] += 0.05
+    false = compare_figures(figures, verified[0].reconstruction.to_document())
+    assert [sentence.split(":")[0] for sentence in false] == [
+        "reconstruction.confusion.target.floors.agreement",
+        "reconstruction.whole_surface.measured",
+    ]
+
+
 def test_recorded_figures_are_held_against_a_run_with_other_noise(handmade, verified):
     figures = verified[0].reconstruction.to_document()
     plan = handmade.tampered(

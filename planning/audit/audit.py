@@ -48,6 +48,7 @@ class Audit:
         samples: The audit's samples.
         lit: Whether any projector lights each sample, shape (n,).
         predicted: Whether any pair measures each sample, shape (n,).
+        predicted_by: Whether each camera measures each sample, shape (n_c, n).
         reachable_by_projectors: Shape (n,).
         reachable_by_cameras: Shape (n,).
     """
@@ -58,6 +59,7 @@ class Audit:
     samples: AuditSamples
     lit: NDArray[np.bool_]
     predicted: NDArray[np.bool_]
+    predicted_by: NDArray[np.bool_]
     reachable_by_projectors: NDArray[np.bool_]
     reachable_by_cameras: NDArray[np.bool_]
 
@@ -138,6 +140,7 @@ def _result(
         samples=own.samples,
         lit=own.lit,
         predicted=own.measured,
+        predicted_by=own.measured_by,
         reachable_by_projectors=reach.projectors,
         reachable_by_cameras=reach.cameras,
     )

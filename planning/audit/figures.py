@@ -15,6 +15,20 @@ _REPEATABLE = {
     "predicted_missing": (0.25, 0.01),
 }
 _FRACTION_SLACK = 0.025
+# Of confusion tables and of parts of the surface; errors there are those of few points.
+_SHARES = frozenset(
+    (
+        "both",
+        "missing",
+        "unexpected",
+        "neither",
+        "beside",
+        "agreement",
+        "trivial_agreement",
+        "predicted",
+        "measured",
+    )
+)
 
 
 def compare_figures(
@@ -39,6 +53,7 @@ def compare_figures(
                 f"reconstruction.{name}: claimed {claimed}, run again {value:.6g}, "
                 f"tolerance {slack:.2g}"
             )
+    failures += _compare_tables(recorded, found)
     rows = recorded.get("completeness") or []
     if len(rows) != len(found["completeness"]):
         failures.append(f"reconstruction.completeness: {len(rows)} rows are claimed")
@@ -57,6 +72,34 @@ def compare_figures(
         failures.append(
             "reconstruction.passed: claimed true, the check run again fails"
         )
+    return failures
+
+
+def _compare_tables(recorded: Mapping[str, Any], found: Mapping[str, Any]) -> list[str]:
+    """Hold the confusion tables, and the whole surface's row, against a run again.
+
+    Plans from before have none; rows of single regions rest on few samples.
+    """
+    failures: list[str] = []
+    for name in ("confusion", "dominant", "whole_surface"):
+        claimed, value = recorded.get(name), found.get(name)
+        if claimed is not None and value is not None:
+            failures += _differing(f"reconstruction.{name}", claimed, value)
+    return failures
+
+
+def _differing(key: str, claimed: object, value: Mapping[str, Any]) -> list[str]:
+    if not isinstance(claimed, Mapping):
+        return [f"{key}: {claimed!r} is claimed, a table is expected"]
+    failures: list[str] = []
+    for name, own in value.items():
+        if isinstance(own, Mapping):
+            failures += _differing(f"{key}.{name}", claimed.get(name), own)
+        elif name in _SHARES and not _near(claimed.get(name), own, _FRACTION_SLACK):
+            failures.append(
+                f"{key}.{name}: claimed {claimed.get(name)}, run again {own:.4f}, "
+                f"tolerance {_FRACTION_SLACK}"
+            )
     return failures
 
 

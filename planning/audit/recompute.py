@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from planning.plan import RigPlan
-from planning.requirements import Requirements
+from planning.requirements import ProjectorLimits, Requirements
 
 from .bodies import blocks_before, blocks_beside
 from .occlusion import Shadow
@@ -123,10 +123,13 @@ def eyes_of(plan: RigPlan) -> tuple[Eye, ...]:
 
 
 def light_only(
-    plan: RigPlan, samples: AuditSamples, shadow: Shadow
+    plan: RigPlan,
+    samples: AuditSamples,
+    shadow: Shadow,
+    limits: ProjectorLimits | None = None,
 ) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
-    """Return `light` and `margins` of `Recomputed`."""
-    limits = plan.requirements.projector
+    """Return `light` and `margins` of `Recomputed`; by the plan's limits or others."""
+    limits = plan.requirements.projector if limits is None else limits
     lamps = lamps_of(plan)
     light = np.zeros((len(lamps), len(samples)), dtype=np.int8)
     margins = np.full(light.shape, -np.inf)
@@ -137,14 +140,27 @@ def light_only(
     return light, margins
 
 
-def recompute(plan: RigPlan, samples: AuditSamples, shadow: Shadow) -> Recomputed:
-    """Recompute what every device and every pair of the plan does to each sample."""
-    light, margins = light_only(plan, samples, shadow)
+def recompute(
+    plan: RigPlan,
+    samples: AuditSamples,
+    shadow: Shadow,
+    requirements: Requirements | None = None,
+) -> Recomputed:
+    """Recompute what every device and every pair of the plan does to each sample.
+
+    Args:
+        plan: Devices, and the limits that hold by default.
+        samples: Of its surface.
+        shadow: Occlusion.
+        requirements: Limits other than the plan's.
+    """
+    limits = plan.requirements if requirements is None else requirements
+    light, margins = light_only(plan, samples, shadow, limits.projector)
     lamps, eyes = lamps_of(plan), eyes_of(plan)
     lit = np.any(light == LIT, axis=0)
     pairs = np.full((len(lamps), len(eyes), len(samples)), _NOT_LIT, dtype=np.int8)
     for column, eye in enumerate(eyes):
-        sight = sight_steps(eye, samples.take(lit), plan.requirements.camera, shadow)
+        sight = sight_steps(eye, samples.take(lit), limits.camera, shadow)
         whole = np.zeros(len(samples), dtype=np.int8)
         whole[lit] = sight
         for row, lamp in enumerate(lamps):
@@ -152,7 +168,7 @@ def recompute(plan: RigPlan, samples: AuditSamples, shadow: Shadow) -> Recompute
             both = np.flatnonzero(by_lamp & (whole == SEEN))
             pairs[row, column, by_lamp] = whole[by_lamp]
             pairs[row, column, both] += pair_steps(
-                lamp, eye, samples.take(both), plan.requirements.triangulation
+                lamp, eye, samples.take(both), limits.triangulation
             )
     return Recomputed(samples, light, margins, pairs)
 

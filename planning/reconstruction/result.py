@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .cloud import Cloud
+from .comparison import Comparison
 from .merge import Merged
 from .photometry import Photometry
 from .verdict import Accuracy, Completeness
@@ -43,6 +44,7 @@ class Reconstruction:
         photometry: The simulated light and sensor.
         failures: One sentence for each limit that isn't kept.
         seconds: Processor time of `render`, `decode` and `merge` over all pairs [s].
+        comparison: With a plan's prediction; None if none was given.
     """
 
     everything: Cloud
@@ -53,6 +55,7 @@ class Reconstruction:
     photometry: Photometry
     failures: tuple[str, ...]
     seconds: dict[str, float]
+    comparison: Comparison | None = None
 
     @property
     def passed(self) -> bool:
@@ -94,6 +97,7 @@ class Reconstruction:
             "predicted_missing": complete.predicted_missing,
             "pixel_noise": self.photometry.pixel_noise,
             "ambient": self.photometry.ambient,
+            **({} if self.comparison is None else self.comparison.to_document()),
             "passed": self.passed,
             "failures": list(self.failures),
         }

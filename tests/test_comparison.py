@@ -1,0 +1,132 @@
+"""Prediction against measurement: counted areas, parts of the surface, both limits."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from geometry.devices import ParallelModel, PinholeModel
+from geometry.poses import look_at
+from geometry.sampling import SurfaceSamples
+from planning.audit.floors import receding
+from planning.audit.predicates import Eye, Lamp
+from planning.audit.samples import AuditSamples
+from planning.reconstruction.cloud import Cloud
+from planning.reconstruction.comparison import Confusion, Prediction, compare
+from planning.reconstruction.verdict import Accuracy
+
+TAU = 1e-3
+
+
+def cloud_at(points: np.ndarray) -> Cloud:
+    """Points seen from above."""
+    n = len(points)
+    empty = Cloud.empty()
+    down = np.tile([0.0, 0.0, -1.0], (n, 1))
+    return dataclasses.replace(
+        empty, points=points, rays=down, beams=down, camera=np.zeros(n, dtype=np.int16)
+    )
+
+
+@pytest.fixture(scope="module")
+def four():
+    """Four samples a metre apart that face up; the first two lie beside a point."""
+    points = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0]])
+    up = np.tile([0.0, 0.0, 1.0], (4, 1))
+    prediction = Prediction(
+        SurfaceSamples(points, up, np.arange(4), 1.0),
+        weights=np.array([1.0, 2.0, 3.0, 4.0]),
+        in_target=np.array([True, True, True, False]),
+        region=np.array([0, 1, 1, -1]),
+        centres=np.array([[0.0, 0.0, 9.0], [0.0, 0.0, 8.0]]),
+        claimed=np.array([[True, False, False, False], [False, False, True, False]]),
+        possible=np.array([[True, True, False, False], [False] * 4]),
+    )
+    near = points[:2] + np.array([0.9 * TAU, 0.0, 0.0])
+    accuracy = Accuracy(np.array([3e-5, -4e-5]), np.array([0, 1]))
+    faces = np.array([0, 1, 1, -1])
+    return compare(prediction, cloud_at(near), accuracy, faces, TAU)
+
+
+def test_areas_are_counted_by_what_was_said_and_what_was_found(four):
+    table = four.tables["target"]["limits"]
+    assert table == Confusion(1 / 6, 3 / 6, 2 / 6, 0.0, 0.0)
+    assert table.agreement == pytest.approx(1 / 6)
+    assert table.trivial == pytest.approx(3 / 6)
+    whole = four.tables["surface"]
+    assert whole["limits"] == Confusion(0.1, 0.3, 0.2, 0.4, 0.0)
+    assert whole["floors"] == Confusion(0.3, 0.0, 0.0, 0.7, 0.0)
+    assert whole["floors"].agreement == 1.0
+    assert whole["floors"].trivial == pytest.approx(0.7)
+
+
+def test_every_region_has_its_own_row(four):
+    first, second = four.regions
+    assert (first["id"], second["id"]) == (0, 1)
+    assert first["measured"] == first["predicted"] == 1.0
+    assert first["predicted_missing"] == 0.0
+    assert second["measured"] == pytest.approx(2 / 5)
+    assert second["predicted_missing"] == 1.0
+    assert first["rms_m"] == pytest.approx(3e-5)
+    assert second["bias_m"] == pytest.approx(-4e-5)
+    assert four.dominant["n_points"] == 2
+    assert four.dominant["predicted_missing"] == pytest.approx(3 / 4)
+    assert four.surface["measured"] == pytest.approx(0.3)
+
+
+def beside(normal, centre) -> Confusion:
+    """Table with a sample that isn't predicted, half a gap from one that is."""
+    points = np.array([[0.0, 0.0, 0.0], [0.5 * TAU, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    normals = np.array([[0.0, 0.0, 1.0], normal, [0.0, 0.0, 1.0]])
+    claimed = np.array([[True, False, False]])
+    prediction = Prediction(
+        SurfaceSamples(points, normals, np.arange(3), 1.0),
+        np.ones(3),
+        np.ones(3, bool),
+        np.full(3, -1),
+        np.array([centre]),
+        claimed,
+        claimed,
+    )
+    found = compare(prediction, cloud_at(points[:1]), None, np.full(3, -1), TAU)
+    return found.tables["surface"]["limits"]
+
+
+def test_what_lies_beside_predicted_surface_is_counted_apart():
+    table = beside([0.0, 0.0, 1.0], [0.0, 0.0, 9.0])
+    assert table == Confusion(1 / 3, 0.0, 0.0, 1 / 3, 1 / 3)
+    assert table.agreement == 1.0
+    assert table.trivial == pytest.approx(0.5)
+
+
+def test_surface_that_faces_away_from_the_camera_isnt_beside():
+    """On a thin wall the other side is near, too."""
+    table = beside([0.0, 0.0, -1.0], [0.0, 0.0, 9.0])
+    assert table == Confusion(1 / 3, 0.0, 0.0, 2 / 3, 0.0)
+
+
+def test_of_no_area_nothing_is_said():
+    sure = np.ones(2, bool)
+    table = Confusion.of(sure, sure, sure, np.zeros(2))
+    assert table.neither == 1.0
+    assert table.agreement == 1.0
+
+
+@pytest.mark.parametrize("degrees", [0.0, 40.0, 66.0])
+def test_how_fast_a_ring_recedes_is_the_incidence_along_it(degrees):
+    """A plane under parallel rings about z; at (x, 0, 0) the ring runs along y."""
+    point = np.array([[0.1, 0.0, 0.0]])
+    tilt = np.deg2rad(degrees)
+    camera = point[0] + np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+    samples = AuditSamples(
+        point,
+        np.array([[0.0, 0.0, 1.0]]),
+        *(np.zeros(1, int), np.zeros((1, 3)), np.zeros(1, int)),
+        *(np.ones(1, bool), np.ones(1)),
+    )
+    beam = ParallelModel((100, 100), pixel_pitch_m=1e-2, range_m=(0.1, 9.0))
+    lamp = Lamp(beam, np.eye(4), np.eye(4), np.array([0.05, 0.2]))
+    pose = look_at(camera, point[0], np.array([1.0, 0.0, 0.0]))
+    lens = PinholeModel(np.diag([900.0, 900.0, 1.0]), (100, 100), range_m=(0.1, 9.0))
+    slant = receding(lamp, Eye(lens, pose), samples)
+    assert slant == pytest.approx(np.sin(tilt), abs=1e-12)
