@@ -90,7 +90,7 @@ def test_edges_on_a_plane_are_where_the_rings_are(rigs, light, focal):
     assert len(edges) > 3000
     assert len(np.unique(edges.rings)) > 25
     assert abs(error.mean()) < 0.005
-    assert np.sqrt(np.mean(error**2)) < 0.015
+    assert np.sqrt(np.mean(error**2)) < 0.003
     assert np.abs(error).max() < 0.1
 
 

@@ -51,12 +51,18 @@ class Photometry:
             waves += np.sin((along * (2.0 * np.pi / length)).astype(np.float32))
         return 1.0 + np.float32(self.albedo_variation / 3.0) * waves
 
-    def blur(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return an image under the lens's point spread, a separable Gaussian."""
+    def blur(self, image: NDArray[np.float32], fold: int = 1) -> NDArray[np.float32]:
+        """Return an image under the lens's point spread, a separable Gaussian.
+
+        Args:
+            image: Shape (fold h, fold w).
+            fold: Cells along a pixel.
+        """
         if self.camera_blur_px == 0.0:
             return image
-        reach = max(1, int(np.ceil(3.5 * self.camera_blur_px)))
-        taps = np.exp(-0.5 * (np.arange(reach + 1) / self.camera_blur_px) ** 2)
+        blur = fold * self.camera_blur_px
+        reach = max(1, int(np.ceil(3.5 * blur)))
+        taps = np.exp(-0.5 * (np.arange(reach + 1) / blur) ** 2)
         taps = (taps / (2.0 * taps.sum() - taps[0])).astype(np.float32)
         blurred = np.empty_like(image)
         for first in range(0, len(image), _STRIP):

@@ -53,23 +53,26 @@ class _Canvas:
 
     Attributes:
         corner: Pixel (u, v) of the top-left pixel.
-        shape: Rows and columns.
-        pixels: Flat index of each sample of the view, senseless outside, shape (n,).
-        weights: Share of the pixel that each sample stands for, shape (n,).
+        shape: Rows and columns, in pixels.
+        fold: Cells along a pixel.
+        cells: Flat index of each sample's cell, senseless outside, shape (n,).
+        weights: Share of the cell that each sample stands for, shape (n,).
         inside: Samples inside.
     """
 
     corner: tuple[int, int]
     shape: tuple[int, int]
-    pixels: NDArray[np.int64]
+    fold: int
+    cells: NDArray[np.int64]
     weights: NDArray[np.float32]
     inside: NDArray[np.int64]
 
     @classmethod
     def about(cls, seen: View, lit: NDArray[np.int64]) -> "_Canvas":
         """Return the bounding box of samples and a margin; all where there is none."""
-        rows, columns = seen.shape
-        v, u = np.divmod(seen.pixels, columns)
+        fold, (rows, columns) = seen.fold, seen.shape
+        y, x = np.divmod(seen.cells, fold * columns)
+        v, u = y // fold, x // fold
         top, left, bottom, right = 0, 0, rows, columns
         if len(lit):
             top = max(0, int(v[lit].min()) - _MARGIN_PX)
@@ -80,19 +83,35 @@ class _Canvas:
         return cls(
             (seen.corner[0] + left, seen.corner[1] + top),
             (bottom - top, right - left),
-            (v - top) * (right - left) + (u - left),
+            fold,
+            (y - fold * top) * (fold * (right - left)) + (x - fold * left),
             seen.weights,
             np.flatnonzero(inside),
         )
 
     def image(
-        self, values: NDArray[np.float32], samples: NDArray[np.int64]
+        self,
+        values: NDArray[np.float32],
+        samples: NDArray[np.int64],
+        lens: Photometry,
     ) -> NDArray[np.float32]:
-        """Return the image (h, w) that samples of these values make."""
-        rows, columns = self.shape
+        """Return the image (h, w) that samples of these values make behind a lens."""
+        rows, columns = (self.fold * side for side in self.shape)
         weighted = self.weights[samples] * values
-        summed = np.bincount(self.pixels[samples], weighted, rows * columns)
-        return summed.astype(np.float32).reshape(self.shape)
+        summed = np.bincount(self.cells[samples], weighted, rows * columns)
+        cells = summed.astype(np.float32).reshape(rows, columns)
+        return _binned(lens.blur(cells, self.fold), self.fold)
+
+
+def _binned(cells: NDArray[np.float32], fold: int) -> NDArray[np.float32]:
+    """Return the mean of the cells of each pixel."""
+    if fold == 1:
+        return cells
+    total = np.zeros((len(cells) // fold, cells.shape[1] // fold), dtype=np.float32)
+    for i in range(fold):
+        for j in range(fold):
+            total += cells[i::fold, j::fold]
+    return total / np.float32(fold * fold)
 
 
 def render_pair(
@@ -118,22 +137,18 @@ def render_pair(
     light = _shine(seen, projector, design, patterns, caster, photometry)
     canvas = _Canvas.about(seen, light.samples)
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
-    ambient = photometry.blur(canvas.image(around, canvas.inside))
-    white = photometry.blur(canvas.image(light.white, light.samples))
+    ambient = canvas.image(around, canvas.inside, photometry)
+    white = canvas.image(light.white, light.samples, photometry)
     brightest = float(np.percentile(white + ambient, 99.9))
     gain = photometry.exposure * 255.0 / max(brightest, 1e-9)
 
-    parts = [
-        canvas.image(light.white * _level(patterns.bit(bit), light), light.samples)
-        for bit in range(patterns.n_bits)
-    ]
-    parts.append(canvas.image(light.white * light.root, light.samples))
+    levels = [_level(patterns.bit(bit), light) for bit in range(patterns.n_bits)]
     kind = np.uint8 if photometry.noisy else np.float32
     stack: Images = np.empty((patterns.n_frames, *canvas.shape), dtype=kind)
     stack[0] = photometry.capture(white + ambient, (*seed, 0), gain)
     stack[1] = photometry.capture(ambient, (*seed, 1), gain)
-    for index, part in enumerate(parts):
-        bright = photometry.blur(part)
+    for index, level in enumerate([*levels, light.root]):
+        bright = canvas.image(light.white * level, light.samples, photometry)
         first = 2 + 2 * index
         stack[first] = photometry.capture(bright + ambient, (*seed, first), gain)
         bright = white - bright + ambient
@@ -196,7 +211,8 @@ def _shine_on(
     across = _across(plane, rho, design)
     slant = np.einsum("ij,ij->i", across, rays) / np.einsum("ij,ij->i", normals, rays)
     stretch = 1.0 - 2.0 * slant * np.einsum("ij,ij->i", across, normals) + slant**2
-    pixel = _PIXEL_SPREAD * seen.distances[lit] / seen.camera.focal_px
+    cell = _PIXEL_SPREAD / seen.fold
+    pixel = cell * seen.distances[lit] / seen.camera.focal_px
     spread = scale * np.sqrt(
         photometry.projector_blur_m**2 + pixel**2 * np.maximum(stretch, 0.0)
     )

@@ -12,19 +12,25 @@ from .calibration import CameraCalibration
 from .photometry import Photometry
 
 _MARGIN_PX = 6
+# Drawn edges blurred by less than this in the image are sampled twice a pixel, and so
+# is the blur of the lens: else they lie askew, and no later blur mends it [px].
+_SHARP_PX = 0.7
 _SUB = np.array([[-0.25, -0.25], [-0.25, 0.25], [0.25, -0.25], [0.25, 0.25]])
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What a camera sees: samples of the surface, one a pixel and 4 at steps of depth.
+    """What a camera sees: samples of the surface, one a cell and 4 at steps of depth.
+
+    A cell is a pixel, or a quarter of one where drawn edges are sharper than that.
 
     Attributes:
         camera: The camera that looks.
         corner: Pixel (u, v) of the window's top-left pixel.
-        shape: Rows and columns of the window.
-        pixels: Flat index in the window of each sample, shape (n,).
-        weights: Share of the pixel that each sample stands for, shape (n,).
+        shape: Rows and columns of the window, in pixels.
+        fold: Cells along a pixel, 1 or 2.
+        cells: Flat index in the window's cells of each sample, shape (n,).
+        weights: Share of the cell that each sample stands for, shape (n,).
         points: Surface points in the world [m], shape (n, 3).
         normals: Face normals there, shape (n, 3).
         rays: Viewing directions, shape (n, 3).
@@ -35,7 +41,8 @@ class View:
     camera: CameraCalibration
     corner: tuple[int, int]
     shape: tuple[int, int]
-    pixels: NDArray[np.int64]
+    fold: int
+    cells: NDArray[np.int64]
     weights: NDArray[np.float32]
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
@@ -63,32 +70,38 @@ def view(
     window = _window(camera, mesh)
     if window is None:
         return None
-    (left, top), (rows, columns) = window
+    (left, top), shape = window
+    away = float(np.linalg.norm(mesh.centre - camera.centre))
+    sharp = photometry.projector_blur_m * camera.focal_px < _SHARP_PX * away
+    fold = 2 if sharp else 1
+    rows, columns = fold * shape[0], fold * shape[1]
+    first = 0.5 / fold - 0.5
     grid = np.empty((rows, columns, 2))
-    grid[:, :, 0] = np.arange(left, left + columns)
-    grid[:, :, 1] = np.arange(top, top + rows)[:, None]
+    grid[:, :, 0] = left + first + np.arange(columns) / fold
+    grid[:, :, 1] = (top + first + np.arange(rows) / fold)[:, None]
     grid = grid.reshape(-1, 2)
     rays, faces, distances = _cast(camera, caster, grid, obstacles)
     if not np.any(faces >= 0):
         return None
-    steps = _depth_steps(faces, distances, (rows, columns), camera.focal_px)
+    steps = _depth_steps(faces, distances, (rows, columns), fold * camera.focal_px)
     whole = np.flatnonzero((faces >= 0) & ~steps)
     split = np.flatnonzero(steps)
-    fine = (grid[split][:, None] + _SUB).reshape(-1, 2)
+    fine = (grid[split][:, None] + _SUB / fold).reshape(-1, 2)
     fine_rays, fine_faces, fine_distances = _cast(camera, caster, fine, obstacles)
     hit = fine_faces >= 0
-    pixels = np.concatenate([whole, np.repeat(split, len(_SUB))[hit]])
+    cells = np.concatenate([whole, np.repeat(split, len(_SUB))[hit]])
     all_rays = np.concatenate([rays[whole], fine_rays[hit]])
     all_faces = np.concatenate([faces[whole], fine_faces[hit]])
     reach = np.concatenate([distances[whole], fine_distances[hit]])
-    weights = np.ones(len(pixels), dtype=np.float32)
+    weights = np.ones(len(cells), dtype=np.float32)
     weights[len(whole) :] = 1.0 / len(_SUB)
     points = camera.centre + reach[:, None] * all_rays
     return View(
         camera,
         (left, top),
-        (rows, columns),
-        pixels,
+        shape,
+        fold,
+        cells,
         weights,
         points,
         mesh.face_normals[all_faces],
