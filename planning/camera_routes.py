@@ -139,7 +139,12 @@ def slide_routes(
     scene = scene.among(projectors)
     rows = rows_to_slide_on(scene, projectors)
     slid = slide_cameras(
-        scene, projectors, stage.cameras, rows, spare_field=spare_field
+        scene,
+        projectors,
+        stage.cameras,
+        rows,
+        spare_field=spare_field,
+        confirmed=True,
     )
     routes = stage.routes
     if spare_field or routes is None or len(routes.rival) != len(stage.cameras):

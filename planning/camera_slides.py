@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from .standing import moves_bodies
 
 _ROWS = 6000
 _STREAM = 300
+# Samples that confirm a move which those did not forbid.
+_MORE = 24_000
 
 
 def rows_to_slide_on(
@@ -43,6 +46,7 @@ def slide_cameras(
     max_evaluations: int = 48,
     max_programs: int | None = None,
     spare_field: float = 0.0,
+    confirmed: bool = False,
 ) -> CameraSpread:
     """Slide cameras apart; no move that loses coverage on the rows is taken.
 
@@ -54,6 +58,7 @@ def slide_cameras(
         max_evaluations: Times that coverage is evaluated, at most.
         max_programs: Baseline programs at most; None: no limit of their own.
         spare_field: What is kept free of the half fields beyond seams [rad].
+        confirmed: Whether four times as many samples must agree to each move.
     """
     samples = rows.target.samples
 
@@ -65,6 +70,7 @@ def slide_cameras(
         return measured_among(scene, tuple(projectors), moved, rows, spared)
 
     spared = int(lit_among(projectors, rows, cameras).any(axis=1).sum())
+    more = _More(scene, tuple(projectors), tuple(cameras)) if confirmed else None
     return spread_cameras(
         cameras,
         measure,
@@ -72,10 +78,40 @@ def slide_cameras(
         normals=samples.normals,
         weights=samples.weight,
         limits=spread_limits(scene, spare_field),
+        confirm=None if more is None else more.measured,
         rings=rings_on(scene, rows),
         max_evaluations=max_evaluations,
         max_programs=max_programs,
     )
+
+
+class _More:
+    """Further samples of the target; they are drawn when they are first asked for."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        projectors: tuple[PlannedProjector, ...],
+        cameras: tuple[PlannedCamera, ...],
+    ) -> None:
+        self._scene, self._projectors, self._cameras = scene, projectors, cameras
+
+    def measured(self, poses: NDArray[np.float64]) -> float:
+        """Return how many of them cameras at these poses measure."""
+        moved = [
+            replace(camera, world_from_device=pose)
+            for camera, pose in zip(self._cameras, poses, strict=True)
+        ]
+        rows, spared = self._drawn
+        found = measured_among(self._scene, self._projectors, moved, rows, spared)
+        return float(found.any(axis=1).sum())
+
+    @cached_property
+    def _drawn(self) -> tuple[LitSamples, int]:
+        target = self._scene.target_samples(_MORE, _STREAM + 1)
+        rows = lit_samples(self._scene, self._projectors, target)
+        lit = lit_among(self._projectors, rows, self._cameras)
+        return rows, int(lit.any(axis=1).sum())
 
 
 def spread_limits(scene: Scene, spare_field: float = 0.0) -> SpreadLimits:

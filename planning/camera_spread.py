@@ -30,6 +30,7 @@ from .zone_limits import stands
 
 _Array = NDArray[np.float64]
 Measure = Callable[[_Array], NDArray[np.bool_]]
+Confirm = Callable[[_Array], float]
 
 _STEPS = (1.0, 0.5, 0.25)
 # Reach of the first proposals, as a share of the largest radius of the shell.
@@ -73,6 +74,7 @@ def spread_cameras(
     normals: _Array,
     weights: _Array | float,
     limits: SpreadLimits,
+    confirm: Confirm | None = None,
     required: float = 0.0,
     rings: RingsOnTarget | None = None,
     min_overlap_share: float = 0.01,
@@ -82,8 +84,9 @@ def spread_cameras(
     """Raise the smallest baseline of neighbouring cameras without losing coverage.
 
     A move is taken iff the measured weight is at least max(required, the weight at the
-    start), the overlap graph falls into no more groups, and the smallest baseline of
-    neighbours rises, or their mean does while the smallest stays.
+    start), `confirm` finds no less than at the start either, the overlap graph falls
+    into no more groups, and the smallest baseline of neighbours rises, or their mean
+    does while the smallest stays.
 
     Args:
         cameras: As chosen; each keeps the point that it looks at, and its roll.
@@ -93,6 +96,8 @@ def spread_cameras(
         normals: Unit face normals, shape (n, 3).
         weights: Weight of each sample in [m^2], shape (n,) or one number.
         limits: What binds a camera.
+        confirm: Maps poses to the weight measured of more samples, on which no proposal
+            rests: of many moves, those pass that samples happen to favour.
         required: Weight that must be measured [m^2].
         rings: Rings of each projector on the samples; None: no rings.
         min_overlap_share: Overlap or contact that makes neighbours.
@@ -108,7 +113,13 @@ def spread_cameras(
         rings,
     )
     search = _Search(
-        list(cameras), measure, target, limits, min_overlap_share, max_evaluations
+        list(cameras),
+        measure,
+        confirm,
+        target,
+        limits,
+        min_overlap_share,
+        max_evaluations,
     )
     return search.run(required, max_programs)
 
@@ -120,6 +131,7 @@ class _Search:
         self,
         cameras: list[PlannedCamera],
         measure: Measure,
+        confirm: Confirm | None,
         target: SampledTarget,
         limits: SpreadLimits,
         share: float,
@@ -127,6 +139,8 @@ class _Search:
     ) -> None:
         self.cameras, self.target, self.limits = cameras, target, limits
         self._measure, self._share, self._budget = measure, share, max_evaluations
+        self._confirm = confirm
+        self._confirmed: float | None = None
         self.spent = self.accepted = self.solved = 0
         self.poses = np.stack([camera.world_from_device for camera in cameras])
         self.measured = self._evaluate(self.poses)
@@ -224,9 +238,20 @@ class _Search:
         )
         if not held or self._count_groups(measured) > self._groups:
             return False, none
+        if not self._is_confirmed(poses):
+            return False, none
         self.poses, self.measured, self.pairs = poses, measured, pairs
         self.accepted += 1
         return True, none
+
+    def _is_confirmed(self, poses: _Array) -> bool:
+        """Whether more samples agree that nothing is lost since the start."""
+        if self._confirm is None:
+            return True
+        if self._confirmed is None:
+            # Until a move is taken, the poses are those of the start.
+            self._confirmed = self._confirm(self.poses)
+        return self._confirm(poses) >= self._confirmed
 
     def _demand(
         self, lost: NDArray[np.int64], centres: _Array, known: NDArray[np.int64]

@@ -130,6 +130,22 @@ def test_a_pair_slides_apart_and_loses_nothing(pair):
     np.testing.assert_array_equal(spread.measured_by, ball.measure(poses))
 
 
+def test_a_move_that_more_samples_deny_is_not_taken(pair):
+    ball, cameras, freely = pair
+    start = np.stack([camera.world_from_device for camera in cameras])
+
+    def apart(poses):
+        return float(np.linalg.norm(poses[0, :3, 3] - poses[1, :3, 3]))
+
+    held = ball.spread(cameras, confirm=lambda poses: -apart(poses))
+    assert held.n_accepted == 0
+    assert held.smallest_after_m == pytest.approx(apart(start))
+    limit = 0.5 * (freely.smallest_before_m + freely.smallest_after_m)
+    part = ball.spread(cameras, confirm=lambda poses: float(apart(poses) <= limit))
+    assert part.n_accepted > 0
+    assert freely.smallest_before_m < part.smallest_after_m <= limit
+
+
 def test_moved_cameras_stay_in_the_workspace_keep_their_aim_and_their_roll(pair):
     ball, cameras, spread = pair
     part = ball.measure(np.stack([camera.world_from_device for camera in cameras]))

@@ -179,7 +179,7 @@ def compare(
         "surface": np.ones(len(measured), dtype=bool),
     }
     predictions = {
-        by: (by_camera.any(axis=0), prediction.widened(by_camera, tau_m))
+        by: (_by_any(by_camera), prediction.widened(by_camera, tau_m))
         for by, by_camera in (
             ("limits", prediction.claimed),
             ("floors", prediction.possible),
@@ -206,10 +206,14 @@ def compare(
     )
 
 
+def _by_any(by_camera: _Flags) -> _Flags:
+    return np.asarray(by_camera.any(axis=0))
+
+
 def _row(prediction: Prediction, measured: _Flags, part: _Flags) -> dict[str, Any]:
     """Shares of a part of the surface; null where nothing of it was sampled."""
     weights = prediction.weights[part]
-    claimed = prediction.claimed.any(axis=0)[part]
+    claimed = _by_any(prediction.claimed)[part]
 
     def share(of: _Flags, among: _Flags) -> float | None:
         total = float(weights[among].sum())
