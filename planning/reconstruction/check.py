@@ -15,6 +15,7 @@ from geometry.sampling import SurfaceSamples, sample_surface
 
 from ..plan import RigPlan
 from .calibration import (
+    CameraCalibration,
     PairCalibration,
     ProjectorCalibration,
     calibrate_camera,
@@ -23,6 +24,7 @@ from .calibration import (
 from .causes import likely_cause, rejection
 from .cloud import Cloud
 from .decode import Decoded, decode
+from .defocus import defocus_of, through_lens
 from .merge import merge
 from .obstacles import Both, obstacles_of
 from .patterns import ring_patterns
@@ -159,6 +161,8 @@ def _decode_pairs(
     believed = [calibrate_camera(camera) for camera in plan.cameras]
     designed = [calibrate_projector(projector) for projector in plan.projectors]
     radii = [projector.ring_radii for projector in plan.projectors]
+    lenses = _lenses(truth, believed, photometry)
+    blurred = defocus_of(truth, "projector")
     requirements = plan.requirements
     steepest = max(requirements.camera.max_incidence - _SLANT_MARGIN, _SLANTED)
     max_slant = float(np.tan(steepest))
@@ -169,7 +173,7 @@ def _decode_pairs(
             if camera is None:
                 return None
             before = obstacles_of(truth, camera.id)
-            return view(camera, mesh, caster, photometry, before)
+            return view(camera, mesh, caster, lenses[c], before)
 
     def measure(pair: tuple[int, int]) -> Decoded:
         p, c = pair
@@ -182,7 +186,14 @@ def _decode_pairs(
             before = obstacles_of(truth, projector.id)
             past = caster if before is None else Both(caster, before)
             frames = render_pair(
-                seen, projector, design, patterns, past, photometry, (seed, p, c)
+                seen,
+                projector,
+                design,
+                patterns,
+                past,
+                lenses[c],
+                (seed, p, c),
+                blurred,
             )
         with spent.on("decode"):
             return decode(
@@ -198,6 +209,18 @@ def _decode_pairs(
         views = list(pool.map(look, range(len(believed))))
         done = list(_reported(pool.map(measure, pairs), len(pairs), progress))
     return list(zip(pairs, done, strict=True))
+
+
+def _lenses(
+    truth: RigPlan, cameras: list[CameraCalibration], photometry: Photometry
+) -> list[Photometry]:
+    """Return light and sensor behind each camera's lens, focused as it is."""
+    defocus, middle = defocus_of(truth, "camera"), truth.surface.mesh.centre
+    away = [(middle - c.centre) @ c.world_from_device[:3, 2] for c in cameras]
+    return [
+        through_lens(photometry, defocus, float(depth), camera.focal_px)
+        for camera, depth in zip(cameras, away, strict=True)
+    ]
 
 
 class _Spent:

@@ -15,8 +15,8 @@ class Photometry:
     """The simulated light and sensor.
 
     Attributes:
-        projector_blur_m: Standard deviation of the blur of a drawn edge, across the
-            beam at the object [m].
+        projector_blur_m: Standard deviation of the blur of a drawn edge in focus,
+            across the beam at the object [m].
         camera_blur_px: Standard deviation of the lens's blur [px].
         ambient: Ambient light as a share of the projector's at normal incidence.
         albedo_variation: Amplitude of the texture, as a share of the mean albedo.

@@ -9,6 +9,7 @@ from scipy.special import ndtr
 from geometry.rays import CHUNK, equal_parts
 
 from .calibration import ProjectorCalibration
+from .defocus import Defocus
 from .obstacles import Occluder
 from .patterns import Frames, Images, RingPatterns, ring_plane
 from .photometry import Photometry
@@ -43,6 +44,20 @@ class _Light:
         """Return the light on the samples of all parts."""
         names = [field.name for field in fields(cls)]
         return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+
+
+@dataclass(frozen=True)
+class _Blur:
+    """Blur of drawn edges across the beam: in focus, and off it."""
+
+    in_focus_m: float
+    defocus: Defocus | None
+
+    def square(self, depth: NDArray[np.float64]) -> NDArray[np.float64] | float:
+        """Return the variance at depths [m^2], shape (n,)."""
+        if self.defocus is None:
+            return self.in_focus_m**2
+        return self.in_focus_m**2 + self.defocus.blur_m(depth) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +137,7 @@ def render_pair(
     caster: Occluder,
     photometry: Photometry,
     seed: tuple[int, ...],
+    defocus: Defocus | None = None,
 ) -> Frames:
     """Return the frames of one camera under one projector.
 
@@ -133,8 +149,10 @@ def render_pair(
         caster: Of the mesh, and the bodies, that really stand there.
         photometry: Light and sensor.
         seed: Of the noise of this pair.
+        defocus: Of the projector; None: equally sharp everywhere.
     """
-    light = _shine(seen, projector, design, patterns, caster, photometry)
+    blur = _Blur(photometry.projector_blur_m, defocus)
+    light = _shine(seen, projector, design, patterns, caster, blur)
     canvas = _Canvas.about(seen, light.samples)
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
     ambient = canvas.image(around, canvas.inside, photometry)
@@ -171,12 +189,12 @@ def _shine(
     design: ProjectorCalibration,
     patterns: RingPatterns,
     caster: Occluder,
-    photometry: Photometry,
+    blur: _Blur,
 ) -> _Light:
     facing = _facing(seen, projector)
     # In parts, so that what is between stays in the cache.
     parts = [
-        _shine_on(seen, facing[part], projector, design, patterns, caster, photometry)
+        _shine_on(seen, facing[part], projector, design, patterns, caster, blur)
         for part in equal_parts(len(facing), CHUNK) or [slice(0)]
     ]
     light = _Light.joined([light for light, _ in parts])
@@ -194,7 +212,7 @@ def _shine_on(
     design: ProjectorCalibration,
     patterns: RingPatterns,
     caster: Occluder,
-    photometry: Photometry,
+    blur: _Blur,
 ) -> tuple[_Light, NDArray[np.float64]]:
     """Light on those of some samples that it reaches, and their depths.
 
@@ -213,9 +231,7 @@ def _shine_on(
     stretch = 1.0 - 2.0 * slant * np.einsum("ij,ij->i", across, normals) + slant**2
     cell = _PIXEL_SPREAD / seen.fold
     pixel = cell * seen.distances[lit] / seen.camera.focal_px
-    spread = scale * np.sqrt(
-        photometry.projector_blur_m**2 + pixel**2 * np.maximum(stretch, 0.0)
-    )
+    spread = scale * np.sqrt(blur.square(depth) + pixel**2 * np.maximum(stretch, 0.0))
     annulus = np.searchsorted(patterns.radii, rho)
     edges = np.concatenate([[-np.inf], patterns.radii, [np.inf]])
     drawn = ndtr((patterns.outer_radius - rho) / spread)
