@@ -16,9 +16,9 @@ from .triangulate import RingHits, intersect_rings
 
 # Neighbours along a ring edge are looked for this far away in the image [px].
 _NEAR_PX = 2.6
-# Edges in a row that make a piece of surface. Single ones are often false, four hardly
+# Edges in a row that make a piece of surface. Single ones are often false, three hardly
 # more often than a dozen, and ribs are but a few pixels wide.
-_MIN_CHAIN = 4
+_MIN_CHAIN = 3
 # Share of the changes of one bit alone that must name a ring. Rings, however fine and
 # dim, reach 0.95 in every bit, steps of depth included; in the frame that stands in
 # another's place hardly any do. Between the two is an image disordered in part.
