@@ -83,11 +83,13 @@ class PinholeModel:
             Shape (n, 3, 2).
         """
         p = points[:, :2] / points[:, 2:]
-        norm = np.sqrt(1.0 + np.sum(p * p, axis=1))
-        r = np.column_stack([p, np.ones(len(p))]) / norm[:, None]
-        dr_dp = (np.eye(3)[None, :, :2] - r[:, :, None] * r[:, None, :2]) / norm[
-            :, None, None
-        ]
+        # Column by column, several times as fast as over axes of three and two.
+        x, y = p.T
+        norm = np.sqrt(1.0 + (x * x + y * y))
+        r = (x / norm, y / norm, 1.0 / norm)
+        dr_dp = np.empty((len(p), 3, 2))
+        for i, j in np.ndindex(3, 2):
+            dr_dp[:, i, j] = (float(i == j) - r[i] * r[j]) / norm
         if any(self.distortion):
             dr_dp = dr_dp @ np.linalg.inv(self._distort_slope(p))
         return dr_dp / self._focal

@@ -16,14 +16,13 @@ from .overlaps import overlap_entries
 from .plan import FORMAT, VERSION, RigPlan
 from .progress import Stopwatch
 from .range_entries import ranges_entry, with_spread
-from .relaxations import reachability_relaxations
 from .requirements import Requirements
 from .ring_axes import widest_gap
 from .ring_entries import evenly_ringed, lost_to_rings_m2, with_rings
 from .routes import routes_entry
 from .seams import overlap_components
 from .surface import Surface
-from .wider_field import wider_field
+from .what_helps import add_what_helps
 
 
 def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
@@ -74,20 +73,7 @@ def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
         surface,
     )
     plan = RigPlan(document, surface)
-    areas = document["coverage"]["target"]
-    reachable, whole = "reachable_by_projectors_m2", "area_m2"
-    if falls_short(areas, reachable, whole, requirements.min_reachable):
-        with clock.stage("relaxations", "what would help"):
-            document["coverage"]["relaxations"] = reachability_relaxations(
-                scene, reference, (draft.tilt, 0.0)
-            )
-    proof = document["certificates"]["projectors"]
-    if proof["needed"]["count"] > requirements.max_projectors:
-        with clock.stage("relaxations", "what would help"):
-            field = wider_field(scene, draft.stage, requirements.max_projectors)
-        if field is not None:
-            needed = proof["needed"] | {"wider_field": field}
-            document["certificates"]["projectors"] = proof | {"needed": needed}
+    add_what_helps(document, draft, devices, claims, clock)
     return plan
 
 
@@ -199,8 +185,3 @@ def _document(
         "reconstruction": None,
         "timings_s": dict(clock.seconds),
     }
-
-
-def falls_short(areas: dict[str, float], part: str, whole: str, share: float) -> bool:
-    """Return whether an area is less than a share of another."""
-    return areas[part] < share * areas[whole]

@@ -1,6 +1,6 @@
 """Section VI of the paper: the fewest cameras that measure what is lit."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,10 +27,14 @@ from .selection import (
     others_instead,
     select_fewest,
 )
-from .sights import Sight, Sights, sights_of, view_of
+from .shortfall import area_words
+from .sights import Sight, Sights, joined_sight, sights_of, view_of
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
+# Seen by several cameras and worked on together: many calls on few rows are slow, and
+# much more leaves the cache.
+_PAIRS = 8192
 ROUNDS = 3
 _STREAM = 200
 
@@ -50,6 +54,21 @@ class LitSamples:
     lit: NDArray[np.bool_]
     lights: tuple[Light, ...]
     rings: tuple[Rings, ...]
+
+
+class NothingMeasuredError(InfeasibleLimitsError):
+    """No candidate measures any lit sample.
+
+    Attributes:
+        cameras: The candidates.
+        rows: The lit samples.
+    """
+
+    def __init__(
+        self, message: str, cameras: tuple[PlannedCamera, ...], rows: LitSamples
+    ) -> None:
+        super().__init__(message)
+        self.cameras, self.rows = cameras, rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,14 +161,30 @@ def measured_by(
     if sights is None:
         sights = sights_of(scene, cameras, rows.target)
     measured = np.zeros((len(rows.target), len(cameras)), dtype=bool)
-    for column, sight in enumerate(sights):
+    for first, last in _chunks(sights):
         scene.pulse()
-        measured[sight.rows, column] = _measured(scene, sight, rows)
+        column = np.repeat(
+            np.arange(first, last), [len(s.rows) for s in sights[first:last]]
+        )
+        seen = joined_sight(sights[first:last])
+        measured[seen.rows, column] = _measured(scene, seen, rows)
     return measured
 
 
+def _chunks(sights: Sequence[Sight]) -> Iterator[tuple[int, int]]:
+    """Ranges of cameras that together see about `_PAIRS` samples, or of one."""
+    ends = np.cumsum([len(sight.rows) for sight in sights])
+    first = 0
+    while first < len(sights):
+        before = ends[first - 1] if first else 0
+        last = int(np.searchsorted(ends, before + _PAIRS, side="right"))
+        last = max(last, first + 1)
+        yield first, last
+        first = last
+
+
 def _measured(scene: Scene, sight: Sight, rows: LitSamples) -> NDArray[np.bool_]:
-    """Return which of the samples that a camera sees it measures."""
+    """Return which of the samples that are seen, by whatever cameras, are measured."""
     limits = scene.requirements.triangulation
     normals = rows.target.samples.normals
     measured = np.zeros(len(sight.rows), dtype=bool)
@@ -202,7 +237,7 @@ def plan_cameras(
         known: Candidates that may do with fewer than the search finds.
 
     Raises:
-        InfeasibleLimitsError: If no candidate measures any lit sample.
+        NothingMeasuredError: If no candidate measures any lit sample.
     """
     required = scene.requirements
     target = first_target(scene)
@@ -273,10 +308,11 @@ def refuse_unmeasured(
         measured: Which candidate measures which, shape (n, m).
 
     Raises:
-        InfeasibleLimitsError: It names the limits that stop most samples.
+        NothingMeasuredError: It names the limits that stop most samples.
     """
     if not measured.any():
-        raise InfeasibleLimitsError(_nothing_measured(scene, offered.cameras, rows))
+        said = _nothing_measured(scene, offered.cameras, rows)
+        raise NothingMeasuredError(said, offered.cameras, rows)
 
 
 def confirms(seen: NDArray[np.bool_], chosen: NDArray[np.int64], share: float) -> bool:
@@ -373,13 +409,14 @@ def _nothing_measured(
         )
     counts = np.bincount(causes, minlength=measurability.MEASURED)
     order = np.argsort(-counts, kind="stable")
+    weight = rows.target.samples.weight
     named = ", ".join(
-        f"{measurability.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} %"
+        f"{measurability.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} % "
+        f"({area_words(float(weight * counts[i]))})"
         for i in order
         if counts[i] >= 0.01 * len(causes)
     )
     return (
         f"no camera of {len(candidates)} poses measures any lit sample; the limit that "
-        f"stops each sample where it comes furthest is {named}; relax it (sigma is "
-        f"--accuracy, the others stand in the rig file)"
+        f"stops each sample where it comes furthest is {named}"
     )

@@ -185,7 +185,8 @@ def pair_quality(
     r, m = seen.rays, rings.normals
     along = np.einsum("ij,ij->i", r, m)
     v = normals * along[:, None] + m * seen.facing[:, None]
-    g = np.linalg.norm(np.einsum("ijk,ij->ik", seen.jacobian, v), axis=1)
+    gu, gv = np.einsum("ijk,ij->ik", seen.jacobian, v).T
+    g = np.sqrt(gu * gu + gv * gv)
     conditioning = np.abs(along)
     safe = np.maximum(conditioning, 1e-12)
     noise = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)

@@ -5,9 +5,12 @@ and f-numbers, the planner wants pixels and the range of distances that is sharp
 """
 
 import math
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+_Length = TypeVar("_Length", float, NDArray[np.float64])
 
 
 def focal_length_px(focal_m: float, pixel_m: float) -> float:
@@ -136,8 +139,8 @@ def depth_of_field(
 
 
 def blur_diameter(
-    focal_m: float, f_number: float, focus_m: float, distance_m: float
-) -> float:
+    focal_m: float, f_number: float, focus_m: float, distance_m: _Length
+) -> _Length:
     """Return the diameter of the blur circle of a point out of focus in [m].
 
     With focus distance s, point distance d, aperture f / N and magnification
@@ -149,7 +152,7 @@ def blur_diameter(
         focal_m: Focal length f in [m].
         f_number: N.
         focus_m: s in [m].
-        distance_m: d in [m].
+        distance_m: d in [m], one or many.
     """
     aperture = focal_m / f_number
     magnification = focal_m / (focus_m - focal_m)

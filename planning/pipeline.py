@@ -11,15 +11,17 @@ from geometry.mesh import TriangleMesh
 from geometry.refinement import cut_for_curvature
 
 from . import camera_bound
-from .assemble import falls_short, write_plan
+from .assemble import write_plan
 from .camera_bound import bound_stage
+from .camera_relaxations import nothing_measured
 from .camera_routes import slide_routes
 from .camera_stage import follow_cameras, place_cameras
-from .cameras import CameraStage
+from .cameras import CameraStage, NothingMeasuredError
 from .continuous import DEFAULT, PROVE, prove_fewest
 from .cost import cost_entry
 from .draft import Draft, Order
 from .errors import (
+    InfeasibleLimitsError,
     InputError,
     InterruptedPlanError,
     RequirementError,
@@ -40,6 +42,7 @@ from .scene import Scene
 from .selection import larger
 from .shortfall import shortfalls
 from .verification import verify_plan
+from .what_helps import falls_short
 
 
 def plan_rig(
@@ -205,9 +208,13 @@ def _placed(
         camera = PlannedCamera(
             "", np.eye(4), rig.camera_device(), body=rig.camera_body()
         )
-        solution = place_cameras(
-            scene, projectors, camera, n_cameras, tilt, order.cameras_by
-        )
+        try:
+            solution = place_cameras(
+                scene, projectors, camera, n_cameras, tilt, order.cameras_by
+            )
+        except NothingMeasuredError as error:
+            helps = nothing_measured(scene.among(projectors), rig, error)
+            raise InfeasibleLimitsError(f"{error}; {helps}") from None
         cameras = solution.stage
         clock.say(
             f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "

@@ -58,10 +58,10 @@ def adjacency(points: _Array, normals: _Array) -> Adjacency:
     valid = distance.ravel() <= _REACH * np.median(distance[:, -1])
     valid &= first != second
     valid &= np.einsum("ij,ij->i", normals[first], normals[second]) > _SAME_SHEET
-    pairs = np.column_stack([first, second])[valid]
+    first, second = first[valid], second[valid]
     # The nearest of one needn't have it among its own nearest.
-    pairs = np.unique(np.concatenate([pairs, pairs[:, ::-1]]), axis=0)
-    first, second = pairs[:, 0], pairs[:, 1]
+    both = np.concatenate([n * first + second, n * second + first])
+    first, second = np.divmod(np.unique(both), n)
     apart = np.linalg.norm(points[first] - points[second], axis=1)
     order = np.lexsort((second, apart, first))
     return Adjacency(first[order], second[order])

@@ -8,6 +8,10 @@ from .requirements import Requirements
 
 # Areas below this are told in mm² [m²].
 _SMALL_M2 = 1e-4
+# Causes that take less than this share of what is left aren't told.
+_TOLD = 0.01
+_OF_PROJECTORS = ("projector_", "tangent_angle")
+_OF_CAMERAS = ("camera_", "sample_distance", "conditioning", "sigma", "pitch")
 _CAUSE_WORDS = {
     "projector_beam": "outside the beam or the image of every projector",
     "projector_range": "out of the projectors' range",
@@ -49,6 +53,7 @@ def shortfalls(document: dict[str, Any], requirements: Requirements) -> tuple[st
     """
     return (
         *_reachable(document, requirements),
+        *_measurable(document, requirements),
         *_covered(document, requirements),
         *_check(document),
     )
@@ -64,8 +69,8 @@ def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]
     line = (
         f"only {_percent(share)} of the target can be lit from anywhere in the "
         f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
-        f"{_cm2(areas['area_m2'] - areas['reachable_by_projectors_m2'])} of "
-        f"{_cm2(areas['area_m2'])} can't be reached: "
+        f"{area_words(areas['area_m2'] - areas['reachable_by_projectors_m2'])} of "
+        f"{area_words(areas['area_m2'])} can't be reached: "
         f"{causes_line(causes, areas['area_m2'])}{_inside(document)}"
     )
     steps = [
@@ -76,6 +81,34 @@ def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]
     return (f"{line}. What would help: {'; '.join(steps)}",)
 
 
+def _measurable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+    """Whether enough of what is lit is within the cameras' reach."""
+    areas = document["coverage"]["target"]
+    lit, reached = areas["lit_m2"], areas["reachable_by_cameras_m2"]
+    if not lit > 0.0 or reached >= asked.min_reachable * lit:
+        return ()
+    share = reached / lit
+    steps = [
+        f"{step['change']} would reach {_percent(step['reachable_share'])}"
+        for step in document["coverage"].get("camera_relaxations", [])
+    ]
+    steps.append(f"--min-reachable {_down(share)} accepts what there is")
+    return (
+        f"only {_percent(share)} of what is lit can be measured from anywhere in the "
+        f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
+        f"{area_words(lit - reached)} of {area_words(lit)} can't be: "
+        f"{_areas_line(document['coverage'].get('unmeasurable_by_cause', {}))}. What "
+        f"would help: {'; '.join(steps)}",
+    )
+
+
+def _areas_line(areas: dict[str, float]) -> str:
+    """The causes with their areas, the largest first, but for what is next to none."""
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
+    told = [pair for pair in ranked if pair[1] >= _TOLD * sum(areas.values())]
+    return "; ".join(f"{area_words(area)} {cause_words(c)}" for c, area in told)
+
+
 def _inside(document: dict[str, Any]) -> str:
     """How much of what can't be reached lies inside the body."""
     inside = document["coverage"].get("unreachable_inside_m2", 0.0)
@@ -84,7 +117,7 @@ def _inside(document: dict[str, Any]) -> str:
     shell = document["meshes"][0].get("shell", {})
     hollow = shell.get("kind") == "hollow shell"
     where = "lies inside the hollow body" if hollow else "lies in cavities"
-    return f"; {_cm2(inside)} of it {where}"
+    return f"; {area_words(inside)} of it {where}"
 
 
 def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
@@ -113,10 +146,24 @@ def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
         verb = deed if proof["count"] > 1 else deed.replace(" ", "s ", 1)
         yield (
             f"{proof['count']} {devices} {verb.format(_percent(share))}, "
-            f"{_percent(required)} is required; {_cm2(whole - part)} of "
-            f"{_cm2(whole)} are left{_bodies(document, proof)}. What would help: "
-            f"{_more(kind, proof, asked, share)}"
+            f"{_percent(required)} is required; {area_words(whole - part)} of "
+            f"{area_words(whole)} are left{_bodies(document, proof)}. "
+            f"{_why(kind, document)}What would help: {_more(kind, proof, asked, share)}"
         )
+
+
+def _why(kind: str, document: dict[str, Any]) -> str:
+    """What keeps devices of a kind from the target, with areas, as a sentence."""
+    prefixes = _OF_PROJECTORS if kind == "projectors" else _OF_CAMERAS
+    areas = {
+        cause: area
+        for cause, area in document["coverage"]["uncovered_by_cause"].items()
+        if cause.startswith(prefixes)
+    }
+    if not areas:
+        return ""
+    of = "target" if kind == "projectors" else "lit target"
+    return f"Of the {of}: {_areas_line(areas)}. "
 
 
 def _bodies(document: dict[str, Any], proof: dict[str, Any]) -> str:
@@ -152,7 +199,8 @@ def _more(kind: str, proof: dict[str, Any], asked: Requirements, share: float) -
     )
     more = f"--max-{kind} {needed['count']} ({bound})"
     field = needed.get("wider_field")
-    return f"{more}, or {accept}" if field is None else f"{more}, {field}, or {accept}"
+    single = [*needed.get("relaxations", []), *([] if field is None else [field])]
+    return ", ".join([more, *single, f"or {accept}"])
 
 
 def _check(document: dict[str, Any]) -> tuple[str, ...]:
@@ -168,7 +216,8 @@ def _down(share: float) -> str:
     return f"{math.floor(100.0 * share) / 100.0:.2f}"
 
 
-def _cm2(area_m2: float) -> str:
+def area_words(area_m2: float) -> str:
+    """Return an area in cm², or a small one in mm²."""
     if area_m2 < _SMALL_M2:
         return f"{1e6 * area_m2:.3g} mm²"
     return f"{1e4 * area_m2:.1f} cm²"

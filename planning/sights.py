@@ -41,9 +41,10 @@ def sights_of(
     """Return what each camera sees of samples."""
     offered: list[Sight] = []
     wanted = np.zeros((len(cameras), len(target)), dtype=bool)
+    facing = _facing(cameras, target, scene.requirements.camera.max_incidence)
     for row, camera in enumerate(cameras):
         scene.pulse()
-        sight = _in_the_open(scene, camera, target)
+        sight = _in_the_open(scene, camera, target, np.flatnonzero(facing[row]))
         wanted[row, sight.rows] = True
         offered.append(sight)
     samples = target.samples
@@ -61,6 +62,21 @@ def sights_of(
     return tuple(
         unblocked(sight, camera, samples.points, scene.standing)
         for sight, camera in zip(clear, cameras, strict=True)
+    )
+
+
+def joined_sight(sights: Sequence[Sight]) -> Sight:
+    """Return the sights of several cameras, one after the other."""
+    views = [sight.view for sight in sights]
+    return Sight(
+        np.concatenate([sight.rows for sight in sights]),
+        View(
+            np.concatenate([view.stage for view in views]),
+            np.concatenate([view.rays for view in views]),
+            np.concatenate([view.distances for view in views]),
+            np.concatenate([view.facing for view in views]),
+            np.concatenate([view.jacobian for view in views]),
+        ),
     )
 
 
@@ -115,13 +131,13 @@ class Sights:
         return found
 
 
-def _in_the_open(scene: Scene, camera: PlannedCamera, target: Target) -> Sight:
-    """Return what a camera would see, were there nothing in between."""
+def _in_the_open(
+    scene: Scene, camera: PlannedCamera, target: Target, some: NDArray[np.int64]
+) -> Sight:
+    """Return which of some samples a camera would see, were nothing in between."""
     limits = scene.requirements.camera
-    # Most of what a candidate can't see faces away from it.
-    facing = _facing(camera, target, limits.max_incidence)
-    seen = measurability.view(camera, target.take(facing), limits, None)
-    return _taken(Sight(facing, seen), np.flatnonzero(seen.stage == measurability.SEEN))
+    seen = measurability.view(camera, target.take(some), limits, None)
+    return _taken(Sight(some, seen), np.flatnonzero(seen.stage == measurability.SEEN))
 
 
 def _taken(sight: Sight, chosen: NDArray[np.int64]) -> Sight:
@@ -129,10 +145,22 @@ def _taken(sight: Sight, chosen: NDArray[np.int64]) -> Sight:
 
 
 def _facing(
-    camera: PlannedCamera, target: Target, max_incidence: float
-) -> NDArray[np.int64]:
-    """Samples that a camera may meet within the incidence limit, rounding allowed."""
-    offsets = target.samples.points - camera.world_from_device[:3, 3]
-    along = -np.einsum("ij,ij->i", offsets, target.samples.normals)
-    distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
-    return np.flatnonzero(along >= (np.cos(max_incidence) - _ROUNDING) * distances)
+    cameras: Sequence[PlannedCamera], target: Target, max_incidence: float
+) -> NDArray[np.bool_]:
+    """Whether a camera may meet a sample within the incidence limit, rounding allowed.
+
+    Most of what a candidate can't see faces away from it. With O, P and N about one of
+    the samples, -(P - O).N = O.N - P.N and |P - O|^2 = |O|^2 - 2 O.P + |P|^2; shape
+    (n_cameras, n).
+    """
+    normals = target.samples.normals
+    middle = target.samples.points[:1].sum(axis=0)
+    points = target.samples.points - middle
+    centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras]) - middle
+    along = centres @ normals.T - np.einsum("ij,ij->i", points, normals)
+    squares = np.einsum("ij,ij->i", centres, centres)[:, None] - 2.0 * (
+        centres @ points.T
+    )
+    squares += np.einsum("ij,ij->i", points, points)
+    distances = np.sqrt(np.maximum(squares, 0.0))
+    return along >= (np.cos(max_incidence) - _ROUNDING) * distances

@@ -169,6 +169,8 @@ def _run_ipopt(
             "print_time": False,
             "show_eval_warnings": False,
             "error_on_fail": False,
+            # The gradient by parameters, of which there are none.
+            "no_nlp_grad": True,
         },
     )
     # The step's ball holds these bounds too; they keep iterates from running away.

@@ -300,6 +300,7 @@ def _claim(document: dict[str, Any], surface: Surface) -> None:
     for name, causes in (
         ("uncovered_by_cause", LIGHT + SIGHT + PAIR),
         ("unreachable_by_cause", LIGHT),
+        ("unmeasurable_by_cause", SIGHT + PAIR),
     ):
         split = {c: area(lambda row, n=name, c=c: row[n] == c, inside) for c in causes}
         coverage[name] = {cause: value for cause, value in split.items() if value > 0}
@@ -370,6 +371,9 @@ def _evaluate(
     else:
         cause = LIGHT[max(steps)]
     reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 6
+    sight = 9 if measured or not any(lit) else 0
+    if not measured and any(lit):
+        sight = _reference_sight(document, surface, p, n, lit)
     any_light = {"max_incidence": math.radians(89.0), "min_tangent_angle": 0.0}
     return {
         "falls": [
@@ -384,10 +388,10 @@ def _evaluate(
         "margins": margins,
         "server": margins.index(max(margins)) if any(lit) else None,
         "by_projectors": reference == 6,
-        "by_cameras": measured
-        or (any(lit) and _reference_sight(document, surface, p, n, lit)),
+        "by_cameras": any(lit) and sight == 9,
         "uncovered_by_cause": cause,
         "unreachable_by_cause": None if reference == 6 else LIGHT[reference],
+        "unmeasurable_by_cause": None if sight == 9 else (SIGHT + PAIR)[sight],
         "inside": inside,
     }
 
@@ -420,9 +424,9 @@ def _reference_light(
 
 def _reference_sight(
     document: dict[str, Any], surface: Surface, p: Any, n: Any, lit: list[bool]
-) -> bool:
+) -> int:
     camera = document["cameras"][0]
-    return any(
+    return max(
         pair_steps(
             projector,
             camera | {"world_from_device": pose},
@@ -430,7 +434,6 @@ def _reference_sight(
             n,
             document["requirements"],
         )
-        == 9
         for pose in surface.reference_cameras.tolist()
         for projector, on in zip(document["projectors"], lit, strict=True)
         if on

@@ -5,7 +5,7 @@ import dataclasses
 
 import pytest
 
-from planning.shortfall import _cm2, shortfalls
+from planning.shortfall import area_words, shortfalls
 from planning.summary import _cell
 
 
@@ -75,7 +75,7 @@ def test_bodies_that_are_in_the_way_are_named(plan):
     blocked = {"P1": 0.0, "C1": 2.5e-5, "C2": 4.1e-4}
     (line,) = missed(plan, blocked=blocked, lit_m2=0.4)
     words = "410 mm² blocked by the body of C2, 25 mm² blocked by the body of C1"
-    assert f"are left ({words}). What would help" in line
+    assert f"are left ({words}). Of the target: " in line
     assert "P1" not in line
     assert missed(plan, blocked=blocked) == ()
     document = copy.deepcopy(plan.document)
@@ -97,7 +97,7 @@ def test_a_failed_check_lists_its_own_sentences(plan):
 
 
 def test_areas_of_tiny_parts_are_told_in_square_millimetres():
-    assert [_cm2(area) for area in (2.5e-6, 9.9e-5, 1.2e-4)] == [
+    assert [area_words(area) for area in (2.5e-6, 9.9e-5, 1.2e-4)] == [
         "2.5 mm²",
         "99 mm²",
         "1.2 cm²",

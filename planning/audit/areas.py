@@ -10,7 +10,7 @@ from planning.plan import RigPlan
 
 from .estimates import Estimator
 from .ledger import Ledger, as_number
-from .predicates import LIGHT_CAUSES, LIT, PAIR_CAUSES, SIGHT_CAUSES
+from .predicates import LIGHT_CAUSES, LIT, MEASURED, PAIR_CAUSES, SIGHT_CAUSES
 from .recompute import Reach, Recomputed
 
 CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
@@ -90,6 +90,18 @@ def audit_causes(
         estimator,
         ledger,
     )
+    # Only there where it is more than the requirement allows.
+    if ledger.read("coverage", "unmeasurable_by_cause") is not None:
+        beyond = target & own.lit & ~reach.cameras
+        _audit_split(
+            "unmeasurable_by_cause",
+            SIGHT_CAUSES + PAIR_CAUSES,
+            [beyond & (reach.furthest_pair == index) for index in range(MEASURED)],
+            "reachable_by_cameras_m2",
+            estimator,
+            ledger,
+            whole="lit_m2",
+        )
 
 
 def audit_contributions(
@@ -146,22 +158,25 @@ def _audit_split(
     rest: str,
     estimator: Estimator,
     ledger: Ledger,
+    *,
+    whole: str = "area_m2",
 ) -> None:
+    """Check a split of `whole` less `rest` by causes, part by part and as a sum."""
     key = f"coverage.{name}"
     split = ledger.read("coverage", name)
     if not ledger.holds(isinstance(split, dict), key, "is missing"):
         return
     unknown = sorted(set(split) - set(causes))
     ledger.holds(not unknown, key, f"causes that there are not: {', '.join(unknown)}")
-    whole = estimator.target_m2
+    target = estimator.target_m2
     for cause, mask in zip(causes, masks, strict=True):
         ledger.number(
             f"{key}.{cause}",
             split.get(cause, 0.0),
             estimator.area(mask),
-            estimator.tolerance(mask, whole),
+            estimator.tolerance(mask, target),
         )
     total = sum(as_number(value) or 0.0 for value in split.values())
-    area = as_number(ledger.read("coverage", "target", "area_m2")) or 0.0
+    area = as_number(ledger.read("coverage", "target", whole)) or 0.0
     done = as_number(ledger.read("coverage", "target", rest)) or 0.0
-    ledger.number(f"{key} (sum)", total, area - done, 1e-4 * whole)
+    ledger.number(f"{key} (sum)", total, area - done, 1e-4 * target)

@@ -94,11 +94,15 @@ class Reach:
         cameras: Reachable by cameras, shape (n,).
         furthest: Most limits of *lit* that any reference projector passes, shape (n,);
             final only where no reference projector lights the sample.
+        furthest_pair: Most limits of *seen* and *measurable* that any pair of a
+            reference camera and a projector passes, shape (n,); final only on lit
+            samples that no such pair, and none of the plan's, measures.
     """
 
     projectors: NDArray[np.bool_]
     cameras: NDArray[np.bool_]
     furthest: NDArray[np.int8]
+    furthest_pair: NDArray[np.int8]
 
 
 def lamps_of(plan: RigPlan) -> tuple[Lamp, ...]:
@@ -181,8 +185,8 @@ def reach_of(plan: RigPlan, own: Recomputed, shadow: Shadow, seed: int) -> Reach
     """
     rng = np.random.default_rng(seed)
     by_projectors, furthest = _reach_by_projectors(plan, own, shadow, rng)
-    by_cameras = _reach_by_cameras(plan, own, shadow, rng)
-    return Reach(by_projectors, by_cameras, furthest)
+    by_cameras, furthest_pair = _reach_by_cameras(plan, own, shadow, rng)
+    return Reach(by_projectors, by_cameras, furthest, furthest_pair)
 
 
 def reference_lamps(plan: RigPlan) -> list[Lamp]:
@@ -219,10 +223,11 @@ def _reach_by_projectors(
 
 def _reach_by_cameras(
     plan: RigPlan, own: Recomputed, shadow: Shadow, rng: np.random.Generator
-) -> NDArray[np.bool_]:
-    reached = own.measured.copy()
+) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
+    furthest = np.zeros(len(own.samples), dtype=np.int8)
+    furthest[own.measured] = MEASURED
     if not plan.cameras:
-        return reached
+        return own.measured.copy(), furthest
     device: PinholeModel = plan.cameras[0].device
     lamps = lamps_of(plan)
     left = np.flatnonzero(own.lit & ~own.measured)
@@ -231,7 +236,7 @@ def _reach_by_cameras(
     for index in rng.permutation(len(poses)):
         if len(left) == 0:
             break
-        found = _measurable(
+        steps = _steps_with_any(
             Eye(device, poses[index], blocks_before(plan, "camera", poses[index])),
             lamps,
             rest,
@@ -239,28 +244,27 @@ def _reach_by_cameras(
             plan.requirements,
             shadow,
         )
+        furthest[left] = np.maximum(furthest[left], steps)
+        found = steps == MEASURED
         if np.any(found):
-            reached[left[found]] = True
             left, rest = left[~found], rest.take(~found)
-    return reached
+    return furthest == MEASURED, furthest
 
 
-def _measurable(
+def _steps_with_any(
     eye: Eye,
     lamps: tuple[Lamp, ...],
     samples: AuditSamples,
     lit_by: NDArray[np.bool_],
     requirements: Requirements,
     shadow: Shadow,
-) -> NDArray[np.bool_]:
-    """Whether a camera measures each sample with any projector that lights it."""
-    found = np.zeros(len(samples), dtype=bool)
-    seen = sight_steps(eye, samples, requirements.camera, shadow) == SEEN
+) -> NDArray[np.int8]:
+    """How many limits each sample passes with the best projector that lights it."""
+    steps = sight_steps(eye, samples, requirements.camera, shadow)
+    seen = steps == SEEN
     for lamp, lit in zip(lamps, lit_by, strict=True):
-        both = np.flatnonzero(seen & lit & ~found)
+        both = np.flatnonzero(seen & lit & (steps < MEASURED))
         if len(both):
-            steps = pair_steps(
-                lamp, eye, samples.take(both), requirements.triangulation
-            )
-            found[both] = steps == MEASURED - SEEN
-    return found
+            own = pair_steps(lamp, eye, samples.take(both), requirements.triangulation)
+            steps[both] = np.maximum(steps[both], SEEN + own)
+    return steps

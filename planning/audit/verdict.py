@@ -9,8 +9,9 @@ def unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
     """Return one sentence for each requirement on the target that isn't met.
 
     lit >= dominant_coverage x reachable by projectors, measured >= coverage x reachable
-    by cameras, reachable by projectors >= min_reachable x target. Read from the claims,
-    which the audit holds against its own figures apart.
+    by cameras, reachable by projectors >= min_reachable x target, reachable by cameras
+    >= min_reachable x lit. Read from the claims, which the audit holds against its own
+    figures apart.
     """
     limits = plan.requirements
     target = plan.coverage.get("target")
@@ -29,6 +30,7 @@ def unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
             "reachable_by_projectors_m2",
         ),
         ("coverage", "measured_m2", limits.coverage, "reachable_by_cameras_m2"),
+        ("min_reachable", "reachable_by_cameras_m2", limits.min_reachable, "lit_m2"),
     )
     sentences: list[str] = []
     for name, part, share, whole in rules:
