@@ -5,14 +5,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..plan import RigPlan
+from .calibration import ProjectorCalibration, calibrate_projector
 from .corrections import Device
 from .diagnosis import Cause, Explanation
+from .supposed import GRAZING, incidence_cosine
 
 _MM = 1e3
-# Incidence of light beyond which edges smear: formulation.md section 2 [rad].
-GRAZING = np.deg2rad(70.0)
 # Turns below this aren't worth a word [rad].
 _NO_TURN = np.deg2rad(0.005)
+# An axis that passes the object by more than this share of its distance isn't aimed.
+_MOST_ASIDE = 0.5
 
 
 def in_words(cause: Cause, plan: RigPlan) -> str:
@@ -45,9 +47,9 @@ def _looks(explanation: Explanation, plan: RigPlan) -> str:
         return f"{names[0]} looks as if {_focal(before, after)}"
     away = float(np.linalg.norm(explanation.before.body.centre - before.centre))
     looks = f"{names[0]} looks as if it {_displaced(before, after, away)}"
-    if correction.role == "projectors" and explanation.cosine < np.cos(GRAZING):
-        degrees = np.rad2deg(np.arccos(explanation.cosine))
-        looks += f", its light grazing the surface at {degrees:.0f} degrees (median)"
+    if isinstance(before, ProjectorCalibration):
+        assert isinstance(after, ProjectorCalibration)
+        looks += _grazing(before, after, plan)
     if correction.role == "cameras":
         looks += _too_wide(names[0], after, plan)
     return looks
@@ -82,13 +84,51 @@ def _displaced(before: Device, after: Device, away: float) -> str:
     if angle > _NO_TURN:
         axes = (after.world_from_device[:3, 2], before.world_from_device[:3, 2])
         aside = away * _aside(*axes)
-        words.append(
-            f"were turned by {np.rad2deg(angle):.2g} degrees "
-            f"(aimed {_MM * aside:.2g} mm off at the object)"
-        )
+        least = "at least " * isinstance(before, ProjectorCalibration)
+        turned = f"were turned by {least}{np.rad2deg(angle):.2g} degrees"
+        if aside < _MOST_ASIDE * away:
+            turned += f" (aimed {_millimetres(aside)} off at the object)"
+        words.append(turned)
     if moved > 0.0:
-        words.append(f"stood {_MM * moved:.3g} mm from its place")
+        words.append(f"stood {_millimetres(moved)} from its place")
     return " and ".join(words) or "were not moved"
+
+
+def _grazing(
+    before: ProjectorCalibration, after: ProjectorCalibration, plan: RigPlan
+) -> str:
+    """Say at what angle the target is lit that the projector should serve.
+
+    That is what it would meet more squarely than any other projector of the plan.
+    """
+    mesh = plan.surface.mesh
+    target = plan.surface.target_faces(plan.requirements.target)
+    middles, normals = mesh.face_centroids[target], mesh.face_normals[target]
+    areas = mesh.face_areas[target]
+    each = [
+        incidence_cosine(calibrate_projector(p), middles, normals)
+        for p in plan.projectors
+    ]
+    planned = incidence_cosine(before, middles, normals)
+    limit = np.cos(plan.requirements.projector.max_incidence)
+    own = (planned >= limit) & (planned >= np.max(each, axis=0))
+    if not own.any():
+        return ""
+    lit = incidence_cosine(after, middles[own], normals[own])
+    order = np.argsort(lit)
+    half = np.searchsorted(np.cumsum(areas[own][order]), 0.5 * areas[own].sum())
+    angle = float(np.arccos(np.clip(lit[order[half]], -1.0, 1.0)))
+    if angle < GRAZING:
+        return ""
+    return (
+        f", so that it meets the surface that it should serve at "
+        f"{np.rad2deg(angle):.0f} degrees (median): grazing"
+    )
+
+
+def _millimetres(length: float) -> str:
+    """Return a length in [m] in words: two digits, whole millimetres from 10 on."""
+    return f"{_MM * length:.0f} mm" if length >= 0.01 else f"{_MM * length:.2g} mm"
 
 
 def _too_wide(name: str, after: Device, plan: RigPlan) -> str:

@@ -12,7 +12,7 @@ from .cause_words import in_words
 from .cloud import Cloud
 from .diagnosis import Pairs, diagnose
 from .inaccurate import where_inaccurate
-from .missing import hole_between, left_out_nearby, missing_where
+from .missing import hole_between, left_out_nearby, missing_where, no_edges
 from .overlap import lit_twice
 from .result import PairCount
 from .roots import wrong_roots
@@ -146,24 +146,26 @@ def _silent(pairs: dict[str, list[PairCount]], dark: str) -> list[str]:
 
 
 def _double_light(measured: Measured) -> list[str]:
-    """Name pairs with many saturated pixels, and whose light falls on them as well."""
-    found: list[str] = []
+    """Name projectors that saturate many pixels, and what else lights these."""
+    plan = measured.plan
+    found: dict[tuple[str, ...], list[str]] = {}
     for (p, c), pair in measured.decoded:
         n = pair.n_saturated
-        if n <= _SATURATED_SHARE * (pair.lit_pixels + n):
-            continue
-        names = f"{measured.plan.projectors[p].id} with {measured.plan.cameras[c].id}"
-        share = n / (pair.lit_pixels + n)
-        others = lit_twice(measured.plan, pair.saturated, p, c)
-        why = (
-            f"{' and '.join(others)} lights them too: on at the same time, it adds up"
+        lit = pair.lit_pixels + n
+        if n > _SATURATED_SHARE * lit:
+            others = lit_twice(plan, pair.saturated, p, c)
+            names = (plan.projectors[p].id, *others)
+            seen = f"{100 * n / lit:.0f} % in {plan.cameras[c].id}"
+            found.setdefault(names, []).append(seen)
+    return [
+        f"{name} saturates lit pixels, {', '.join(seen)}: "
+        + (
+            f"{' and '.join(others)} lights them too, on at the same time it adds up"
             if others
             else "exposed too long"
         )
-        found.append(
-            f"{names}: {100 * share:.0f} % of the lit pixels are saturated; {why}"
-        )
-    return found
+        for (name, *others), seen in found.items()
+    ]
 
 
 def _wrong_roots(measured: Measured) -> list[str]:
@@ -187,7 +189,10 @@ def _lost(measured: Measured, *, displaced: bool) -> list[str]:
         return [where, hole]
     cause = left_out_nearby(plan, measured.decoded, samples, missing)
     if cause is None:
-        return [where, "no edge was found there: unlit, hidden or outside the images"]
+        return [
+            where,
+            no_edges(plan, samples.points[missing], samples.normals[missing]),
+        ]
     name, share = cause
     return [
         where,

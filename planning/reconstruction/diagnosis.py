@@ -86,8 +86,8 @@ def _equally_good(tried: list[Explanation]) -> tuple[Explanation, ...]:
 
 
 def _clearly_worse(one: Explanation, best: Explanation) -> bool:
-    """Whether edges, one by one, tell which of two changes is right."""
-    rows = one.rows | best.rows
+    """Whether the edges that the better change puts right tell that it is."""
+    rows = best.rows
     left, least = (capped(e.mismatch[rows], CAP_M) for e in (one, best))
     # Outliers of either are no evidence.
     size = np.minimum(left, least)

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from geometry.proximity import closest_points
 
 from ..plan import RigPlan
-from .cause_words import GRAZING
 from .cloud import Cloud
+from .supposed import GRAZING
 
 _MM = 1e3
 # Points of each pair that are looked at.

@@ -12,7 +12,8 @@ from ..plan import RigPlan
 from .cloud import Cloud
 from .decode import CAUSES
 from .diagnosis import Pairs
-from .supposed import Evidence, Supposed, places
+from .overlap import light_falls, outer_radius
+from .supposed import GRAZING, Evidence, Supposed, incidence_cosine, places
 
 _MM = 1e3
 _MOST_REGIONS = 3
@@ -140,3 +141,33 @@ def left_out_nearby(
     if not shares[cause] >= _MOST:
         return None
     return CAUSES[cause], float(shares[cause])
+
+
+def no_edges(
+    plan: RigPlan, points: NDArray[np.float64], normals: NDArray[np.float64]
+) -> str:
+    """Say why there is no edge about missing samples, by the plan's own geometry.
+
+    Args:
+        plan: Of the rig.
+        points: Of the samples [m], shape (n, 3).
+        normals: Unit normals there, shape (n, 3).
+    """
+    supposed = Supposed.of(plan)
+    cosines = np.full((len(supposed.projectors), len(points)), -1.0)
+    for p, projector in enumerate(supposed.projectors):
+        outer = outer_radius(plan.projectors[p].ring_radii)
+        lit = light_falls(projector, outer, supposed.body.caster, points, normals)
+        cosines[p, lit] = incidence_cosine(projector, points, normals)[lit]
+    best, projector = cosines.max(axis=0), cosines.argmax(axis=0)
+    if np.mean(best > 0.0) < _MOST:
+        return "no edge was found there: no projector's light falls on most of them"
+    angle = float(np.median(np.arccos(best[best > 0.0])))
+    if angle < GRAZING:
+        return "no edge was found there: dark, hidden or outside the images"
+    squarest = np.bincount(projector[best > 0.0], minlength=len(cosines))
+    name = plan.projectors[int(np.argmax(squarest))].id
+    return (
+        f"no edge was found there: {name} meets them at {np.rad2deg(angle):.0f} "
+        f"degrees (median), at grazing incidence"
+    )

@@ -15,8 +15,8 @@ from .calibration import ProjectorCalibration
 from .obstacles import Occluder
 from .supposed import Evidence, Supposed, places
 
-# As in the decoder: less contrast between light on and off is no light [grey levels].
-MIN_CONTRAST = 10.0
+# Less contrast between on and off is noise: three deviations of both [grey levels].
+MIN_CONTRAST = 5.0
 _LEVELS = 256
 # Light met more obliquely isn't told from none (docs/semantics.md) [cosine].
 _GLANCING = np.cos(np.deg2rad(89.0))
@@ -169,6 +169,11 @@ def light_falls(
     return lit
 
 
+def outer_radius(radii: NDArray[np.float64]) -> float:
+    """Return where the last annulus ends: as wide as the one before, (n_rings,)."""
+    return float(2.0 * radii[-1] - radii[-2])
+
+
 def lit_twice(
     plan: RigPlan, pixels: NDArray[np.float64], p: int, c: int
 ) -> tuple[str, ...]:
@@ -188,8 +193,7 @@ def lit_twice(
     spot = supposed.body.caster, at.points[known], at.normals[known]
     lit: list[str] = []
     for q, projector in enumerate(supposed.projectors):
-        radii = plan.projectors[q].ring_radii
-        outer = float(2.0 * radii[-1] - radii[-2])
+        outer = outer_radius(plan.projectors[q].ring_radii)
         if q != p and np.mean(light_falls(projector, outer, *spot)) > 0.5:
             lit.append(projector.id)
     return tuple(lit)

@@ -28,6 +28,8 @@ from .patterns import ring_plane
 Role = Literal["cameras", "projectors"]
 # Edges of each pair of devices that are looked at.
 EDGES_A_PAIR = 240
+# Incidence of light beyond which edges smear: formulation.md section 2 [rad].
+GRAZING = np.deg2rad(70.0)
 # Pairs with fewer edges say nothing.
 _LEAST_EDGES = 60
 
@@ -228,11 +230,27 @@ def mismatches(
             pixels, depth = projector.panel(points)
             plane = ring_plane(design, pixels)
             off = np.hypot(plane[:, 0], plane[:, 1]) - radii
-            beams = np.broadcast_to(projector.axis, points.shape)
             if design.light == "diverging":
                 off = off * depth / np.sqrt(1.0 + radii * radii)
-                beams = points - projector.centre
-                beams = beams / np.linalg.norm(beams, axis=1, keepdims=True)
-        cosine[own] = -np.einsum("ij,ij->i", beams, at.normals[own])
+            cosine[own] = incidence_cosine(projector, points, at.normals[own])
         mismatch[own] = off
     return np.where(cosine > 0.0, mismatch, np.nan), cosine
+
+
+def incidence_cosine(
+    projector: ProjectorCalibration,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the cosine of the incidence of a projector's light, shadows left aside.
+
+    Args:
+        projector: As it is supposed to stand.
+        points: Of the surface [m], shape (n, 3).
+        normals: Unit normals there, shape (n, 3).
+    """
+    if projector.light == "parallel":
+        return -(normals @ projector.axis)
+    beams = points - projector.centre
+    beams = beams / np.linalg.norm(beams, axis=1, keepdims=True)
+    return -np.einsum("ij,ij->i", beams, normals)
