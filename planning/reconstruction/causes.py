@@ -87,9 +87,10 @@ def explained(failures: tuple[str, ...], measured: Measured) -> tuple[str, ...]:
         failures: One clause for each limit that isn't kept.
         measured: What the check found.
     """
-    causes = [*_unordered(measured), *_dark(measured)]
-    causes += _double_light(measured)
-    if not _unordered(measured):
+    # Edges of disordered frames, or of two projectors at once, are no evidence.
+    blurred = [*_unordered(measured), *_double_light(measured)]
+    causes = [*blurred, *_dark(measured)]
+    if not blurred:
         found = diagnose(measured.plan, measured.decoded)
         causes += [in_words(cause, measured.plan) for cause in found]
         causes += _wrong_roots(measured) if not found else []

@@ -42,8 +42,17 @@ class Cause:
 
 
 def diagnose(plan: RigPlan, decoded: Pairs) -> tuple[Cause, ...]:
-    """Return the changes that the edges ask for, what explains most first."""
-    evidence = Evidence.of(plan, decoded)
+    """Return the changes that the edges of a check ask for, see `diagnose_edges`."""
+    return diagnose_edges(plan, Evidence.of(plan, decoded))
+
+
+def diagnose_edges(plan: RigPlan, evidence: Evidence) -> tuple[Cause, ...]:
+    """Return the changes that edges ask for, what explains most first.
+
+    Args:
+        plan: How everything should stand.
+        evidence: Labelled edges of the pairs of devices.
+    """
     if len(evidence) == 0:
         return ()
     supposed = Supposed.of(plan)

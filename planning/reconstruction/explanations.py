@@ -86,7 +86,7 @@ class State:
 
     def explanations(self) -> list[Explanation]:
         """Fit every change to the edges that it bears on."""
-        off = {role: self._off(role) for role in _ROLES}
+        off = self._off()
         swaps = [
             self._fitted(swapped(role, *two))
             for role in _ROLES
@@ -102,24 +102,41 @@ class State:
         devices: list[tuple[Role, int]] = [
             (role, index) for role in _ROLES for index in off[role]
         ]
-        for device in devices:
-            tried += self._nearby(*device)
+        for role, index in devices:
+            tried += self._nearby(role, index)
         best = min(tried, key=lambda e: e.left_m)
         for role, index in devices:
             own = self.evidence.index(role) == index
-            if self.misfit(best.mismatch, own) > _FAR_TIMES * self.fine_m:
+            does = [best, *(e for e in tried if np.array_equal(e.rows, own))]
+            least = min(self.misfit(e.mismatch, own) for e in does)
+            if least > _FAR_TIMES * self.fine_m:
                 tried.append(self._afar(role, index))
         return tried
 
     def _n_measured(self, role: Role) -> int:
         return len(np.unique(self.evidence.index(role)))
 
-    def _off(self, role: Role) -> list[int]:
-        """Devices some of whose edges are off their rings."""
-        index = self.evidence.index(role)
-        fine = self.fine_m
-        every = np.unique(index).tolist()
-        return [k for k in every if self.misfit(rows=index == k) > fine]
+    def _off(self) -> dict[Role, list[int]]:
+        """Devices whose edges are off their rings with all partners, else with some."""
+        pairs = {
+            (p, c): self.misfit(
+                rows=(self.evidence.projector == p) & (self.evidence.camera == c)
+            )
+            for p, c in self.evidence.pairs()
+        }
+        for enough in (min, max):
+            off: dict[Role, list[int]] = {}
+            for axis, role in enumerate(reversed(_ROLES)):
+                every = sorted({pair[axis] for pair in pairs})
+                off[role] = [
+                    k
+                    for k in every
+                    if enough(m for pair, m in pairs.items() if pair[axis] == k)
+                    > self.fine_m
+                ]
+            if any(off.values()):
+                return off
+        return {role: [] for role in _ROLES}
 
     def _nearby(self, role: Role, index: int) -> list[Explanation]:
         """Fit the changes of one device that begin where it should stand."""

@@ -1,6 +1,7 @@
 """Samples that were promised and have no point: where they lie, and why."""
 
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,15 +96,17 @@ def _side(
 
     Zero directions where it has none within reach, or has them on all sides.
     """
-    k = min(_NEIGHBOURS, len(measured))
-    distance, nearest = KDTree(measured).query(points, k=[*range(1, k + 1)])  # pyright: ignore[reportArgumentType]
+    nearby: Any = [*range(1, min(_NEIGHBOURS, len(measured)) + 1)]
+    distance, nearest = KDTree(measured).query(points, k=nearby)
     near = distance <= reach
     away = measured[np.where(near, nearest, 0)] - points[:, None]
-    first = away[:, 0] / np.maximum(distance[:, :1], 1e-12)
-    beyond = np.einsum("ijk,ik->ij", away, first) < -0.1 * distance
-    share = np.sum(beyond & near, axis=1) / np.maximum(near.sum(axis=1), 1)
+    away = np.where(near[:, :, None], away / np.maximum(distance, 1e-12)[:, :, None], 0)
+    mean = away.sum(axis=1)
+    side = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+    beyond = np.einsum("ijk,ik->ij", away, side) < -0.1
+    share = beyond.sum(axis=1) / np.maximum(near.sum(axis=1), 1)
     sound = near[:, 0] & (share <= _ONE_SIDED)
-    return np.where(sound[:, None], first, 0.0), distance[:, 0]
+    return np.where(sound[:, None], side, 0.0), distance[:, 0]
 
 
 def left_out_nearby(

@@ -95,8 +95,10 @@ def three_classes(light: NDArray[np.float32]) -> tuple[float, float]:
     whole = np.full_like(low, _LEVELS)
     between = gain(np.zeros_like(low), low) + gain(low, high) + gain(high, whole)
     between[low > high] = -np.inf
-    one, two = np.unravel_index(int(np.argmax(between)), between.shape)
-    return float(one) - 0.5, float(two) - 0.5
+    # Between heaps of grey every threshold is as good: the middle one is taken.
+    best = np.argwhere(between >= (1.0 - 1e-12) * between.max())
+    one, two = best.mean(axis=0) - 0.5
+    return float(one), float(two)
 
 
 def best_threshold(

@@ -129,6 +129,11 @@ class Evidence:
         """Return which device of a role each edge is of, shape (n,)."""
         return self.camera if role == "cameras" else self.projector
 
+    def pairs(self) -> list[tuple[int, int]]:
+        """Return the pairs of projector and camera that there are edges of."""
+        both = zip(self.projector.tolist(), self.camera.tolist(), strict=True)
+        return sorted(set(both))
+
     def take(self, chosen: NDArray[np.int64]) -> "Evidence":
         """Return some of the edges."""
         return Evidence(
