@@ -2,15 +2,13 @@
 
 Poses are known, so that the clouds are in one frame already. Where several projectors
 light a piece of surface, the one that meets it more squarely stays, then among cameras
-the one with the smaller standard deviation along the normal. What has nothing near it
-that stays was no redundancy, and stays as well.
+the one with the smaller standard deviation along the normal.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from .cloud import Cloud
 
@@ -21,9 +19,6 @@ _MIN_POINTS = 12
 _MIN_SPREAD = 0.02
 # A projector may stand for another in a tile if it measured this share as many points.
 _MIN_SUPPORT = 0.4
-# A point is alone if nothing that stays is within this share of a ring gap; a surface
-# that faces the other way counts as farther than that.
-_ALONE_GAPS, _FACING = 0.4, 0.6
 # Directions that a surface may face, and one for surface whose direction isn't known.
 _SIDES = 7
 
@@ -61,32 +56,10 @@ def merge(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Merged:
         tiles = _Tiles.of(part.pixels, side)
         normals[rows] = _plane_normals(part, tiles)
         square[rows] = _squarest_projector(part, tiles, normals[rows])
+    cloud, normals = cloud.take(square), normals[square]
     sigma = cloud.sigma(normals)
-    kept = np.flatnonzero(square)
-    best = _sharpest_camera(
-        cloud.take(kept), sigma[kept], _side(normals[kept]), 0.5 * gap_m
-    )
-    stays = np.zeros(len(cloud), dtype=bool)
-    stays[kept[best]] = True
-    stays |= _alone(cloud.points, normals, stays, _ALONE_GAPS * gap_m)
-    return Merged(cloud.take(stays), normals[stays], sigma[stays])
-
-
-def _alone(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    stays: NDArray[np.bool_],
-    reach_m: float,
-) -> NDArray[np.bool_]:
-    """Return which points have none that stays within reach on their side, (n,)."""
-    facing = np.where(np.isfinite(normals), normals, 0.0)
-    place = np.hstack([points / reach_m, _FACING * facing])
-    alone = np.zeros(len(points), dtype=bool)
-    gone = np.flatnonzero(~stays)
-    if len(gone) and stays.any():
-        nearest, _ = KDTree(place[stays]).query(place[gone], distance_upper_bound=1.0)
-        alone[gone] = ~(nearest <= 1.0)
-    return alone
+    best = _sharpest_camera(cloud, sigma, _side(normals), 0.5 * gap_m)
+    return Merged(cloud.take(best), normals[best], sigma[best])
 
 
 @dataclass(frozen=True, eq=False)
