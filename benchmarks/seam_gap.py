@@ -52,8 +52,8 @@ def predicted_limit() -> float:
     return flat_limit(extents[0], extents[1])
 
 
-def check(baseline: float) -> Reconstruction:
-    """Reconstruct the wall; samples about the seam are those predicted measured."""
+def seam_samples() -> tuple[SurfaceSamples, NDArray[np.bool_]]:
+    """Return samples about the seam, all of which are said to be measured."""
     x, y = np.meshgrid(
         np.linspace(-_HALF_WIDTH, _HALF_WIDTH, 81),
         np.linspace(-_HALF_HEIGHT, _HALF_HEIGHT, 81),
@@ -61,7 +61,12 @@ def check(baseline: float) -> Reconstruction:
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     samples = SurfaceSamples(points, normals, np.zeros(len(points), np.int64), 1.0)
-    every = np.ones(len(points), dtype=bool)
+    return samples, np.ones(len(points), dtype=bool)
+
+
+def check(baseline: float) -> Reconstruction:
+    """Reconstruct the wall; samples about the seam are those predicted measured."""
+    samples, every = seam_samples()
     return reconstruct_plan(
         wall_rig(baseline), seed=0, threads=1, samples=samples, predicted=every
     )

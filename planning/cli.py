@@ -311,13 +311,13 @@ def _check_target(options: dict[str, Any]) -> None:
     "--mesh",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Also hold the plan's surface against this mesh, read anew.",
+    help="Hold the plan's surface against this mesh; if it differs, render with it.",
 )
 @click.option(
     "--truth",
     type=click.Path(path_type=Path),
     metavar="other-plan.json",
-    help="Render with the devices of another plan: what really stands there.",
+    help="Render with another plan's devices and surface: what really stands there.",
 )
 @click.option(
     "--seed", type=click.IntRange(0), help="Of the audit [default: the plan's]."

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _MM = 1e3
 _MESH_SAMPLES = 2000
+# A mesh that is larger or smaller by more than this is another file or unit.
+_MOST_RESIZED = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +103,12 @@ def verify_plan(
 
     Args:
         plan: The plan, as written.
-        mesh: If given, it must be the surface that the plan speaks of.
+        mesh: If given, it must be the surface that the plan speaks of. If it isn't, it
+            is also what is rendered, so that the pixels say how it differs; unless its
+            size is so different that the file is another one, or in another unit.
         check_pixels: Whether the reconstruction is run.
-        truth: What really stands there; the plan by default. With it, every limit of
-            the check that isn't kept is a failure.
+        truth: What really stands there; the plan by default. With it, or with another
+            mesh, every limit of the check that isn't kept is a failure.
         seed: Of the audit's samples and the pixel noise; the plan's own by default.
         threads: Worker threads; the result doesn't depend on them.
         progress: Receives a line when a stage begins.
@@ -118,15 +122,21 @@ def verify_plan(
     audit = audit_plan(plan, seed=seed, threads=threads)
     failures = list(audit.failures)
     if mesh is not None:
-        failures += compare_meshes(mesh, plan.surface.mesh, threads=threads)
+        differs = compare_meshes(mesh, plan.surface.mesh, threads=threads)
+        failures += differs
+        if differs and _comparable(mesh, plan.surface.mesh):
+            truth = _with_mesh(truth or plan, mesh)
     recorded = plan.document["reconstruction"]
     failures += contradictions(recorded)
     if not check_pixels:
         return Verification(tuple(failures), audit, None)
     found = _reconstruct(plan, audit, truth, seed, threads, say)
+    if truth is not None:
+        # What is recorded is of the rig as planned.
+        return Verification((*failures, *found.failures), audit, found)
     false = compare_figures(recorded, found.to_document())
     owned_up = recorded is not None and recorded.get("passed") is False
-    if owned_up and not false and truth is None:
+    if owned_up and not false:
         return Verification(tuple(failures), audit, found, found.failures)
     return Verification((*failures, *found.failures, *false), audit, found)
 
@@ -165,6 +175,26 @@ def compare_meshes(
             f"tolerance 0.1 %"
         ]
     return []
+
+
+def _comparable(mesh: TriangleMesh, surface: TriangleMesh) -> bool:
+    """Whether a mesh may be the plan's object, changed: near it and of its size."""
+    low, high = 1.0 / _MOST_RESIZED, _MOST_RESIZED
+    apart = float(np.linalg.norm(mesh.centre - surface.centre))
+    return low <= mesh.radius / surface.radius <= high and apart <= surface.radius
+
+
+def _with_mesh(plan: RigPlan, mesh: TriangleMesh) -> RigPlan:
+    """Return the devices of a plan about another object."""
+    n = len(mesh.faces)
+    surface = replace(
+        plan.surface,
+        mesh=mesh,
+        member=np.zeros(n, dtype=np.int64),
+        region=np.full(n, -1, dtype=np.int64),
+        steep=np.zeros((n, 3)),
+    )
+    return RigPlan(plan.document, surface)
 
 
 def _silent(line: str) -> None:

@@ -1,5 +1,7 @@
 """Eq. (10) at image level: a millimetre beyond d'_max opens a hole, none inside it."""
 
+import re
+
 import pytest
 
 
@@ -25,6 +27,9 @@ def test_a_millimetre_beyond_the_limit_opens_a_hole_that_the_check_sees(wall):
     found = wall.check(wall.predicted_limit() + 1e-3)
     assert not found.passed
     assert any("have no point within 0.75 mm" in text for text in found.failures)
+    hole = r"between what C1 and C2 measured, a hole about 1\.\d mm wide: the baseline"
+    assert all(re.search(hole, text) for text in found.failures), found.failures
+    assert all("161.0 mm, is too wide" in text for text in found.failures)
     # The millimetre, and the pixels at either border that no edge is read from.
     assert 1.0e-3 < wall.hole(found) < 1.6e-3
     assert not found.accuracy.rms_m > 1e-4

@@ -1,27 +1,38 @@
 """What the errors of a reconstruction point at, in words."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.mesh import TriangleMesh
-from geometry.proximity import closest_points
+from geometry.sampling import SurfaceSamples
 
-from ..requirements import CheckLimits
+from ..plan import RigPlan
+from .cause_words import in_words
 from .cloud import Cloud
+from .diagnosis import Pairs, diagnose
+from .inaccurate import where_inaccurate
+from .missing import hole_between, left_out_nearby, missing_where, no_edges
+from .overlap import lit_twice
 from .result import PairCount
+from .roots import wrong_roots
 
 _MM = 1e3
-# Incidence of light beyond which edges smear: formulation.md section 2 [rad].
-_GRAZING = np.deg2rad(70.0)
 # Points of each pair that the search for a cause looks at.
 _POINTS_A_PAIR = 1000
+# A device whose edges are fewer than this share of what its role gives is all but dark.
+_DARK_SHARE = 0.01
+# More saturated pixels than this share of the lit ones are no highlights.
+_SATURATED_SHARE = 0.02
+# A projector counts if so many of the points that are off are its own.
+_MUCH = 0.25
 
 
 _WORDS = {
     "labels": "the codes contradict the patterns: frames out of order or of another "
-    "projector",
+    "projector, or two projectors on at once",
     "no_intersection": "the rays miss the rings: a pose isn't that of the plan",
-    "conditioning": "the rays run along the rings' cones",
+    "conditioning": "the rays run along the rings' cones, where the two roots meet",
     "outside_panel": "the points lie outside the projector's image",
     "isolated": "the edges are scattered: little light, or nearly hidden",
     "depth_step": "the edges hang between surfaces, or the surface is too slanted",
@@ -41,118 +52,151 @@ def rejection(pairs: tuple[PairCount, ...]) -> str | None:
     return f"{count[cause]} of {n_edges} edges left out as `{cause}`, {_WORDS[cause]}"
 
 
-def likely_cause(
-    cloud: Cloud,
-    mesh: TriangleMesh,
-    limits: CheckLimits,
-    pairs: tuple[PairCount, ...],
-    *,
-    projectors: tuple[str, ...],
-    cameras: tuple[str, ...],
-) -> str:
-    """Return the likely cause of a failed check.
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a check found, for the search for causes.
 
-    In this order: pairs whose labels contradict each other; devices that gave no point;
-    devices whose every pair is off while others are not; grazing light; the object.
+    Attributes:
+        plan: Of the rig.
+        decoded: What each pair gave, by indices of projector and camera.
+        counts: The same in numbers.
+        cloud: All points, before redundancy was removed.
+        samples: Of the target.
+        predicted: Which of them the plan claims measured; None: no claim.
+        missing: Which of those have no point, shape (n,).
+    """
+
+    plan: RigPlan
+    decoded: Pairs
+    counts: tuple[PairCount, ...]
+    cloud: Cloud
+    samples: SurfaceSamples
+    predicted: NDArray[np.bool_] | None
+    missing: NDArray[np.bool_]
+
+
+def explained(failures: tuple[str, ...], measured: Measured) -> tuple[str, ...]:
+    """Return failures of a check with what their likely causes are.
+
+    What is wrong with devices or object as a whole explains every failure: dark
+    devices, labels that contradict each other, wrong roots, a changed pose, optics or
+    size. What is missing is looked at where it is missing; and what is inaccurate,
+    nothing being wrong as a whole, where the points are off.
 
     Args:
-        cloud: All points, before redundancy was removed.
-        mesh: The mesh of the plan.
-        limits: Of the check.
-        pairs: What each pair gave.
-        projectors: Ids, in the order of the cloud's indices.
-        cameras: Likewise.
+        failures: One clause for each limit that isn't kept.
+        measured: What the check found.
     """
-    unordered = tuple(p for p in pairs if 2 * p.rejected.get("labels", 0) > p.n_edges)
-    if unordered:
-        names = ", ".join(f"{pair.projector} with {pair.camera}" for pair in unordered)
-        return f"{names}: {rejection(unordered)}"
-    silent = [
-        name
-        for names, index in ((projectors, cloud.projector), (cameras, cloud.camera))
-        for i, name in enumerate(names)
-        if not np.any(index == i)
-    ]
-    if silent:
-        own = (p for p in pairs if p.projector in silent or p.camera in silent)
-        why = rejection(tuple(own)) or "dark, covered, blocked or aimed elsewhere"
-        return f"{' and '.join(silent)} gave no point: {why}"
-    few = cloud.take(_some_of_each_pair(cloud))
-    nearest = closest_points(mesh, few.points)
-    error = np.abs(nearest.distances)
-    medians = _pair_medians(few, error, len(projectors), len(cameras))
-    off = medians > limits.max_rms_m
-    if not off.any():
-        far = error > limits.max_rms_m
-        cosine = -np.einsum("ij,ij->i", few.beams, mesh.face_normals[nearest.faces])
-        if far.any() and float(np.median(cosine[far])) < np.cos(_GRAZING):
-            return "most of the points that are off were lit at grazing incidence"
-        return (
-            "most points of every pair are accurate: the rest, or the surface that is "
-            "missing, lies where few rings reach"
+    # Edges of disordered frames, or of two projectors at once, are no evidence.
+    blurred = [*_unordered(measured), *_double_light(measured)]
+    causes = [*blurred, *_dark(measured)]
+    if not blurred:
+        found = diagnose(measured.plan, measured.decoded)
+        causes += [in_words(cause, measured.plan) for cause in found]
+        causes += _wrong_roots(measured) if not found else []
+    lost = _lost(measured, displaced=bool(causes))
+    inaccurate = causes or [where_inaccurate(measured.plan, measured.cloud)]
+    return tuple(
+        "; ".join(
+            [clause, *lost, *causes] if _of_coverage(clause) else [clause, *inaccurate]
         )
-    known = np.isfinite(medians)
-    if np.all(off[known]):
-        return (
-            f"every pair of devices is off (median error "
-            f"{_MM * np.nanmin(medians):.3f} to "
-            f"{_MM * np.nanmax(medians):.3f} mm): the object isn't the mesh of the "
-            f"plan, or most devices differ from it"
-        )
-    return _name_devices(off, known, medians, projectors, cameras)
-
-
-def _some_of_each_pair(cloud: Cloud) -> NDArray[np.int64]:
-    chosen: list[NDArray[np.int64]] = []
-    pair = cloud.projector.astype(np.int64) << 16 | cloud.camera
-    for key in np.unique(pair):
-        rows = np.flatnonzero(pair == key)
-        chosen.append(rows[:: -(-len(rows) // _POINTS_A_PAIR)])
-    return np.concatenate(chosen)
-
-
-def _pair_medians(
-    cloud: Cloud, error: NDArray[np.float64], n_projectors: int, n_cameras: int
-) -> NDArray[np.float64]:
-    """Median error of each pair [m], NaN where it has no point."""
-    medians = np.full((n_projectors, n_cameras), np.nan)
-    for p in range(n_projectors):
-        for c in range(n_cameras):
-            own = (cloud.projector == p) & (cloud.camera == c)
-            if own.any():
-                medians[p, c] = np.median(error[own])
-    return medians
-
-
-def _name_devices(
-    off: NDArray[np.bool_],
-    known: NDArray[np.bool_],
-    medians: NDArray[np.float64],
-    projectors: tuple[str, ...],
-    cameras: tuple[str, ...],
-) -> str:
-    """Name the devices whose every pair is off, if they account for all that is."""
-    bad_cameras = np.all(off | ~known, axis=0)
-    bad_projectors = np.all(off | ~known, axis=1)
-    cameras_off = [name for name, bad in zip(cameras, bad_cameras, strict=True) if bad]
-    projectors_off = [
-        name for name, bad in zip(projectors, bad_projectors, strict=True) if bad
-    ]
-    by_camera = np.tile(bad_cameras, (len(projectors), 1))
-    by_projector = np.tile(bad_projectors[:, None], len(cameras))
-    explanations: tuple[tuple[list[str], NDArray[np.bool_]], ...] = (
-        (projectors_off, by_projector),
-        (cameras_off, by_camera),
-        (projectors_off + cameras_off, by_camera | by_projector),
+        for clause in failures
     )
-    for names, blamed in explanations:
-        if names and not np.any(off & ~blamed):
-            rest = known & ~blamed
-            verb = "differs" if len(names) == 1 else "differ"
-            return (
-                f"{' and '.join(names)} {verb} from the plan in pose or optics: median "
-                f"error {_MM * np.median(medians[off]):.3f} mm, of the other pairs "
-                f"{_MM * np.median(medians[rest]):.3f} mm"
-            )
-    pairs = ", ".join(f"{projectors[p]} with {cameras[c]}" for p, c in np.argwhere(off))
-    return f"some pairs of devices are off and others aren't: {pairs}"
+
+
+def _of_coverage(clause: str) -> bool:
+    """Whether a clause of `verdict.judge` says that something is missing."""
+    return "predicted measured" in clause
+
+
+def _unordered(measured: Measured) -> list[str]:
+    pairs = measured.counts
+    unordered = tuple(p for p in pairs if 2 * p.rejected.get("labels", 0) > p.n_edges)
+    names = ", ".join(f"{pair.projector} with {pair.camera}" for pair in unordered)
+    return [f"{names}: {rejection(unordered)}"] if unordered else []
+
+
+def _dark(measured: Measured) -> list[str]:
+    """Name devices that gave hardly any edge, or edges but no point."""
+    counts, plan = measured.counts, measured.plan
+    by_projector = {
+        projector.id: [pair for pair in counts if pair.projector == projector.id]
+        for projector in plan.projectors
+    }
+    by_camera = {
+        camera.id: [pair for pair in counts if pair.camera == camera.id]
+        for camera in plan.cameras
+    }
+    return [
+        *_silent(by_projector, "no camera saw its light"),
+        *_silent(by_camera, "it saw no light"),
+    ]
+
+
+def _silent(pairs: dict[str, list[PairCount]], dark: str) -> list[str]:
+    n_edges = {name: sum(p.n_edges for p in own) for name, own in pairs.items()}
+    few = _DARK_SHARE * max(n_edges.values(), default=0)
+    silent: list[str] = []
+    for name, own in pairs.items():
+        if n_edges[name] <= few:
+            why = "off, covered, blocked or aimed elsewhere"
+            silent.append(f"{name} is dark: {dark}; {why}")
+        elif not any(pair.n_points for pair in own):
+            silent.append(f"{name} gave no point: {rejection(tuple(own))}")
+    return silent
+
+
+def _double_light(measured: Measured) -> list[str]:
+    """Name projectors that saturate many pixels, and what else lights these."""
+    plan = measured.plan
+    found: dict[tuple[str, ...], list[str]] = {}
+    for (p, c), pair in measured.decoded:
+        n = pair.n_saturated
+        lit = pair.lit_pixels + n
+        if n > _SATURATED_SHARE * lit:
+            others = lit_twice(plan, pair.saturated, p, c)
+            names = (plan.projectors[p].id, *others)
+            seen = f"{100 * n / lit:.0f} % in {plan.cameras[c].id}"
+            found.setdefault(names, []).append(seen)
+    return [
+        f"{name} saturates lit pixels, {', '.join(seen)}: "
+        + (
+            f"{' and '.join(others)} lights them too, on at the same time it adds up"
+            if others
+            else "exposed too long"
+        )
+        for (name, *others), seen in found.items()
+    ]
+
+
+def _wrong_roots(measured: Measured) -> list[str]:
+    return [
+        f"{projector} with {camera}: {100 * share:.0f} % of the points took the wrong "
+        f"one of the two roots; the root disc isn't the one drawn for {camera}"
+        for projector, camera, share in wrong_roots(measured.plan, measured.decoded)
+    ]
+
+
+def _lost(measured: Measured, *, displaced: bool) -> list[str]:
+    """Say where samples are missing, and why unless devices are to blame as a whole."""
+    plan, samples, missing = measured.plan, measured.samples, measured.missing
+    if measured.predicted is None or not missing.any():
+        return []
+    where = missing_where(plan, samples, measured.predicted, missing)
+    if displaced:
+        return [where]
+    hole = hole_between(plan, measured.cloud, samples, missing)
+    if hole is not None:
+        return [where, hole]
+    cause = left_out_nearby(plan, measured.decoded, samples, missing)
+    if cause is None:
+        return [
+            where,
+            no_edges(plan, samples.points[missing], samples.normals[missing]),
+        ]
+    name, share = cause
+    return [
+        where,
+        f"edges on {100 * share:.0f} % of them were left out as `{name}`, "
+        f"{_WORDS[name]}",
+    ]

@@ -17,11 +17,10 @@ from ..plan import RigPlan
 from .calibration import (
     CameraCalibration,
     PairCalibration,
-    ProjectorCalibration,
     calibrate_camera,
     calibrate_projector,
 )
-from .causes import likely_cause, rejection
+from .causes import Measured, explained, rejection
 from .cloud import Cloud
 from .decode import Decoded, decode
 from .defocus import defocus_of, through_lens
@@ -29,8 +28,9 @@ from .merge import merge
 from .obstacles import Both, obstacles_of
 from .patterns import ring_patterns
 from .photometry import Photometry
-from .render import render_pair
+from .render import Shown, render_pair
 from .result import PairCount, Reconstruction
+from .schedule import on_at_once
 from .verdict import judge, measure_accuracy, measure_completeness
 from .view import View, view
 
@@ -99,15 +99,10 @@ def reconstruct_plan(
         accuracy = measure_accuracy(merged.cloud, mesh, threads=threads)
         failures = judge(accuracy, completeness, limits)
     if accuracy is not None and failures:
-        cause = likely_cause(
-            everything,
-            mesh,
-            limits,
-            pairs,
-            projectors=tuple(projector.id for projector in plan.projectors),
-            cameras=tuple(camera.id for camera in plan.cameras),
+        measured = Measured(
+            plan, decoded, pairs, everything, samples, predicted, completeness.missing
         )
-        failures = tuple(f"{failure}; {cause}" for failure in failures)
+        failures = explained(failures, measured)
     return Reconstruction(
         everything,
         merged,
@@ -175,30 +170,41 @@ def _decode_pairs(
             before = obstacles_of(truth, camera.id)
             return view(camera, mesh, caster, lenses[c], before)
 
+    def shown(p: int, c: int) -> Shown | None:
+        """Return a projector as it shows its patterns and a camera's disc."""
+        projector = shining.get(designed[p].id)
+        if projector is None:
+            return None
+        before = obstacles_of(truth, projector.id)
+        past = caster if before is None else Both(caster, before)
+        patterns = ring_patterns(designed[p], radii[p], believed[c])
+        return Shown(projector, designed[p], patterns, past, blurred)
+
+    beside = on_at_once(plan, truth)
+
     def measure(pair: tuple[int, int]) -> Decoded:
         p, c = pair
         design, seen = designed[p], views[c]
-        projector: ProjectorCalibration | None = shining.get(design.id)
-        if seen is None or projector is None:
-            return Decoded.nothing()
-        patterns = ring_patterns(design, radii[p], believed[c])
         with spent.on("render"):
-            before = obstacles_of(truth, projector.id)
-            past = caster if before is None else Both(caster, before)
+            one = shown(p, c)
+            if seen is None or one is None:
+                return Decoded.nothing()
+            others = (shown(k, c) for k in beside[p])
             frames = render_pair(
                 seen,
-                projector,
+                one.projector,
                 design,
-                patterns,
-                past,
+                one.patterns,
+                one.caster,
                 lenses[c],
                 (seed, p, c),
                 blurred,
+                tuple(other for other in others if other is not None),
             )
         with spent.on("decode"):
             return decode(
                 frames,
-                patterns,
+                one.patterns,
                 PairCalibration(design, believed[c]),
                 min_conditioning=requirements.triangulation.min_conditioning,
                 max_slant=max_slant,

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from .calibration import PairCalibration
 from .cloud import Cloud
-from .edges import Edges, find_edges
+from .edges import SATURATED, Edges, find_edges
 from .patterns import Frames, RingPatterns
 from .triangulate import RingHits, intersect_rings
 
@@ -35,6 +35,17 @@ _RING_APART_PX = 1000.0
 # enough to mix surface with step.
 _MAX_SLANT = 2.14
 _STEPS_STEEPER = 1.74
+# Saturated pixels that are kept as evidence, about.
+_SATURATED_KEPT = 500
+# Why an edge may give no point, in the order in which it is asked; `fates` counts so.
+CAUSES = (
+    "labels",
+    "no_intersection",
+    "conditioning",
+    "outside_panel",
+    "isolated",
+    "depth_step",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,17 +57,28 @@ class Decoded:
         lit_pixels: Pixels with enough contrast between white and black.
         n_edges: Edges found, whether a point came of them or not.
         rejected: Edges that gave no point, by cause.
+        edges: All edges, for the search for causes.
+        fates: Index in `CAUSES` of why each edge gave no point, -1 if it gave one,
+            shape (n_edges,).
+        n_saturated: Pixels that the white frame saturates.
+        saturated: Some of them, (u, v) in the camera's image, shape (k, 2).
     """
 
     cloud: Cloud
     lit_pixels: int
     n_edges: int
     rejected: dict[str, int]
+    edges: Edges
+    fates: NDArray[np.int8]
+    n_saturated: int
+    saturated: NDArray[np.float64]
 
     @classmethod
     def nothing(cls) -> "Decoded":
         """Return what a device that is off gives."""
-        return cls(Cloud.empty(), 0, 0, {})
+        fates = np.zeros(0, dtype=np.int8)
+        nowhere = np.zeros((0, 2))
+        return cls(Cloud.empty(), 0, 0, {}, Edges.nothing(), fates, 0, nowhere)
 
 
 def decode(
@@ -88,6 +110,9 @@ def decode(
             f"disc, each with its inverse"
         )
     edges, lit_pixels = find_edges(frames, patterns)
+    saturated = np.argwhere(frames.stack[0] >= SATURATED)[:, ::-1] + np.array(
+        frames.corner, dtype=np.float64
+    )
     camera, projector = calibration.camera, calibration.projector
     rays = camera.rays(edges.pixels)
     radii = patterns.radii[edges.rings]
@@ -101,18 +126,24 @@ def decode(
         "depth_step": across > _STEPS_STEEPER * max_slant,
     }
     kept = np.ones(len(edges), dtype=bool)
+    fates = np.full(len(edges), -1, dtype=np.int8)
     rejected: dict[str, int] = {}
     if _out_of_order(edges):
         # What labels are left are chance.
         causes = {"labels": kept.copy()}
     for cause, fails in causes.items():
         rejected[cause] = int(np.count_nonzero(kept & fails))
+        fates[kept & fails] = CAUSES.index(cause)
         kept &= ~fails
     return Decoded(
         _cloud(edges, rays, hits, calibration).take(kept),
         lit_pixels,
         len(edges),
         rejected,
+        edges,
+        fates,
+        len(saturated),
+        saturated[:: max(1, len(saturated) // _SATURATED_KEPT)],
     )
 
 

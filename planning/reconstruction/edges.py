@@ -14,7 +14,7 @@ from scipy.special import erfinv
 from .patterns import Frames, Images, RingPatterns
 
 _MIN_CONTRAST = 10.0
-_SATURATED = 254.5
+SATURATED = 254.5
 # Least |I - I_inv| / (W - K) of every bit beside an edge, and of the root bit on it.
 _MIN_CERTAINTY = 0.25
 # Least contrast of a pixel, as a share of the largest beside it: less is the rim of an
@@ -48,6 +48,15 @@ class Edges:
 
     def __len__(self) -> int:
         return len(self.pixels)
+
+    @classmethod
+    def nothing(cls) -> "Edges":
+        """Return no edges."""
+        none, places = np.zeros(0), np.zeros((0, 2))
+        count = np.zeros(0, dtype=np.int64)
+        return cls(
+            places, count, np.zeros(0, np.int8), places, none, count, count.copy()
+        )
 
 
 def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[Edges, int]:
@@ -89,7 +98,7 @@ class _Reader:
         self.patterns = patterns
         white, black = stack[0].astype(np.float32), stack[1].astype(np.float32)
         contrast = white - black
-        self.valid = (contrast >= _MIN_CONTRAST) & (white < _SATURATED)
+        self.valid = (contrast >= _MIN_CONTRAST) & (white < SATURATED)
         self.contrast = np.maximum(contrast, np.float32(1.0))
         code = np.zeros(contrast.shape, dtype=np.int16)
         least = np.full(contrast.shape, np.inf, dtype=np.float32)

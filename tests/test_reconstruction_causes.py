@@ -1,0 +1,144 @@
+"""Failures that no displaced device explains: each is named for what it is."""
+
+import copy
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from geometry.primitives import sphere
+from geometry.sampling import sample_surface
+from planning.plan import RigPlan
+from planning.reconstruction import check as check_module
+from planning.reconstruction.check import reconstruct_plan
+
+FOCAL = 1400.0
+
+
+@pytest.fixture(scope="module")
+def plan(rigs) -> RigPlan:
+    return rigs.small_rig(sphere(0.04, subdivisions=4), focal=FOCAL)
+
+
+@pytest.fixture(scope="module")
+def claims(rigs, plan) -> dict[str, Any]:
+    """What the rig is sure to measure; rings are 5 px apart at this focal length."""
+    near = rigs.small_rig(plan.surface.mesh)
+    samples = sample_surface(plan.surface.mesh, 3000, seed=5)
+    return {"samples": samples, "predicted": rigs.predict_on_sphere(near, samples)}
+
+
+def changed(plan: RigPlan, change: Callable[[dict[str, Any]], object]) -> RigPlan:
+    document = copy.deepcopy(plan.document)
+    change(document)
+    return RigPlan(document, plan.surface)
+
+
+def failures(plan: RigPlan, claims: dict[str, Any], truth: RigPlan | None = None):
+    return reconstruct_plan(plan, seed=0, truth=truth, **claims).failures
+
+
+def test_two_projectors_on_at_once_are_named(plan, claims):
+    schedule = {"groups": [["P1", "P2"]]}
+    truth = changed(plan, lambda d: d.update(firing_schedule=schedule))
+    found = failures(plan, claims, truth)
+    assert found
+    words = (
+        r"P1 saturates lit pixels, \d+ % in C\d.*: P2 lights them too, on at the same"
+    )
+    assert all(re.search(words, text) for text in found), found
+    # A plan that fires them together itself isn't rendered so: its images are apart.
+    together = changed(plan, lambda d: d.update(firing_schedule=schedule))
+    assert failures(together, claims, together) == ()
+
+
+def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
+    draw = check_module.ring_patterns
+
+    def drawn(projector, radii, camera):
+        patterns = draw(projector, radii, camera)
+        if (projector.id, camera.id) != ("P1", "C2"):
+            return patterns
+        return replace(patterns, camera_in_ring=-patterns.camera_in_ring)
+
+    monkeypatch.setattr(check_module, "ring_patterns", drawn)
+    found = failures(plan, claims)
+    words = r"P1 with C2: \d+ % of the points took the wrong one of the two roots"
+    assert found
+    assert all(re.search(words, text) for text in found), found
+
+
+def test_samples_where_the_roots_meet_are_said_to_be_left_out(plan, claims):
+    """The ring axis through the object, |r.m| >= 0.35 asked: none where r.m = 0."""
+
+    def one_pair(document: dict[str, Any]) -> None:
+        del document["projectors"][1], document["cameras"][1:]
+        document["requirements"]["triangulation"]["min_conditioning"] = 0.35
+        entry = document["projectors"][0]
+        entry["world_from_ring"] = entry["world_from_device"]
+
+    blind = changed(plan, one_pair)
+    samples = claims["samples"]
+    ring, eye = blind.projectors[0].world_from_ring, blind.cameras[0].world_from_device
+    local = (samples.points - ring[:3, 3]) @ ring[:3, :3]
+    rays = samples.points - eye[:3, 3]
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    across = np.hypot(local[:, 0], local[:, 1])
+    tilt = across / local[:, 2]
+    m = np.column_stack([local[:, :2] / across[:, None], -tilt])
+    conditioning = np.einsum("ij,ij->i", rays @ ring[:3, :3], m)
+    facing = np.einsum("ij,ij->i", rays, samples.normals) < -0.6
+    light = samples.points - ring[:3, 3]
+    facing &= np.einsum("ij,ij->i", light, samples.normals) < -0.5
+    every = {"samples": samples, "predicted": facing & (np.abs(conditioning) < 0.1)}
+    assert every["predicted"].sum() > 10
+    found = failures(blind, every)
+    assert found
+    assert all("`conditioning`, the rays run along" in text for text in found), found
+
+
+def test_a_hidden_region_is_named_with_its_share(plan, claims):
+    """Faces with x > 0.02 are region 7, which C3 sees best; and C3 is off."""
+    mesh = plan.surface.mesh
+    region = np.where(mesh.face_centroids[:, 0] > 0.02, 7, 0)
+    marked = RigPlan(plan.document, replace(plan.surface, region=region))
+    truth = changed(plan, lambda d: d["cameras"].pop(2))
+    samples = claims["samples"]
+    found = failures(marked, claims, truth)
+    assert any("C3 is dark: it saw no light" in text for text in found), found
+    shares = re.findall(r"([\d.]+) % of what is promised of region (\d)", found[-1])
+    assert shares
+    assert shares[0][1] == "7"
+    inside = claims["predicted"] & (region[samples.faces] == 7)
+    missing = reconstruct_plan(marked, seed=0, truth=truth, **claims)
+    lost = missing.completeness.missing & inside
+    assert float(shares[0][0]) == pytest.approx(
+        100 * lost.sum() / inside.sum(), abs=0.1
+    )
+
+
+def test_where_no_light_falls_is_said(plan, claims):
+    samples = claims["samples"]
+    back = {"samples": samples, "predicted": samples.normals[:, 1] > 0.8}
+    found = failures(plan, back)
+    assert found
+    assert all("no projector's light falls on most of them" in t for t in found), found
+
+
+def test_surface_met_at_grazing_incidence_is_said(plan, claims):
+    """Between 80 and 88 degrees from the nearest projector, but within its beam."""
+    samples = claims["samples"]
+    best = np.full(len(samples), -1.0)
+    for projector in plan.projectors:
+        to = projector.world_from_device[:3, 3] - samples.points
+        to /= np.linalg.norm(to, axis=1, keepdims=True)
+        best = np.maximum(best, np.einsum("ij,ij->i", to, samples.normals))
+    grazed = (best < np.cos(np.deg2rad(82.0))) & (best > np.cos(np.deg2rad(88.0)))
+    grazed &= samples.normals[:, 1] > 0.0
+    found = failures(plan, {"samples": samples, "predicted": grazed})
+    assert found
+    words = r"P\d meets them at 8\d degrees \(median\), at grazing incidence"
+    assert all(re.search(words, text) for text in found), found
