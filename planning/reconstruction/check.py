@@ -25,7 +25,7 @@ from .cloud import Cloud
 from .decode import Decoded, decode
 from .merge import merge
 from .obstacles import Both, obstacles_of
-from .patterns import ring_patterns
+from .patterns import Frames, ring_patterns
 from .photometry import Photometry
 from .render import render_pair
 from .result import PairCount, Reconstruction
@@ -38,6 +38,9 @@ _DEFAULT_SAMPLES = 20_000
 _SLANTED = np.deg2rad(65.0)
 _SLANT_MARGIN = np.deg2rad(5.0)
 Progress = Callable[[int, int], None]
+Pairs = list[tuple[tuple[int, int], Decoded]]
+# From a projector, a camera and what it took to what is decoded; None: nothing.
+Develop = Callable[[int, int, Frames], Frames | None]
 
 
 def reconstruct_plan(
@@ -50,6 +53,7 @@ def reconstruct_plan(
     predicted: NDArray[np.bool_] | None = None,
     photometry: Photometry | None = None,
     progress: Progress | None = None,
+    develop: Develop | None = None,
 ) -> Reconstruction:
     """Measure the object of a plan through rendered images, and judge the result.
 
@@ -65,14 +69,54 @@ def reconstruct_plan(
             completeness is reported but not judged.
         photometry: Simulated light and sensor.
         progress: Called with the pairs done and their total.
+        develop: Called with the indices of projector and camera and the frames of each
+            pair, in any thread; returns those that are decoded.
 
     Raises:
         ValueError: If `predicted` comes without samples, or in another number.
     """
     light = photometry or Photometry()
-    samples, predicted = _target_samples(plan, samples, predicted, seed)
     spent = _Spent()
-    decoded = _decode_pairs(plan, truth or plan, light, seed, threads, progress, spent)
+    decoded = _decode_pairs(
+        plan, truth or plan, light, seed, threads, progress, spent, develop
+    )
+    return conclude(
+        plan,
+        decoded,
+        seed=seed,
+        threads=threads,
+        samples=samples,
+        predicted=predicted,
+        photometry=light,
+        seconds=spent.seconds,
+    )
+
+
+def conclude(
+    plan: RigPlan,
+    decoded: Pairs,
+    *,
+    seed: int,
+    threads: int = 2,
+    samples: SurfaceSamples | None = None,
+    predicted: NDArray[np.bool_] | None = None,
+    photometry: Photometry | None = None,
+    seconds: dict[str, float] | None = None,
+) -> Reconstruction:
+    """Merge what the pairs of a rig measured, and judge it.
+
+    Args:
+        plan: As in `reconstruct_plan`.
+        decoded: Projector, camera and what they gave, of every pair.
+        seed: Of the samples, where none are given.
+        threads: As in `reconstruct_plan`.
+        samples: Likewise.
+        predicted: Likewise.
+        photometry: Of the simulation; None: the images were taken.
+        seconds: Processor time spent so far by stage [s]; that of `merge` is added.
+    """
+    samples, predicted = _target_samples(plan, samples, predicted, seed)
+    spent = _Spent(seconds)
     parts = [
         replace(
             pair.cloud,
@@ -112,7 +156,7 @@ def reconstruct_plan(
         accuracy,
         completeness,
         pairs,
-        light,
+        photometry,
         failures,
         spent.seconds,
     )
@@ -148,7 +192,8 @@ def _decode_pairs(
     threads: int,
     progress: Progress | None,
     spent: "_Spent",
-) -> list[tuple[tuple[int, int], Decoded]]:
+    develop: Develop | None,
+) -> Pairs:
     """Render and decode every pair; the order, and every number, is always the same."""
     mesh = truth.surface.mesh
     caster = RayCaster(mesh, threads=1)
@@ -184,6 +229,10 @@ def _decode_pairs(
             frames = render_pair(
                 seen, projector, design, patterns, past, photometry, (seed, p, c)
             )
+        if develop is not None:
+            frames = develop(p, c, frames)
+            if frames is None:
+                return Decoded.nothing()
         with spent.on("decode"):
             return decode(
                 frames,
@@ -203,8 +252,8 @@ def _decode_pairs(
 class _Spent:
     """Processor time by stage, over all threads: what eq. (8) calls t1, t2 and t3."""
 
-    def __init__(self) -> None:
-        self.seconds = {"render": 0.0, "decode": 0.0, "merge": 0.0}
+    def __init__(self, before: dict[str, float] | None = None) -> None:
+        self.seconds = {"render": 0.0, "decode": 0.0, "merge": 0.0} | (before or {})
         self._lock = Lock()
 
     @contextmanager
