@@ -372,9 +372,8 @@ def reconstruct(**options: Any) -> None:  # noqa: ANN401
     """Measure the object from images, rendered or captured; write cloud.ply."""
     from .reconstruct_command import reconstruct_command
 
-    for name in ("captures", "save_captures", "calibration"):
-        if options[name] is not None:
-            raise click.UsageError(f"--{name.replace('_', '-')} isn't built yet")
+    if options["calibration"] is not None:
+        raise click.UsageError("--calibration isn't built yet")
     if options["captures"] is not None and options["save_captures"] is not None:
         raise click.UsageError(
             "give --captures or --save-captures, not both: the one reads images, the "

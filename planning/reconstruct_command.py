@@ -7,6 +7,7 @@ is smaller than asked, 2 unwritable, 3 a bad plan, calibration or folder of capt
 import json
 import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,16 @@ import click
 
 from geometry.sampling import SurfaceSamples
 
-from .audit.prediction import Prediction, predict_measured
+from .audit.prediction import predict_measured
 from .plan import RigPlan
 from .progress import Report
 from .reconstruct_summary import summary
-from .reconstruction.check import reconstruct_plan
+from .reconstruction.captured import (
+    Expected,
+    reconstruct_captured,
+    reconstruct_rendered,
+)
+from .reconstruction.captures import CaptureFolder
 from .reconstruction.cloud_file import CloudFile, LengthUnit, remove_cloud
 from .reconstruction.result import Reconstruction
 from .writable import writable
@@ -32,30 +38,51 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
     report = _report(quiet=options["quiet"])
     plan = RigPlan.load(path)
     folder = Path(options["output"] or path.parent)
-    with writable(folder):
-        seed = options["seed"]
-        seed = int(plan.document["seed"]) if seed is None else seed
-        threads = options["threads"] or _cores()
-        _say(report, "predicting what the plan's poses measure")
-        predicted = predict_measured(plan, seed=seed, threads=threads)
-        found = reconstruct_plan(
-            plan,
-            seed=seed,
-            threads=threads,
-            samples=_samples(predicted),
-            predicted=predicted.measured,
-            progress=lambda done, total: _say(report, f"pair {done} of {total}"),
-        )
+    with ExitStack() as kept:
+        for needed in (folder, options["save_captures"]):
+            if needed is not None:
+                kept.enter_context(writable(needed))
+        found = _reconstruct(plan, options, report)
         file = _save(plan, found, folder / CLOUD)
     _print(plan, found, file, folder / CLOUD, as_json=options["as_json"])
     return 0 if found.passed else 1
 
 
-def _samples(predicted: Prediction) -> SurfaceSamples:
-    inside = predicted.samples
-    return SurfaceSamples(
+def _reconstruct(
+    plan: RigPlan, options: Mapping[str, Any], report: Report | None
+) -> Reconstruction:
+    seed = options["seed"]
+    seed = int(plan.document["seed"]) if seed is None else seed
+    threads = options["threads"] or _cores()
+    _say(report, "predicting what the plan's poses measure")
+    expected = _expected(plan, seed, threads)
+
+    def progress(done: int, total: int) -> None:
+        _say(report, f"pair {done} of {total}")
+
+    if options["captures"] is not None:
+        folder = CaptureFolder(options["captures"], plan)
+        return reconstruct_captured(
+            folder, expected, threads=threads, progress=progress
+        )
+    place = options["save_captures"]
+    return reconstruct_rendered(
+        plan,
+        expected,
+        seed=seed,
+        threads=threads,
+        save=None if place is None else CaptureFolder(place, plan),
+        progress=progress,
+    )
+
+
+def _expected(plan: RigPlan, seed: int, threads: int) -> Expected:
+    found = predict_measured(plan, seed=seed, threads=threads)
+    inside = found.samples
+    samples = SurfaceSamples(
         inside.points, inside.normals, inside.faces, float(inside.weights[0])
     )
+    return Expected(samples, found.measured, found.by_pair)
 
 
 def _save(plan: RigPlan, found: Reconstruction, path: Path) -> CloudFile | None:

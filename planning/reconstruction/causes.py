@@ -20,6 +20,7 @@ _POINTS_A_PAIR = 1000
 _WORDS = {
     "labels": "the codes contradict the patterns: frames out of order or of another "
     "projector",
+    "unconfirmed": "neither the mesh nor another pair confirms the points",
     "no_intersection": "the rays miss the rings: a pose isn't that of the plan",
     "conditioning": "the rays run along the rings' cones",
     "outside_panel": "the points lie outside the projector's image",

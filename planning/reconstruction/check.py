@@ -53,7 +53,6 @@ def reconstruct_plan(
     predicted: NDArray[np.bool_] | None = None,
     photometry: Photometry | None = None,
     progress: Progress | None = None,
-    develop: Develop | None = None,
 ) -> Reconstruction:
     """Measure the object of a plan through rendered images, and judge the result.
 
@@ -69,16 +68,20 @@ def reconstruct_plan(
             completeness is reported but not judged.
         photometry: Simulated light and sensor.
         progress: Called with the pairs done and their total.
-        develop: Called with the indices of projector and camera and the frames of each
-            pair, in any thread; returns those that are decoded.
 
     Raises:
         ValueError: If `predicted` comes without samples, or in another number.
     """
     light = photometry or Photometry()
-    spent = _Spent()
-    decoded = _decode_pairs(
-        plan, truth or plan, light, seed, threads, progress, spent, develop
+    spent = Spent()
+    decoded = decode_rendered(
+        plan,
+        truth or plan,
+        light,
+        seed=seed,
+        threads=threads,
+        progress=progress,
+        spent=spent,
     )
     return conclude(
         plan,
@@ -116,7 +119,7 @@ def conclude(
         seconds: Processor time spent so far by stage [s]; that of `merge` is added.
     """
     samples, predicted = _target_samples(plan, samples, predicted, seed)
-    spent = _Spent(seconds)
+    spent = Spent(seconds)
     parts = [
         replace(
             pair.cloud,
@@ -184,32 +187,46 @@ def _target_samples(
     return samples.take(inside), predicted[inside]
 
 
-def _decode_pairs(
+def decode_rendered(
     plan: RigPlan,
     truth: RigPlan,
     photometry: Photometry,
+    *,
     seed: int,
     threads: int,
-    progress: Progress | None,
-    spent: "_Spent",
-    develop: Develop | None,
+    spent: "Spent",
+    progress: Progress | None = None,
+    believed: RigPlan | None = None,
+    develop: Develop | None = None,
 ) -> Pairs:
-    """Render and decode every pair; the order, and every number, is always the same."""
+    """Render and decode every pair; the order, and every number, is always the same.
+
+    Args:
+        plan: For which the patterns are drawn.
+        truth: What really stands there, devices matched by id.
+        photometry: Simulated light and sensor.
+        seed: Of the pixel noise.
+        threads: Worker threads.
+        spent: Receives the processor time.
+        progress: Called with the pairs done and their total.
+        believed: What the decoder knows of poses and optics; the plan by default.
+        develop: Called with the indices of projector and camera and the frames of each
+            pair, in any thread; returns those that are decoded.
+    """
     mesh = truth.surface.mesh
     caster = RayCaster(mesh, threads=1)
     standing = {camera.id: calibrate_camera(camera) for camera in truth.cameras}
     shining = {
         projector.id: calibrate_projector(projector) for projector in truth.projectors
     }
-    believed = [calibrate_camera(camera) for camera in plan.cameras]
+    known = pair_calibrations(believed or plan)
+    drawn = [calibrate_camera(camera) for camera in plan.cameras]
     designed = [calibrate_projector(projector) for projector in plan.projectors]
     radii = [projector.ring_radii for projector in plan.projectors]
-    requirements = plan.requirements
-    steepest = max(requirements.camera.max_incidence - _SLANT_MARGIN, _SLANTED)
-    max_slant = float(np.tan(steepest))
+    limits = decoder_limits(plan)
 
     def look(c: int) -> View | None:
-        camera = standing.get(believed[c].id)
+        camera = standing.get(drawn[c].id)
         with spent.on("render"):
             if camera is None:
                 return None
@@ -222,7 +239,7 @@ def _decode_pairs(
         projector: ProjectorCalibration | None = shining.get(design.id)
         if seen is None or projector is None:
             return Decoded.nothing()
-        patterns = ring_patterns(design, radii[p], believed[c])
+        patterns = ring_patterns(design, radii[p], drawn[c])
         with spent.on("render"):
             before = obstacles_of(truth, projector.id)
             past = caster if before is None else Both(caster, before)
@@ -234,22 +251,35 @@ def _decode_pairs(
             if frames is None:
                 return Decoded.nothing()
         with spent.on("decode"):
-            return decode(
-                frames,
-                patterns,
-                PairCalibration(design, believed[c]),
-                min_conditioning=requirements.triangulation.min_conditioning,
-                max_slant=max_slant,
-            )
+            return decode(frames, patterns, known[p, c], **limits)
 
-    pairs = [(p, c) for c in range(len(believed)) for p in range(len(designed))]
     with ThreadPoolExecutor(threads) as pool:
-        views = list(pool.map(look, range(len(believed))))
-        done = list(_reported(pool.map(measure, pairs), len(pairs), progress))
-    return list(zip(pairs, done, strict=True))
+        views = list(pool.map(look, range(len(drawn))))
+        done = list(reported(pool.map(measure, known), len(known), progress))
+    return list(zip(known, done, strict=True))
 
 
-class _Spent:
+def pair_calibrations(plan: RigPlan) -> dict[tuple[int, int], PairCalibration]:
+    """Return what a plan says of every pair, camera by camera."""
+    projectors = [calibrate_projector(projector) for projector in plan.projectors]
+    return {
+        (p, c): PairCalibration(projector, calibrate_camera(camera))
+        for c, camera in enumerate(plan.cameras)
+        for p, projector in enumerate(projectors)
+    }
+
+
+def decoder_limits(plan: RigPlan) -> dict[str, float]:
+    """Return the limits that `decode` takes of a plan."""
+    requirements = plan.requirements
+    steepest = max(requirements.camera.max_incidence - _SLANT_MARGIN, _SLANTED)
+    return {
+        "min_conditioning": requirements.triangulation.min_conditioning,
+        "max_slant": float(np.tan(steepest)),
+    }
+
+
+class Spent:
     """Processor time by stage, over all threads: what eq. (8) calls t1, t2 and t3."""
 
     def __init__(self, before: dict[str, float] | None = None) -> None:
@@ -258,6 +288,7 @@ class _Spent:
 
     @contextmanager
     def on(self, stage: str) -> Generator[None]:
+        """Count the time of this thread within the block for a stage."""
         begin = time.thread_time()
         try:
             yield
@@ -266,9 +297,10 @@ class _Spent:
                 self.seconds[stage] += time.thread_time() - begin
 
 
-def _reported(
+def reported(
     results: Iterator[Decoded], total: int, progress: Progress | None
 ) -> Iterator[Decoded]:
+    """Pass results on, and say how many there were."""
     for n, result in enumerate(results, start=1):
         if progress is not None:
             progress(n, total)
