@@ -243,6 +243,11 @@ class _Desk:
                 f"devices, or exchanged, or poses that aren't those of the plan or the "
                 f"calibration"
             )
+        elif (p, c) in confirmed.strays:
+            found.append(
+                f"{confirmed.strays[p, c]} of its {len(pair.cloud)} points are left "
+                f"out: far off the mesh, and no other pair confirms them"
+            )
         elif not len(pair.cloud) and (share >= _MISSED or pair.rejected.get("labels")):
             count = _count(pair)
             why = rejection((count,)) or "no ring edge was decoded"

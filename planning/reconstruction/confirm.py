@@ -28,6 +28,11 @@ _SAME_SPOT_PX = 0.5
 # Of one spot two pairs may differ by this many times the limit of the mean error: half
 # a pixel beside the spot lies nearer or farther on slanted surface.
 _APART = 3.0
+# Points this many times the limit from the mesh are stray; a pair whose share of them
+# is larger has seen a dent, or something is wrong with its images.
+_STRAY = 10.0
+_FEW_STRAYS = 0.005
+_FEWEST_STRAYS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +42,14 @@ class Confirmed:
     Attributes:
         pairs: As they were, those that nothing confirms without points.
         errors_m: Median distance from the mesh [m] of each pair that is left out.
+        strays: Points of a pair that are left out, far from the mesh and confirmed by
+            no other pair.
         by_each_other: Whether the pairs agree with each other, but not with the mesh.
     """
 
     pairs: Pairs
     errors_m: dict[tuple[int, int], float]
+    strays: dict[tuple[int, int], int]
     by_each_other: bool
 
 
@@ -58,7 +66,8 @@ def confirm(
     The mesh confirms a pair whose median distance from it keeps the limit. A pair that
     is off, though every confirmed pair that saw the same spots agrees with it, has seen
     a dent. If the mesh confirms none, but all pairs agree with each other, the object
-    isn't the mesh; two pairs at least, of other cameras and other projectors.
+    isn't the mesh; two pairs at least, of other cameras and other projectors. Where a
+    confirmed pair has many points far from the mesh, these too need another pair.
 
     Args:
         pairs: What each pair gave.
@@ -67,31 +76,38 @@ def confirm(
         limit_m: Largest root mean square distance from the mesh [m].
         threads: Worker threads of the closest points.
     """
-    clouds = {key: _some(pair.cloud) for key, pair in pairs if len(pair.cloud)}
     errors = {
-        key: float(np.median(np.abs(_distances(mesh, cloud, threads))))
-        for key, cloud in clouds.items()
+        key: np.abs(_distances(mesh, _some(pair.cloud), threads))
+        for key, pair in pairs
+        if len(pair.cloud)
     }
-    good = {key for key, error in errors.items() if error <= limit_m}
-    left = set(errors) - good
-    if not left:
-        return Confirmed(pairs, {}, by_each_other=False)
-    whole = {key: pair.cloud for key, pair in pairs if key in errors}
-    apart = _disagreements(whole, cameras)
-    tolerance = _APART * limit_m
-    if not good:
-        if _agree(set(errors), apart, tolerance):
-            return Confirmed(pairs, {}, by_each_other=True)
-    for key in sorted(left):
-        others = [
-            apart[frozenset((key, other))]
-            for other in good
-            if frozenset((key, other)) in apart
-        ]
-        if others and max(others) <= tolerance:
-            left.remove(key)
-    kept = [(key, _emptied(pair) if key in left else pair) for key, pair in pairs]
-    return Confirmed(kept, {key: errors[key] for key in left}, by_each_other=False)
+    medians = {key: float(np.median(error)) for key, error in errors.items()}
+    good = {key for key, median in medians.items() if median <= limit_m}
+    clouds = {key: pair.cloud for key, pair in pairs if key in errors}
+    off = set(medians) - good
+    if off:
+        apart = _disagreements(clouds, cameras)
+        if not good and _agree(off, apart, _APART * limit_m):
+            return Confirmed(pairs, {}, {}, by_each_other=True)
+        off = {key for key in off if not _seen_by(good, key, apart, _APART * limit_m)}
+    strays: dict[tuple[int, int], int] = {}
+    kept: Pairs = []
+    for key, pair in pairs:
+        if key in off:
+            nothing = np.zeros(len(pair.cloud), dtype=bool)
+            kept.append((key, _left(pair, nothing)))
+            continue
+        if key in good and np.mean(errors[key] > _STRAY * limit_m) > _FEW_STRAYS:
+            far = np.abs(_distances(mesh, pair.cloud, threads)) > _STRAY * limit_m
+            others = [clouds[one] for one in sorted(good - {key})]
+            camera = cameras[key[1]]
+            if not _seen_too(pair.cloud.take(far), others, camera, _APART * limit_m):
+                strays[key] = int(np.count_nonzero(far))
+                pair = _left(pair, ~far)
+        kept.append((key, pair))
+    return Confirmed(
+        kept, {key: medians[key] for key in off}, strays, by_each_other=False
+    )
 
 
 def _some(cloud: Cloud) -> Cloud:
@@ -102,10 +118,33 @@ def _distances(mesh: TriangleMesh, cloud: Cloud, threads: int) -> NDArray[np.flo
     return closest_points(mesh, cloud.points, threads=threads).distances
 
 
-def _emptied(pair: Decoded) -> Decoded:
-    nothing = pair.cloud.take(np.zeros(0, dtype=np.int64))
-    why = pair.rejected | {"unconfirmed": len(pair.cloud)}
-    return replace(pair, cloud=nothing, rejected=why)
+def _left(pair: Decoded, kept: NDArray[np.bool_]) -> Decoded:
+    """Return a pair with some of its points, the others counted as unconfirmed."""
+    why = pair.rejected | {"unconfirmed": int(np.count_nonzero(~kept))}
+    return replace(pair, cloud=pair.cloud.take(kept), rejected=why)
+
+
+def _seen_by(
+    good: set[tuple[int, int]],
+    key: tuple[int, int],
+    apart: dict[frozenset[tuple[int, int]], float],
+    tolerance: float,
+) -> bool:
+    """Whether a pair agrees with every confirmed one that saw the same spots."""
+    both = [frozenset((key, other)) for other in good]
+    differences = [apart[one] for one in both if one in apart]
+    return bool(differences) and max(differences) <= tolerance
+
+
+def _seen_too(
+    strays: Cloud, others: list[Cloud], camera: CameraCalibration, tolerance: float
+) -> bool:
+    """Whether other pairs measured stray points alike."""
+    found = [_difference(strays, other, camera) for other in others]
+    differences = np.concatenate([*found, np.zeros(0)])
+    return len(differences) >= _FEWEST_STRAYS and bool(
+        np.median(differences) <= tolerance
+    )
 
 
 def _disagreements(
