@@ -69,15 +69,18 @@ def _require_linear(
     """Refuse grey levels that aren't in proportion to light, by half-bright pixels.
 
     There a frame and its inverse together exceed white if dark tones were lifted, as
-    by a display's gamma; the half of all frames tells that from single bad ones.
+    by a display's gamma; in most of the frames, unlike what befell a single one.
     """
     clear = contrast >= 0.5 * float(np.median(contrast))
     level = (pairs[:, 0, clear] - pairs[:, 1, clear]) / contrast[clear]
     share = rests[:, clear] / contrast[clear]
     half = np.abs(level) <= _HALF_BRIGHT
-    if np.count_nonzero(half) < _FEWEST_BRIGHT:
-        return
-    excess = float(np.median(share[half]) - np.median(share[~half]))
+    excesses = [
+        float(np.median(rest[mid]) - np.median(rest[~mid]))
+        for rest, mid in zip(share, half, strict=True)
+        if min(np.count_nonzero(mid), np.count_nonzero(~mid)) >= _FEWEST_BRIGHT
+    ]
+    excess = float(np.median(excesses)) if excesses else 0.0
     if not abs(excess) <= _MOST_BENT:
         raise CapturesError(
             f"where a frame and its inverse are half bright they add up to "
@@ -161,7 +164,7 @@ def _gradient(
     image: NDArray[np.uint8 | np.float32], good: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Grey levels a pixel along u and v at the good pixels, shape (2, n)."""
-    down, across = np.gradient(image.astype(np.float32))
+    down, across = map(np.asarray, np.gradient(image.astype(np.float32)))
     return np.stack([across[good], down[good]]).astype(np.float64)
 
 

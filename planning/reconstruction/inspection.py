@@ -89,7 +89,8 @@ def _lit(stack: Images) -> NDArray[np.bool_]:
     black = stack[1].astype(np.float32)
     sums = [np.add(stack[k], stack[k + 1], dtype=np.float32) for k in (2, 4)]
     by_bits = np.minimum(*sums) - 2.0 * black >= _LIT_BY_BITS
-    return (_contrast(stack) >= _LIT) | binary_opening(by_bits, np.ones((3, 3)))
+    opened = np.asarray(binary_opening(by_bits, np.ones((3, 3))), dtype=bool)
+    return (_contrast(stack) >= _LIT) | opened
 
 
 def _contrast(stack: Images) -> NDArray[np.float32]:
