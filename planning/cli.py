@@ -14,7 +14,6 @@ from typing import Any, NoReturn
 import click
 
 _NOT_BUILT = {
-    "reconstruct": "simulates or reads captures, decodes, triangulates, merges",
     "report": "writes one self-contained HTML file",
     "export": "writes poses for OpenCV, COLMAP, glTF, Blender, ROS, USD, CSV",
 }
@@ -93,6 +92,7 @@ def commands() -> None:
     \b
     plan --mesh face.obj --max-projectors 3   plans, checks, writes ./face-plan/
     plan verify face-plan/plan.json           recomputes every claim, checks again
+    plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
 
     Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
     4 nothing can be served, 5 time limit, 130 interrupted.
@@ -331,6 +331,55 @@ def verify(**options: Any) -> None:  # noqa: ANN401
     from .commands import verify_command
 
     _run(lambda: verify_command(options), debug=options["debug"])
+
+
+@commands.command()
+@click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Where cloud.ply goes [default: the plan's folder].",
+)
+@click.option(
+    "--captures",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Read images that cameras took, FOLDER/C1/P1/00-white.png and so on, instead "
+    "of simulating them.",
+)
+@click.option(
+    "--save-captures",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Write the simulated images there, as --captures reads them.",
+)
+@click.option(
+    "--calibration",
+    type=click.Path(path_type=Path),
+    metavar="FILE.json",
+    help="Poses and optics as measured after mounting [default: the plan's].",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), help="Of samples and noise [default: the plan's]."
+)
+@click.option("--threads", type=click.IntRange(1), metavar="N", help="Worker threads.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option("--quiet", is_flag=True, help="No progress on stderr.")
+@click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
+def reconstruct(**options: Any) -> None:  # noqa: ANN401
+    """Measure the object from images, rendered or captured; write cloud.ply."""
+    from .reconstruct_command import reconstruct_command
+
+    if options["calibration"] is not None:
+        raise click.UsageError("--calibration isn't built yet")
+    if options["captures"] is not None and options["save_captures"] is not None:
+        raise click.UsageError(
+            "give --captures or --save-captures, not both: the one reads images, the "
+            "other writes simulated ones"
+        )
+    _run(lambda: reconstruct_command(options), debug=options["debug"])
 
 
 @commands.command()

@@ -3,10 +3,8 @@
 import json
 import os
 import signal
-import tempfile
 import time
-from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +31,7 @@ from .rig import list_presets, load_rig
 from .sample_head import HeadShape, write_sample
 from .summary import summary
 from .verification import verify_plan
+from .writable import writable
 
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
@@ -41,7 +40,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     report = _report(quiet=options["quiet"])
     path = Path(options["ranges"] or options["meshes"][0])
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
-    with _writable(folder):
+    with writable(folder):
         rig = load_rig(options["rig_name"], light=options["light"])
         if report is not None:
             report(f"reading {path}")
@@ -195,27 +194,6 @@ def _say_lines(report: Report | None, lines: Sequence[str]) -> None:
     if report is not None:
         for line in lines:
             report(line)
-
-
-@contextmanager
-def _writable(folder: Path) -> Generator[None]:
-    """Fail before the work, not after it; leave no empty folder where it fails."""
-    missing = [f for f in (folder, *folder.parents) if not f.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise click.UsageError(
-            f"can't write to {folder}: {error.strerror}; choose another folder with -o"
-        ) from None
-    try:
-        yield
-    except BaseException:
-        for made in missing:
-            with suppress(OSError):
-                made.rmdir()
-        raise
 
 
 def _save(

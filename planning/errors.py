@@ -30,6 +30,14 @@ class PlanFileError(InputError):
     """A plan file, or the surface beside it, that can't be used."""
 
 
+class CapturesError(InputError):
+    """Captured images that can't be used."""
+
+
+class CalibrationError(InputError):
+    """A calibration file that can't be used."""
+
+
 class InfeasibleLimitsError(PlanningError):
     """No device can serve anything: empty or contradictory limits."""
 

@@ -252,7 +252,7 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
         (["vrify"], 2, "verify"),
         (["export", "plan.json", "--to", "ros"], 2, "isn't built yet"),
         (["report", "plan.json"], 2, "isn't built yet"),
-        (["reconstruct", "plan.json"], 2, "isn't built yet"),
+        (["reconstruct", "no.json"], 3, "no such file"),
     ],
 )
 def test_errors_are_one_line_with_the_documented_code(

@@ -31,6 +31,7 @@ _MUCH = 0.25
 _WORDS = {
     "labels": "the codes contradict the patterns: frames out of order or of another "
     "projector, or two projectors on at once",
+    "unconfirmed": "neither the mesh nor another pair confirms the points",
     "no_intersection": "the rays miss the rings: a pose isn't that of the plan",
     "conditioning": "the rays run along the rings' cones, where the two roots meet",
     "outside_panel": "the points lie outside the projector's image",

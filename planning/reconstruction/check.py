@@ -26,7 +26,7 @@ from .decode import Decoded, decode
 from .defocus import defocus_of, through_lens
 from .merge import merge
 from .obstacles import Both, obstacles_of
-from .patterns import ring_patterns
+from .patterns import Frames, ring_patterns
 from .photometry import Photometry
 from .render import Shown, render_pair
 from .result import PairCount, Reconstruction
@@ -40,6 +40,9 @@ _DEFAULT_SAMPLES = 20_000
 _SLANTED = np.deg2rad(65.0)
 _SLANT_MARGIN = np.deg2rad(5.0)
 Progress = Callable[[int, int], None]
+Pairs = list[tuple[tuple[int, int], Decoded]]
+# From a projector, a camera and what it took to what is decoded; None: nothing.
+Develop = Callable[[int, int, Frames], Frames | None]
 
 
 def reconstruct_plan(
@@ -72,9 +75,53 @@ def reconstruct_plan(
         ValueError: If `predicted` comes without samples, or in another number.
     """
     light = photometry or Photometry()
+    spent = Spent()
+    decoded = decode_rendered(
+        plan,
+        truth or plan,
+        light,
+        seed=seed,
+        threads=threads,
+        progress=progress,
+        spent=spent,
+    )
+    return conclude(
+        plan,
+        decoded,
+        seed=seed,
+        threads=threads,
+        samples=samples,
+        predicted=predicted,
+        photometry=light,
+        seconds=spent.seconds,
+    )
+
+
+def conclude(
+    plan: RigPlan,
+    decoded: Pairs,
+    *,
+    seed: int,
+    threads: int = 2,
+    samples: SurfaceSamples | None = None,
+    predicted: NDArray[np.bool_] | None = None,
+    photometry: Photometry | None = None,
+    seconds: dict[str, float] | None = None,
+) -> Reconstruction:
+    """Merge what the pairs of a rig measured, and judge it.
+
+    Args:
+        plan: As in `reconstruct_plan`.
+        decoded: Projector, camera and what they gave, of every pair.
+        seed: Of the samples, where none are given.
+        threads: As in `reconstruct_plan`.
+        samples: Likewise.
+        predicted: Likewise.
+        photometry: Of the simulation; None: the images were taken.
+        seconds: Processor time spent so far by stage [s]; that of `merge` is added.
+    """
     samples, predicted = _target_samples(plan, samples, predicted, seed)
-    spent = _Spent()
-    decoded = _decode_pairs(plan, truth or plan, light, seed, threads, progress, spent)
+    spent = Spent(seconds)
     parts = [
         replace(
             pair.cloud,
@@ -109,7 +156,7 @@ def reconstruct_plan(
         accuracy,
         completeness,
         pairs,
-        light,
+        photometry,
         failures,
         spent.seconds,
     )
@@ -137,33 +184,48 @@ def _target_samples(
     return samples.take(inside), predicted[inside]
 
 
-def _decode_pairs(
+def decode_rendered(
     plan: RigPlan,
     truth: RigPlan,
     photometry: Photometry,
+    *,
     seed: int,
     threads: int,
-    progress: Progress | None,
-    spent: "_Spent",
-) -> list[tuple[tuple[int, int], Decoded]]:
-    """Render and decode every pair; the order, and every number, is always the same."""
+    spent: "Spent",
+    progress: Progress | None = None,
+    believed: RigPlan | None = None,
+    develop: Develop | None = None,
+) -> Pairs:
+    """Render and decode every pair; the order, and every number, is always the same.
+
+    Args:
+        plan: For which the patterns are drawn.
+        truth: What really stands there, devices matched by id.
+        photometry: Simulated light and sensor.
+        seed: Of the pixel noise.
+        threads: Worker threads.
+        spent: Receives the processor time.
+        progress: Called with the pairs done and their total.
+        believed: What the decoder knows of poses and optics; the plan by default.
+        develop: Called with the indices of projector and camera and the frames of each
+            pair, in any thread; returns those that are decoded.
+    """
     mesh = truth.surface.mesh
     caster = RayCaster(mesh, threads=1)
     standing = {camera.id: calibrate_camera(camera) for camera in truth.cameras}
     shining = {
         projector.id: calibrate_projector(projector) for projector in truth.projectors
     }
-    believed = [calibrate_camera(camera) for camera in plan.cameras]
+    known = pair_calibrations(believed or plan)
+    drawn = [calibrate_camera(camera) for camera in plan.cameras]
     designed = [calibrate_projector(projector) for projector in plan.projectors]
     radii = [projector.ring_radii for projector in plan.projectors]
-    lenses = _lenses(truth, believed, photometry)
+    lenses = _lenses(truth, drawn, photometry)
     blurred = defocus_of(truth, "projector")
-    requirements = plan.requirements
-    steepest = max(requirements.camera.max_incidence - _SLANT_MARGIN, _SLANTED)
-    max_slant = float(np.tan(steepest))
+    limits = decoder_limits(plan)
 
     def look(c: int) -> View | None:
-        camera = standing.get(believed[c].id)
+        camera = standing.get(drawn[c].id)
         with spent.on("render"):
             if camera is None:
                 return None
@@ -177,7 +239,7 @@ def _decode_pairs(
             return None
         before = obstacles_of(truth, projector.id)
         past = caster if before is None else Both(caster, before)
-        patterns = ring_patterns(designed[p], radii[p], believed[c])
+        patterns = ring_patterns(designed[p], radii[p], drawn[c])
         return Shown(projector, designed[p], patterns, past, blurred)
 
     beside = on_at_once(plan, truth)
@@ -201,20 +263,17 @@ def _decode_pairs(
                 blurred,
                 tuple(other for other in others if other is not None),
             )
+        if develop is not None:
+            frames = develop(p, c, frames)
+            if frames is None:
+                return Decoded.nothing()
         with spent.on("decode"):
-            return decode(
-                frames,
-                one.patterns,
-                PairCalibration(design, believed[c]),
-                min_conditioning=requirements.triangulation.min_conditioning,
-                max_slant=max_slant,
-            )
+            return decode(frames, one.patterns, known[p, c], **limits)
 
-    pairs = [(p, c) for c in range(len(believed)) for p in range(len(designed))]
     with ThreadPoolExecutor(threads) as pool:
-        views = list(pool.map(look, range(len(believed))))
-        done = list(_reported(pool.map(measure, pairs), len(pairs), progress))
-    return list(zip(pairs, done, strict=True))
+        views = list(pool.map(look, range(len(drawn))))
+        done = list(reported(pool.map(measure, known), len(known), progress))
+    return list(zip(known, done, strict=True))
 
 
 def _lenses(
@@ -229,15 +288,36 @@ def _lenses(
     ]
 
 
-class _Spent:
+def pair_calibrations(plan: RigPlan) -> dict[tuple[int, int], PairCalibration]:
+    """Return what a plan says of every pair, camera by camera."""
+    projectors = [calibrate_projector(projector) for projector in plan.projectors]
+    return {
+        (p, c): PairCalibration(projector, calibrate_camera(camera))
+        for c, camera in enumerate(plan.cameras)
+        for p, projector in enumerate(projectors)
+    }
+
+
+def decoder_limits(plan: RigPlan) -> dict[str, float]:
+    """Return the limits that `decode` takes of a plan."""
+    requirements = plan.requirements
+    steepest = max(requirements.camera.max_incidence - _SLANT_MARGIN, _SLANTED)
+    return {
+        "min_conditioning": requirements.triangulation.min_conditioning,
+        "max_slant": float(np.tan(steepest)),
+    }
+
+
+class Spent:
     """Processor time by stage, over all threads: what eq. (8) calls t1, t2 and t3."""
 
-    def __init__(self) -> None:
-        self.seconds = {"render": 0.0, "decode": 0.0, "merge": 0.0}
+    def __init__(self, before: dict[str, float] | None = None) -> None:
+        self.seconds = {"render": 0.0, "decode": 0.0, "merge": 0.0} | (before or {})
         self._lock = Lock()
 
     @contextmanager
     def on(self, stage: str) -> Generator[None]:
+        """Count the time of this thread within the block for a stage."""
         begin = time.thread_time()
         try:
             yield
@@ -246,9 +326,10 @@ class _Spent:
                 self.seconds[stage] += time.thread_time() - begin
 
 
-def _reported(
+def reported(
     results: Iterator[Decoded], total: int, progress: Progress | None
 ) -> Iterator[Decoded]:
+    """Pass results on, and say how many there were."""
     for n, result in enumerate(results, start=1):
         if progress is not None:
             progress(n, total)

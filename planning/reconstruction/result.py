@@ -41,7 +41,7 @@ class Reconstruction:
         accuracy: Of the merged cloud; None if it is empty.
         completeness: Of the target.
         pairs: What each pair gave.
-        photometry: The simulated light and sensor.
+        photometry: The simulated light and sensor; None: the images were taken.
         failures: One sentence for each limit that isn't kept.
         seconds: Processor time of `render`, `decode` and `merge` over all pairs [s].
         comparison: With a plan's prediction; None if none was given.
@@ -52,7 +52,7 @@ class Reconstruction:
     accuracy: Accuracy | None
     completeness: Completeness
     pairs: tuple[PairCount, ...]
-    photometry: Photometry
+    photometry: Photometry | None
     failures: tuple[str, ...]
     seconds: dict[str, float]
     comparison: Comparison | None = None
@@ -80,6 +80,7 @@ class Reconstruction:
     def to_document(self) -> dict[str, Any]:
         """Return the `reconstruction` object of `plan.json`."""
         accuracy, complete = self.accuracy, self.completeness
+        light = self.photometry
         return {
             "n_points": self.n_points,
             "n_merged": self.n_merged,
@@ -95,8 +96,8 @@ class Reconstruction:
                 )
             ],
             "predicted_missing": complete.predicted_missing,
-            "pixel_noise": self.photometry.pixel_noise,
-            "ambient": self.photometry.ambient,
+            "pixel_noise": light and light.pixel_noise,
+            "ambient": light and light.ambient,
             **({} if self.comparison is None else self.comparison.to_document()),
             "passed": self.passed,
             "failures": list(self.failures),

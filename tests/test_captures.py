@@ -1,0 +1,560 @@
+"""Captured images: read by name, held against each other, never a wrong cloud."""
+
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from geometry.sampling import SurfaceSamples
+from planning.audit.prediction import predict_measured
+from planning.errors import CapturesError
+from planning.plan import RigPlan
+from planning.reconstruction.captured import (
+    Expected,
+    reconstruct_captured,
+    reconstruct_rendered,
+)
+from planning.reconstruction.captures import CaptureFolder, frame_names
+from planning.reconstruction.result import Reconstruction
+
+# A point farther off than this is no noise: 20 times the rms of the good cloud.
+WRONG_M = 5e-4
+
+
+def small_plan(rigs, light: str) -> RigPlan:
+    """Two projectors and two cameras of 320 x 240 px before a waved ball of 10 cm.
+
+    P1 has 32 annuli, so that any 5 bits are a ring; P2 has codes to spare.
+    """
+    make = rigs.diverging if light == "diverging" else rigs.parallel
+    projectors = [
+        make("P1", rigs.direction(-30.0, 5.0), 0.055, 6.2e-3),
+        make("P2", rigs.direction(25.0, 15.0), 0.055, 5.5e-3),
+    ]
+    projectors[0]["ring_radii"] = projectors[0]["ring_radii"][:31]
+    cameras = [
+        rigs.camera("C1", rigs.direction(-5.0, -20.0)),
+        rigs.camera("C2", rigs.direction(10.0, 35.0)),
+    ]
+    for entry in cameras:
+        entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
+        entry["resolution"] = [320, 240]
+    body = rigs.bumpy_sphere(0.05, subdivisions=4)
+    plan = rigs.plan_of(body, projectors, cameras)
+    plan.document["requirements"]["check"] = rigs.CHECK | {"tau_m": 6.2e-3}
+    return plan
+
+
+def expected_of(plan: RigPlan) -> Expected:
+    found = predict_measured(plan, seed=0, n_samples=4000, threads=1)
+    inside = found.samples
+    weight = float(inside.weights[0])
+    samples = SurfaceSamples(inside.points, inside.normals, inside.faces, weight)
+    return Expected(samples, found.measured, found.by_pair)
+
+
+@dataclass(frozen=True, eq=False)
+class InMemory(CaptureFolder):
+    """Images of every pair that were never written."""
+
+    stacks: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
+
+    def require(self) -> None:
+        pass
+
+    def read(self, p: int, c: int) -> np.ndarray:
+        return self.stacks[p, c]
+
+    def write(self, p: int, c: int, stack: np.ndarray) -> None:
+        self.stacks[p, c] = stack
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A plan, what it should measure, its images, and the cloud that they give."""
+
+    plan: RigPlan
+    expected: Expected
+    images: InMemory
+    good: Reconstruction
+
+    def after(
+        self, change: Callable[[np.ndarray], np.ndarray], pair=(0, 0)
+    ) -> Reconstruction:
+        """Reconstruct with the images of one pair changed."""
+        return self.of({pair: change(self.images.stacks[pair].copy())})
+
+    def of(self, changed: dict[tuple[int, int], np.ndarray]) -> Reconstruction:
+        images = InMemory(Path("x"), self.plan, self.images.stacks | changed)
+        return reconstruct_captured(images, self.expected, threads=1)
+
+    def n_bits(self, p: int) -> int:
+        return (len(self.images.stacks[p, 0]) - 4) // 2
+
+
+def job_of(plan: RigPlan) -> Job:
+    expected, images = expected_of(plan), InMemory(Path("x"), plan)
+    good = reconstruct_rendered(plan, expected, seed=0, threads=1, save=images)
+    return Job(plan, expected, images, good)
+
+
+@pytest.fixture(scope="module")
+def job(rigs) -> Job:
+    return job_of(small_plan(rigs, "diverging"))
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def lit_job(request, rigs, job) -> Job:
+    if request.param == "diverging":
+        return job
+    return job_of(small_plan(rigs, request.param))
+
+
+@pytest.fixture(scope="module")
+def saved(rigs, tmp_path_factory) -> tuple[RigPlan, Expected, CaptureFolder]:
+    """Images of one projector and two cameras, in files."""
+    plan = small_plan(rigs, "diverging")
+    del plan.document["projectors"][1]
+    expected = expected_of(plan)
+    folder = CaptureFolder(tmp_path_factory.mktemp("saved") / "captures", plan)
+    reconstruct_rendered(plan, expected, seed=0, threads=1, save=folder)
+    return plan, expected, folder
+
+
+@pytest.fixture
+def copied(saved, tmp_path) -> tuple[CaptureFolder, Expected]:
+    """The same in a folder that may be spoiled."""
+    plan, expected, folder = saved
+    shutil.copytree(folder.path, tmp_path / "captures")
+    return CaptureFolder(tmp_path / "captures", plan), expected
+
+
+def assert_no_wrong_point(found: Reconstruction) -> None:
+    if found.accuracy is not None:
+        assert found.accuracy.max_m < WRONG_M
+
+
+def assert_left_out(found: Reconstruction, pair: str, why: str) -> None:
+    """A pair is gone and said to be; the others are as good as ever."""
+    assert_no_wrong_point(found)
+    assert not found.passed
+    assert found.failures[0].startswith(f"{pair}: ")
+    assert why in found.failures[0]
+    points = {f"{one.projector} with {one.camera}": one.n_points for one in found.pairs}
+    assert points.pop(pair) == 0
+    assert min(points.values()) > 1000
+
+
+def exchanged(n: int, *pairs: tuple[int, int]) -> np.ndarray:
+    order = np.arange(n)
+    for one, other in pairs:
+        order[[one, other]] = order[[other, one]]
+    return order
+
+
+def test_good_images_give_a_good_cloud(lit_job):
+    assert lit_job.good.failures == ()
+    assert lit_job.good.accuracy.rms_m < 5e-5
+    assert_no_wrong_point(lit_job.good)
+    again = lit_job.of({})
+    assert again.failures == ()
+    assert np.array_equal(again.merged.cloud.points, lit_job.good.merged.cloud.points)
+    assert np.array_equal(again.merged.sigma, lit_job.good.merged.sigma, equal_nan=True)
+    assert again.photometry is None
+    assert again.to_document()["pixel_noise"] is None
+
+
+def test_white_and_black_exchanged(job):
+    found = job.after(lambda s: s[exchanged(len(s), (0, 1))])
+    assert_left_out(found, "P1 with C1", "white is darker than black")
+
+
+@pytest.mark.parametrize("p", [0, 1])
+def test_a_bit_or_root_disc_exchanged_with_its_inverse(lit_job, p):
+    for bit in range(lit_job.n_bits(p) + 1):
+        frames = 2 + 2 * bit, 3 + 2 * bit
+        found = lit_job.after(lambda s, f=frames: s[exchanged(len(s), f)], (p, 0))
+        assert_left_out(found, f"P{p + 1} with C1", "left out")
+
+
+@pytest.mark.parametrize("p", [0, 1])
+def test_two_bits_or_a_bit_and_the_root_disc_exchanged(lit_job, p):
+    root = lit_job.n_bits(p)
+    neighbours = [(bit, bit + 1) for bit in range(root)]
+    for one, other in [*neighbours, *((bit, root) for bit in range(root - 1))]:
+        a, b = 2 + 2 * one, 2 + 2 * other
+        found = lit_job.after(
+            lambda s, a=a, b=b: s[exchanged(len(s), (a, b), (a + 1, b + 1))], (p, 0)
+        )
+        # Frames that are dark or bright all over may change places unnoticed.
+        assert_no_wrong_point(found)
+
+
+@pytest.mark.parametrize(("one", "other"), [(2, 4), (3, 4), (2, 5)])
+def test_single_frames_exchanged_do_not_add_up(job, one, other):
+    found = job.after(lambda s: s[exchanged(len(s), (one, other))])
+    assert_left_out(found, "P1 with C1", "don't add up to white and black")
+    assert "02-bit0" in found.failures[0]
+    assert "04-bit1" in found.failures[0]
+    assert "06-bit2" not in found.failures[0]
+
+
+@pytest.mark.parametrize("gain", [0.9, 0.96, 1.05])
+def test_one_frame_of_another_exposure_is_named(job, gain):
+    for frame, name in (
+        (0, "00-white or 01-black"),
+        (2, "02-bit0"),
+        (3, "03-bit0-inv"),
+    ):
+        found = job.after(lambda s, k=frame: scaled(s, k, gain))
+        assert_left_out(found, "P1 with C1", "than the other frames")
+        assert name in found.failures[0]
+        assert ("brighter" in found.failures[0]) == (gain > 1.0)
+    assert job.after(lambda s: scaled(s, 4, 1.01)).passed
+
+
+def scaled(stack: np.ndarray, frame: int, gain: float) -> np.ndarray:
+    stack[frame] = np.clip(np.rint(gain * stack[frame]), 0, 255)
+    return stack
+
+
+@pytest.mark.parametrize("frames", [[0], [2], [5], [4, 5]])
+@pytest.mark.parametrize("part", [1.0, 0.3])
+def test_a_frame_that_moved_is_found_to_a_third_of_a_pixel(job, frames, part):
+    def moved(stack):
+        there = np.roll(stack[frames], 1, axis=2).astype(float)
+        stack[frames] = np.rint(part * there + (1.0 - part) * stack[frames])
+        return stack
+
+    found = job.after(moved, (1, 0))
+    assert_left_out(found, "P2 with C1", " px against the others")
+
+
+def test_over_exposed_images_lose_what_is_clipped(job):
+    def brighter(gain):
+        return lambda s: np.clip(np.rint(gain * s), 0, 255).astype(np.uint8)
+
+    found = job.after(brighter(1.4), (1, 0))
+    assert_no_wrong_point(found)
+    assert "of the lit pixels are clipped and left out" in found.failures[0]
+    before, after = (r.pairs[1].lit_pixels for r in (job.good, found))
+    assert 0.5 * before < after < 0.97 * before
+    found = job.after(brighter(5.0), (1, 0))
+    assert_left_out(found, "P2 with C1", "over-exposed")
+
+
+def test_a_sensor_that_is_full_before_its_numbers_are(job):
+    """Levels pile up at 150, far below 250."""
+    found = job.after(lambda s: np.minimum(s, 150), (1, 0))
+    assert_no_wrong_point(found)
+    assert "of the lit pixels are clipped and left out" in found.failures[0]
+
+
+@pytest.mark.parametrize("level", [0, 255])
+def test_a_frame_of_one_level(job, level):
+    def flat(stack):
+        stack[4] = level
+        return stack
+
+    found = job.after(flat)
+    assert_left_out(found, "P1 with C1", "04-bit1")
+
+
+def test_a_damaged_part_of_a_frame_is_left_out_and_the_rest_measured(job):
+    def spoiled(stack):
+        stack[4, 100:125, 130:160] = 0
+        return stack
+
+    found = job.after(spoiled)
+    assert_no_wrong_point(found)
+    assert "don't add up to white and black" in found.failures[0]
+    assert found.pairs[0].n_points > 1000
+
+
+def test_white_that_is_dark_in_part_is_said(job):
+    """Its pixels don't count as lit by white, but bits and inverses light them."""
+
+    def cut(stack):
+        stack[0, 120:] = 0
+        return stack
+
+    found = job.after(cut, (1, 0))
+    assert_no_wrong_point(found)
+    assert found.failures[0].startswith("P2 with C1: ")
+
+
+def test_frames_of_one_image_are_named(job):
+    def doubled(stack):
+        stack[4:6] = stack[2:4]
+        return stack
+
+    found = job.after(doubled)
+    assert_left_out(found, "P1 with C1", "02-bit0 and 04-bit1 are the same image")
+
+
+def test_a_camera_with_gamma_is_told_to_switch_it_off(job):
+    def bent(stack):
+        return np.rint(255.0 * (stack / 255.0) ** (1 / 2.2)).astype(np.uint8)
+
+    found = job.after(bent)
+    assert_left_out(found, "P1 with C1", "in proportion to light")
+
+
+def test_half_the_light_is_no_fault(job):
+    found = job.after(lambda s: np.rint(0.5 * s).astype(np.uint8))
+    assert found.failures == ()
+    assert_no_wrong_point(found)
+
+
+def test_mirrored_and_turned_images_are_confirmed_by_nothing(lit_job):
+    for change in (lambda s: s[:, :, ::-1], lambda s: s[:, ::-1, ::-1]):
+        found = lit_job.after(change)
+        assert_left_out(found, "P1 with C1", "off the mesh (median), and no other pair")
+
+
+def test_images_of_two_cameras_exchanged_give_no_cloud(lit_job):
+    stacks = lit_job.images.stacks
+    found = lit_job.of({(p, c): stacks[p, 1 - c] for p in (0, 1) for c in (0, 1)})
+    assert found.n_merged == 0
+    assert len(found.failures) == 5
+    assert "no other pair confirms" in found.failures[0]
+    found = lit_job.of({(0, c): stacks[0, 1 - c] for c in (0, 1)})
+    assert_no_wrong_point(found)
+    assert [pair.n_points > 1000 for pair in found.pairs] == [False, True] * 2
+    assert found.failures[0].startswith("P1 with C1: left out")
+    assert found.failures[1].startswith("P1 with C2: left out")
+
+
+def test_images_of_two_projectors_exchanged(job):
+    """P2 has one bit more: its lower bits stand in for those of P1."""
+    other = job.images.stacks[1, 0]
+    order = [*range(12), len(other) - 2, len(other) - 1]
+    assert_left_out(job.after(lambda s: other[order]), "P1 with C1", "left out")
+
+
+def test_a_pair_without_light_is_missed_where_it_should_measure(job):
+    found = job.after(lambda s: 0 * s)
+    assert_left_out(found, "P1 with C1", "no light")
+    assert "it should measure 1" in found.failures[0]
+    spared = job.expected.by_pair.copy()
+    spared[0, 0] = 0.0
+    images = InMemory(Path("x"), job.plan, job.images.stacks | {(0, 0): 0 * other(job)})
+    quiet = Expected(job.expected.samples, job.expected.measured, spared)
+    found = reconstruct_captured(images, quiet, threads=1)
+    assert not any("no light" in sentence for sentence in found.failures)
+
+
+def other(job: Job) -> np.ndarray:
+    return job.images.stacks[0, 0]
+
+
+def test_no_light_at_all_is_an_error(job):
+    dark = {key: 0 * stack for key, stack in job.images.stacks.items()}
+    with pytest.raises(CapturesError, match=r"no light.*the other 3 pairs can't"):
+        job.of(dark)
+
+
+def test_files_give_the_cloud_that_was_made_before_they_were_written(saved):
+    plan, expected, folder = saved
+    before = reconstruct_rendered(plan, expected, seed=0, threads=1)
+    after = reconstruct_captured(folder, expected, threads=2)
+    assert before.failures == after.failures == ()
+    assert np.array_equal(before.merged.cloud.points, after.merged.cloud.points)
+    names = sorted(p.name for p in (folder.path / "C2" / "P1").iterdir())
+    assert names == [f"{name}.png" for name in sorted(frame_names(plan, 0, 1))]
+    assert names[-1] == "15-root-C2-inverse.png"
+
+
+def test_order_and_dates_of_files_mean_nothing_and_strangers_are_passed_over(copied):
+    folder, expected = copied
+    place = folder.place(0, 0)
+    for path in sorted(place.iterdir(), reverse=True):
+        path.write_bytes(path.read_bytes())
+    (place / "notes.txt").write_text("taken on Friday")
+    shutil.copy(place / "02-bit0.png", place / "preview.png")
+    assert reconstruct_captured(folder, expected, threads=1).failures == ()
+
+
+SPOILED = {
+    "missing": (lambda f: f.unlink(), r"P1: lacks 04-bit1$"),
+    "renamed": (
+        lambda f: f.rename(f.with_name("bit1.png")),
+        r"lacks 04-bit1; holds bit1.png, no frame's name",
+    ),
+    "twice": (
+        lambda f: shutil.copy(f, f.with_suffix(".tif")),
+        r"04-bit1.png, 04-bit1.tif are one frame",
+    ),
+    "empty": (lambda f: f.write_bytes(b""), r"04-bit1.png: not a readable image"),
+    "text": (lambda f: f.write_text("hello"), r"04-bit1.png: not a readable image"),
+    "cut": (
+        lambda f: f.write_bytes(f.read_bytes()[: f.stat().st_size // 2]),
+        r"04-bit1.png: not a readable image",
+    ),
+    "flipped byte": (lambda f: f.write_bytes(flipped(f)), r"not a readable image"),
+    "folder": (lambda f: (f.unlink(), f.mkdir()), r"04-bit1.png: not a readable image"),
+    "small": (
+        lambda f: opened(f).resize((160, 120)).save(f),
+        r"04-bit1.png: 160 x 120 px, must be the camera's 320 x 240",
+    ),
+    "turned": (
+        lambda f: opened(f).transpose(Image.Transpose.ROTATE_90).save(f),
+        r"240 x 320 px",
+    ),
+    "jpeg": (lambda f: opened(f).save(f, format="JPEG"), r"JPEG moves edges"),
+    "jpeg in tiff": (
+        lambda f: opened(f).save(f, format="TIFF", compression="jpeg"),
+        r"TIFF moves edges",
+    ),
+    "two levels": (lambda f: opened(f).convert("1").save(f), r"pixels of mode 1"),
+    "see-through": (
+        lambda f: with_alpha(opened(f), 128).save(f),
+        r"is partly transparent",
+    ),
+    "16 bits among 8": (
+        lambda f: Image.fromarray(pixels(f).astype(np.uint16) * 257).save(f),
+        r"04-bit1.png: 16 bits, 00-white.png has 8",
+    ),
+    "floats": (
+        lambda f: Image.fromarray(pixels(f).astype(np.float32)).save(f, format="TIFF"),
+        r"pixels of mode F",
+    ),
+    "two pages": (
+        lambda f: opened(f).save(
+            f, format="TIFF", save_all=True, append_images=[opened(f)]
+        ),
+        r"several images",
+    ),
+}
+
+
+def opened(path: Path) -> Image.Image:
+    with Image.open(path) as image:
+        image.load()
+        return image.copy()
+
+
+def pixels(path: Path) -> np.ndarray:
+    return np.array(opened(path))
+
+
+def with_alpha(image: Image.Image, alpha: int) -> Image.Image:
+    image = image.convert("RGBA")
+    image.putalpha(alpha)
+    return image
+
+
+def flipped(path: Path) -> bytes:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    return bytes(content)
+
+
+@pytest.mark.parametrize("fault", SPOILED)
+def test_a_spoiled_file_costs_its_pair_and_is_named(copied, fault):
+    folder, expected = copied
+    spoil, why = SPOILED[fault]
+    spoil(folder.place(0, 0) / "04-bit1.png")
+    found = reconstruct_captured(folder, expected, threads=1)
+    assert_no_wrong_point(found)
+    assert [pair.n_points > 1000 for pair in found.pairs] == [False, True]
+    assert found.failures[0].startswith("P1 with C1: left out: ")
+    assert re.search(why, found.failures[0]), found.failures[0]
+
+
+def as_rgb(path: Path) -> None:
+    opened(path).convert("RGB").save(path)
+
+
+def as_rgba(path: Path) -> None:
+    with_alpha(opened(path), 255).save(path)
+
+
+def as_palette(path: Path) -> None:
+    opened(path).convert("P").save(path)
+
+
+def as_tiff(path: Path) -> None:
+    opened(path).save(path.with_suffix(".TIFF"), compression="tiff_lzw")
+    path.unlink()
+
+
+def as_bitmap(path: Path) -> None:
+    opened(path).save(path.with_suffix(".bmp"))
+    path.unlink()
+
+
+def as_16_bits(path: Path) -> None:
+    Image.fromarray(pixels(path).astype(np.uint16) * 257).save(path)
+
+
+def as_12_bits(path: Path) -> None:
+    """As a 12-bit sensor's numbers in 16 bits."""
+    twelve = np.rint(pixels(path) * (4095 / 255)).astype(np.uint16)
+    Image.fromarray(twelve).save(path.with_suffix(".tif"))
+    path.unlink()
+
+
+@pytest.mark.parametrize(
+    "rewrite",
+    [as_rgb, as_rgba, as_palette, as_tiff, as_bitmap, as_16_bits, as_12_bits],
+)
+def test_every_lossless_way_to_store_an_image_gives_the_same_cloud(
+    saved, copied, rewrite
+):
+    folder, expected = copied
+    for path in sorted(folder.path.rglob("*.png")):
+        rewrite(path)
+    found = reconstruct_captured(folder, expected, threads=1)
+    before = reconstruct_captured(saved[2], expected, threads=1)
+    assert found.failures == ()
+    assert found.n_merged == pytest.approx(before.n_merged, rel=0.01)
+    if rewrite is not as_12_bits:
+        assert np.allclose(
+            found.merged.cloud.points, before.merged.cloud.points, rtol=0, atol=1e-9
+        )
+
+
+def test_colours_are_clipped_where_one_channel_is(copied):
+    """A blown red channel hides in the mean of the three."""
+    folder, expected = copied
+    for path in sorted(folder.place(0, 0).glob("*.png")):
+        grey = pixels(path).astype(float)
+        tinted = np.stack([1.6 * grey, 0.8 * grey, 0.6 * grey], axis=2)
+        Image.fromarray(np.clip(np.rint(tinted), 0, 255).astype(np.uint8)).save(path)
+    found = reconstruct_captured(folder, expected, threads=1)
+    assert_no_wrong_point(found)
+    assert "of the lit pixels are clipped" in found.failures[0]
+
+
+def test_missing_folders_are_named_with_what_is_there(copied):
+    folder, expected = copied
+    shutil.move(folder.place(0, 0), folder.path / "C1" / "p1x")
+    found = reconstruct_captured(folder, expected, threads=1)
+    assert found.failures[0].endswith(
+        "no such folder; " + str(folder.path / "C1") + " holds p1x"
+    )
+    shutil.move(folder.path / "C1", folder.path / "left")
+    found = reconstruct_captured(folder, expected, threads=1)
+    assert "P1: no such folder" in found.failures[0]
+    shutil.move(folder.path / "C2", folder.path / "right")
+    with pytest.raises(CapturesError, match="must be called C1, C2, it holds left, r"):
+        reconstruct_captured(folder, expected)
+    nowhere = CaptureFolder(folder.path / "nowhere", folder.plan)
+    with pytest.raises(CapturesError, match="nowhere: no such folder"):
+        reconstruct_captured(nowhere, expected)
+
+
+def test_folders_of_cameras_exchanged_show_by_the_names_of_their_root_discs(copied):
+    folder, expected = copied
+    one, two, away = (folder.path / name for name in ("C1", "C2", "away"))
+    one.rename(away)
+    two.rename(one)
+    away.rename(two)
+    with pytest.raises(CapturesError, match=r"lacks 12-root-C1, 13-root-C1-inverse"):
+        reconstruct_captured(folder, expected)

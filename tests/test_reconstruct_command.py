@@ -1,0 +1,224 @@
+"""`plan reconstruct` from files to files: exit codes, streams, the cloud."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+import planning
+from geometry.proximity import closest_points
+from planning.cli import commands
+from planning.plan import RigPlan
+
+
+@pytest.fixture(scope="module")
+def folder(rigs, tmp_path_factory) -> Path:
+    """A plan of one projector and two cameras in files; its mesh is in inches."""
+    body = rigs.bumpy_sphere(0.05, subdivisions=4)
+    cameras = [
+        rigs.camera("C1", rigs.direction(-5.0, -20.0)),
+        rigs.camera("C2", rigs.direction(10.0, 35.0)),
+    ]
+    for entry in cameras:
+        entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
+        entry["resolution"] = [320, 240]
+    lamp = rigs.diverging("P1", rigs.direction(-30.0, 5.0), 0.055, 6.2e-3)
+    plan = rigs.plan_of(body, [lamp], cameras)
+    plan.document["requirements"]["check"] = rigs.CHECK | {"tau_m": 6.2e-3}
+    names = ("units", "rig", "regions", "coverage", "marginal", "certificates")
+    names += ("baselines", "cost", "members", "reconstruction", "timings_s")
+    document = {
+        "format": "ringrig-plan",
+        "version": 1,
+        "seed": 3,
+        "truncated": False,
+        "meshes": [{"unit": "in", "scale_to_m": 0.0254}],
+        "surface": {"path": "surface.npz"},
+        **dict.fromkeys(names),
+        **plan.document,
+    }
+    place = tmp_path_factory.mktemp("reconstruct")
+    RigPlan(document, plan.surface).save(place / "plan.json")
+    return place
+
+
+def run(*words):
+    """Run `plan reconstruct` in this process; return exit code, stdout, stderr."""
+    result = CliRunner().invoke(commands, ["reconstruct", *map(str, words)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+@pytest.fixture(scope="module")
+def simulated(folder):
+    words = ["-o", folder / "one", "--save-captures", folder / "captures"]
+    return run(folder / "plan.json", *words, "--quiet")
+
+
+def header_of(path: Path) -> list[str]:
+    return path.read_bytes().split(b"end_header\n")[0].decode().splitlines()
+
+
+def test_simulation_writes_a_cloud_and_says_what_it_found(folder, simulated):
+    code, out, err = simulated
+    assert (code, err) == (0, "")
+    for words in (
+        "P1 with C2: ",
+        "accuracy against the mesh: rms 0.0",
+        "completeness of the target predicted measured: ",
+        "cloud.ply",
+        "sigma along the normal: violet 0.000",
+        "every limit of the check is kept",
+    ):
+        assert words in out
+    assert [path.name for path in (folder / "one").iterdir()] == ["cloud.ply"]
+
+
+def test_saved_images_give_the_same_file_in_a_process_of_its_own(folder, simulated):
+    home = str(Path(planning.__file__).resolve().parents[1])
+    words = ["reconstruct", "plan.json", "--captures", "captures", "-o", "two"]
+    done = subprocess.run(
+        [sys.executable, "-c", "from planning.cli import main; main()", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": home, "PYTHONWARNINGS": "ignore"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "plan: pair 2 of 2" in done.stderr
+    assert "plan: " not in done.stdout
+    one, two = ((folder / name / "cloud.ply").read_bytes() for name in ("one", "two"))
+    assert one == two
+
+
+def test_another_reader_finds_the_cloud_on_the_mesh_with_its_colours(folder, simulated):
+    """In inches, as the mesh file: 5 cm are 1.97."""
+    path = folder / "one" / "cloud.ply"
+    cloud = trimesh.load(path)
+    assert isinstance(cloud, trimesh.PointCloud)
+    surface = RigPlan.load(folder / "plan.json").surface.mesh
+    distance = closest_points(surface, 0.0254 * np.asarray(cloud.vertices)).distances
+    assert np.abs(distance).max() < 0.5e-3
+    assert len(np.unique(cloud.colors, axis=0)) > 100
+    rows = rows_of(path)
+    assert len(rows) == len(cloud.vertices) > 1000
+    lightness = cloud.colors[:, :3] @ np.array([0.2126, 0.7152, 0.0722])
+    order = np.argsort(rows["sigma"])
+    assert np.all(np.diff(lightness[order]) > -2.0)
+    ratio = np.median(np.abs(distance)) / (0.0254 * np.median(rows["sigma"]))
+    assert 0.5 < ratio / 0.6745 < 1.6
+
+
+def rows_of(path: Path) -> np.ndarray:
+    """Read the rows by what the header says, with code of this test's own."""
+    kinds = {"double": "<f8", "float": "<f4", "uchar": "u1"}
+    words = [line.split() for line in header_of(path)]
+    fields = [(word[2], kinds[word[1]]) for word in words if word[0] == "property"]
+    content = path.read_bytes().split(b"end_header\n", 1)[1]
+    return np.frombuffer(content, dtype=fields)
+
+
+def test_the_header_tells_unit_and_colours(folder, simulated):
+    path = folder / "one" / "cloud.ply"
+    header = header_of(path)
+    assert header[:3] == [
+        "ply",
+        "format binary_little_endian 1.0",
+        "comment ringrig cloud",
+    ]
+    assert "comment unit in, 0.0254 m; axes of the mesh" in header
+    rows = rows_of(path)
+    low, high = np.quantile(rows["sigma"], [0.02, 0.98])
+    colours = next(line for line in header if "viridis" in line)
+    said = colours.split("by sigma, ")[1].split(":")[0].split(" to ")
+    assert [float(word) for word in said] == pytest.approx([low, high], rel=1e-4)
+    length = np.linalg.norm(np.stack([rows[f"n{a}"] for a in "xyz"]), axis=0)
+    known = length > 0.5
+    assert np.allclose(length[known], 1.0, atol=1e-6)
+    assert np.all(length[~known] == 0.0)
+    assert known.mean() > 0.9
+    # Outward, as the ball is seen from outside.
+    outward = sum(rows[a] * rows[f"n{a}"] for a in "xyz")
+    assert np.all(outward[known] > 0.0)
+    assert np.all(np.isfinite(rows["sigma"]))
+    assert np.all(rows["sigma"] > 0.0)
+
+
+def test_a_missing_pair_exits_1_with_a_smaller_cloud(folder, simulated, tmp_path):
+    shutil.copytree(folder / "captures" / "C1", tmp_path / "captures" / "C1")
+    words = ["--captures", tmp_path / "captures", "-o", tmp_path / "out", "--quiet"]
+    code, out, err = run(folder / "plan.json", *words)
+    assert (code, err) == (1, "")
+    assert "not met: P1 with C2: left out: " in out
+    assert "NOT reconstructed as planned: " in out
+    rows = rows_of(tmp_path / "out" / "cloud.ply")
+    assert 500 < len(rows) < len(rows_of(folder / "one" / "cloud.ply"))
+    code, out, err = run(folder / "plan.json", *words, "--json")
+    document = json.loads(out)
+    assert (code, document["passed"]) == (1, False)
+    assert "P1 with C2: left out" in document["failures"][0]
+    assert document["unit"] == "in"
+    assert document["n_merged"] == len(rows)
+    assert [pair["n_points"] > 0 for pair in document["pairs"]] == [True, False]
+
+
+def test_no_cloud_stays_where_none_is_confirmed(folder, simulated, tmp_path):
+    """Each camera's images stand under the name of the other."""
+    for name, other in (("C1", "C2"), ("C2", "C1")):
+        place = tmp_path / "captures" / name / "P1"
+        shutil.copytree(folder / "captures" / other / "P1", place)
+        for path in sorted(place.glob("*-root-*")):
+            number, rest = path.name.split("-", 1)
+            shift = 2 if name == "C2" else -2
+            path.rename(
+                place / f"{int(number) + shift:02d}-{rest.replace(other, name)}"
+            )
+    out_folder = tmp_path / "out"
+    shutil.copytree(folder / "one", out_folder)
+    mine = out_folder / "mine.ply"
+    mine.write_text("ply\n")
+    words = ["--captures", tmp_path / "captures", "-o", out_folder, "--quiet"]
+    code, out, _ = run(folder / "plan.json", *words)
+    assert code == 1
+    assert "no other pair confirms them" in out
+    assert "none was written" in out
+    assert [path.name for path in out_folder.iterdir()] == ["mine.ply"]
+
+
+def test_a_cloud_of_someone_else_is_not_removed(folder, simulated, tmp_path):
+    from planning.reconstruction.cloud_file import remove_cloud
+
+    other = tmp_path / "cloud.ply"
+    other.write_text("ply\nformat ascii 1.0\ncomment mine\n")
+    assert not remove_cloud(other)
+    assert other.exists()
+    assert not remove_cloud(tmp_path / "nothing.ply")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--captures", "no"], 3, "no: no such folder"),
+        (["--captures", "one"], 3, "must be called C1, C2, it holds cloud.ply"),
+        (["--captures", "a", "--save-captures", "b"], 2, "not both"),
+        (["-o", "plan.json/x"], 2, "can't write to plan.json/x"),
+        (["--save-captures", "plan.json/x"], 2, "can't write to plan.json/x"),
+        (["--threads", "0"], 2, "not in the range"),
+    ],
+)
+def test_errors_are_one_line_with_the_documented_code(
+    folder, simulated, words, code, message, monkeypatch
+):
+    monkeypatch.chdir(folder)
+    found, out, err = run("plan.json", "--quiet", *words)
+    assert (found, out) == (code, "")
+    assert message in " ".join(err.split())
