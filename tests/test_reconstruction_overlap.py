@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geometry.mesh import TriangleMesh
 from geometry.primitives import sphere
 from geometry.rays import RayCaster
 from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
@@ -132,3 +133,18 @@ def test_pixels_in_both_beams_are_said_to_be(plan):
     assert lit_twice(plan, side, 0, 0) == ()
     nowhere = np.array([[0.0, 0.0]])
     assert lit_twice(plan, nowhere, 0, 0) == ()
+
+
+def test_light_does_not_fall_behind_a_sphere(rigs):
+    """Two spheres in a row, as seen from the projector."""
+    front, back = sphere(0.02, subdivisions=3), sphere(0.02, subdivisions=3)
+    towards = rigs.direction(-35.0, 5.0)
+    vertices = np.vstack([front.vertices + 0.06 * towards, back.vertices])
+    faces = np.vstack([front.faces, back.faces + len(front.vertices)])
+    two = rigs.small_rig(TriangleMesh(vertices, faces))
+    device = calibrate_projector(two.projectors[0])
+    caster = RayCaster(two.surface.mesh, threads=1)
+    normals = np.array([towards, towards, rigs.direction(35.0, 5.0)])
+    points = np.array([0.06, 0.0, 0.0])[:, None] * towards + 0.02 * normals
+    lit = light_falls(device, 1.0, caster, points, normals)
+    assert lit.tolist() == [True, False, False]

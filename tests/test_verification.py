@@ -7,6 +7,7 @@ import pytest
 
 from geometry.mesh import TriangleMesh
 from geometry.primitives import sphere
+from planning import verification
 from planning.audit.figures import compare_figures
 from planning.errors import PlanFileError
 from planning.plan import RigPlan
@@ -217,6 +218,46 @@ def test_the_files_alone_are_enough_and_the_mesh_may_be_given(handmade, tmp_path
     assert verify_plan(plan, sphere(0.05, subdivisions=3), check_pixels=False).passed
     found = verify_plan(plan, sphere(0.051, subdivisions=3), check_pixels=False)
     assert [f for f in found.failures if "isn't that of surface.npz" in f]
+
+
+def test_another_object_is_named_by_its_mesh_and_by_the_pixels(handmade):
+    plan = handmade.build_plan()
+    mesh = plan.surface.mesh
+    found = verify_plan(plan, TriangleMesh(1.01 * mesh.vertices, mesh.faces))
+    assert found.audit.passed
+    assert found.reconstruction.accuracy.bias_m == pytest.approx(5e-4, rel=0.1)
+    assert found.failures[0].startswith("mesh: its bounding box (")
+    assert "the object looks 1 % larger against the mesh" in found.failures[1]
+    assert not any("claimed" in failure for failure in found.failures)
+
+
+def test_a_mesh_in_another_unit_or_place_is_not_rendered(handmade, monkeypatch):
+    truths = []
+    render = verification._reconstruct
+
+    def spied(plan, audit, truth, *rest):
+        truths.append(truth)
+        return None if len(truths) > 1 else render(plan, audit, truth, *rest)
+
+    monkeypatch.setattr(verification, "_reconstruct", spied)
+    plan = handmade.build_plan()
+    mesh = plan.surface.mesh
+    found = verify_plan(plan, TriangleMesh(25.4 * mesh.vertices, mesh.faces))
+    assert len(found.failures) == 1
+    assert found.failures[0].startswith("mesh: ")
+    assert found.reconstruction.passed
+    for changed, rendered in (
+        (mesh.vertices + [0.06, 0.0, 0.0], False),
+        (mesh.vertices + [0.04, 0.0, 0.0], True),
+        (1.4 * mesh.vertices, True),
+        (mesh.vertices / 1.6, False),
+        (mesh.vertices, False),
+    ):
+        with pytest.raises(AttributeError):
+            verify_plan(plan, TriangleMesh(changed, mesh.faces))
+        assert (truths[-1] is not None) is rendered
+        if rendered:
+            assert np.array_equal(truths[-1].surface.mesh.vertices, changed)
 
 
 def test_a_changed_surface_is_refused(handmade, tmp_path):
