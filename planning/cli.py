@@ -372,8 +372,6 @@ def reconstruct(**options: Any) -> None:  # noqa: ANN401
     """Measure the object from images, rendered or captured; write cloud.ply."""
     from .reconstruct_command import reconstruct_command
 
-    if options["calibration"] is not None:
-        raise click.UsageError("--calibration isn't built yet")
     if options["captures"] is not None and options["save_captures"] is not None:
         raise click.UsageError(
             "give --captures or --save-captures, not both: the one reads images, the "

@@ -19,6 +19,7 @@ from .audit.prediction import predict_measured
 from .plan import RigPlan
 from .progress import Report
 from .reconstruct_summary import summary
+from .reconstruction.calibration_file import calibrated_plan
 from .reconstruction.captured import (
     Expected,
     reconstruct_captured,
@@ -54,6 +55,8 @@ def _reconstruct(
     seed = options["seed"]
     seed = int(plan.document["seed"]) if seed is None else seed
     threads = options["threads"] or _cores()
+    mounted = options["calibration"]
+    mounted = None if mounted is None else calibrated_plan(plan, mounted)
     _say(report, "predicting what the plan's poses measure")
     expected = _expected(plan, seed, threads)
 
@@ -63,7 +66,7 @@ def _reconstruct(
     if options["captures"] is not None:
         folder = CaptureFolder(options["captures"], plan)
         return reconstruct_captured(
-            folder, expected, threads=threads, progress=progress
+            folder, expected, believed=mounted, threads=threads, progress=progress
         )
     place = options["save_captures"]
     return reconstruct_rendered(
@@ -71,6 +74,8 @@ def _reconstruct(
         expected,
         seed=seed,
         threads=threads,
+        truth=mounted,
+        believed=mounted,
         save=None if place is None else CaptureFolder(place, plan),
         progress=progress,
     )

@@ -1,15 +1,18 @@
 """Captured images: read by name, held against each other, never a wrong cloud."""
 
+import copy
 import re
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from geometry.mesh import TriangleMesh
+from geometry.proximity import closest_points
 from geometry.sampling import SurfaceSamples
 from planning.audit.prediction import predict_measured
 from planning.errors import CapturesError
@@ -175,10 +178,10 @@ def test_white_and_black_exchanged(job):
 
 
 @pytest.mark.parametrize("p", [0, 1])
-def test_a_bit_or_root_disc_exchanged_with_its_inverse(lit_job, p):
-    for bit in range(lit_job.n_bits(p) + 1):
+def test_a_bit_or_root_disc_exchanged_with_its_inverse(job, p):
+    for bit in range(job.n_bits(p) + 1):
         frames = 2 + 2 * bit, 3 + 2 * bit
-        found = lit_job.after(lambda s, f=frames: s[exchanged(len(s), f)], (p, 0))
+        found = job.after(lambda s, f=frames: s[exchanged(len(s), f)], (p, 0))
         assert_left_out(found, f"P{p + 1} with C1", "left out")
 
 
@@ -186,7 +189,7 @@ def test_a_bit_or_root_disc_exchanged_with_its_inverse(lit_job, p):
 def test_two_bits_or_a_bit_and_the_root_disc_exchanged(lit_job, p):
     root = lit_job.n_bits(p)
     neighbours = [(bit, bit + 1) for bit in range(root)]
-    for one, other in [*neighbours, *((bit, root) for bit in range(root - 1))]:
+    for one, other in [*neighbours, (0, root), (3, root)]:
         a, b = 2 + 2 * one, 2 + 2 * other
         found = lit_job.after(
             lambda s, a=a, b=b: s[exchanged(len(s), (a, b), (a + 1, b + 1))], (p, 0)
@@ -335,6 +338,74 @@ def test_images_of_two_projectors_exchanged(job):
     other = job.images.stacks[1, 0]
     order = [*range(12), len(other) - 2, len(other) - 1]
     assert_left_out(job.after(lambda s: other[order]), "P1 with C1", "left out")
+
+
+def stood_there(job: Job, change, *, mesh=None) -> Reconstruction:
+    """Images of a rig that isn't the plan, and of an object that perhaps isn't."""
+    document = copy.deepcopy(job.plan.document)
+    change(document)
+    surface = job.plan.surface
+    surface = surface if mesh is None else replace(surface, mesh=mesh)
+    truth = RigPlan(document, surface)
+    return reconstruct_rendered(job.plan, job.expected, seed=0, threads=1, truth=truth)
+
+
+def test_a_camera_that_stands_elsewhere_is_confirmed_by_no_pair_of_its_projectors(job):
+    """Points of one projector lie on its rings whatever camera is wrong."""
+
+    def moved(document):
+        document["cameras"][0]["world_from_device"][0][3] += 4e-3
+
+    found = stood_there(job, moved)
+    assert_no_wrong_point(found)
+    assert [pair.n_points > 1000 for pair in found.pairs] == [False, False, True, True]
+    assert found.failures[0].startswith("P1 with C1: left out: its points lie 0.")
+    assert found.failures[1].startswith("P2 with C1: left out")
+
+
+def test_a_projector_that_stands_elsewhere_is_confirmed_by_no_pair_of_its_cameras(job):
+    def moved(document):
+        for name in ("world_from_device", "world_from_ring"):
+            document["projectors"][0][name][0][3] += 4e-3
+
+    found = stood_there(job, moved)
+    assert_no_wrong_point(found)
+    assert [pair.n_points > 1000 for pair in found.pairs] == [False, True] * 2
+
+
+def test_an_object_that_is_not_the_mesh_is_measured_and_said_to_differ(job):
+    """Pairs agree with each other: the cloud is right, and the mesh is wrong."""
+    old = job.plan.surface.mesh
+    other = TriangleMesh(1.02 * old.vertices, old.faces)
+    found = stood_there(job, lambda document: None, mesh=other)
+    assert not found.passed
+    assert "the pairs agree with each other, but not with the mesh" in found.failures[0]
+    assert all(pair.n_points > 1000 for pair in found.pairs)
+    distance = closest_points(other, found.merged.cloud.points).distances
+    assert np.abs(distance).max() < WRONG_M
+
+
+def test_a_deep_dent_that_two_pairs_saw_is_kept_and_one_pairs_word_is_not(job):
+    old = job.plan.surface.mesh
+    top = (
+        old.vertices @ np.array([0.0, -1.0, 0.1]) / np.linalg.norm(old.vertices, axis=1)
+    )
+    depth = 0.04 * np.clip((top - 0.9) / 0.1, 0.0, 1.0)
+    other = TriangleMesh((1.0 - depth)[:, None] * old.vertices, old.faces)
+    found = stood_there(job, lambda document: None, mesh=other)
+    distance = closest_points(other, found.merged.cloud.points).distances
+    assert np.abs(distance).max() < WRONG_M
+    assert found.accuracy.max_m > 1e-3
+    assert not any("no other pair" in sentence for sentence in found.failures)
+    assert not found.passed
+
+    def alone(document):
+        document["projectors"].pop()
+        document["cameras"].pop()
+
+    found = stood_there(job, alone, mesh=other)
+    assert any("confirms them" in sentence for sentence in found.failures)
+    assert found.accuracy.max_m < 10.1 * job.plan.requirements.check.max_rms_m
 
 
 def test_a_pair_without_light_is_missed_where_it_should_measure(job):

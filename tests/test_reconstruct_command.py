@@ -194,6 +194,31 @@ def test_no_cloud_stays_where_none_is_confirmed(folder, simulated, tmp_path):
     assert [path.name for path in out_folder.iterdir()] == ["mine.ply"]
 
 
+def test_a_calibration_moves_devices_in_simulation_and_captures(
+    folder, simulated, tmp_path
+):
+    document = json.loads((folder / "plan.json").read_text())
+    pose = np.array(document["cameras"][0]["world_from_device"])
+    pose[:3, 3] += 4e-3 * pose[:3, 0]
+    device = {"id": "C1", "world_from_device": pose.tolist()}
+    calibration = {"format": "ringrig-calibration", "version": 1, "devices": [device]}
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(calibration))
+    images = ["--save-captures", tmp_path / "captures"]
+    words = ["--calibration", path, "-o", tmp_path / "one", "--quiet"]
+    code, out, _ = run(folder / "plan.json", *words, *images)
+    assert code == 0, out
+    images = ["--captures", tmp_path / "captures"]
+    words = ["--calibration", path, "-o", tmp_path / "two", "--quiet"]
+    assert run(folder / "plan.json", *words, *images)[0] == 0
+    one, two = (tmp_path / name / "cloud.ply" for name in ("one", "two"))
+    assert one.read_bytes() == two.read_bytes()
+    words = ["-o", tmp_path / "three", "--quiet"]
+    code, out, _ = run(folder / "plan.json", *words, *images)
+    assert code == 1
+    assert "P1 with C1: left out: its points lie " in out
+
+
 def test_a_cloud_of_someone_else_is_not_removed(folder, simulated, tmp_path):
     from planning.reconstruction.cloud_file import remove_cloud
 
@@ -209,6 +234,7 @@ def test_a_cloud_of_someone_else_is_not_removed(folder, simulated, tmp_path):
     [
         (["--captures", "no"], 3, "no: no such folder"),
         (["--captures", "one"], 3, "must be called C1, C2, it holds cloud.ply"),
+        (["--calibration", "no.json"], 3, "no.json: no such file"),
         (["--captures", "a", "--save-captures", "b"], 2, "not both"),
         (["-o", "plan.json/x"], 2, "can't write to plan.json/x"),
         (["--save-captures", "plan.json/x"], 2, "can't write to plan.json/x"),

@@ -33,6 +33,7 @@ _WORDS = {
     "projector, or two projectors on at once",
     "unconfirmed": "neither the mesh nor another pair confirms the points",
     "no_intersection": "the rays miss the rings: a pose isn't that of the plan",
+    "root": "the root disc was drawn for another place of the camera",
     "conditioning": "the rays run along the rings' cones, where the two roots meet",
     "outside_panel": "the points lie outside the projector's image",
     "isolated": "the edges are scattered: little light, or nearly hidden",

@@ -25,6 +25,9 @@ _LOOKED_AT = 2000
 _FEWEST = 30
 # Two pairs saw one spot if their edges lie this near in an image [px].
 _SAME_SPOT_PX = 0.5
+# Points are looked for this far beside an edge of their own ring [px].
+_BESIDE_PX = 30.0
+_RING_APART_PX = 1000.0
 # Of one spot two pairs may differ by this many times the limit of the mean error: half
 # a pixel beside the spot lies nearer or farther on slanted surface.
 _APART = 3.0
@@ -99,9 +102,10 @@ def confirm(
             continue
         if key in good and np.mean(errors[key] > _STRAY * limit_m) > _FEW_STRAYS:
             far = np.abs(_distances(mesh, pair.cloud, threads)) > _STRAY * limit_m
-            others = [clouds[one] for one in sorted(good - {key})]
+            others = {one: clouds[one] for one in sorted(good - {key})}
             camera = cameras[key[1]]
-            if not _seen_too(pair.cloud.take(far), others, camera, _APART * limit_m):
+            taken = pair.cloud.take(far)
+            if not _seen_too(key, taken, others, camera, _APART * limit_m):
                 strays[key] = int(np.count_nonzero(far))
                 pair = _left(pair, ~far)
         kept.append((key, pair))
@@ -137,10 +141,17 @@ def _seen_by(
 
 
 def _seen_too(
-    strays: Cloud, others: list[Cloud], camera: CameraCalibration, tolerance: float
+    key: tuple[int, int],
+    strays: Cloud,
+    others: dict[tuple[int, int], Cloud],
+    camera: CameraCalibration,
+    tolerance: float,
 ) -> bool:
     """Whether other pairs measured stray points alike."""
-    found = [_difference(strays, other, camera) for other in others]
+    found = [
+        _difference(strays, other, camera, same=one[0] == key[0])
+        for one, other in others.items()
+    ]
     differences = np.concatenate([*found, np.zeros(0)])
     return len(differences) >= _FEWEST_STRAYS and bool(
         np.median(differences) <= tolerance
@@ -153,10 +164,12 @@ def _disagreements(
     """Median difference [m] of each two pairs where both saw one spot."""
     found: dict[frozenset[tuple[int, int]], float] = {}
     for one, other in combinations(sorted(clouds), 2):
+        seen, also = clouds[one], clouds[other]
+        same = one[0] == other[0]
         differences = np.concatenate(
             [
-                _difference(clouds[one], clouds[other], cameras[one[1]]),
-                _difference(clouds[other], clouds[one], cameras[other[1]]),
+                _difference(seen, also, cameras[one[1]], same=same),
+                _difference(also, seen, cameras[other[1]], same=same),
             ]
         )
         if len(differences) >= _FEWEST:
@@ -165,18 +178,36 @@ def _disagreements(
 
 
 def _difference(
-    seen: Cloud, other: Cloud, camera: CameraCalibration
+    seen: Cloud, other: Cloud, camera: CameraCalibration, *, same: bool
 ) -> NDArray[np.float64]:
-    """Differences of distance [m] where points of another pair show on edges of one."""
+    """How far points of a pair are from those of another, as its camera sees them [m].
+
+    Where the other's show on an edge, the difference of distance. On an edge of the
+    same ring of one projector that is no news, since both lie on its surface: there
+    counts how far beside the edge they show.
+    """
     pixels = camera.project(other.points)
     shown = np.flatnonzero(np.isfinite(pixels[:, 0]))
-    apart, nearest = KDTree(seen.pixels).query(
-        pixels[shown], distance_upper_bound=_SAME_SPOT_PX
+    if len(shown) == 0:
+        return np.zeros(0)
+    apart, nearest = KDTree(_place(pixels[shown], other.ring[shown], same)).query(
+        _place(seen.pixels, seen.ring, same),
+        distance_upper_bound=_BESIDE_PX if same else _SAME_SPOT_PX,
     )
     hit = np.isfinite(apart)
-    own, others = np.asarray(nearest)[hit], shown[hit]
-    reach = np.linalg.norm(seen.points[own] - camera.centre, axis=1)
-    return np.abs(np.linalg.norm(other.points[others] - camera.centre, axis=1) - reach)
+    beside, others = np.asarray(apart)[hit], shown[np.asarray(nearest)[hit]]
+    own = np.linalg.norm(seen.points[hit] - camera.centre, axis=1)
+    reach = np.linalg.norm(other.points[others] - camera.centre, axis=1)
+    deep = np.where(beside <= _SAME_SPOT_PX, np.abs(own - reach), 0.0)
+    wide = beside * own / camera.focal_px * float(same)
+    return np.asarray(np.maximum(deep, wide), dtype=np.float64)
+
+
+def _place(
+    pixels: NDArray[np.float64], rings: NDArray[np.int16], by_ring: bool
+) -> NDArray[np.float64]:
+    """Return pixels with a third coordinate that keeps rings apart, if asked for."""
+    return np.column_stack([pixels, _RING_APART_PX * rings * float(by_ring)])
 
 
 def _agree(

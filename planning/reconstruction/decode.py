@@ -120,6 +120,7 @@ def decode(
     length, across = _chains(edges, hits, camera.focal_px, max_slant)
     causes = {
         "no_intersection": ~np.isfinite(hits.distances),
+        "root": _doubtful_root(edges, rays, patterns, calibration),
         "conditioning": ~(np.abs(hits.conditioning) >= min_conditioning),
         "outside_panel": ~projector.in_panel(projector.panel(hits.points)[0], 1.0),
         "isolated": length < _MIN_CHAIN,
@@ -145,6 +146,35 @@ def decode(
         len(saturated),
         saturated[:: max(1, len(saturated) // _SATURATED_KEPT)],
     )
+
+
+def _doubtful_root(
+    edges: Edges,
+    rays: NDArray[np.float64],
+    patterns: RingPatterns,
+    calibration: PairCalibration,
+) -> NDArray[np.bool_]:
+    """Edges of which both roots, or neither, lie on the side that the disc told.
+
+    The disc was drawn for the planned place of the camera. Where that isn't its
+    measured place, the sign of r.m and the side of the disc differ near its border.
+    """
+    camera, projector = calibration.camera, calibration.projector
+    place = projector.to_ring(camera.centre[None])[0]
+    if np.allclose(place, patterns.camera_in_ring, rtol=0.0, atol=1e-9):
+        return np.zeros(len(edges), dtype=bool)
+
+    def fits(roots: NDArray[np.int8]) -> NDArray[np.bool_]:
+        radii = patterns.radii[edges.rings]
+        points = intersect_rings(camera.centre, rays, radii, roots, projector).points
+        local = projector.to_ring(points)
+        flat = local[:, :2]
+        if patterns.light == "diverging":
+            flat = flat / local[:, 2:]
+        inside = projector.in_panel(projector.panel(points)[0], 1.0)
+        return (np.sign(patterns.root_side(flat)) == edges.roots) & inside
+
+    return fits(edges.roots) == fits(-edges.roots)
 
 
 def _out_of_order(edges: Edges) -> bool:
