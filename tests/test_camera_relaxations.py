@@ -13,7 +13,7 @@ from geometry.poses import look_at
 from geometry.primitives import grid, sphere
 from planning import camera_relaxations, optics
 from planning.audit import audit_plan
-from planning.camera_demands import demands
+from planning.camera_demands import Demands, demands
 from planning.camera_knobs import knobs
 from planning.camera_relaxations import (
     _SPARE,
@@ -22,7 +22,12 @@ from planning.camera_relaxations import (
     for_so_many,
     out_of_reach,
 )
-from planning.cameras import CameraStage, lit_samples, measured_by
+from planning.cameras import (
+    CameraStage,
+    furthest_failure,
+    lit_samples,
+    measured_by,
+)
 from planning.candidates import aimed_poses
 from planning.claims import Devices, make_claims
 from planning.measurability import CAUSES, MEASURED
@@ -52,7 +57,7 @@ def rig(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def world(rig):
-    """A ball under one projector, seen by cameras that hold it, nearly or not."""
+    """A ball under two projectors, seen by cameras that hold it, nearly or not."""
     ball = sphere(0.1, subdivisions=3)
     required = rig.requirements(
         ball.centre, ball.radius, max_projectors=1, target="surface", tau_m=0.004
@@ -61,12 +66,21 @@ def world(rig):
     scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
     up = np.array([0.0, 0.0, 1.0])
     device = rig.projector_device()
-    stands = np.array([[0.0, -1.1, 0.1]])
-    (light,) = aimed_poses(stands, np.zeros(3), up, device)
-    ring = ring_frame(light, device, 0.1, -1.5)
+    stands = np.array([[0.0, -1.1, 0.1], [0.5, -1.0, -0.2]])
+    lights = aimed_poses(stands, np.zeros(3), up, device)
     radii = np.linspace(0.004, 0.3, 75)
-    projector = PlannedProjector("P1", "diverging", light, ring, device, radii)
-    rows = lit_samples(scene, [projector], scene.target_samples(400, 7))
+    projector, second = (
+        PlannedProjector(
+            "P1",
+            "diverging",
+            light,
+            ring_frame(light, device, 0.1, -1.5),
+            device,
+            radii,
+        )
+        for light in lights
+    )
+    rows = lit_samples(scene, [projector, second], scene.target_samples(400, 7))
     places = [(0.6, -0.9, 0.1), (-0.4, -1.0, 0.6), (0.6, -0.9, -0.3)]
     aims = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.1), (0.25, 0.165, 0.0)]
     assert len(rows.target) > 60
@@ -93,9 +107,11 @@ def turned_to(name, value, scene, rows, camera):
         case "pitch":
             pair = replace(pair, min_ring_pitch_px=-value)
         case "gap":
-            rings = rows.rings[0]
-            wider = replace(rings, spacing=rings.spacing * value / 2.0)
-            rows = replace(rows, rings=(wider,))
+            wider = tuple(
+                replace(rings, spacing=rings.spacing * value / 2.0)
+                for rings in rows.rings
+            )
+            rows = replace(rows, rings=wider)
         case "blur":
             sharp = optics.depth_of_field(0.012, 11.0, value * 3.45e-6, 1.15)
             device = replace(device, range_m=sharp)
@@ -227,6 +243,24 @@ def test_an_image_asks_for_the_angle_off_its_middle(rig, world):
     assert set(found.furthest[helped]) == {CAUSES.index("camera_field")}
 
 
+def test_the_limit_at_which_a_sample_comes_furthest_is_that_of_its_views(rig, world):
+    scene, _, rows, cameras = world
+    scene = tightened(
+        scene,
+        camera={"max_incidence": np.radians(45.0), "max_sample_distance_m": 0.00035},
+        triangulation={"min_conditioning": 0.4, "min_ring_pitch_px": 12.0},
+    )
+    near, _, aside = cameras
+    near = replace(near, device=replace(near.device, range_m=(1.02, 1.06)))
+    aside = replace(aside, device=replace(aside.device, range_m=(1.0, 1.05)))
+    causes = set()
+    for camera in (near, *cameras, aside):
+        found = demands(scene, camera, rows, knobs(rig, scene.requirements))
+        assert np.array_equal(found.furthest, furthest_failure(scene, [camera], rows))
+        causes |= set(found.furthest.tolist())
+    assert len(causes) >= 7
+
+
 def test_two_limits_that_forbid_a_sample_are_helped_by_neither(rig, world):
     scene, _, rows, cameras = world
     required = scene.requirements
@@ -340,6 +374,24 @@ def test_one_camera_is_enough_at_what_is_told_and_not_below(rig, world):
 
     assert enough(value)
     assert not enough(value - 1)
+
+
+def test_a_limit_gives_way_as_far_as_the_share_asks_or_as_it_helps(rig, monkeypatch):
+    """Ten of twenty samples ask 1, 2, ... 10 degrees; two are measured as it is."""
+    asked = np.full((1, 20), np.inf)
+    asked[0, :10] = np.arange(1.0, 11.0) - 0.5
+    asked[0, 18:] = -np.inf
+    furthest = np.where(np.isneginf(asked[0]), MEASURED, 2).astype(np.int8)
+    found = Demands(furthest, asked)
+    monkeypatch.setattr(camera_relaxations, "demands", lambda *_: found)
+    monkeypatch.setattr(camera_relaxations, "taken", lambda rows, *_: rows)
+    (knob,) = knobs(rig, _requirements())[:1]
+    table = camera_relaxations._Least((knob,), 20)
+    table.add(scene=None, camera=None, rows=None)
+    for least, degrees, gained in ((0.35, 5, 5), (0.9, 10, 10), (0.1, None, None)):
+        changes = table.least_changes(_Share(20, 2, least))
+        want = {} if degrees is None else {knob.say(degrees): gained}
+        assert changes == want
 
 
 def two_floors():
