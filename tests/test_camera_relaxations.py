@@ -4,6 +4,7 @@ import copy
 import re
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -387,7 +388,7 @@ def test_a_limit_gives_way_as_far_as_the_share_asks_or_as_it_helps(rig, monkeypa
     monkeypatch.setattr(camera_relaxations, "taken", lambda rows, *_: rows)
     (knob,) = knobs(rig, _requirements())[:1]
     table = camera_relaxations._Least((knob,), 20)
-    table.add(scene=None, camera=None, rows=None)
+    table.add(scene=None, camera=None, rows=SimpleNamespace(lit=None))
     for least, degrees, gained in ((0.35, 5, 5), (0.9, 10, 10), (0.1, None, None)):
         changes = table.least_changes(_Share(20, 2, least))
         want = {} if degrees is None else {knob.say(degrees): gained}
