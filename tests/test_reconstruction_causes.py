@@ -13,7 +13,13 @@ from geometry.primitives import sphere
 from geometry.sampling import sample_surface
 from planning.plan import RigPlan
 from planning.reconstruction import check as check_module
+from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
 from planning.reconstruction.check import reconstruct_plan
+from planning.reconstruction.cloud import Cloud
+from planning.reconstruction.decode import Decoded
+from planning.reconstruction.patterns import ring_plane
+from planning.reconstruction.roots import wrong_roots
+from planning.reconstruction.supposed import Evidence, Supposed, places
 
 FOCAL = 1400.0
 
@@ -69,6 +75,45 @@ def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
     words = r"P1 with C2: \d+ % of the points took the wrong one of the two roots"
     assert found
     assert all(re.search(words, text) for text in found), found
+
+
+def test_only_a_point_whose_ray_meets_its_ring_on_the_mesh_has_a_wrong_root(plan):
+    """Points 10 mm before the mesh: labelled with the ring there, and with another."""
+    camera, projector = plan.cameras[0], plan.projectors[0]
+    n = 80
+    away = np.linspace(-0.01, 0.01, n)
+    pixels = calibrate_camera(camera).project(
+        np.column_stack([away, np.full(n, -0.039), away])
+    )
+    at = places(Evidence.at(plan, pixels, 0, 0), Supposed.of(plan)).points
+    design = calibrate_projector(projector)
+    rho = np.hypot(*ring_plane(design, design.panel(at)[0]).T)
+    rays = calibrate_camera(camera).rays(pixels)
+    numbers = np.zeros(n)
+    cloud = Cloud(
+        points=at - 0.01 * rays,
+        rays=rays,
+        beams=rays,
+        pixels=pixels,
+        camera=np.zeros(n, np.int16),
+        projector=np.zeros(n, np.int16),
+        ring=np.arange(n, dtype=np.int16),
+        conditioning=numbers,
+        shift=rays,
+        noise_px=numbers,
+    )
+    order = np.argsort(rho)
+    for shift, share in ((0.0, 1.0), (2e-3, None)):
+        marked = changed(
+            plan,
+            lambda d, s=shift: d["projectors"][0].update(
+                ring_radii=(rho[order] + s).tolist()
+            ),
+        )
+        pair = replace(Decoded.nothing(), cloud=cloud.take(order))
+        pair = replace(pair, cloud=replace(pair.cloud, ring=cloud.ring))
+        wrong = (("P1", "C1", share),) if share else ()
+        assert wrong_roots(marked, [((0, 0), pair)]) == wrong
 
 
 def test_samples_where_the_roots_meet_are_said_to_be_left_out(plan, claims):

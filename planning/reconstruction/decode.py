@@ -41,6 +41,7 @@ _SATURATED_KEPT = 500
 CAUSES = (
     "labels",
     "no_intersection",
+    "root",
     "conditioning",
     "outside_panel",
     "isolated",

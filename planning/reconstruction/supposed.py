@@ -213,9 +213,9 @@ def mismatches(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return how far edges are off their rings, and how squarely they are lit.
 
-    With X where the edge lies and rho the ring coordinate of the projector's pixel that
-    lights X (as the patterns were drawn), the mismatch is
-    ``(rho - R) z / sqrt(1 + R^2)``, in parallel light ``rho - R``.
+    With X where the edge lies, z its depth before the projector, and rho the ring
+    coordinate of the projector's pixel that lights X (as the patterns were drawn), the
+    mismatch is ``(rho - R) z / sqrt(1 + R^2)``, in parallel light ``rho - R``.
 
     Args:
         evidence: The edges.
