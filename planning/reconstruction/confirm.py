@@ -196,11 +196,13 @@ def _difference(
     )
     hit = np.isfinite(apart)
     beside, others = np.asarray(apart)[hit], shown[np.asarray(nearest)[hit]]
-    own = np.linalg.norm(seen.points[hit] - camera.centre, axis=1)
-    reach = np.linalg.norm(other.points[others] - camera.centre, axis=1)
+    own, reach = (
+        np.sqrt(np.sum((points - camera.centre) ** 2, axis=1))
+        for points in (seen.points[hit], other.points[others])
+    )
     deep = np.where(beside <= _SAME_SPOT_PX, np.abs(own - reach), 0.0)
-    wide = beside * own / camera.focal_px * float(same)
-    return np.asarray(np.maximum(deep, wide), dtype=np.float64)
+    wide = beside * own / camera.focal_px if same else np.zeros(len(own))
+    return np.maximum(deep, wide).astype(np.float64)
 
 
 def _place(
