@@ -41,10 +41,12 @@ _SATURATED_KEPT = 500
 CAUSES = (
     "labels",
     "no_intersection",
+    "root",
     "conditioning",
     "outside_panel",
     "isolated",
     "depth_step",
+    "unconfirmed",
 )
 
 
