@@ -32,8 +32,8 @@ def folder(rigs, tmp_path_factory) -> Path:
     lamp = rigs.diverging("P1", rigs.direction(-30.0, 5.0), 0.055, 6.2e-3)
     plan = rigs.plan_of(body, [lamp], cameras)
     plan.document["requirements"]["check"] = rigs.CHECK | {"tau_m": 6.2e-3}
-    names = ("units", "rig", "regions", "coverage", "marginal", "certificates")
-    names += ("baselines", "cost", "members", "reconstruction", "timings_s")
+    names = ("units", "regions", "coverage", "marginal", "certificates")
+    names += ("cost", "members", "reconstruction", "timings_s")
     document = {
         "format": "ringrig-plan",
         "version": 1,
@@ -42,6 +42,8 @@ def folder(rigs, tmp_path_factory) -> Path:
         "meshes": [{"unit": "in", "scale_to_m": 0.0254}],
         "surface": {"path": "surface.npz"},
         **dict.fromkeys(names),
+        "rig": {},
+        "baselines": [],
         **plan.document,
     }
     place = tmp_path_factory.mktemp("reconstruct")

@@ -17,7 +17,7 @@ from geometry.proximity import closest_points
 from .calibration import CameraCalibration
 from .check import Pairs
 from .cloud import Cloud
-from .decode import Decoded
+from .decode import CAUSES, Decoded
 
 _MM = 1e3
 # Points of a pair that are looked at, and the fewest that say anything.
@@ -125,7 +125,9 @@ def _distances(mesh: TriangleMesh, cloud: Cloud, threads: int) -> NDArray[np.flo
 def _left(pair: Decoded, kept: NDArray[np.bool_]) -> Decoded:
     """Return a pair with some of its points, the others counted as unconfirmed."""
     why = pair.rejected | {"unconfirmed": int(np.count_nonzero(~kept))}
-    return replace(pair, cloud=pair.cloud.take(kept), rejected=why)
+    fates = pair.fates.copy()
+    fates[np.flatnonzero(fates < 0)[~kept]] = CAUSES.index("unconfirmed")
+    return replace(pair, cloud=pair.cloud.take(kept), rejected=why, fates=fates)
 
 
 def _seen_by(
@@ -196,18 +198,21 @@ def _difference(
     )
     hit = np.isfinite(apart)
     beside, others = np.asarray(apart)[hit], shown[np.asarray(nearest)[hit]]
-    own = np.linalg.norm(seen.points[hit] - camera.centre, axis=1)
-    reach = np.linalg.norm(other.points[others] - camera.centre, axis=1)
+    own, reach = (
+        np.sqrt(np.sum((points - camera.centre) ** 2, axis=1))
+        for points in (seen.points[hit], other.points[others])
+    )
     deep = np.where(beside <= _SAME_SPOT_PX, np.abs(own - reach), 0.0)
-    wide = beside * own / camera.focal_px * float(same)
-    return np.asarray(np.maximum(deep, wide), dtype=np.float64)
+    wide = beside * own / camera.focal_px if same else np.zeros(len(own))
+    return np.maximum(deep, wide)
 
 
 def _place(
     pixels: NDArray[np.float64], rings: NDArray[np.int16], by_ring: bool
 ) -> NDArray[np.float64]:
     """Return pixels with a third coordinate that keeps rings apart, if asked for."""
-    return np.column_stack([pixels, _RING_APART_PX * rings * float(by_ring)])
+    apart = _RING_APART_PX * float(by_ring)
+    return np.column_stack([pixels, apart * rings.astype(np.float64)])
 
 
 def _agree(

@@ -46,6 +46,7 @@ CAUSES = (
     "outside_panel",
     "isolated",
     "depth_step",
+    "unconfirmed",
 )
 
 

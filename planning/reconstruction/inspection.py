@@ -76,7 +76,9 @@ def inspect(stack: Images, patterns: RingPatterns, names: Sequence[str]) -> Insp
             f"don't add up to white and black"
         )
     frames = part.copy()
-    frames[:, clipped | broken] = 0
+    # Without contrast nothing is decoded; what is clipped stays so for all to see.
+    frames[:, broken] = 0
+    frames[:, clipped] = 255
     return Inspected(Frames(frames, corner), tuple(notes))
 
 
