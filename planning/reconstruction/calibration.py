@@ -144,6 +144,13 @@ class ProjectorCalibration:
         """Direction of the optical axis in the world, shape (3,)."""
         return self.world_from_device[:3, 2]
 
+    def beams(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return unit directions of the light at world points, (n, 3) both."""
+        if self.light == "parallel":
+            return np.broadcast_to(self.axis, points.shape)
+        beams = points - self.centre
+        return beams / np.linalg.norm(beams, axis=1, keepdims=True)
+
     @property
     def ring_from_device(self) -> NDArray[np.float64]:
         """Pose of the device in the ring frame, shape (4, 4)."""

@@ -32,6 +32,9 @@ _WORDS = {
     "labels": "the codes contradict the patterns: frames out of order or of another "
     "projector, or two projectors on at once",
     "unconfirmed": "neither the mesh nor another pair confirms the points",
+    "off_prior": "no ring meets the rays near the prior mesh",
+    "ambiguous": "several rings meet the rays near the prior mesh: fewer rings or a "
+    "better prior would tell them apart",
     "no_intersection": "the rays miss the rings: a pose isn't that of the plan",
     "root": "the root disc was drawn for another place of the camera",
     "conditioning": "the rays run along the rings' cones, where the two roots meet",

@@ -115,6 +115,42 @@ def decode(
     saturated = np.argwhere(frames.stack[0] >= SATURATED)[:, ::-1] + np.array(
         frames.corner, dtype=np.float64
     )
+    # Out of order, what labels are left are chance.
+    return measure_edges(
+        edges,
+        patterns,
+        calibration,
+        lit_pixels,
+        saturated,
+        min_conditioning=min_conditioning,
+        max_slant=max_slant,
+        believed=not _out_of_order(edges),
+    )
+
+
+def measure_edges(
+    edges: Edges,
+    patterns: RingPatterns,
+    calibration: PairCalibration,
+    lit_pixels: int,
+    saturated: NDArray[np.float64],
+    *,
+    min_conditioning: float,
+    max_slant: float = _MAX_SLANT,
+    believed: bool = True,
+) -> Decoded:
+    """Measure the points of labelled edges, wherever the labels come from.
+
+    Args:
+        edges: With a ring and a root each.
+        patterns: Whose rings were drawn.
+        calibration: Of both devices.
+        lit_pixels: Pixels that the projector lights.
+        saturated: Pixels (u, v) that it saturates, shape (k, 2).
+        min_conditioning: As in `decode`.
+        max_slant: As in `decode`.
+        believed: Whether the labels can be; otherwise all are left out.
+    """
     camera, projector = calibration.camera, calibration.projector
     rays = camera.rays(edges.pixels)
     radii = patterns.radii[edges.rings]
@@ -131,8 +167,7 @@ def decode(
     kept = np.ones(len(edges), dtype=bool)
     fates = np.full(len(edges), -1, dtype=np.int8)
     rejected: dict[str, int] = {}
-    if _out_of_order(edges):
-        # What labels are left are chance.
+    if not believed:
         causes = {"labels": kept.copy()}
     for cause, fails in causes.items():
         rejected[cause] = int(np.count_nonzero(kept & fails))
@@ -242,7 +277,7 @@ def _cloud(
     return Cloud(
         points=hits.points,
         rays=rays,
-        beams=_beams(hits.points, calibration),
+        beams=calibration.projector.beams(hits.points),
         pixels=edges.pixels,
         camera=np.zeros(len(edges), dtype=np.int16),
         projector=np.zeros(len(edges), dtype=np.int16),
@@ -251,16 +286,6 @@ def _cloud(
         shift=_shift(edges, rays, hits, calibration),
         noise_px=edges.noise_px,
     )
-
-
-def _beams(
-    points: NDArray[np.float64], calibration: PairCalibration
-) -> NDArray[np.float64]:
-    projector = calibration.projector
-    if projector.light == "parallel":
-        return np.broadcast_to(projector.axis, points.shape)
-    beams = points - projector.centre
-    return beams / np.linalg.norm(beams, axis=1, keepdims=True)
 
 
 def _shift(

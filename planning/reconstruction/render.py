@@ -1,5 +1,6 @@
 """What the cameras record under a projector's patterns."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -254,6 +255,34 @@ def _added(
     ]
     values = [light.white, *(light.white * level for level in [*levels, light.root])]
     return [canvas.image(value, light.samples, photometry) for value in values]
+
+
+def render_lines(
+    seen: View, shown: Sequence[Shown], photometry: Photometry, seed: tuple[int, ...]
+) -> Frames:
+    """Return one image of bright rings, under projectors that shine at once.
+
+    Where the light of several falls on a surface, it adds up.
+
+    Args:
+        seen: What the camera sees.
+        shown: The projectors; the odd annuli of their patterns are bright.
+        photometry: Light and sensor.
+        seed: Of the noise.
+    """
+    everything = np.arange(len(seen.cells))
+    canvas = _Canvas.about(seen, everything)
+    around = seen.albedo * np.float32(photometry.ambient)
+    image = canvas.image(around, everything, photometry)
+    for one in shown:
+        light = one.light(seen, photometry)
+        bright = (np.arange(one.patterns.n_annuli) % 2).astype(np.float32)
+        level = light.white * _level(bright, light)
+        image += canvas.image(level, light.samples, photometry)
+    # Lines may cover little of the image; the brightest are exposed for all the same.
+    brightest = float(np.percentile(image[image > 0.0], 99.0)) if image.any() else 1.0
+    gain = photometry.exposure * 255.0 / max(brightest, 1e-9)
+    return Frames(photometry.capture(image, seed, gain)[None], canvas.corner)
 
 
 def _level(bright: NDArray[np.float32], light: _Light) -> NDArray[np.float32]:
