@@ -1,0 +1,150 @@
+"""The devices of section VII, placed by hand: what a plan says of each."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.poses import look_at
+
+Light = Literal["diverging", "parallel"]
+
+UP = np.array([0.0, 0.0, 1.0])
+# Both projectors of the paper have 1024 x 768 px, the cameras 1280 x 720 px.
+PROJECTOR_PX = (1024, 768)
+CAMERA_PX = (1280, 720)
+STANDOFF_M = 1.0
+# Ours; the paper gives none. The panel of the parallel beam is 307 x 230 mm, so that
+# the ring of 4 inches fits; the diverging one throws 1 m wide at 2 m.
+PIXEL_PITCH_M = 0.3e-3
+THROW_RATIO = 2.0
+_RANGE_M = (0.5, 1.6)
+
+
+@dataclass(frozen=True)
+class Optics:
+    """A camera's interior, and what a user should know of it.
+
+    Attributes:
+        focal_px: Focal length in [px].
+        centre_px: Principal point (u, v) in [px].
+        distortion: k1 of the lens.
+    """
+
+    focal_px: float
+    centre_px: tuple[float, float]
+    distortion: float = 0.0
+
+    @property
+    def field_m(self) -> tuple[float, float]:
+        """Width and height that are seen at the standoff [m]."""
+        width, height = (side * STANDOFF_M / self.focal_px for side in CAMERA_PX)
+        return width, height
+
+
+# "The estimated focal length here is about 8000 pixels", "(u0, v0) = (174, 68)".
+PRINTED = Optics(8000.0, (174.0, 68.0))
+# Ours: 457 x 257 mm at 1 m hold the ring of 4 inches, 203 mm across.
+FITTING = Optics(2800.0, (639.5, 359.5))
+
+
+def bearing(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
+    """Return the direction (3,) from the object to a device.
+
+    Args:
+        azimuth_deg: 0 before the object, on the side of -y; positive towards +x.
+        elevation_deg: Above the horizon.
+    """
+    a, e = np.deg2rad([azimuth_deg, elevation_deg])
+    return np.array([np.cos(e) * np.sin(a), -np.cos(e) * np.cos(a), np.sin(e)])
+
+
+def projector_entry(
+    name: str,
+    light: Light,
+    direction: NDArray[np.float64],
+    target: NDArray[np.float64],
+    radii_m: NDArray[np.float64],
+) -> dict[str, Any]:
+    """Return a projector whose rings are centred on a point of the object.
+
+    In parallel light its radii are those on the object; in diverging light those at
+    the standoff.
+
+    Args:
+        name: Its id.
+        light: Kind of light.
+        direction: From the target to the device, unit, shape (3,).
+        target: Where the ring axis goes through [m], shape (3,).
+        radii_m: Radii of the rings [m], rising.
+    """
+    width, height = PROJECTOR_PX
+    pose = look_at(target + STANDOFF_M * direction, target, UP)
+    focal = THROW_RATIO * width
+    matrix = [
+        [focal, 0.0, 0.5 * (width - 1)],
+        [0.0, focal, 0.5 * (height - 1)],
+        [0.0, 0.0, 1.0],
+    ]
+    diverging = light == "diverging"
+    return {
+        "id": name,
+        "light": light,
+        "world_from_device": pose.tolist(),
+        "world_from_ring": pose.tolist(),
+        "K": matrix if diverging else None,
+        "resolution": list(PROJECTOR_PX),
+        "pixel_pitch_m": None if diverging else PIXEL_PITCH_M,
+        "range_m": list(_RANGE_M),
+        "ring_radii": (radii_m / STANDOFF_M if diverging else radii_m).tolist(),
+        "beam_radius": None,
+        "min_margin_rad": 0.0,
+        "lit_area_m2": 0.0,
+    }
+
+
+def camera_entry(
+    name: str,
+    optics: Optics,
+    direction: NDArray[np.float64],
+    target: NDArray[np.float64],
+) -> dict[str, Any]:
+    """Return a camera with the target in the middle of its image.
+
+    A principal point off the middle turns the optical axis past the target.
+
+    Args:
+        name: Its id.
+        optics: Its interior.
+        direction: From the target to the device, unit, shape (3,).
+        target: What the image's middle shows [m], shape (3,).
+    """
+    (width, height), (cx, cy), f = CAMERA_PX, optics.centre_px, optics.focal_px
+    pose = look_at(target + STANDOFF_M * direction, target, UP)
+    middle = np.array([0.5 * (width - 1) - cx, 0.5 * (height - 1) - cy, f])
+    # Device axes such that the ray of the middle pixel is where look_at's +z is.
+    pose[:3, :3] = pose[:3, :3] @ _turned_to_z(middle / np.linalg.norm(middle))
+    return {
+        "id": name,
+        "world_from_device": pose.tolist(),
+        "K": [[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]],
+        "distortion": [optics.distortion, 0.0, 0.0, 0.0, 0.0],
+        "resolution": list(CAMERA_PX),
+        "range_m": list(_RANGE_M),
+        "seen_area_m2": 0.0,
+        "sole_area_m2": 0.0,
+    }
+
+
+def _turned_to_z(ray: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smallest rotation that takes a unit vector near +z to +z, shape (3, 3)."""
+    x, y, z = ray
+    share = 1.0 / (1.0 + z)
+    return np.array(
+        [
+            [1.0 - share * x * x, -share * x * y, -x],
+            [-share * x * y, 1.0 - share * y * y, -y],
+            [x, y, z],
+        ]
+    )

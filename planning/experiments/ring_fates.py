@@ -1,0 +1,185 @@
+"""What becomes of each ring: drawn, landed on the object, seen, measured.
+
+The paper's false projections, and what its lens cuts off, by rays of the truth.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from geometry.rays import RayCaster
+
+from ..plan import PlannedProjector, RigPlan
+from ..reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+    calibrate_camera,
+    calibrate_projector,
+)
+from ..reconstruction.cloud import Cloud
+
+# Places on a ring, and how near a measured point makes one measured [m].
+_PLACES = 1440
+_NEAR_M = 1.0e-3
+# Rays to a camera leave the surface this far off, as a share of their length.
+_SLACK = 1e-5
+
+
+@dataclass(frozen=True)
+class RingFate:
+    """Shares of one ring's circumference.
+
+    Attributes:
+        projector: Id of the projector.
+        ring: Number of the ring, from 0.
+        on_object: Drawn in the panel and landed on the object.
+        seen: Of it, what each camera's image shows; by camera id.
+        measured: Of it, what each camera measured; by camera id.
+        measured_by_any: Of it, what some camera measured.
+    """
+
+    projector: str
+    ring: int
+    on_object: float
+    seen: dict[str, float]
+    measured: dict[str, float]
+    measured_by_any: float
+
+
+def ring_fates(plan: RigPlan, cloud: Cloud) -> tuple[RingFate, ...]:
+    """Return what became of every ring of every projector.
+
+    Args:
+        plan: Devices and the object.
+        cloud: What was measured, with the plan's indices.
+    """
+    caster = RayCaster(plan.surface.mesh, threads=1)
+    cameras = [calibrate_camera(camera) for camera in plan.cameras]
+    fates: list[RingFate] = []
+    for p, planned in enumerate(plan.projectors):
+        projector = calibrate_projector(planned)
+        for k, radius in enumerate(planned.ring_radii):
+            points, normals = _landed(projector, float(radius), caster)
+            seen = [_shows(camera, points, normals, caster) for camera in cameras]
+            own = [
+                _measured(cloud, (p, c, k), points) & seen[c]
+                for c in range(len(cameras))
+            ]
+            fates.append(
+                RingFate(
+                    planned.id,
+                    k,
+                    len(points) / _PLACES,
+                    {one.id: _share(s) for one, s in zip(cameras, seen, strict=True)},
+                    {one.id: _share(m) for one, m in zip(cameras, own, strict=True)},
+                    _share(np.any(own, axis=0)),
+                )
+            )
+    return tuple(fates)
+
+
+def lit_and_seen(
+    plan: RigPlan, points: NDArray[np.float64], normals: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return which points some ring pattern lights and some camera shows, (n,).
+
+    What could be measured at all: inside the outermost ring of a projector, facing it
+    and a camera, neither hidden.
+
+    Args:
+        plan: Devices and the object.
+        points: On the surface [m], shape (n, 3).
+        normals: Outward, shape (n, 3).
+    """
+    caster = RayCaster(plan.surface.mesh, threads=1)
+    lit, seen = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    for planned in plan.projectors:
+        lit |= _lights(planned, points, normals, caster)
+    for planned in plan.cameras:
+        seen |= _shows(calibrate_camera(planned), points, normals, caster)
+    return lit & seen
+
+
+def _landed(
+    projector: ProjectorCalibration, radius: float, caster: RayCaster
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points and normals of the object that a ring falls on, (n, 3) each."""
+    turn = np.arange(_PLACES) * (2.0 * np.pi / _PLACES)
+    flat = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    ring = projector.world_from_ring
+    if projector.light == "parallel":
+        starts = ring[:3, 3] + flat @ ring[:3, :2].T
+        beams = np.broadcast_to(projector.axis, starts.shape)
+    else:
+        beams = flat @ ring[:3, :2].T + ring[:3, 2]
+        beams /= np.linalg.norm(beams, axis=1, keepdims=True)
+        starts = np.broadcast_to(projector.centre, beams.shape)
+    faces, away = caster.first_hits(starts, beams)
+    points = starts + np.where(faces >= 0, away, 1.0)[:, None] * beams
+    landed = (faces >= 0) & projector.in_panel(projector.panel(points)[0])
+    return points[landed], caster.mesh.face_normals[faces[landed]]
+
+
+def _lights(
+    planned: PlannedProjector,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    caster: RayCaster,
+) -> NDArray[np.bool_]:
+    projector = calibrate_projector(planned)
+    pixels, depth = projector.panel(points)
+    local, beams = projector.to_ring(points), projector.beams(points)
+    rho, away = np.hypot(local[:, 0], local[:, 1]), depth
+    if projector.light == "diverging":
+        rho = rho / local[:, 2]
+        away = np.linalg.norm(points - projector.centre, axis=1)
+    lit = projector.in_panel(pixels) & (rho <= planned.ring_radii[-1])
+    lit &= np.einsum("ij,ij->i", normals, beams) < 0.0
+    return lit & ~_blocked(points, -beams, away, caster)
+
+
+def _shows(
+    camera: CameraCalibration,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    caster: RayCaster,
+) -> NDArray[np.bool_]:
+    """Whether a camera's image shows points of the surface, (n,)."""
+    u, v = camera.project(points).T
+    width, height = camera.resolution
+    inside = (u >= -0.5) & (u <= width - 0.5) & (v >= -0.5) & (v <= height - 0.5)
+    towards = camera.centre - points
+    away = np.linalg.norm(towards, axis=1)
+    towards /= away[:, None]
+    inside &= np.einsum("ij,ij->i", normals, towards) > 0.0
+    return inside & ~_blocked(points, towards, away, caster)
+
+
+def _blocked(
+    points: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    away: NDArray[np.float64],
+    caster: RayCaster,
+) -> NDArray[np.bool_]:
+    """Whether the object lies between its points and a device, (n,)."""
+    slack = _SLACK * away
+    reach = np.maximum(away - 2.0 * slack, 0.0)
+    return caster.occluded(points + slack[:, None] * towards, towards, reach)
+
+
+def _measured(
+    cloud: Cloud, which: tuple[int, int, int], points: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether places of a ring have a point of that projector, camera and ring."""
+    p, c, k = which
+    own = (cloud.projector == p) & (cloud.camera == c) & (cloud.ring == k)
+    if not own.any() or len(points) == 0:
+        return np.zeros(len(points), dtype=bool)
+    apart, _ = KDTree(cloud.points[own]).query(points, distance_upper_bound=_NEAR_M)
+    return np.isfinite(apart)
+
+
+def _share(values: NDArray[np.bool_]) -> float:
+    return float(np.mean(values)) if len(values) else 0.0

@@ -1,0 +1,146 @@
+"""Runs an experiment: one viewpoint, several, merged, and held to the truth."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.sampling import SurfaceSamples, sample_surface
+
+from ..reconstruction.check import Progress, conclude, reconstruct_plan
+from ..reconstruction.cloud import Cloud
+from ..reconstruction.photometry import Photometry
+from ..reconstruction.result import Reconstruction
+from ..reconstruction.single_shot_rig import shoot_rig
+from .errors import Measured, measured
+from .one_image import LabelCount, Prior, judged_labels
+from .ring_fates import RingFate, lit_and_seen, ring_fates
+from .setups import Experiment
+
+# The paper assumes that there is no light but the projectors'.
+DARK = Photometry(ambient=0.0)
+_SAMPLES = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What an experiment gave, held to the truth.
+
+    Attributes:
+        experiment: What was run.
+        photometry: Light and sensor.
+        reconstruction: From pixels, all pairs of devices.
+        samples: Of the surface that could be measured.
+        visible: Share of the whole surface that these are.
+        single: The first projector and the first camera alone.
+        viewpoints: Each camera alone, under all projectors.
+        union: All points.
+        merged: Those that stay where redundancy is removed.
+        fates: What became of each ring.
+        labels: Of single images; None: rings were told apart by a sequence.
+    """
+
+    experiment: Experiment
+    photometry: Photometry
+    reconstruction: Reconstruction
+    samples: SurfaceSamples
+    visible: float
+    single: Measured
+    viewpoints: tuple[Measured, ...]
+    union: Measured
+    merged: Measured
+    fates: tuple[RingFate, ...]
+    labels: LabelCount | None
+
+    @property
+    def clouds(self) -> tuple[Measured, ...]:
+        """Every cloud that was held to the truth, from few devices to all."""
+        return (self.single, *self.viewpoints, self.union, self.merged)
+
+    @property
+    def stays(self) -> NDArray[np.bool_]:
+        """Which of all points stay where redundancy is removed, shape (n,)."""
+        return np.isin(_keys(self.union.cloud), _keys(self.merged.cloud))
+
+
+def run_experiment(
+    experiment: Experiment,
+    *,
+    photometry: Photometry = DARK,
+    seed: int = 0,
+    threads: int = 2,
+    prior: Prior | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Render, decode, triangulate and merge an experiment, and hold it to the truth.
+
+    Args:
+        experiment: What to run.
+        photometry: Light and sensor; no ambient light by default, as in the paper.
+        seed: Of the pixel noise and the samples.
+        threads: Worker threads; the result doesn't depend on them.
+        prior: What is known of the object: rings are then labelled by it, in a single
+            image of each camera under each projector; None: by a coded sequence.
+        progress: Called with the pairs done and their total.
+    """
+    plan, labels = experiment.plan, None
+    if prior is None:
+        found = reconstruct_plan(
+            plan, seed=seed, threads=threads, photometry=photometry, progress=progress
+        )
+    else:
+        shots = shoot_rig(
+            plan,
+            prior.mesh,
+            tolerance_m=prior.tolerance_m,
+            photometry=photometry,
+            seed=seed,
+            progress=progress,
+        )
+        pairs = [((shot.projector, shot.camera), shot.decoded) for shot in shots]
+        found = conclude(plan, pairs, seed=seed, threads=threads, photometry=photometry)
+        labels = judged_labels(plan, shots)
+    samples, visible = observable(experiment, seed)
+    everything, merged = found.everything, found.merged.cloud
+    names = [camera.id for camera in plan.cameras]
+    first = f"{plan.projectors[0].id} with {names[0]}"
+    by_one = (everything.camera == 0) & (everything.projector == 0)
+    gap_m = experiment.gap_m
+    mesh = experiment.mesh
+    viewpoints = tuple(
+        measured(
+            f"{name}, all projectors",
+            everything.take(everything.camera == c),
+            mesh,
+            samples,
+            gap_m,
+        )
+        for c, name in enumerate(names)
+    )
+    return Outcome(
+        experiment,
+        photometry,
+        found,
+        samples,
+        visible,
+        measured(first, everything.take(by_one), mesh, samples, gap_m),
+        viewpoints,
+        measured("all points", everything, mesh, samples, gap_m),
+        measured("merged", merged, mesh, samples, gap_m),
+        ring_fates(plan, everything),
+        labels,
+    )
+
+
+def observable(experiment: Experiment, seed: int) -> tuple[SurfaceSamples, float]:
+    """Return samples of what could be measured, and their share of the surface."""
+    samples = sample_surface(experiment.mesh, _SAMPLES, seed=seed)
+    able = lit_and_seen(experiment.plan, samples.points, samples.normals)
+    return samples.take(able), float(np.mean(able))
+
+
+def _keys(cloud: Cloud) -> NDArray[np.void]:
+    """What tells a point from every other, as one value that compares exactly."""
+    devices = np.column_stack([cloud.projector, cloud.camera, cloud.ring])
+    rows = np.ascontiguousarray(np.column_stack([devices, cloud.pixels]))
+    return rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))).ravel()

@@ -1,0 +1,77 @@
+"""A second sequence of rings, midway between those of the first.
+
+The paper's future work: "sampling density determination given the density of previous
+light sources". Finer rings in one sequence would come too near each other in the
+images; a second sequence doubles the density and keeps their distance.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plan import RigPlan
+from ..reconstruction.check import reconstruct_plan
+from ..reconstruction.cloud import Cloud
+from .errors import Measured, measured
+from .run import Outcome, observable
+
+
+@dataclass(frozen=True, eq=False)
+class Doubled:
+    """What a second sequence adds.
+
+    Attributes:
+        first: All points of the first sequence.
+        both: All points of both; rings are numbered outwards through both.
+    """
+
+    first: Measured
+    both: Measured
+
+
+def midway(radii: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return radii midway between the rings, the first between centre and ring."""
+    return 0.5 * (np.concatenate([[0.0], radii[:-1]]) + radii)
+
+
+def second_sequence(plan: RigPlan) -> RigPlan:
+    """Return a plan whose projectors draw their rings midway between its own."""
+    shifted = [
+        entry | {"ring_radii": midway(projector.ring_radii).tolist()}
+        for entry, projector in zip(
+            plan.document["projectors"], plan.projectors, strict=True
+        )
+    ]
+    return RigPlan(plan.document | {"projectors": shifted}, plan.surface)
+
+
+def joined_sequences(first: Cloud, second: Cloud) -> Cloud:
+    """Return both clouds with their rings numbered outwards, the second's before."""
+    return Cloud.join(
+        [
+            replace(first, ring=(2 * first.ring + 1).astype(np.int16)),
+            replace(second, ring=(2 * second.ring).astype(np.int16)),
+        ]
+    )
+
+
+def double_density(outcome: Outcome, *, seed: int = 0, threads: int = 2) -> Doubled:
+    """Measure an experiment's object again, with rings between those of before.
+
+    Args:
+        outcome: What the first sequence gave.
+        seed: Of the first sequence; the second's noise is another.
+        threads: Worker threads; the result doesn't depend on them.
+    """
+    experiment = outcome.experiment
+    second = reconstruct_plan(
+        second_sequence(experiment.plan),
+        seed=seed + 1,
+        threads=threads,
+        photometry=outcome.photometry,
+    )
+    cloud = joined_sequences(outcome.reconstruction.everything, second.everything)
+    samples, _ = observable(experiment, seed)
+    both = measured("both sequences", cloud, experiment.mesh, samples, experiment.gap_m)
+    return Doubled(outcome.union, both)

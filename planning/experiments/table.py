@@ -1,0 +1,167 @@
+"""What an experiment gave, as lines to read and as plain values."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .devices import CAMERA_PX, PROJECTOR_PX
+from .errors import Errors, Measured
+from .one_image import LabelCount
+from .run import Outcome
+from .second_sequence import Doubled
+from .setups import Experiment
+
+_MM = 1e3
+_NUMBERS = (
+    f"{'points':>8s}{'rms':>8s}{'p95':>8s}{'bias':>9s}{'> 1 mm':>9s}{'rest rms':>10s}"
+)
+
+
+def setup_lines(experiment: Experiment) -> list[str]:
+    """Return what is set up: numbers of the paper, then ours."""
+    optics, plan = experiment.optics, experiment.plan
+    width, height = (_MM * side for side in optics.field_m)
+    radii = ", ".join(f"{_MM * radius:.4g}" for radius in experiment.radii_m)
+    u, v = optics.centre_px
+    sides = np.ptp(experiment.mesh.bounds, axis=0)
+    extent = " x ".join(f"{_MM * side:.0f}" for side in sides)
+    panel, image = (f"{w} x {h} px" for w, h in (PROJECTOR_PX, CAMERA_PX))
+    lens = f", k1 = {optics.distortion:g}" if optics.distortion else ""
+    return [
+        f"{experiment.name}, {extent} mm; {experiment.light} light",
+        f"{len(plan.projectors)} projectors of {panel}, "
+        f"{len(experiment.radii_m)} circles: {radii} mm",
+        f"{len(plan.cameras)} cameras of {image}, about 1 m; "
+        f"f = {optics.focal_px:g} px, centre ({u:g}, {v:g}){lens}: {width:.0f} x "
+        f"{height:.0f} mm at 1 m",
+    ]
+
+
+def cloud_lines(clouds: Sequence[Measured]) -> list[str]:
+    """Return a table of errors, a row for each cloud."""
+    lines = [f"{'points of':24s}{_NUMBERS}{'half gap':>10s}{'one gap':>9s}"]
+    for one in clouds:
+        half, whole = one.complete
+        lines.append(f"{one.name:24s}{_numbers(one.errors)}{half:10.3f}{whole:9.3f}")
+    return lines
+
+
+def ring_lines(outcome: Outcome) -> list[str]:
+    """Return a table with a row for each ring of each projector.
+
+    Shares are of the circumference; errors of all points of the ring.
+    """
+    cameras = [camera.id for camera in outcome.experiment.plan.cameras]
+    shown = "".join(f"{'seen ' + name:>9s}" for name in cameras)
+    got = "".join(f"{'got ' + name:>9s}" for name in cameras)
+    lines = [
+        f"{'ring':10s}{'mm':>7s}{'landed':>9s}{shown}{got}{'got any':>9s}{_NUMBERS}"
+    ]
+    for fate in outcome.fates:
+        seen = "".join(f"{fate.seen[name]:9.3f}" for name in cameras)
+        measured = "".join(f"{fate.measured[name]:9.3f}" for name in cameras)
+        radius = _MM * outcome.experiment.radii_m[fate.ring]
+        lines.append(
+            f"{fate.projector + ' ' + str(fate.ring + 1):10s}{radius:7.1f}"
+            f"{fate.on_object:9.3f}{seen}{measured}{fate.measured_by_any:9.3f}"
+            f"{_numbers(_of_ring(outcome, fate.projector, fate.ring))}"
+        )
+    return lines
+
+
+def label_line(labels: LabelCount) -> str:
+    """Return how labels of single images compare with the truth."""
+    counts = (labels.right, labels.wrong, labels.stray, labels.off_prior)
+    right, wrong, stray, off, unsure = (
+        100.0 * part / max(labels.n, 1) for part in (*counts, labels.ambiguous)
+    )
+    return (
+        f"labels by the prior mesh: {labels.n} points of lines; right {right:.1f} %, "
+        f"wrong {wrong:.2f} %, on no ring {stray:.2f} %, left out "
+        f"{off + unsure:.1f} % ({unsure:.1f} ambiguous, {off:.1f} off the prior)"
+    )
+
+
+def outcome_lines(outcome: Outcome) -> list[str]:
+    """Return everything that there is to read of an experiment."""
+    return [
+        *setup_lines(outcome.experiment),
+        f"{100 * outcome.visible:.1f} % of the surface is inside the outermost ring, "
+        f"lit and seen; completeness is of it, at half a ring gap and one, "
+        f"{_MM * outcome.experiment.gap_m:.1f} mm; lengths in mm",
+        "",
+        *cloud_lines(outcome.clouds),
+        "",
+        *ring_lines(outcome),
+        *([] if outcome.labels is None else ["", label_line(outcome.labels)]),
+    ]
+
+
+def outcome_document(outcome: Outcome) -> dict[str, Any]:
+    """Return the same as plain values, in metres."""
+    experiment, plan = outcome.experiment, outcome.experiment.plan
+    return {
+        "experiment": experiment.name,
+        "variant": experiment.variant,
+        "light": experiment.light,
+        "focal_px": experiment.optics.focal_px,
+        "centre_px": list(experiment.optics.centre_px),
+        "distortion_k1": experiment.optics.distortion,
+        "ambient": outcome.photometry.ambient,
+        "radii_m": experiment.radii_m.tolist(),
+        "ring_gap_m": experiment.gap_m,
+        "projectors": plan.document["projectors"],
+        "cameras": plan.document["cameras"],
+        "observable_share": outcome.visible,
+        "labels": None if outcome.labels is None else vars(outcome.labels),
+        "clouds": [_cloud_document(one) for one in outcome.clouds],
+        "rings": [
+            {
+                "projector": fate.projector,
+                "ring": fate.ring,
+                "on_object": fate.on_object,
+                "seen": fate.seen,
+                "measured": fate.measured,
+                "measured_by_any": fate.measured_by_any,
+                "errors": _of_ring(outcome, fate.projector, fate.ring).to_document(),
+            }
+            for fate in outcome.fates
+        ],
+    }
+
+
+def doubled_document(doubled: Doubled) -> dict[str, Any]:
+    """Return what a second sequence added, as plain values."""
+    return {
+        "first": _cloud_document(doubled.first),
+        "both": _cloud_document(doubled.both),
+    }
+
+
+def _cloud_document(one: Measured) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "errors": one.errors.to_document(),
+        "completeness_half_gap": one.complete[0],
+        "completeness_one_gap": one.complete[1],
+    }
+
+
+def _of_ring(outcome: Outcome, projector: str, ring: int) -> Errors:
+    ids = [one.id for one in outcome.experiment.plan.projectors]
+    cloud = outcome.union.cloud
+    own = (cloud.projector == ids.index(projector)) & (cloud.ring == ring)
+    return Errors.of(outcome.union.distances[own])
+
+
+def _numbers(errors: Errors) -> str:
+    """Columns: points, rms, p95, bias in mm, share of outliers, rms of the rest."""
+    values = (errors.rms_m, errors.p95_m, errors.bias_m, errors.outliers, errors.rest_m)
+    if any(value is None for value in values):
+        return f"{errors.n:8d}" + f"{'-':>8s}{'-':>8s}{'-':>9s}{'-':>9s}{'-':>10s}"
+    rms, p95, bias, outliers, rest = (float(value or 0.0) for value in values)
+    return (
+        f"{errors.n:8d}{_MM * rms:8.3f}{_MM * p95:8.3f}{_MM * bias:+9.4f}"
+        f"{100 * outliers:8.2f}%{_MM * rest:10.3f}"
+    )
