@@ -334,7 +334,58 @@ def verify(**options: Any) -> None:  # noqa: ANN401
 
 
 @commands.command()
-@click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
+@click.argument(
+    "plan_file",
+    type=click.Path(path_type=Path),
+    metavar="[DIR/plan.json]",
+    required=False,
+)
+@click.option(
+    "--experiment",
+    type=click.Choice(["box", "face"]),
+    help="Instead of a plan: an experiment of the paper's section VII, with its truth.",
+)
+@click.option(
+    "--light",
+    type=click.Choice(["diverging", "parallel"]),
+    help="Of the experiment [default: parallel, as the paper assumes].",
+)
+@click.option(
+    "--variant",
+    type=click.Choice(["printed", "fits"]),
+    help="Of the experiment: the paper's focal length and image centre, or a lens that "
+    "sees all rings [default: printed].",
+)
+@click.option(
+    "--ambient",
+    type=click.FloatRange(0.0, 10.0),
+    metavar="A",
+    help="Of the experiment: room light as a share of the projector's [default: 0].",
+)
+@click.option(
+    "--distortion",
+    type=click.FloatRange(-0.5, 0.5),
+    metavar="K1",
+    help="Of the experiment: k1 of the cameras' lenses [default: 0].",
+)
+@click.option(
+    "--second-sequence",
+    is_flag=True,
+    help="Of the experiment: measure again with rings midway between the first ones.",
+)
+@click.option(
+    "--single-shot",
+    is_flag=True,
+    help="Simulate one image of each camera under each projector; rings are told apart "
+    "by a prior mesh: the plan's, or one that is off.",
+)
+@click.option(
+    "--prior-mm",
+    type=_Positive(),
+    metavar="MM",
+    help="With --single-shot: how near the object lies to the prior [default: 1; of an "
+    "experiment 6, its prior 5 mm off].",
+)
 @click.option(
     "-o",
     "--output",
@@ -370,6 +421,11 @@ def verify(**options: Any) -> None:  # noqa: ANN401
 @click.option("--debug", is_flag=True, help="Tracebacks instead of one-line errors.")
 def reconstruct(**options: Any) -> None:  # noqa: ANN401
     """Measure the object from images, rendered or captured; write cloud.ply."""
+    _check_reconstruct(options)
+    if options["experiment"] is not None:
+        from .experiment_command import experiment_command
+
+        _run(lambda: experiment_command(options), debug=options["debug"])
     from .reconstruct_command import reconstruct_command
 
     if options["captures"] is not None and options["save_captures"] is not None:
@@ -378,6 +434,35 @@ def reconstruct(**options: Any) -> None:  # noqa: ANN401
             "other writes simulated ones"
         )
     _run(lambda: reconstruct_command(options), debug=options["debug"])
+
+
+def _given(options: dict[str, Any], name: str) -> bool:
+    # A number that is 0 is given, and equal to False.
+    return options[name] is not None and options[name] is not False
+
+
+def _check_reconstruct(options: dict[str, Any]) -> None:
+    experiment = options["experiment"] is not None
+    if experiment == (options["plan_file"] is not None):
+        raise click.UsageError("give DIR/plan.json, or --experiment box or face")
+    if not options["single_shot"] and options["prior_mm"] is not None:
+        raise click.UsageError("--prior-mm goes with --single-shot")
+    plan_only = ("captures", "save_captures", "calibration")
+    own = ("light", "variant", "ambient", "distortion", "second_sequence")
+    for name in plan_only if experiment else own:
+        if _given(options, name):
+            kind = "an experiment" if experiment else "a plan"
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} doesn't go with {kind}: it is of "
+                f"{'plans' if experiment else 'experiments'}"
+            )
+    if options["single_shot"]:
+        for name in ("captures", "save_captures", "calibration", "second_sequence"):
+            if _given(options, name):
+                raise click.UsageError(
+                    f"give --single-shot or --{name.replace('_', '-')}, not both: "
+                    f"it is of coded sequences"
+                )
 
 
 @commands.command()

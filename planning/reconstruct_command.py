@@ -28,9 +28,12 @@ from .reconstruction.captured import (
 from .reconstruction.captures import CaptureFolder
 from .reconstruction.cloud_file import CloudFile, LengthUnit, remove_cloud
 from .reconstruction.result import Reconstruction
+from .reconstruction.single_shot_check import reconstruct_single_shot
 from .writable import writable
 
 CLOUD = "cloud.ply"
+# How near the object is taken to lie to the mesh that labels single images.
+_PRIOR_MM = 1.0
 
 
 def reconstruct_command(options: Mapping[str, Any]) -> int:
@@ -63,6 +66,16 @@ def _reconstruct(
     def progress(done: int, total: int) -> None:
         _say(report, f"pair {done} of {total}")
 
+    if options["single_shot"]:
+        return reconstruct_single_shot(
+            plan,
+            expected.samples,
+            expected.measured,
+            tolerance_m=1e-3 * (options["prior_mm"] or _PRIOR_MM),
+            seed=seed,
+            threads=threads,
+            progress=progress,
+        )
     if options["captures"] is not None:
         folder = CaptureFolder(options["captures"], plan)
         return reconstruct_captured(
