@@ -127,5 +127,5 @@ draw_rig(plan, face_status=face_status(plan))
 
 # %%
 assert shot.labels.wrong < 0.002 * shot.labels.n
-assert outcome.union.errors.rms_m < 0.4e-3
+assert outcome.union.errors.rest_m < 0.2e-3
 assert target["lit_m2"] < 0.6 * target["area_m2"]
