@@ -14,10 +14,12 @@ from geometry.sampling import sample_surface
 from planning.plan import RigPlan
 from planning.reconstruction import check as check_module
 from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
+from planning.reconstruction.causes import rejection
 from planning.reconstruction.check import reconstruct_plan
 from planning.reconstruction.cloud import Cloud
-from planning.reconstruction.decode import Decoded
+from planning.reconstruction.decode import CAUSES, Decoded
 from planning.reconstruction.patterns import ring_plane
+from planning.reconstruction.result import PairCount
 from planning.reconstruction.roots import wrong_roots
 from planning.reconstruction.supposed import Evidence, Supposed, places
 
@@ -187,3 +189,9 @@ def test_surface_met_at_grazing_incidence_is_said(plan, claims):
     assert found
     words = r"P\d meets them at 8\d degrees \(median\), at grazing incidence"
     assert all(re.search(words, text) for text in found), found
+
+
+def test_every_cause_of_the_decoder_has_words(plan):
+    for cause in CAUSES:
+        pair = PairCount("P1", "C1", 0, 10, 0, {cause: 4})
+        assert f"4 of 10 edges left out as `{cause}`, " in rejection((pair,))

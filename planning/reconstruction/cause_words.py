@@ -134,7 +134,7 @@ def _millimetres(length: float) -> str:
 def _too_wide(name: str, after: Device, plan: RigPlan) -> str:
     """Name a baseline of the plan that exceeds its limit with the camera so placed."""
     centres = {c.id: c.world_from_device[:3, 3] for c in plan.cameras}
-    for row in plan.document.get("baselines", ()):
+    for row in plan.document.get("baselines") or ():
         if name not in row["cameras"] or row["d_max"] is None:
             continue
         (other,) = (one for one in row["cameras"] if one != name)

@@ -21,5 +21,5 @@ def on_at_once(plan: RigPlan, truth: RigPlan) -> list[list[int]]:
 
 def _fired_with(plan: RigPlan) -> dict[str, frozenset[str]]:
     """Return which projectors share the group of each, if there is a schedule."""
-    groups = plan.document.get("firing_schedule", {}).get("groups", ())
+    groups = (plan.document.get("firing_schedule") or {}).get("groups", ())
     return {name: frozenset(group) - {name} for group in groups for name in group}
