@@ -256,6 +256,8 @@ def test_a_sensor_that_is_full_before_its_numbers_are(job):
     found = job.after(lambda s: np.minimum(s, 150), (1, 0))
     assert_no_wrong_point(found)
     assert "of the lit pixels are clipped and left out" in found.failures[0]
+    before, after = (r.pairs[1].lit_pixels for r in (job.good, found))
+    assert after < 0.9 * before
 
 
 @pytest.mark.parametrize("level", [0, 255])
