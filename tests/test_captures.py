@@ -29,6 +29,14 @@ from planning.reconstruction.result import Reconstruction
 WRONG_M = 5e-4
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _without_causes():
+    """Leave out the search for causes, which takes longer than all the rest here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("planning.reconstruction.check.explained", lambda said, _: said)
+        yield
+
+
 def small_plan(rigs, light: str) -> RigPlan:
     """Two projectors and two cameras of 320 x 240 px before a waved ball of 10 cm.
 
@@ -189,7 +197,7 @@ def test_a_bit_or_root_disc_exchanged_with_its_inverse(job, p):
 def test_two_bits_or_a_bit_and_the_root_disc_exchanged(lit_job, p):
     root = lit_job.n_bits(p)
     neighbours = [(bit, bit + 1) for bit in range(root)]
-    for one, other in [*neighbours, (0, root), (3, root)]:
+    for one, other in [*neighbours[1::2], (0, root), (3, root), (root - 1, root)]:
         a, b = 2 + 2 * one, 2 + 2 * other
         found = lit_job.after(
             lambda s, a=a, b=b: s[exchanged(len(s), (a, b), (a + 1, b + 1))], (p, 0)
@@ -207,7 +215,7 @@ def test_single_frames_exchanged_do_not_add_up(job, one, other):
     assert "06-bit2" not in found.failures[0]
 
 
-@pytest.mark.parametrize("gain", [0.9, 0.96, 1.05])
+@pytest.mark.parametrize("gain", [0.96, 1.05])
 def test_one_frame_of_another_exposure_is_named(job, gain):
     for frame, name in (
         (0, "00-white or 01-black"),
@@ -226,8 +234,9 @@ def scaled(stack: np.ndarray, frame: int, gain: float) -> np.ndarray:
     return stack
 
 
-@pytest.mark.parametrize("frames", [[0], [2], [5], [4, 5]])
-@pytest.mark.parametrize("part", [1.0, 0.3])
+@pytest.mark.parametrize(
+    ("frames", "part"), [([0], 0.3), ([2], 1.0), ([5], 0.3), ([4, 5], 0.3)]
+)
 def test_a_frame_that_moved_is_found_to_a_third_of_a_pixel(job, frames, part):
     def moved(stack):
         there = np.roll(stack[frames], 1, axis=2).astype(float)
@@ -256,6 +265,8 @@ def test_a_sensor_that_is_full_before_its_numbers_are(job):
     found = job.after(lambda s: np.minimum(s, 150), (1, 0))
     assert_no_wrong_point(found)
     assert "of the lit pixels are clipped and left out" in found.failures[0]
+    before, after = (r.pairs[1].lit_pixels for r in (job.good, found))
+    assert after < 0.9 * before
 
 
 @pytest.mark.parametrize("level", [0, 255])
