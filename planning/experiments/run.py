@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples, sample_surface
 
-from ..reconstruction.check import Progress, conclude, reconstruct_plan
+from ..reconstruction.check import conclude, reconstruct_plan
 from ..reconstruction.cloud import Cloud
 from ..reconstruction.photometry import Photometry
+from ..reconstruction.rendered import Progress
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.single_shot_rig import shoot_rig
 from .errors import Measured, measured

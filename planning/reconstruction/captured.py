@@ -18,21 +18,21 @@ from ..plan import RigPlan
 from .calibration import calibrate_camera, calibrate_projector
 from .captures import CaptureFolder, frame_names, whole_image
 from .causes import rejection
-from .check import (
-    Pairs,
-    Progress,
-    Spent,
-    conclude,
-    decode_rendered,
-    decoder_limits,
-    pair_calibrations,
-    reported,
-)
+from .check import conclude
 from .confirm import Confirmed, confirm
 from .decode import Decoded, decode
 from .inspection import DarkError, inspect
 from .patterns import Frames, Images, RingPatterns, ring_patterns
 from .photometry import Photometry
+from .rendered import (
+    Pairs,
+    Progress,
+    Spent,
+    decode_rendered,
+    decoder_limits,
+    pair_calibrations,
+    reported,
+)
 from .result import PairCount, Reconstruction
 
 _MM = 1e3

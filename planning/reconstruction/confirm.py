@@ -15,9 +15,9 @@ from geometry.mesh import TriangleMesh
 from geometry.proximity import closest_points
 
 from .calibration import CameraCalibration
-from .check import Pairs
 from .cloud import Cloud
 from .decode import CAUSES, Decoded
+from .rendered import Pairs
 
 _MM = 1e3
 # Points of a pair that are looked at, and the fewest that say anything.

@@ -1,134 +1,20 @@
 """What the cameras record under a projector's patterns."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
-
-from geometry.rays import CHUNK, equal_parts
 
 from .calibration import ProjectorCalibration
+from .canvas import Canvas
 from .defocus import Defocus
+from .light import Blur, Light, shine
 from .obstacles import Occluder
 from .overlap import Whites
-from .patterns import Frames, Images, RingPatterns, ring_plane
+from .patterns import Frames, Images, RingPatterns
 from .photometry import Photometry
 from .view import View
-
-# Blurred light reaches no further than this beyond the samples that are lit [px].
-_MARGIN_PX = 6
-# Standard deviation of the unit square that a pixel gathers light over.
-_PIXEL_SPREAD = 1.0 / np.sqrt(12.0)
-# Shadow rays stop this share of their length before the point they ask about.
-_SHADOW_SLACK = 2e-5
-
-
-@dataclass(frozen=True, eq=False)
-class _Light:
-    """A projector's light on the samples of a view that it reaches, shape (n,) each.
-
-    `annulus` is where a sample lies; `inner` and `outer` the shares of blurred light
-    from the next annulus inwards and outwards; `root` the share of the root disc's
-    outside; `white` the irradiance under the white frame times the albedo.
-    """
-
-    samples: NDArray[np.int64]
-    white: NDArray[np.float32]
-    annulus: NDArray[np.int64]
-    inner: NDArray[np.float32]
-    outer: NDArray[np.float32]
-    root: NDArray[np.float32]
-
-    @classmethod
-    def joined(cls, parts: "list[_Light]") -> "_Light":
-        """Return the light on the samples of all parts."""
-        names = [field.name for field in fields(cls)]
-        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
-
-
-@dataclass(frozen=True)
-class _Blur:
-    """Blur of drawn edges across the beam: in focus, and off it."""
-
-    in_focus_m: float
-    defocus: Defocus | None
-
-    def square(self, depth: NDArray[np.float64]) -> NDArray[np.float64] | float:
-        """Return the variance at depths [m^2], shape (n,)."""
-        if self.defocus is None:
-            return self.in_focus_m**2
-        return self.in_focus_m**2 + self.defocus.blur_m(depth) ** 2
-
-
-@dataclass(frozen=True, eq=False)
-class _Canvas:
-    """The part of a view's window that a projector lights.
-
-    Without its light a frame and its inverse are alike, so nothing is decoded there.
-
-    Attributes:
-        corner: Pixel (u, v) of the top-left pixel.
-        shape: Rows and columns, in pixels.
-        fold: Cells along a pixel.
-        cells: Flat index of each sample's cell, senseless outside, shape (n,).
-        weights: Share of the cell that each sample stands for, shape (n,).
-        inside: Samples inside.
-    """
-
-    corner: tuple[int, int]
-    shape: tuple[int, int]
-    fold: int
-    cells: NDArray[np.int64]
-    weights: NDArray[np.float32]
-    inside: NDArray[np.int64]
-
-    @classmethod
-    def about(cls, seen: View, lit: NDArray[np.int64]) -> "_Canvas":
-        """Return the bounding box of samples and a margin; all where there is none."""
-        fold, (rows, columns) = seen.fold, seen.shape
-        y, x = np.divmod(seen.cells, fold * columns)
-        v, u = y // fold, x // fold
-        top, left, bottom, right = 0, 0, rows, columns
-        if len(lit):
-            top = max(0, int(v[lit].min()) - _MARGIN_PX)
-            left = max(0, int(u[lit].min()) - _MARGIN_PX)
-            bottom = min(rows, int(v[lit].max()) + 1 + _MARGIN_PX)
-            right = min(columns, int(u[lit].max()) + 1 + _MARGIN_PX)
-        inside = (v >= top) & (v < bottom) & (u >= left) & (u < right)
-        return cls(
-            (seen.corner[0] + left, seen.corner[1] + top),
-            (bottom - top, right - left),
-            fold,
-            (y - fold * top) * (fold * (right - left)) + (x - fold * left),
-            seen.weights,
-            np.flatnonzero(inside),
-        )
-
-    def image(
-        self,
-        values: NDArray[np.float32],
-        samples: NDArray[np.int64],
-        lens: Photometry,
-    ) -> NDArray[np.float32]:
-        """Return the image (h, w) that samples of these values make behind a lens."""
-        rows, columns = (self.fold * side for side in self.shape)
-        weighted = self.weights[samples] * values
-        summed = np.bincount(self.cells[samples], weighted, rows * columns)
-        cells = summed.astype(np.float32).reshape(rows, columns)
-        return _binned(lens.blur(cells, self.fold), self.fold)
-
-
-def _binned(cells: NDArray[np.float32], fold: int) -> NDArray[np.float32]:
-    """Return the mean of the cells of each pixel."""
-    if fold == 1:
-        return cells
-    total = np.zeros((len(cells) // fold, cells.shape[1] // fold), dtype=np.float32)
-    for i in range(fold):
-        for j in range(fold):
-            total += cells[i::fold, j::fold]
-    return total / np.float32(fold * fold)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +35,11 @@ class Shown:
     caster: Occluder
     defocus: Defocus | None = None
 
-    def light(self, seen: View, photometry: Photometry) -> _Light:
+    def light(self, seen: View, photometry: Photometry) -> Light:
         """Return its light on the samples of a view."""
-        blur = _Blur(photometry.projector_blur_m, self.defocus)
+        blur = Blur(photometry.projector_blur_m, self.defocus)
         devices = self.projector, self.design, self.patterns, self.caster
-        return _shine(seen, *devices, blur)
+        return shine(seen, *devices, blur)
 
 
 def render_pair(
@@ -186,7 +72,7 @@ def render_pair(
     light = one.light(seen, photometry)
     others = [(other.patterns, other.light(seen, photometry)) for other in beside]
     reached = [light.samples, *(other.samples for _, other in others)]
-    canvas = _Canvas.about(seen, np.concatenate(reached))
+    canvas = Canvas.about(seen, np.concatenate(reached))
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
     ambient = canvas.image(around, canvas.inside, photometry)
     white = canvas.image(light.white, light.samples, photometry)
@@ -226,7 +112,7 @@ def render_whites(
         photometry: Light and sensor.
         seed: Of the noise of these images.
     """
-    canvas = _Canvas.about(seen, np.zeros(0, dtype=np.int64))
+    canvas = Canvas.about(seen, np.zeros(0, dtype=np.int64))
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
     ambient = canvas.image(around, canvas.inside, photometry)
     lights = [one.light(seen, photometry) for one in shown]
@@ -241,8 +127,8 @@ def render_whites(
 
 
 def _added(
-    canvas: _Canvas,
-    light: _Light,
+    canvas: Canvas,
+    light: Light,
     patterns: RingPatterns,
     n_bits: int,
     photometry: Photometry,
@@ -271,7 +157,7 @@ def render_lines(
         seed: Of the noise.
     """
     everything = np.arange(len(seen.cells))
-    canvas = _Canvas.about(seen, everything)
+    canvas = Canvas.about(seen, everything)
     around = seen.albedo * np.float32(photometry.ambient)
     image = canvas.image(around, everything, photometry)
     for one in shown:
@@ -285,119 +171,10 @@ def render_lines(
     return Frames(photometry.capture(image, seed, gain)[None], canvas.corner)
 
 
-def _level(bright: NDArray[np.float32], light: _Light) -> NDArray[np.float32]:
+def _level(bright: NDArray[np.float32], light: Light) -> NDArray[np.float32]:
     """Blurred brightness of a bit's frame at each lit sample."""
     inwards = np.concatenate([bright[:1], bright[:-1]]) - bright
     outwards = np.concatenate([bright[1:], bright[-1:]]) - bright
     k = light.annulus
     level = bright[k] + inwards[k] * light.inner + outwards[k] * light.outer
     return level.astype(np.float32, copy=False)
-
-
-def _shine(
-    seen: View,
-    projector: ProjectorCalibration,
-    design: ProjectorCalibration,
-    patterns: RingPatterns,
-    caster: Occluder,
-    blur: _Blur,
-) -> _Light:
-    facing = _facing(seen, projector)
-    # In parts, so that what is between stays in the cache.
-    parts = [
-        _shine_on(seen, facing[part], projector, design, patterns, caster, blur)
-        for part in equal_parts(len(facing), CHUNK) or [slice(0)]
-    ]
-    light = _Light.joined([light for light, _ in parts])
-    if projector.light == "parallel" or not len(light.samples):
-        return light
-    depth = np.concatenate([depth for _, depth in parts])
-    falloff = (float(np.median(depth)) / depth) ** 2
-    return replace(light, white=(light.white * falloff).astype(np.float32))
-
-
-def _shine_on(
-    seen: View,
-    facing: NDArray[np.int64],
-    projector: ProjectorCalibration,
-    design: ProjectorCalibration,
-    patterns: RingPatterns,
-    caster: Occluder,
-    blur: _Blur,
-) -> tuple[_Light, NDArray[np.float64]]:
-    """Light on those of some samples that it reaches, and their depths.
-
-    How it falls off with depth is left to the caller.
-    """
-    lit, cosine, pixels, depth = _reached(seen, facing, projector, caster)
-    rays, normals = seen.rays[lit], seen.normals[lit]
-    plane = ring_plane(design, pixels)
-    rho = np.hypot(plane[:, 0], plane[:, 1])
-    # Ring coordinate in a metre across the beam.
-    scale = np.ones_like(rho)
-    if projector.light == "diverging":
-        scale = np.sqrt(1.0 + rho * rho) / depth
-    across = _across(plane, rho, design)
-    slant = np.einsum("ij,ij->i", across, rays) / np.einsum("ij,ij->i", normals, rays)
-    stretch = 1.0 - 2.0 * slant * np.einsum("ij,ij->i", across, normals) + slant**2
-    cell = _PIXEL_SPREAD / seen.fold
-    pixel = cell * seen.distances[lit] / seen.camera.focal_px
-    spread = scale * np.sqrt(blur.square(depth) + pixel**2 * np.maximum(stretch, 0.0))
-    annulus = np.searchsorted(patterns.radii, rho)
-    edges = np.concatenate([[-np.inf], patterns.radii, [np.inf]])
-    drawn = ndtr((patterns.outer_radius - rho) / spread)
-    light = _Light(
-        lit,
-        (seen.albedo[lit] * cosine * drawn).astype(np.float32),
-        annulus,
-        ndtr((edges[annulus] - rho) / spread).astype(np.float32),
-        ndtr((rho - edges[annulus + 1]) / spread).astype(np.float32),
-        ndtr(patterns.root_side(plane) / spread).astype(np.float32),
-    )
-    return light, depth
-
-
-def _reached(
-    seen: View,
-    facing: NDArray[np.int64],
-    projector: ProjectorCalibration,
-    caster: Occluder,
-) -> tuple[
-    NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-]:
-    """Samples that the projector lights, their cos(incidence), pixels and depths."""
-    pixels, depth = projector.panel(seen.points[facing])
-    drawn = projector.in_panel(pixels)
-    able, pixels, depth = facing[drawn], pixels[drawn], depth[drawn]
-    points = seen.points[able]
-    if projector.light == "diverging":
-        starts = projector.centre
-        beams = points - starts
-        reach = np.sqrt(np.einsum("ij,ij->i", beams, beams))
-        beams /= reach[:, None]
-    else:
-        beams, reach = np.broadcast_to(projector.axis, points.shape), depth
-        starts = points - reach[:, None] * beams
-    shadowed = caster.occluded(starts, beams, reach * (1.0 - _SHADOW_SLACK))
-    cosine = -np.einsum("ij,ij->i", beams, seen.normals[able])
-    lit = ~shadowed
-    return able[lit], cosine[lit], pixels[lit], depth[lit]
-
-
-def _facing(seen: View, projector: ProjectorCalibration) -> NDArray[np.int64]:
-    """Samples whose faces are turned towards the projector."""
-    along = seen.normals @ projector.axis
-    if projector.light == "diverging":
-        along = np.einsum("ij,ij->i", seen.normals, seen.points)
-        along -= seen.normals @ projector.centre
-    return np.flatnonzero(along < 0.0)
-
-
-def _across(
-    plane: NDArray[np.float64], rho: NDArray[np.float64], design: ProjectorCalibration
-) -> NDArray[np.float64]:
-    """Unit normals of the ring surfaces in the world, (n, 3)."""
-    tilt = rho if design.light == "diverging" else np.zeros_like(rho)
-    flat = plane / np.maximum(rho, 1e-12)[:, None]
-    local = np.column_stack([flat, -tilt]) / np.sqrt(1.0 + tilt * tilt)[:, None]
-    return local @ design.world_from_ring[:3, :3].T

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 
 from ..plan import RigPlan
-from .check import Progress, conclude
+from .check import conclude
 from .photometry import Photometry
+from .rendered import Progress
 from .result import Reconstruction
 from .single_shot_rig import shoot_rig
 
