@@ -12,7 +12,7 @@ import pytest
 from geometry.primitives import sphere
 from geometry.sampling import sample_surface
 from planning.plan import RigPlan
-from planning.reconstruction import check as check_module
+from planning.reconstruction import rendered as rendered_module
 from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
 from planning.reconstruction.causes import rejection
 from planning.reconstruction.check import reconstruct_plan
@@ -64,7 +64,7 @@ def test_two_projectors_on_at_once_are_named(plan, claims):
 
 
 def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
-    draw = check_module.ring_patterns
+    draw = rendered_module.ring_patterns
 
     def drawn(projector, radii, camera):
         patterns = draw(projector, radii, camera)
@@ -72,7 +72,7 @@ def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
             return patterns
         return replace(patterns, camera_in_ring=-patterns.camera_in_ring)
 
-    monkeypatch.setattr(check_module, "ring_patterns", drawn)
+    monkeypatch.setattr(rendered_module, "ring_patterns", drawn)
     found = failures(plan, claims)
     words = r"P1 with C2: \d+ % of the points took the wrong one of the two roots"
     assert found

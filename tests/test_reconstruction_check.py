@@ -14,7 +14,7 @@ from geometry.poses import look_at
 from geometry.primitives import box, sphere
 from geometry.sampling import sample_surface
 from planning.plan import RigPlan
-from planning.reconstruction import check as check_module
+from planning.reconstruction import rendered as rendered_module
 from planning.reconstruction.check import Reconstruction, reconstruct_plan
 from planning.reconstruction.patterns import Frames
 from planning.reconstruction.verdict import nearest_distance
@@ -303,7 +303,7 @@ def test_faces_of_a_cube_in_grazing_light_cost_nothing_elsewhere(
 
 def exchange_frames(monkeypatch, projector: str) -> None:
     """Let two bits of one projector change places in every camera's images."""
-    render = check_module.render_pair
+    render = rendered_module.render_pair
 
     def render_exchanged(seen, shining, design, *rest):
         frames = render(seen, shining, design, *rest)
@@ -312,7 +312,7 @@ def exchange_frames(monkeypatch, projector: str) -> None:
             order[[6, 7, 8, 9]] = 8, 9, 6, 7
         return Frames(frames.stack[order], frames.corner)
 
-    monkeypatch.setattr(check_module, "render_pair", render_exchanged)
+    monkeypatch.setattr(rendered_module, "render_pair", render_exchanged)
 
 
 def test_frames_out_of_order_are_named(rigs, one_light, samples, monkeypatch):
