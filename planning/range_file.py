@@ -184,6 +184,6 @@ def _number(cells: dict[str, str], name: str, where: str) -> float:
         ) from None
     if not abs(value) <= _FARTHEST:
         raise InputError(
-            f"{where}: {name} = {value:g} must be finite, at most {_FARTHEST:g}"
+            f"{where}: {name} = {value:.12g} must be finite, at most {_FARTHEST:g}"
         )
     return value

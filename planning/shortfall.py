@@ -213,7 +213,9 @@ def _percent(share: float) -> str:
 
 
 def _down(share: float) -> str:
-    return f"{math.floor(100.0 * share) / 100.0:.2f}"
+    """Rounded down to hundredths, or to one digit: no option takes a share of 0."""
+    places = 2 if not 0.0 < share < 0.01 else -math.floor(math.log10(share))
+    return f"{math.floor(10.0**places * share) / 10.0**places:.{places}f}"
 
 
 def area_words(area_m2: float) -> str:

@@ -230,6 +230,7 @@ GOOD = "a,0,0,0,0,0,1,0.1"
         (f"{HEADER}\n,0,0,0,0,0,1,0.1", "point is empty"),
         (f"{HEADER}\n{GOOD}\na,0,0,x,0,0,1,0.1", "line 3: z_mm = 'x' must be a number"),
         (f"{HEADER}\na,0,0,nan,0,0,1,0.1", "z_mm = nan must be finite"),
+        (f"{HEADER}\na,0,0,1000000001,0,0,1,0.1", "z_mm = 1000000001 must be finite"),
         (f"{HEADER}\na,0,0,0,0,0,0,0.1", "no direction"),
         (f"{HEADER}\na,0,0,0,0,0,1,0", "sigma_deg = 0 must be over 0"),
         (f"{HEADER}\na,0,0,0,0,0,1,7", "at most 5"),

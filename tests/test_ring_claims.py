@@ -13,12 +13,14 @@ import trimesh
 
 from geometry.mesh import TriangleMesh
 from planning.audit import audit_plan
+from planning.audit.chords import random_beam
 from planning.audit.estimates import Estimator
 from planning.audit.ledger import Ledger
 from planning.audit.occlusion import Shadow
 from planning.audit.predicates import Lamp
 from planning.audit.recompute import recompute
-from planning.audit.ring_light import ring_spacing
+from planning.audit.ring_gaps import audit_gaps
+from planning.audit.ring_light import RingLight, ring_spacing
 from planning.audit.rings import audit_rings
 from planning.audit.samples import draw_samples
 from planning.cameras import lit_samples, measured_by
@@ -151,6 +153,32 @@ def _lost(document):
 
 def _cut(document):
     document["projectors"][0]["rings"] = None
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_gap_that_only_a_sliver_has_is_looked_for_before_it_is_called_false(
+    drum, place
+):
+    plan, _, shadow, _ = drum
+    light, claims = RingLight(plan, shadow), plan.document["projectors"][1]["rings"]
+    lamp, rng = light.lamps[1], np.random.default_rng(0)
+    even = float(lamp.radii[-1]) * np.arange(1, claims["n_even"] + 1) / claims["n_even"]
+    strikes = random_beam(light, lamp, 0.5 * even[0], rng).strikes
+    gaps = ring_spacing(lamp, strikes.samples.points)
+    extreme = claims["gap_m"][place]
+    # As if no ray had met the part of the surface with the extreme gaps.
+    apart = gaps < 0.85 * extreme if place == 1 else gaps > 1.2 * extreme
+    missed = dataclasses.replace(strikes, lit=strikes.lit & apart)
+    assert 0 < missed.lit.sum() < strikes.lit.sum()
+    audited = []
+    for factor in (1.0, 1.2 if place == 1 else 0.8):
+        rings = copy.deepcopy(claims)
+        rings["gap_m"][place] *= factor
+        ledger = Ledger(plan.document)
+        audit_gaps("P2.rings", rings, lamp, even, missed, ledger, light, rng)
+        audited.append([f for f in ledger.failures if f"gap_m.{place}" in f])
+    assert audited[0] == []
+    assert "claimed" in audited[1][0]
 
 
 # Each round is one document with several false claims, none in the way of another.

@@ -71,6 +71,17 @@ def test_cameras_that_miss_by_a_hair_offer_the_share_they_reach(plan):
     assert "--max-cameras" not in line
 
 
+@pytest.mark.parametrize(
+    ("measured", "accepted"),
+    [(0.0043, "0.004"), (0.00096, "0.0009"), (0.0101, "0.01"), (0.001, "0.001")],
+)
+def test_a_share_that_is_advised_is_one_that_the_option_takes(plan, measured, accepted):
+    (line,) = missed(plan, measured_m2=measured)
+    advised = line.split("--coverage ")[1].split(" ")[0]
+    assert advised == accepted
+    assert 0.0 < float(advised) <= measured
+
+
 def test_bodies_that_are_in_the_way_are_named(plan):
     blocked = {"P1": 0.0, "C1": 2.5e-5, "C2": 4.1e-4}
     (line,) = missed(plan, blocked=blocked, lit_m2=0.4)

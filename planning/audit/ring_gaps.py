@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,13 @@ from .areas import ROUNDING
 from .estimates import POINT
 from .extremes import audit_extreme
 from .ledger import Ledger
+from .optics import in_frame
 from .predicates import Lamp
-from .ring_light import Strikes, ring_spacing
+from .ring_light import RingLight, Strikes, ring_spacing
+
+# Rays of a closer look, and how many times it is taken before a claim is false.
+_RAYS = 60_000
+_LOOKS = 8
 
 
 def audit_spacing(
@@ -71,10 +77,13 @@ def audit_gaps(
     even: NDArray[np.float64],
     strikes: Strikes,
     ledger: Ledger,
+    light: RingLight,
+    rng: np.random.Generator,
 ) -> None:
     """Check `gap_m`, the least and largest distance of rings on lit surface.
 
-    No gap there is wider than an even one: that bounds `n_even`.
+    No gap there is wider than an even one: that bounds `n_even`. A lit sliver that the
+    plan met and these rays didn't is looked for before its gap is called false.
 
     Args:
         key: Of the claims.
@@ -83,6 +92,8 @@ def audit_gaps(
         even: Radii of the even rings.
         strikes: Random rays of its light.
         ledger: Takes the false claims.
+        light: Casts the rays of a closer look.
+        rng: Draws them.
     """
     points = strikes.samples.points[strikes.lit]
     found, claimed = ring_spacing(lamp, points), rings.get("gap_m")
@@ -100,6 +111,7 @@ def audit_gaps(
             ledger,
             largest=largest,
             unit="m",
+            closer=partial(_closer, light, lamp, rng.spawn(1)[0], largest),
         )
     allowed = ring_spacing(replace(lamp, radii=even), points)
     share = float(np.mean(found > allowed * (1.0 + ROUNDING)))
@@ -109,3 +121,35 @@ def audit_gaps(
         f"{len(even)} even rings stand closer than the plan's on {100 * share:.3g} % "
         f"of its light on the surface, nowhere may they",
     )
+
+
+def _closer(
+    light: RingLight,
+    lamp: Lamp,
+    rng: np.random.Generator,
+    largest: bool,
+    bound: float,
+) -> NDArray[np.float64]:
+    """Return ring distances on lit surface where they may reach a bound [m].
+
+    Rays through those annuli alone whose rings stand that far apart (or that close) at
+    the farthest (nearest) vertex; as many times as it takes to meet one.
+    """
+    inner, outer = np.append(0.0, lamp.radii[:-1]), lamp.radii
+    gap = outer - inner
+    gap[0] = gap[1]
+    if lamp.diverging:
+        depth = in_frame(lamp.world_from_ring, light.mesh.vertices)[:, 2]
+        slope = np.hypot(1.0, inner if largest else outer)
+        gap = gap * (depth.max() if largest else depth.min()) / slope
+    may = np.flatnonzero(gap >= bound if largest else gap <= bound)
+    found = np.empty(0)
+    for _ in range(_LOOKS if len(may) else 0):
+        width = (outer - inner)[may]
+        ring = may[rng.choice(len(may), size=_RAYS, p=width / width.sum())]
+        coordinates = rng.uniform(inner[ring], outer[ring])
+        met = light.strike(lamp, coordinates, rng.uniform(0.0, 2.0 * np.pi, _RAYS))
+        found = ring_spacing(lamp, met.samples.points[met.lit])
+        if np.any(found >= bound if largest else found <= bound):
+            break
+    return found

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
+from geometry.mesh import TriangleMesh
 from planning.plan import RigPlan
 from planning.surface import Surface
 
@@ -49,6 +50,11 @@ class RingLight:
         self._within = plan.surface.target_faces(plan.requirements.target)
         self._limits = plan.requirements.projector
         self.shadow = shadow
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """What the light falls on."""
+        return self._surface.mesh
 
     def strike(
         self,

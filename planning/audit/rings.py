@@ -80,7 +80,7 @@ def audit_rings(
             continue
         every_even[row] = even
         beam = random_beam(light, lamp, 0.5 * even[0], rng)
-        audit_gaps(key, rings, lamp, even, beam.strikes, ledger)
+        audit_gaps(key, rings, lamp, even, beam.strikes, ledger, light, rng)
         theta = plan.requirements.projector.max_incidence
         chords = counted_chords(light, beam, even[0], creases.points, theta)
         _audit_errors(key, rings, lamp, even[0], chords, plan.requirements, ledger)
