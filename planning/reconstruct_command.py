@@ -16,6 +16,7 @@ import click
 from geometry.sampling import SurfaceSamples
 
 from .audit.prediction import predict_measured
+from .errors import CapturesError
 from .plan import RigPlan
 from .progress import Report
 from .reconstruct_summary import summary
@@ -42,11 +43,17 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
     report = _report(quiet=options["quiet"])
     plan = RigPlan.load(path)
     folder = Path(options["output"] or path.parent)
+    if options["captures"] is not None:
+        CaptureFolder(options["captures"], plan).require()
     with ExitStack() as kept:
         for needed in (folder, options["save_captures"]):
             if needed is not None:
                 kept.enter_context(writable(needed))
-        found = _reconstruct(plan, options, report)
+        try:
+            found = _reconstruct(plan, options, report)
+        except CapturesError:
+            remove_cloud(folder / CLOUD)
+            raise
         file = _save(plan, found, folder / CLOUD)
     _print(plan, found, file, folder / CLOUD, as_json=options["as_json"])
     return 0 if found.passed else 1

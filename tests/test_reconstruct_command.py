@@ -196,6 +196,22 @@ def test_no_cloud_stays_where_none_is_confirmed(folder, simulated, tmp_path):
     assert [path.name for path in out_folder.iterdir()] == ["mine.ply"]
 
 
+def test_no_cloud_stays_where_no_image_can_be_used(folder, simulated, tmp_path):
+    """But a folder that was mistyped costs nothing."""
+    out_folder, captures = tmp_path / "out", tmp_path / "captures"
+    shutil.copytree(folder / "one", out_folder)
+    words = ["-o", out_folder, "--quiet", "--captures"]
+    assert run(folder / "plan.json", *words, captures)[0] == 3
+    assert (out_folder / "cloud.ply").exists()
+    shutil.copytree(folder / "captures", captures)
+    for path in captures.glob("*/*/00-white.png"):
+        path.unlink()
+    code, _, err = run(folder / "plan.json", *words, captures)
+    assert code == 3
+    assert "can't be used either" in err
+    assert list(out_folder.iterdir()) == []
+
+
 def test_a_calibration_moves_devices_in_simulation_and_captures(
     folder, simulated, tmp_path
 ):

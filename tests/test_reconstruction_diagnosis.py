@@ -19,7 +19,7 @@ from geometry.rays import RayCaster
 from geometry.sampling import sample_surface
 from planning.plan import RigPlan
 from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
-from planning.reconstruction.cause_words import in_words
+from planning.reconstruction.cause_words import _two_digits, in_words
 from planning.reconstruction.diagnosis import diagnose_edges
 from planning.reconstruction.patterns import ring_plane
 from planning.reconstruction.supposed import Evidence
@@ -241,3 +241,11 @@ def test_a_baseline_that_becomes_too_wide_is_named(diverging):
     assert wide in sentence, sentence
     (sentence,) = said(plan, changed(plan, lambda document: apart(document, -2e-3)))
     assert "too wide" not in sentence
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(178.3, "178"), (1956.0, "1956"), (14.4, "14"), (9.96, "10"), (0.0644, "0.064")],
+)
+def test_numbers_are_words_without_an_exponent(value, words):
+    assert _two_digits(value) == words

@@ -64,9 +64,9 @@ def _object_looks(explanation: Explanation) -> str:
     if explanation.correction.kind != "moved":
         words.append(f"{_per_cent(change)} {'larger' if change > 0 else 'smaller'}")
     if explanation.correction.kind != "scale":
-        words.append(f"moved by {_MM * shift:.2g} mm")
+        words.append(f"moved by {_two_digits(_MM * shift)} mm")
         if turn > _NO_TURN:
-            words.append(f"turned by {np.rad2deg(turn):.2g} degrees")
+            words.append(f"turned by {_two_digits(np.rad2deg(turn))} degrees")
     return f"the object looks {', '.join(words)} against the mesh"
 
 
@@ -85,7 +85,7 @@ def _displaced(before: Device, after: Device, away: float) -> str:
         axes = (after.world_from_device[:3, 2], before.world_from_device[:3, 2])
         aside = away * _aside(*axes)
         least = "at least " * isinstance(before, ProjectorCalibration)
-        turned = f"were turned by {least}{np.rad2deg(angle):.2g} degrees"
+        turned = f"were turned by {least}{_two_digits(np.rad2deg(angle))} degrees"
         if aside < _MOST_ASIDE * away:
             turned += f" (aimed {_millimetres(aside)} off at the object)"
         words.append(turned)
@@ -127,8 +127,13 @@ def _grazing(
 
 
 def _millimetres(length: float) -> str:
-    """Return a length in [m] in words: two digits, whole millimetres from 10 on."""
-    return f"{_MM * length:.0f} mm" if length >= 0.01 else f"{_MM * length:.2g} mm"
+    """Return a length in [m] in words."""
+    return f"{_two_digits(_MM * length)} mm"
+
+
+def _two_digits(value: float) -> str:
+    """Return a number in words: two digits, whole from 10 on, never an exponent."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
 
 
 def _too_wide(name: str, after: Device, plan: RigPlan) -> str:
@@ -157,4 +162,4 @@ def _aside(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 
 def _per_cent(change: float) -> str:
-    return f"{100.0 * abs(change):.2g} %"
+    return f"{_two_digits(100.0 * abs(change))} %"
