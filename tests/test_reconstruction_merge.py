@@ -47,7 +47,7 @@ def test_normals_point_to_the_camera_and_sigma_is_along_them():
     result = merged(sheet(noise_px=0.05))
     assert len(result.cloud) == 4000
     np.testing.assert_allclose(result.normals, [[0.0, 0.0, 1.0]] * 4000, atol=1e-9)
-    # Along the normal; a tenth of the whole for the normal's error; texture moves edges.
+    # Along the normal, a tenth of the whole for the normal's error; texture's shift.
     shift = np.hypot(3e-4, 0.1 * np.hypot(1e-4, 3e-4))
     np.testing.assert_allclose(result.sigma, shift * np.hypot(0.05, 0.015))
 
