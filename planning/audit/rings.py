@@ -30,6 +30,8 @@ _SHARE, _RELATIVE = 0.004, 0.05
 # The largest hundredth of fewer chords is a chord or two, where a few lie together
 # between creases: nothing to hold a claim against.
 _LEAST_CHORDS = 200
+# Chords side by side bend alike: so many say as much as one that stands alone.
+_ALIKE = 2.0
 # On a plane errors are roundings, and no claim.
 _FLAT_M = 1e-9
 
@@ -148,7 +150,8 @@ def _audit_quantile(
     if n < _LEAST_CHORDS or (claimed is None and float(errors.max()) <= _FLAT_M):
         # On flat surface the plan may have met no chord at all.
         return
-    noise = _SHARE / 2.0 + _DEVIATIONS * float(np.sqrt(_LEVEL * (1.0 - _LEVEL) / n))
+    alone = n / _ALIKE
+    noise = _SHARE / 2.0 + _DEVIATIONS * float(np.sqrt(_LEVEL * (1.0 - _LEVEL) / alone))
     low = float(np.quantile(errors, max(_LEVEL - noise, 0.0))) * (1.0 - _RELATIVE)
     high = float(np.quantile(errors, min(_LEVEL + noise, 1.0))) * (1.0 + _RELATIVE)
     if _LEVEL + noise >= 1.0:
