@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from .body_room import with_room
 from .camera_bodies import settled_cover, taken
-from .camera_slides import rows_to_slide_on, slide_cameras, spread_limits
+from .camera_slides import (
+    reached_by_candidates,
+    rows_to_slide_on,
+    slide_cameras,
+    spread_limits,
+)
 from .camera_spread import CameraSpread
 from .cameras import CameraCover, CameraStage, measured_by, n_given, plan_cameras
 from .errors import InfeasibleLimitsError
@@ -138,6 +143,7 @@ def slide_routes(
     """
     scene = scene.among(projectors)
     rows = rows_to_slide_on(scene, projectors)
+    reached = reached_by_candidates(scene, stage, rows)
     slid = slide_cameras(
         scene,
         projectors,
@@ -145,12 +151,19 @@ def slide_routes(
         rows,
         spare_field=spare_field,
         confirmed=True,
+        reached=reached,
     )
     routes = stage.routes
     if spare_field or routes is None or len(routes.rival) != len(stage.cameras):
         return stage, slid
     rival = slide_cameras(
-        scene, projectors, routes.rival, rows, max_evaluations=1, max_programs=0
+        scene,
+        projectors,
+        routes.rival,
+        rows,
+        max_evaluations=1,
+        max_programs=0,
+        reached=reached,
     )
     if not _clearly_wider(rival, slid):
         return stage, slid

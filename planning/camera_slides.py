@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .body_room import lacks_room
 from .camera_bodies import lit_among
 from .camera_spread import CameraSpread, spread_cameras
-from .cameras import LitSamples, lit_samples, measured_by
+from .cameras import CameraStage, LitSamples, lit_samples, measured_by
 from .plan import PlannedCamera, PlannedProjector
 from .scene import Scene
 from .spread_problem import RingsOnTarget, SpreadLimits
@@ -20,6 +20,9 @@ _ROWS = 6000
 _STREAM = 300
 # Samples that confirm a move which those did not forbid.
 _MORE = 24_000
+# What candidates reach is the measure of all claims: cameras may measure this share of
+# it more, no further. Where candidates reach nearly all that is lit none can.
+_STRAY, _NEARLY = 0.002, 0.97
 
 
 def rows_to_slide_on(
@@ -47,6 +50,7 @@ def slide_cameras(
     max_programs: int | None = None,
     spare_field: float = 0.0,
     confirmed: bool = False,
+    reached: NDArray[np.bool_] | None = None,
 ) -> CameraSpread:
     """Slide cameras apart; no move that loses coverage on the rows is taken.
 
@@ -59,6 +63,7 @@ def slide_cameras(
         max_programs: Baseline programs at most; None: no limit of their own.
         spare_field: What is kept free of the half fields beyond seams [rad].
         confirmed: Whether four times as many samples must agree to each move.
+        reached: Rows that any candidate measures, shape (n,); None: any may be.
     """
     samples = rows.target.samples
 
@@ -67,7 +72,8 @@ def slide_cameras(
             replace(camera, world_from_device=pose)
             for camera, pose in zip(cameras, poses, strict=True)
         ]
-        return measured_among(scene, tuple(projectors), moved, rows, spared)
+        found = measured_among(scene, tuple(projectors), moved, rows, spared)
+        return found if reached is None else _no_stray(found, reached)
 
     spared = int(lit_among(projectors, rows, cameras).any(axis=1).sum())
     more = _More(scene, tuple(projectors), tuple(cameras)) if confirmed else None
@@ -83,6 +89,32 @@ def slide_cameras(
         max_evaluations=max_evaluations,
         max_programs=max_programs,
     )
+
+
+def reached_by_candidates(
+    scene: Scene, stage: CameraStage, rows: LitSamples
+) -> NDArray[np.bool_] | None:
+    """Return which rows any candidate measures, (n,); None where they reach nearly all.
+
+    Args:
+        scene: With the bodies of the projectors.
+        stage: The candidates, and what they measure of the cover's rows.
+        rows: Lit samples.
+    """
+    lit = stage.rows.lit.any(axis=1)
+    if stage.measured[lit].any(axis=1).mean() >= _NEARLY:
+        return None
+    return np.asarray(measured_by(scene, stage.reference, rows).any(axis=1))
+
+
+def _no_stray(
+    found: NDArray[np.bool_], reached: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return what is measured; nothing where cameras reach what no candidate does."""
+    beyond = np.count_nonzero(found.any(axis=1) & ~reached)
+    if beyond > _STRAY * np.count_nonzero(reached):
+        return np.zeros_like(found)
+    return found
 
 
 class _More:
