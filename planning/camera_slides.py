@@ -19,7 +19,7 @@ from .standing import moves_bodies
 _ROWS = 6000
 _STREAM = 300
 # Samples that confirm a move which those did not forbid.
-_MORE = 24_000
+_MORE = 16_000
 # What candidates reach is the measure of all claims: cameras may measure this share of
 # it more, no further. Where candidates reach nearly all that is lit none can.
 _STRAY, _NEARLY = 0.002, 0.97
@@ -62,7 +62,7 @@ def slide_cameras(
         max_evaluations: Times that coverage is evaluated, at most.
         max_programs: Baseline programs at most; None: no limit of their own.
         spare_field: What is kept free of the half fields beyond seams [rad].
-        confirmed: Whether four times as many samples must agree to each move.
+        confirmed: Whether more samples than the rows must agree to each move.
         reached: Rows that any candidate measures, shape (n,); None: any may be.
     """
     samples = rows.target.samples
