@@ -269,14 +269,7 @@ def _whole_shell(
 ) -> dict[str, int]:
     """What cameras anywhere in the shell would measure, where they may not stand."""
     workspace = scene.requirements.workspace
-    whole = replace(
-        workspace,
-        half_angle=float(np.pi),
-        floor_m=None,
-        box=None,
-        keep_out=(),
-        mounting=(),
-    )
+    whole = workspace.whole_shell
     if whole == workspace or share.wanted <= 0:
         return {}
     site = scene.site("camera", cameras[0].device)

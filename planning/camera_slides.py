@@ -13,7 +13,7 @@ from .camera_spread import CameraSpread, spread_cameras
 from .cameras import CameraStage, LitSamples, lit_samples, measured_by
 from .plan import PlannedCamera, PlannedProjector
 from .scene import Scene
-from .spread_problem import RingsOnTarget, SpreadLimits
+from .spread_problem import RingsOnTarget, SpreadLimits, at_poses
 from .standing import moves_bodies
 
 _ROWS = 6000
@@ -68,10 +68,7 @@ def slide_cameras(
     samples = rows.target.samples
 
     def measure(poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-        moved = [
-            replace(camera, world_from_device=pose)
-            for camera, pose in zip(cameras, poses, strict=True)
-        ]
+        moved = at_poses(cameras, poses)
         found = measured_among(scene, tuple(projectors), moved, rows, spared)
         return found if reached is None else _no_stray(found, reached)
 
@@ -130,10 +127,7 @@ class _More:
 
     def measured(self, poses: NDArray[np.float64]) -> float:
         """Return how many of them cameras at these poses measure."""
-        moved = [
-            replace(camera, world_from_device=pose)
-            for camera, pose in zip(self._cameras, poses, strict=True)
-        ]
+        moved = at_poses(self._cameras, poses)
         rows, spared = self._drawn
         found = measured_among(self._scene, self._projectors, moved, rows, spared)
         return float(found.any(axis=1).sum())

@@ -1,7 +1,6 @@
 """What each subcommand does; everything heavy is imported from here on."""
 
 import json
-import os
 import signal
 import time
 from collections.abc import Mapping, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 from geometry.mesh import TriangleMesh
 from geometry.readers import UNITS, load_mesh
 
+from .console import cores, reporter
 from .draw import save_rig_picture
 from .errors import (
     InterruptedPlanError,
@@ -37,7 +37,7 @@ from .writable import writable
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan, write the output folder, print the result; return the exit code."""
     begin = time.monotonic()
-    report = _report(quiet=options["quiet"])
+    report = reporter(quiet=options["quiet"])
     path = Path(options["ranges"] or options["meshes"][0])
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
     with writable(folder):
@@ -69,7 +69,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 accuracy_mm=options["accuracy_mm"],
                 up=options["up"],
                 seed=options["seed"],
-                threads=options["threads"] or _cores(),
+                threads=options["threads"] or cores(),
                 check=not options["no_check"],
                 prove=options["prove"],
                 cameras_by=options["cameras_by"],
@@ -121,7 +121,7 @@ def _left(limit: float | None, begin: float) -> float | None:
 
 def verify_command(options: Mapping[str, Any]) -> int:
     """Audit and check a plan; return 0 if every claim holds, 1 if not."""
-    report = _report(quiet=options["quiet"])
+    report = reporter(quiet=options["quiet"])
     plan = RigPlan.load(options["plan_file"])
     mesh = None
     if options["mesh"] is not None:
@@ -132,7 +132,7 @@ def verify_command(options: Mapping[str, Any]) -> int:
         plan,
         mesh,
         truth=truth,
-        threads=options["threads"] or _cores(),
+        threads=options["threads"] or cores(),
         progress=report,
         **seed,
     )
@@ -173,10 +173,6 @@ def sample_command(output: Path, faces: int, variant: int | None) -> int:
     return 0
 
 
-def _report(*, quiet: bool) -> Report | None:
-    return None if quiet else lambda line: click.echo(f"plan: {line}", err=True)
-
-
 def _say_size(report: Report | None, mesh: Any) -> None:  # noqa: ANN401
     if report is None:
         return
@@ -210,10 +206,6 @@ def _save(
         # Those of an earlier plan in this folder aren't of this one.
         remove_patterns(folder)
     return [str(name) for name in names]
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
 
 
 def _print_json(document: Mapping[str, Any]) -> None:

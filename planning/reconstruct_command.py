@@ -5,7 +5,6 @@ is smaller than asked, 2 unwritable, 3 a bad plan, calibration or folder of capt
 """
 
 import json
-import os
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,6 +15,7 @@ import click
 from geometry.sampling import SurfaceSamples
 
 from .audit.prediction import predict_measured
+from .console import cores, reporter
 from .errors import CapturesError
 from .plan import RigPlan
 from .progress import Report
@@ -40,7 +40,7 @@ _PRIOR_MM = 1.0
 def reconstruct_command(options: Mapping[str, Any]) -> int:
     """Reconstruct, write the cloud, print the result; return the exit code."""
     path = Path(options["plan_file"])
-    report = _report(quiet=options["quiet"])
+    report = reporter(quiet=options["quiet"])
     plan = RigPlan.load(path)
     folder = Path(options["output"] or path.parent)
     if options["captures"] is not None:
@@ -64,7 +64,7 @@ def _reconstruct(
 ) -> Reconstruction:
     seed = options["seed"]
     seed = int(plan.document["seed"]) if seed is None else seed
-    threads = options["threads"] or _cores()
+    threads = options["threads"] or cores()
     mounted = options["calibration"]
     mounted = None if mounted is None else calibrated_plan(plan, mounted)
     _say(report, "predicting what the plan's poses measure")
@@ -140,14 +140,6 @@ def _print(
     click.echo(json.dumps(document, indent=1, allow_nan=False))
 
 
-def _report(*, quiet: bool) -> Report | None:
-    return None if quiet else lambda line: click.echo(f"plan: {line}", err=True)
-
-
 def _say(report: Report | None, line: str) -> None:
     if report is not None:
         report(line)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2

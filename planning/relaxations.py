@@ -75,14 +75,7 @@ def reachability_relaxations(
     )
     shares = {change: base + gained / len(target) for change, gained in found.items()}
     workspace = scene.requirements.workspace
-    whole = replace(
-        workspace,
-        half_angle=float(np.pi),
-        floor_m=None,
-        box=None,
-        keep_out=(),
-        mounting=(),
-    )
+    whole = workspace.whole_shell
     if whole != workspace:
         site = scene.site("projector", reference[0].device)
         anywhere = projector_candidates(

@@ -145,6 +145,13 @@ class Workspace:
     projector_standoff_m: float | None = None
     camera_standoff_m: float | None = None
 
+    @property
+    def whole_shell(self) -> "Workspace":
+        """The same shell without cone, floor, room, keep-out volumes or mountings."""
+        return replace(
+            self, half_angle=pi, floor_m=None, box=None, keep_out=(), mounting=()
+        )
+
     def inset(self, by_m: float) -> "Workspace":
         """Return the workspace shrunk on all sides.
 
