@@ -7,7 +7,7 @@ For the sample and the twelve meshes in `../shared/data/meshes` (those named, if
 projectors as planned, three at most, and random admissible camera poses, aimed at or
 beside the object at any roll, against the cells that the bound on cameras rests on:
 those in the open, those among shadows, and those by aim. What a pose measures is said
-by the predicates of `planning.audit`, which share no code with the planner.
+by the predicates of `planning.verify.audit`, which share no code with the planner.
 
 `--lens long` narrows the cameras' field to a quarter, so that it binds.
 
@@ -29,13 +29,23 @@ from attack_cells import OwnLight, Tally, Tree
 from continuous_bounds import jobs
 from numpy.typing import NDArray
 
+from geometry.curvature.refinement import cut_for_curvature
 from geometry.devices import PinholeModel
+from geometry.files.readers import load_mesh
 from geometry.poses import look_at
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
 from planning import load_rig
-from planning.audit.occlusion import Shadow
-from planning.audit.predicates import (
+from planning.cameras.camera_cover import LitSamples, lit_samples
+from planning.model.plan import PlannedProjector
+from planning.model.progress import Stopwatch
+from planning.model.requirements import Workspace
+from planning.prepare import first_projectors, prepared
+from planning.projectors.projector_poses import widen_margins
+from planning.proofs.camera_bound import CameraCells, CameraEffort
+from planning.proofs.cells.image_cone import image_cone
+from planning.report.draft import Order
+from planning.scene.scene import Scene
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import (
     PAIR_CAUSES,
     SEEN,
     Eye,
@@ -43,17 +53,7 @@ from planning.audit.predicates import (
     pair_steps,
     sight_steps,
 )
-from planning.audit.samples import AuditSamples
-from planning.camera_bound import CameraCells, CameraEffort
-from planning.cameras import LitSamples, lit_samples
-from planning.draft import Order
-from planning.image_cone import image_cone
-from planning.plan import PlannedProjector
-from planning.prepare import first_projectors, prepared
-from planning.progress import Stopwatch
-from planning.projector_poses import widen_margins
-from planning.requirements import Workspace
-from planning.scene import Scene
+from planning.verify.audit.samples import AuditSamples
 
 _BATCH = 500
 _STREAM = 200

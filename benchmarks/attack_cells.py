@@ -34,21 +34,21 @@ from continuous_bounds import jobs
 from numpy.typing import NDArray
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from geometry.mesh import TriangleMesh
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
-from planning.aim_cells import AimTree
-from planning.continuous import Effort, bound_projectors
-from planning.direction_cells import DirectionTree
-from planning.draft import Order
-from planning.lighting import Target
-from planning.plan import PlannedProjector
-from planning.position_cells import PositionTree
+from planning.model.plan import PlannedProjector
+from planning.model.progress import Stopwatch
+from planning.model.requirements import Workspace
 from planning.prepare import prepared
-from planning.progress import Stopwatch
-from planning.requirements import Workspace
-from planning.scene import Scene
+from planning.proofs.cells.aim_cells import AimTree
+from planning.proofs.cells.direction_cells import DirectionTree
+from planning.proofs.cells.position_cells import PositionTree
+from planning.proofs.projector_bound import Effort, bound_projectors
+from planning.report.draft import Order
+from planning.scene.lighting import Target
+from planning.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[1]
 LIGHTS = ("parallel", "diverging")

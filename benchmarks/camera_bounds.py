@@ -21,18 +21,18 @@ from collections import Counter
 import numpy as np
 from continuous_bounds import jobs
 
-from geometry.mesh import TriangleMesh
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
-from planning.camera_bound import DEFAULT, PROVE, bound_stage
-from planning.camera_stage import place_cameras
-from planning.draft import Order
-from planning.errors import InfeasibleLimitsError
-from planning.plan import PlannedCamera
+from planning.cameras.camera_stage import place_cameras
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import PlannedCamera
+from planning.model.progress import Stopwatch
 from planning.prepare import first_projectors, prepared
-from planning.progress import Stopwatch
-from planning.projector_poses import widen_margins
+from planning.projectors.projector_poses import widen_margins
+from planning.proofs.camera_bound import DEFAULT, PROVE, bound_stage
+from planning.report.draft import Order
 
 
 def main() -> int:

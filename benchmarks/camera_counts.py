@@ -28,24 +28,24 @@ from pathlib import Path
 
 import numpy as np
 from from_tests import load
+from planning.verify.audit.audit import audit_plan
 
-from geometry.mesh import TriangleMesh
-from geometry.refinement import cut_for_curvature
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig, verify_plan
-from planning.assemble import write_plan
-from planning.audit import audit_plan
-from planning.camera_routes import slide_routes
-from planning.camera_stage import CameraSolution, place_cameras
-from planning.cameras import lit_samples, measured_by
-from planning.draft import Draft, Order
+from planning.cameras.camera_cover import lit_samples, measured_by
+from planning.cameras.camera_routes import slide_routes
+from planning.cameras.camera_stage import CameraSolution, place_cameras
+from planning.cameras.routes import CamerasBy
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.progress import Stopwatch
 from planning.pipeline import _polish
-from planning.plan import PlannedCamera, PlannedProjector
 from planning.prepare import Prepared, first_projectors, prepared
-from planning.progress import Stopwatch
-from planning.projector_poses import widen_margins
-from planning.projectors import ProjectorStage
-from planning.routes import CamerasBy
-from planning.scene import Scene
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.projector_stage import ProjectorStage
+from planning.report.assemble import write_plan
+from planning.report.draft import Draft, Order
+from planning.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[1]
 _PROJECTORS = 3

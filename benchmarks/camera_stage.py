@@ -24,10 +24,10 @@ import time
 import numpy as np
 from from_tests import load
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.sample_head.sample_head import sample_head
 from planning import RequirementError, load_mesh, load_rig
 from planning.pipeline import plan_rig
-from planning.sample_head import sample_head
 
 _FACES = 100_000
 _THREADS = 2

@@ -19,10 +19,10 @@ import numpy as np
 from from_tests import load
 from numpy.typing import NDArray
 
-from solvers import cell_bound
-from solvers.cell_bound import CellBound, bound_count
-from solvers.cell_problem import CellProblem
-from solvers.cells import CellBatch, CellTree
+from solvers.cells import cell_bound
+from solvers.cells.cell_bound import CellBound, bound_count
+from solvers.cells.cell_problem import CellProblem
+from solvers.cells.cell_tree import CellBatch, CellTree
 
 TREES = load("cap_trees")
 HIGHS_SECONDS = 60.0

@@ -23,16 +23,16 @@ from pathlib import Path
 import numpy as np
 from from_tests import load
 
-from geometry.mesh import TriangleMesh
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
-from planning.continuous import DEFAULT, PROVE, prove_fewest
-from planning.draft import Order
-from planning.errors import InfeasibleLimitsError
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.progress import Stopwatch
 from planning.prepare import Prepared, prepared
-from planning.progress import Stopwatch
-from planning.projectors import ProjectorStage, plan_projectors
+from planning.projectors.projector_stage import ProjectorStage, plan_projectors
+from planning.proofs.projector_bound import DEFAULT, PROVE, prove_fewest
+from planning.report.draft import Order
 
 ROOT = Path(__file__).resolve().parents[1]
 MANY = 200

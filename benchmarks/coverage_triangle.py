@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.coverage_triangle import largest_baseline, seam_angles
+from planning.cameras.baselines.coverage_triangle import largest_baseline, seam_angles
 
 _Array = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ from from_tests import load
 from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
 
-from geometry.curvature import CurvatureField, principal_curvatures
-from geometry.diffusion import diffused, surface_laplacian, vertex_areas
-from geometry.mesh import TriangleMesh
+from geometry.curvature.curvature import CurvatureField, principal_curvatures
+from geometry.mesh.diffusion import diffused, surface_laplacian, vertex_areas
+from geometry.mesh.mesh import TriangleMesh
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURE = ROOT / "docs" / "images" / "curvature_convergence.png"

@@ -58,9 +58,9 @@ def _measure(path: Path) -> int:
         rows.append((name, now[0] - marks[0], now[1] - marks[1], peak))
         marks[:] = now
 
-    from geometry.curvature import principal_curvatures
-    from geometry.readers import load_mesh
-    from geometry.regions import dominant_regions
+    from geometry.curvature.curvature import principal_curvatures
+    from geometry.files.readers import load_mesh
+    from geometry.regions.regions import dominant_regions
 
     mark("import")
     mesh = load_mesh(path)

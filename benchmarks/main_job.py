@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 from from_tests import load
+from planning.verify.audit.audit import audit_plan
 
 from planning import RigPlan
-from planning.audit import audit_plan
 
 ROOT = Path(__file__).resolve().parents[1]
-RUN = [sys.executable, "-c", "from planning.cli import main; main()"]
+RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
 
 
 def main() -> int:

@@ -27,7 +27,7 @@ from from_tests import load
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT.parent / "shared" / "data" / "nasty"
-RUN = [sys.executable, "-c", "from planning.cli import main; main()"]
+RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
 PROCESSOR_SECONDS = 60.0
 WALL_SECONDS = 600.0
 

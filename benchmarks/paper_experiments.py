@@ -16,10 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.readers import load_mesh
-from planning.errors import RequirementError
-from planning.experiments.errors import Errors, Measured
+from geometry.files.readers import load_mesh
 from planning.experiments.one_image import Prior, judged_labels
+from planning.experiments.point_errors import Errors, Measured
 from planning.experiments.run import DARK, Outcome, run_experiment
 from planning.experiments.second_sequence import double_density
 from planning.experiments.setups import (
@@ -29,12 +28,13 @@ from planning.experiments.setups import (
     single,
 )
 from planning.experiments.table import setup_lines
+from planning.model.errors import RequirementError
 from planning.pipeline import plan_rig
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.cloud import Cloud
-from planning.reconstruction.single_shot_rig import shoot_rig
-from planning.reconstruction.verdict import measure_accuracy
-from planning.rig import load_rig
+from planning.rig.rig import load_rig
+from planning.verify.reconstruction.check.accuracy import measure_accuracy
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.single_shot.single_shot_rig import shoot_rig
 
 _MM = 1e3
 MAKERS = (box_experiment, face_experiment)

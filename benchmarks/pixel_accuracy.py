@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 from from_tests import load
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import sphere
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import sphere
 from planning import load_mesh
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.edges import find_edges
-from planning.reconstruction.photometry import Photometry
-from planning.reconstruction.verdict import measure_accuracy
+from planning.verify.reconstruction.check.accuracy import measure_accuracy
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.decode.edges import find_edges
+from planning.verify.reconstruction.render.photometry import Photometry
 
 ROOT = Path(__file__).resolve().parents[1]
 RIGS, PLANE = load("reconstruction_rigs"), load("test_reconstruction_decode")

@@ -15,10 +15,10 @@ from collections.abc import Callable
 import numpy as np
 from from_tests import load
 
-from geometry.primitives import sphere
-from planning.plan import RigPlan
-from planning.reconstruction.check import Reconstruction, reconstruct_plan
-from planning.verification import verify_plan
+from geometry.shapes.primitives import sphere
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan
+from planning.verify.verification import verify_plan
 
 RIGS = load("reconstruction_rigs")
 RINGS, RESOLUTION = 40, (1280, 720)

@@ -20,17 +20,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from planning.verify.audit.audit import audit_plan
 from scipy.spatial.transform import Rotation
 from seam_gap import GAP, predicted_limit, seam_samples, wall_rig
 
-from geometry.mesh import TriangleMesh
-from geometry.sampling import SurfaceSamples
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
+from geometry.shapes.sample_head.sample_head import write_sample
 from planning import load_mesh, load_rig, plan_rig
-from planning.audit import audit_plan
-from planning.plan import RigPlan
-from planning.reconstruction.check import reconstruct_plan
-from planning.sample_head import write_sample
-from planning.verification import verify_plan
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.verification import verify_plan
 
 SEEDS = 20
 # Incidence that a grazing projector is turned to [rad].

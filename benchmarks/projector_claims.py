@@ -5,7 +5,7 @@ Usage: python benchmarks/projector_claims.py [NAME ...] [--lights parallel diver
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
 at the default requirements: projectors as planned and posed, their poses rounded as
 they are written, and 12,000 fresh samples of the target. What the planner says is lit
-is held against the audit's predicates (`planning/audit`, which shares none with the
+is held against the audit's predicates (`planning/verify/audit`, which shares none with the
 planner): beam, range, incidence, tangent angle and shadow. Printed are the samples said
 to be lit, those of them that break a limit by the audit, those that only the audit
 calls lit, and the margins of what is lit: the least, and that at the required share.
@@ -21,21 +21,26 @@ from dataclasses import replace
 import numpy as np
 from continuous_bounds import jobs, ready_for
 
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
-from planning import lighting
-from planning.audit.occlusion import Shadow
-from planning.audit.predicates import LIT, Lamp, light_margin, light_steps
-from planning.audit.samples import AuditSamples
-from planning.errors import InfeasibleLimitsError
-from planning.lighting import Target
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.rounding import rounded_pose
 from planning.prepare import Prepared
-from planning.projector_light import lit_stages
-from planning.projector_poses import widen_margins
-from planning.projectors import plan_projectors
-from planning.rings import moved_to
-from planning.rounding import rounded_pose
-from planning.share_margin import margin_at_share
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.projector_stage import plan_projectors
+from planning.projectors.share_margin import margin_at_share
+from planning.rings.ring_radii import moved_to
+from planning.scene import lighting
+from planning.scene.lighting import Target
+from planning.scene.lit import lit_stages
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import (
+    LIT,
+    Lamp,
+    light_margin,
+    light_steps,
+)
+from planning.verify.audit.samples import AuditSamples
 
 ROWS = 12_000
 STREAM = 800

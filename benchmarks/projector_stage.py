@@ -18,11 +18,11 @@ from collections.abc import Iterator
 import numpy as np
 from from_tests import load
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_mesh, load_rig
 from planning.pipeline import plan_rig
-from planning.rig import Light
-from planning.sample_head import sample_head
+from planning.rig.rig import Light
 
 _FACES = 100_000
 _THREADS = 2

@@ -19,10 +19,10 @@ from pathlib import Path
 import igl
 import numpy as np
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, grid, sphere
-from geometry.readers import load_mesh
-from geometry.visibility import Visibility
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.visibility import Visibility
+from geometry.shapes.primitives import box, grid, sphere
 
 ROOT = Path(__file__).resolve().parents[1]
 BANDS = (1e-4, 1e-3, 1e-2, 1.0)

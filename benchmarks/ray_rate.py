@@ -20,13 +20,13 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.mesh import TriangleMesh
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
 from geometry.poses import fibonacci_cap
-from geometry.primitives import sphere
-from geometry.readers import load_mesh
-from geometry.sampling import sample_surface
-from geometry.visibility import Visibility, morton_order
-from geometry.visibility_matrix import visibility_matrix
+from geometry.rays.visibility import Visibility, morton_order
+from geometry.rays.visibility_matrix import visibility_matrix
+from geometry.shapes.primitives import sphere
 
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLES, DEVICES = 20_000, 40

@@ -3,7 +3,7 @@
 Usage: python benchmarks/reader_library.py   (ringrig installed, from a checkout)
 
 Every file that `tests/test_reader_traps.py` makes, as it is made, and every one of
-`../shared/data/nasty` is read by `geometry.readers` and by trimesh (as a scene, all
+`../shared/data/nasty` is read by `geometry.files.readers` and by trimesh (as a scene, all
 bodies, without its processing). Counts which come out as the same surface: the same
 triangles, or else the same area and bounding box. Where they don't, the tests say what
 is true: those of the traps give areas and boxes computed by hand, or what is damaged.
@@ -24,8 +24,8 @@ import numpy as np
 import pytest
 from from_tests import load
 
-from geometry.mesh import MeshError
-from geometry.readers import load_mesh
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import MeshError
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"
 OUTCOMES = (

@@ -24,7 +24,7 @@ def main() -> int:
         command = [
             sys.executable,
             "-c",
-            "from planning.cli import main; main()",
+            "from planning.cli.main import main; main()",
             *words,
         ]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)

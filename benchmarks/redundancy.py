@@ -17,19 +17,23 @@ import numpy as np
 from from_tests import load
 from numpy.typing import NDArray
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, sphere
-from geometry.rays import RayCaster
-from geometry.readers import load_mesh
-from geometry.sampling import SurfaceSamples, sample_surface
-from planning.plan import RigPlan
-from planning.reconstruction.calibration import (
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples, sample_surface
+from geometry.rays.rays import RayCaster
+from geometry.shapes.primitives import box, sphere
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     calibrate_camera,
     calibrate_projector,
 )
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.overlap import (
+from planning.verify.reconstruction.check.accuracy import (
+    measure_accuracy,
+    nearest_distance,
+)
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.faults.overlapping_light import (
     balanced_accuracy,
     best_threshold,
     light_falls,
@@ -37,12 +41,11 @@ from planning.reconstruction.overlap import (
     overlap_by_frames,
     overlap_by_intensity,
 )
-from planning.reconstruction.patterns import ring_patterns
-from planning.reconstruction.photometry import Photometry
-from planning.reconstruction.render import Shown, render_whites
-from planning.reconstruction.supposed import incidence_cosine
-from planning.reconstruction.verdict import measure_accuracy, nearest_distance
-from planning.reconstruction.view import view
+from planning.verify.reconstruction.faults.supposed import incidence_cosine
+from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.render import Shown, render_whites
+from planning.verify.reconstruction.render.view import view
 
 RIGS = load("reconstruction_rigs")
 GAP = 3.5e-3

@@ -11,12 +11,12 @@ from pathlib import Path
 
 from PIL import Image
 
-from geometry.curvature import principal_curvatures
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
-from geometry.regions import dominant_regions
-from planning.draw_colours import region_colours
-from planning.draw_views import draw_mesh
+from geometry.curvature.curvature import principal_curvatures
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.regions.regions import dominant_regions
+from planning.report.drawing.draw_colours import region_colours
+from planning.report.drawing.draw_views import draw_mesh
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZE = (400, 500)

@@ -11,7 +11,7 @@ intersection over union of its dominant area with that of the same object
 - with 0.1 % of its size as vertex noise, along the normals and in all directions,
 
 by area, each face looked up on the other surface by its closest point. Meshes are cut
-as `plan_rig` does (`geometry.refinement`) before regions are found. The simplifier
+as `plan_rig` does (`geometry.curvature.refinement`) before regions are found. The simplifier
 is `fast_simplification` (in float32, of the `dev` extra). Where it moves a surface, no
 answer can stay: how far the quarter lies off the mesh is printed as well (95 % of the
 centroids of its faces), and the last column is the quarter by libigl's `qslim`,
@@ -27,12 +27,12 @@ import fast_simplification
 import igl
 import numpy as np
 
-from geometry.curvature import principal_curvatures
-from geometry.mesh import TriangleMesh
-from geometry.proximity import closest_points
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
-from geometry.regions import DominantRegions, dominant_regions
+from geometry.curvature.curvature import principal_curvatures
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.proximity import closest_points
+from geometry.regions.regions import DominantRegions, dominant_regions
 
 ROOT = Path(__file__).resolve().parents[1]
 MESHES = (

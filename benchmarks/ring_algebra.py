@@ -14,9 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.reconstruction.calibration import CameraCalibration, ProjectorCalibration
-from planning.reconstruction.patterns import ring_patterns, ring_plane
-from planning.reconstruction.triangulate import intersect_rings
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+from planning.verify.reconstruction.decode.triangulate import intersect_rings
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    ring_patterns,
+    ring_plane,
+)
 
 MIN_CONDITIONING = 0.1
 _POINTS_A_POSE = 2000

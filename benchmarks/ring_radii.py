@@ -19,17 +19,17 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.readers import load_mesh
+from geometry.files.readers import load_mesh
 from planning import RequirementError, load_rig, plan_rig
-from planning.beam_profile import cast_beam
-from planning.lighting import ring_coordinate
-from planning.plan import PlannedProjector
-from planning.ring_creases import Creases, find_creases
-from planning.ring_limits import ring_beam
-from planning.ring_spacing import spaced_radii
-from planning.ring_stage import space_rings
-from planning.rings import uniform_radii
-from planning.scene import Scene
+from planning.model.plan import PlannedProjector
+from planning.rings.beam_profile import cast_beam
+from planning.rings.ring_creases import Creases, find_creases
+from planning.rings.ring_limits import ring_beam
+from planning.rings.ring_radii import uniform_radii
+from planning.rings.ring_spacing import spaced_radii
+from planning.rings.ring_stage import space_rings
+from planning.scene.lighting import ring_coordinate
+from planning.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[1]
 SCAN = ROOT.parent / "shared" / "data" / "meshes" / "face_scan_james.obj"

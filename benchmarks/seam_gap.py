@@ -11,13 +11,13 @@ import numpy as np
 from from_tests import load
 from numpy.typing import NDArray
 
+from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
-from geometry.primitives import grid
-from geometry.sampling import SurfaceSamples
-from planning.baselines import half_field
-from planning.coverage_triangle import flat_limit
-from planning.plan import RigPlan
-from planning.reconstruction.check import Reconstruction, reconstruct_plan
+from geometry.shapes.primitives import grid
+from planning.cameras.baselines.baseline_rows import half_field
+from planning.cameras.baselines.coverage_triangle import flat_limit
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan
 
 RIGS = load("reconstruction_rigs")
 FOCAL, RESOLUTION = 8000.0, (1280, 180)

@@ -4,7 +4,7 @@ Usage: python benchmarks/share_margins.py [NAME ...] [--lights parallel divergin
        [--axes]
 
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
-at the default requirements: the margin at the required share (`planning.share_margin`,
+at the default requirements: the margin at the required share (`planning.projectors.share_margin`,
 in degrees within the limits) of the cover of most area, of the cover of largest margin
 with as many projectors, and after the pose program. Without a tangent limit the margin
 is by how much the largest incidence of what counts is below its limit, to which the
@@ -28,23 +28,23 @@ from dataclasses import replace
 import numpy as np
 from continuous_bounds import jobs, ready_for
 
-from geometry.mesh import TriangleMesh
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
-from planning import lighting
-from planning.axis_moves import AxisJudge
-from planning.camera_stage import choose_cameras, move_axes
-from planning.cameras import lit_samples, offered_cameras, plan_cameras
-from planning.errors import InfeasibleLimitsError
-from planning.plan import PlannedCamera, PlannedProjector
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from planning.cameras.camera_cover import lit_samples, offered_cameras, plan_cameras
+from planning.cameras.camera_stage import choose_cameras, move_axes
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.prepare import Prepared
-from planning.projector_light import lit_margins, lit_stages
-from planning.projector_poses import widen_margins
-from planning.projectors import ProjectorStage, plan_projectors
-from planning.rings import ring_frame
-from planning.scene import Scene
-from planning.selection import required_rows
-from planning.share_margin import margin_at_share
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.projector_stage import ProjectorStage, plan_projectors
+from planning.projectors.share_margin import margin_at_share
+from planning.proofs.selection import required_rows
+from planning.rings.axis_moves import AxisJudge
+from planning.rings.ring_radii import ring_frame
+from planning.scene import lighting
+from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.scene import Scene
 
 ROWS = 12_000
 

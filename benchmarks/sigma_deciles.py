@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
-from geometry.primitives import grid, sphere
-from geometry.proximity import closest_points
-from geometry.sampling import SurfaceSamples
-from planning import lighting, measurability
-from planning.edge_noise import EdgeNoise
-from planning.lighting import Target
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.cloud import Cloud
-from planning.reconstruction.photometry import Photometry
-from planning.requirements import CameraLimits, TriangulationLimits
+from geometry.rays.proximity import closest_points
+from geometry.shapes.primitives import grid, sphere
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import CameraLimits, TriangulationLimits
+from planning.report.entries.edge_noise import EdgeNoise
+from planning.scene import lighting, measurability
+from planning.scene.lighting import Target
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.render.photometry import Photometry
 
 _Array = NDArray[np.float64]
 

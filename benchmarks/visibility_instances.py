@@ -13,12 +13,12 @@ import numpy as np
 from from_tests import load
 from numpy.typing import NDArray
 
-from geometry.mesh import TriangleMesh
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
 from geometry.poses import fibonacci_cap
-from geometry.readers import load_mesh
-from geometry.sampling import sample_surface
-from geometry.visibility import Visibility
-from geometry.visibility_matrix import visibility_matrix
+from geometry.rays.visibility import Visibility
+from geometry.rays.visibility_matrix import visibility_matrix
 
 MAX_INCIDENCE = np.deg2rad(60.0)
 NARROW_HALF_ANGLE = np.deg2rad(14.0)

@@ -33,7 +33,7 @@ import numpy as np
 from from_tests import load
 
 ROOT = Path(__file__).resolve().parents[1]
-RUN = [sys.executable, "-c", "from planning.cli import main; main()"]
+RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
 _HEAD = (
     "mesh",
     "projectors (candidates, all poses)",

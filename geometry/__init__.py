@@ -6,16 +6,18 @@ from typing import TYPE_CHECKING
 from ._siblings import check_siblings
 
 if TYPE_CHECKING:
-    from .curvature import CurvatureField as CurvatureField
-    from .curvature import principal_curvatures as principal_curvatures
-    from .interchange import from_trimesh as from_trimesh
-    from .interchange import to_trimesh as to_trimesh
-    from .mesh import TriangleMesh as TriangleMesh
-    from .rays import RayCaster as RayCaster
-    from .readers import load_mesh as load_mesh
-    from .regions import Region as Region
-    from .regions import dominant_regions as dominant_regions
-    from .selected_regions import regions_of_faces as regions_of_faces
+    from geometry.curvature.curvature import CurvatureField as CurvatureField
+    from geometry.curvature.curvature import (
+        principal_curvatures as principal_curvatures,
+    )
+    from geometry.files.interchange import from_trimesh as from_trimesh
+    from geometry.files.interchange import to_trimesh as to_trimesh
+    from geometry.files.readers import load_mesh as load_mesh
+    from geometry.mesh.mesh import TriangleMesh as TriangleMesh
+    from geometry.rays.rays import RayCaster as RayCaster
+    from geometry.regions.regions import Region as Region
+    from geometry.regions.regions import dominant_regions as dominant_regions
+    from geometry.regions.selected_regions import regions_of_faces as regions_of_faces
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {

@@ -33,7 +33,7 @@ from planning.experiments.equations import (
     projected,
     projection_matrix,
 )
-from planning.experiments.figures import (
+from planning.experiments.paper_figures import (
     draw_camera_images,
     draw_densities,
     draw_errors,
@@ -45,7 +45,10 @@ from planning.experiments.run import run_experiment
 from planning.experiments.second_sequence import double_density
 from planning.experiments.setups import box_experiment
 from planning.experiments.table import cloud_lines, ring_lines, setup_lines
-from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
 
 printed = box_experiment()
 print("\n".join(setup_lines(printed)))

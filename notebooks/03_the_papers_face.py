@@ -25,26 +25,21 @@
 import tempfile
 from pathlib import Path
 
+from geometry.shapes.sample_head.sample_head import write_sample
 from planning import RequirementError, load_mesh, load_rig, plan_rig
-from planning.draw import draw_rig
-from planning.experiments.figures import (
+from planning.experiments.one_image import Prior
+from planning.experiments.paper_figures import (
     draw_camera_images,
     draw_errors,
     draw_redundancy,
     draw_viewpoints,
 )
-from planning.experiments.one_image import Prior
 from planning.experiments.point_panels import Stage
 from planning.experiments.run import run_experiment
 from planning.experiments.setups import face_experiment
-from planning.experiments.table import (
-    cloud_lines,
-    label_line,
-    ring_lines,
-    setup_lines,
-)
-from planning.face_status import face_status
-from planning.sample_head import write_sample
+from planning.experiments.table import cloud_lines, label_line, ring_lines, setup_lines
+from planning.report.drawing.draw import draw_rig
+from planning.report.face_status import face_status
 
 printed = run_experiment(face_experiment())
 print("\n".join(setup_lines(printed.experiment)))

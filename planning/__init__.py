@@ -6,38 +6,38 @@ from typing import TYPE_CHECKING
 from ._siblings import check_siblings
 
 if TYPE_CHECKING:
-    from geometry.readers import load_mesh as load_mesh
+    from geometry.files.readers import load_mesh as load_mesh
+    from planning.model.errors import InputError as InputError
+    from planning.model.errors import PlanningError as PlanningError
+    from planning.model.errors import RequirementError as RequirementError
+    from planning.model.plan import RigPlan as RigPlan
+    from planning.rig.rig import Rig as Rig
+    from planning.rig.rig import load_rig as load_rig
+    from planning.scene.interest import read_selection as read_selection
+    from planning.scene.interest import read_weight as read_weight
+    from planning.scene.ranges.ranged_body import RangedBody as RangedBody
+    from planning.scene.ranges.ranged_body import read_ranges as read_ranges
+    from planning.verify.verification import Verification as Verification
+    from planning.verify.verification import verify_plan as verify_plan
 
-    from .errors import InputError as InputError
-    from .errors import PlanningError as PlanningError
-    from .errors import RequirementError as RequirementError
-    from .interest import read_selection as read_selection
-    from .interest import read_weight as read_weight
     from .pipeline import plan_rig as plan_rig
-    from .plan import RigPlan as RigPlan
-    from .ranges import RangedBody as RangedBody
-    from .ranges import read_ranges as read_ranges
-    from .rig import Rig as Rig
-    from .rig import load_rig as load_rig
-    from .verification import Verification as Verification
-    from .verification import verify_plan as verify_plan
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
-    "InputError": "planning.errors",
-    "PlanningError": "planning.errors",
-    "RequirementError": "planning.errors",
-    "RangedBody": "planning.ranges",
-    "Rig": "planning.rig",
-    "RigPlan": "planning.plan",
-    "Verification": "planning.verification",
-    "load_mesh": "geometry.readers",
-    "load_rig": "planning.rig",
+    "InputError": "planning.model.errors",
+    "PlanningError": "planning.model.errors",
+    "RequirementError": "planning.model.errors",
+    "RangedBody": "planning.scene.ranges.ranged_body",
+    "Rig": "planning.rig.rig",
+    "RigPlan": "planning.model.plan",
+    "Verification": "planning.verify.verification",
+    "load_mesh": "geometry.files.readers",
+    "load_rig": "planning.rig.rig",
     "plan_rig": "planning.pipeline",
-    "read_ranges": "planning.ranges",
-    "read_selection": "planning.interest",
-    "read_weight": "planning.interest",
-    "verify_plan": "planning.verification",
+    "read_ranges": "planning.scene.ranges.ranged_body",
+    "read_selection": "planning.scene.interest",
+    "read_weight": "planning.scene.interest",
+    "verify_plan": "planning.verify.verification",
 }
 __all__ = [
     "InputError",

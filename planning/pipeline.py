@@ -7,42 +7,42 @@ from typing import Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from geometry.mesh import TriangleMesh
-from geometry.refinement import cut_for_curvature
-
-from . import camera_bound
-from .assemble import write_plan
-from .camera_bound import bound_stage
-from .camera_relaxations import nothing_measured
-from .camera_routes import slide_routes
-from .camera_stage import follow_cameras, place_cameras
-from .cameras import CameraStage, NothingMeasuredError
-from .continuous import DEFAULT, PROVE, prove_fewest
-from .cost import cost_entry
-from .draft import Draft, Order
-from .errors import (
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.mesh.mesh import TriangleMesh
+from planning.cameras.camera_cover import CameraStage, NothingMeasuredError
+from planning.cameras.camera_routes import slide_routes
+from planning.cameras.camera_stage import follow_cameras, place_cameras
+from planning.cameras.routes import CamerasBy
+from planning.model.errors import (
     InfeasibleLimitsError,
     InputError,
     InterruptedPlanError,
     RequirementError,
     TimeLimitError,
 )
-from .interest import Select, Weight, interest_of
-from .plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.progress import Report, Stopwatch
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.projector_stage import ProjectorStage
+from planning.proofs.camera_bound import bound_stage
+from planning.proofs.projector_bound import DEFAULT, PROVE, prove_fewest
+from planning.proofs.selection import larger
+from planning.report.advice.camera_relaxations import nothing_measured
+from planning.report.advice.what_helps import falls_short
+from planning.report.assemble import write_plan
+from planning.report.draft import Draft, Order
+from planning.report.entries.cost import cost_entry
+from planning.report.summary.shortfall import shortfalls
+from planning.rig.range_guard import Guard, guarded
+from planning.rig.rig import Rig
+from planning.rings.ring_stage import space_rings
+from planning.scene.interest import Select, Weight, interest_of
+from planning.scene.ranges.ranged_body import RangedBody
+from planning.scene.scene import Scene
+from planning.verify.verification import verify_plan
+
 from .prepare import first_projectors, prepared
-from .progress import Report, Stopwatch
-from .projector_poses import widen_margins
-from .projectors import ProjectorStage
-from .range_guard import Guard, guarded
-from .ranges import RangedBody
-from .rig import Rig
-from .ring_stage import space_rings
-from .routes import CamerasBy
-from .scene import Scene
-from .selection import larger
-from .shortfall import shortfalls
-from .verification import verify_plan
-from .what_helps import falls_short
+from .proofs import camera_bound
 
 
 def plan_rig(

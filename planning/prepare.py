@@ -6,20 +6,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.bearing import bearing
-from geometry.curvature import CurvatureField, principal_curvatures
-from geometry.regions import DominantRegions, dominant_regions
-from geometry.selected_regions import regions_of_faces
-
-from .body_room import check_existing_room
-from .draft import Order
-from .errors import InputError
-from .plan import PlannedCamera, PlannedProjector
-from .progress import Stopwatch
-from .projectors import ProjectorStage, plan_projectors
-from .requirements import Requirements
-from .rings import outer_radius, ring_gap, uniform_radii
-from .scene import Scene
+from geometry.curvature.curvature import CurvatureField, principal_curvatures
+from geometry.mesh.bearing import bearing
+from geometry.regions.regions import DominantRegions, dominant_regions
+from geometry.regions.selected_regions import regions_of_faces
+from planning.model.errors import InputError
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.progress import Stopwatch
+from planning.model.requirements import Requirements
+from planning.projectors.projector_stage import ProjectorStage, plan_projectors
+from planning.report.draft import Order
+from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
+from planning.scene.clearance import check_existing_room
+from planning.scene.scene import Scene
 
 # Upwards in the image: where the ring axis points until the cameras are known.
 _FIRST_AZIMUTH = -float(np.pi / 2)

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 from ._siblings import check_siblings
 
 if TYPE_CHECKING:
-    from .cell_bound import bound_count as bound_count
-    from .cell_problem import CellProblem as CellProblem
-    from .cells import ArrayTree as ArrayTree
-    from .cover import CoverSolution as CoverSolution
-    from .cover import solve_cover as solve_cover
-    from .cover import solve_max_coverage as solve_max_coverage
-    from .cover_problem import CoverProblem as CoverProblem
+    from solvers.cells.cell_bound import bound_count as bound_count
+    from solvers.cells.cell_problem import CellProblem as CellProblem
+    from solvers.cells.cell_tree import ArrayTree as ArrayTree
+    from solvers.covers.cover import CoverSolution as CoverSolution
+    from solvers.covers.cover import solve_cover as solve_cover
+    from solvers.covers.cover import solve_max_coverage as solve_max_coverage
+    from solvers.covers.cover_problem import CoverProblem as CoverProblem
+
     from .status import SolveStatus as SolveStatus
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.

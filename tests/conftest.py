@@ -142,8 +142,8 @@ def with_few_samples() -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def few() -> Generator[None]:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("planning.claims.N_SAMPLES", 3000)
-            patch.setattr("planning.overlaps.N_SAMPLES", 3000)
+            patch.setattr("planning.report.claims.N_SAMPLES", 3000)
+            patch.setattr("planning.report.entries.overlaps.N_SAMPLES", 3000)
             yield
 
     return few

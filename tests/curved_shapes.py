@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import cylinder, sphere, torus
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import cylinder, sphere, torus
 
 R, TUBE = 0.1, 0.04
 WIDE, TALL = 0.05, 0.3

@@ -435,8 +435,8 @@ def _is_number(word: bytes) -> bool:
 
 def judge(case: Case, folder: Path) -> dict[str, object]:
     """Read a damaged file and say what happened; raises what must not happen."""
-    from geometry.mesh import MeshError
-    from geometry.readers import load_mesh
+    from geometry.files.readers import load_mesh
+    from geometry.mesh.mesh import MeshError
 
     path = folder / case.name
     path.write_bytes(case.data)
@@ -481,7 +481,7 @@ def _rows(mesh) -> set[tuple[float, ...]]:
 
 
 def _check_close(case: Case, mesh, folder: Path) -> None:
-    from geometry.readers import load_mesh
+    from geometry.files.readers import load_mesh
 
     path = folder / case.origin[0]
     path.write_bytes(case.origin[1])
@@ -498,9 +498,9 @@ def _check_close(case: Case, mesh, folder: Path) -> None:
 
 def _exercise(case: Case, folder: Path) -> None:
     """Curvature and regions of what could be read: libigl must live."""
-    from geometry.curvature import principal_curvatures
-    from geometry.readers import load_mesh
-    from geometry.regions import dominant_regions
+    from geometry.curvature.curvature import principal_curvatures
+    from geometry.files.readers import load_mesh
+    from geometry.regions.regions import dominant_regions
 
     path = folder / case.name
     path.write_bytes(case.data)

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap, look_at
-from geometry.primitives import sphere
-from planning.plan import RigPlan
-from planning.surface import Surface
+from geometry.shapes.primitives import sphere
+from planning.model.plan import RigPlan
+from planning.model.surface import Surface
 
 LIGHT = (
     "projector_beam",

@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
-from geometry.primitives import sphere
-from geometry.sampling import SurfaceSamples
-from planning.plan import RigPlan
-from planning.surface import Surface
+from geometry.shapes.primitives import sphere
+from planning.model.plan import RigPlan
+from planning.model.surface import Surface
 
 CHECK = {
     "max_rms_m": 1e-4,

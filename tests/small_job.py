@@ -8,7 +8,7 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from planning.cli import commands
+from planning.cli.main import commands
 
 RIG = """
 base = "default"

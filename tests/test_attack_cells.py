@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import sphere
-from planning.direction_cells import DirectionTree
-from planning.plan import PlannedProjector
-from planning.position_cells import PositionTree
-from planning.rig import load_rig
-from planning.scene import Scene
-from planning.shell_cells import spread
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import sphere
+from planning.model.plan import PlannedProjector
+from planning.proofs.cells.direction_cells import DirectionTree
+from planning.proofs.cells.position_cells import PositionTree
+from planning.proofs.cells.shell_cells import spread
+from planning.rig.rig import load_rig
+from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 
 POSES = 2000

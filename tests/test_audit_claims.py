@@ -7,14 +7,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from planning.verify.audit.audit import audit_plan
 
-from geometry.mesh import TriangleMesh
-from planning.audit import audit_plan
-from planning.audit.baselines import distance_to_surface
-from planning.audit.groups import audit_groups
-from planning.audit.ledger import Ledger
-from planning.errors import PlanFileError
-from planning.plan import RigPlan
+from geometry.mesh.mesh import TriangleMesh
+from planning.model.errors import PlanFileError
+from planning.model.plan import RigPlan
+from planning.verify.audit.baselines.baseline_claims import distance_to_surface
+from planning.verify.audit.coverage.group_claims import audit_groups
+from planning.verify.audit.ledger import Ledger
 
 
 def failures(plan: RigPlan, **options) -> tuple[str, ...]:

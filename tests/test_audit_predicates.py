@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import box, grid, joined
-from planning.audit.occlusion import Shadow
-from planning.audit.optics import pixel_gradient, ring_coordinate, ring_gradient
-from planning.audit.predicates import (
+from geometry.shapes.primitives import box, grid, joined
+from planning.model.requirements import ProjectorLimits
+from planning.verify.audit.predicates.audit_optics import (
+    pixel_gradient,
+    ring_coordinate,
+    ring_gradient,
+)
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import (
     LIGHT_CAUSES,
     LIT,
     PAIR_CAUSES,
@@ -21,9 +26,8 @@ from planning.audit.predicates import (
     Lamp,
     light_steps,
 )
-from planning.audit.recompute import recompute
-from planning.audit.samples import AuditSamples, draw_samples
-from planning.requirements import ProjectorLimits
+from planning.verify.audit.predicates.recompute import recompute
+from planning.verify.audit.samples import AuditSamples, draw_samples
 
 AUDIT = Path(__file__).resolve().parents[1] / "planning" / "audit"
 FREE_LIMITS = ProjectorLimits(math.radians(89.9), 0.0)
@@ -218,16 +222,16 @@ def test_draws_are_uniform_and_split_between_target_and_rest(handmade):
 
 def test_the_audit_imports_nothing_of_the_maker():
     allowed = {
-        "planning.plan",
-        "planning.requirements",
-        "planning.surface",
-        "planning.bodies",
-        "planning.zones",
-        "planning.errors",
-        "planning.files",
-        "geometry.mesh",
-        "geometry.readers",
-        "geometry.rays",
+        "planning.model.plan",
+        "planning.model.requirements",
+        "planning.model.surface",
+        "planning.model.bodies",
+        "planning.model.zones",
+        "planning.model.errors",
+        "planning.model.files",
+        "geometry.mesh.mesh",
+        "geometry.files.readers",
+        "geometry.rays.rays",
         "geometry.devices",
     }
     for path in AUDIT.glob("*.py"):

@@ -5,35 +5,40 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.primitives import sphere
-from planning import measurability
-from planning.axis_moves import (
-    AxisJudge,
-    axis_program,
-    better,
-    move_ring_axes,
-    proposals,
-)
-from planning.camera_stage import (
-    follow_cameras,
-    move_axes,
-    proves_as_much,
-    with_cameras,
-)
-from planning.cameras import (
+from geometry.shapes.primitives import sphere
+from planning.cameras.camera_cover import (
     camera_stage,
     lit_samples,
     measured_by,
     offered_cameras,
     plan_cameras,
 )
-from planning.candidates import projector_candidates
-from planning.lighting import ring_coordinate
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.rig import load_rig
-from planning.rings import ring_axis, ring_frame, ring_frame_of_axis, uniform_radii
-from planning.scene import Scene
-from solvers.axis_program import axis_scores, axis_slack, pair_scores
+from planning.cameras.camera_stage import (
+    follow_cameras,
+    move_axes,
+    proves_as_much,
+    with_cameras,
+)
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.rig.rig import load_rig
+from planning.rings.axis_moves import (
+    AxisJudge,
+    axis_program,
+    better,
+    move_ring_axes,
+    proposals,
+)
+from planning.rings.ring_radii import (
+    ring_axis,
+    ring_frame,
+    ring_frame_of_axis,
+    uniform_radii,
+)
+from planning.scene import measurability
+from planning.scene.lighting import ring_coordinate
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import projector_candidates
+from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores
 
 RADIUS = 0.1
 INF = np.inf

@@ -10,8 +10,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from solvers.axis_nlp import axis_parameters, build_axis_nlp, run_ipopt
-from solvers.axis_program import (
+from solvers.poses.axis_nlp import axis_parameters, build_axis_nlp, run_ipopt
+from solvers.poses.axis_program import (
     INSET,
     AxisProgram,
     axis_direction,

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from planning.coverage_triangle import round_body_limit, seam_angles
-from solvers.baseline_problem import (
+from planning.cameras.baselines.coverage_triangle import round_body_limit, seam_angles
+from solvers.poses.baseline_problem import (
     BaselineProblem,
     HalfSpaces,
     KeptPoints,
     SeamPoints,
     Shell,
 )
-from solvers.baseline_program import build_baseline_program, solve_baseline
+from solvers.poses.baseline_program import build_baseline_program, solve_baseline
 from solvers.status import SolveStatus
 
 THETA = np.radians(60.0)

@@ -9,10 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
-from planning.baselines import baseline_rows, check_seam, half_field
-from planning.coverage_triangle import flat_limit
-from planning.plan import PlannedCamera
-from planning.seams import (
+from planning.cameras.baselines.baseline_rows import (
+    baseline_rows,
+    check_seam,
+    half_field,
+)
+from planning.cameras.baselines.coverage_triangle import flat_limit
+from planning.cameras.baselines.seams import (
     Seam,
     adjacency,
     find_seam,
@@ -20,6 +23,7 @@ from planning.seams import (
     overlap_components,
     overlap_graph_connected,
 )
+from planning.model.plan import PlannedCamera
 
 K = np.array([[800.0, 0.0, 319.5], [0.0, 800.0, 239.5], [0.0, 0.0, 1.0]])
 RESOLUTION = (640, 480)

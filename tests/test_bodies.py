@@ -8,14 +8,37 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
-from geometry.boxes import OrientedBox, boxes_overlap, lines_cross, triangles_touch
 from geometry.devices import ParallelModel, PinholeModel
-from geometry.mesh import TriangleMesh
-from geometry.primitives import grid
-from planning import lighting, load_rig, measurability
-from planning.audit.bodies import Block, block_of
-from planning.audit.occlusion import Shadow
-from planning.audit.predicates import (
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.boxes import (
+    OrientedBox,
+    boxes_overlap,
+    lines_cross,
+    triangles_touch,
+)
+from geometry.shapes.primitives import grid
+from planning import load_rig
+from planning.cameras.camera_bodies import MeasuredCrowd, settled_cover
+from planning.cameras.camera_cover import CameraCover, lit_samples, measured_by
+from planning.cameras.camera_slides import measured_among
+from planning.model.bodies import Body
+from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import Existing, Requirements
+from planning.model.zones import Box
+from planning.projectors.projector_poses import _Lit
+from planning.proofs.conflicts import LitCrowd, settle, settle_others
+from planning.proofs.selection import marginals, select_fewest
+from planning.report.drawing.draw_devices import device_figures
+from planning.scene import lighting, measurability
+from planning.scene.clearance import check_existing_room, lacks_room, offered_with_room
+from planning.scene.lit import lit_stages
+from planning.scene.scene import Scene
+from planning.scene.sights import sights_of
+from planning.scene.standing import bodies_of
+from planning.verify.audit.predicates.blocks import Block, block_of
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
     PROJECTOR_BODY,
     Eye,
@@ -23,25 +46,8 @@ from planning.audit.predicates import (
     light_steps,
     sight_steps,
 )
-from planning.audit.samples import AuditSamples
-from planning.bodies import Body
-from planning.body_conflicts import LitCrowd, settle, settle_others
-from planning.body_room import check_existing_room, lacks_room, offered_with_room
-from planning.camera_bodies import MeasuredCrowd, settled_cover
-from planning.camera_slides import measured_among
-from planning.cameras import CameraCover, lit_samples, measured_by
-from planning.draw_devices import device_figures
-from planning.errors import InfeasibleLimitsError, RigError
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.projector_light import lit_stages
-from planning.projector_poses import _Lit
-from planning.reconstruction.obstacles import Both, obstacles_of
-from planning.requirements import Existing, Requirements
-from planning.scene import Scene
-from planning.selection import marginals, select_fewest
-from planning.sights import sights_of
-from planning.standing import bodies_of
-from planning.zones import Box
+from planning.verify.audit.samples import AuditSamples
+from planning.verify.reconstruction.render.occluders import Both, obstacles_of
 
 # ---- boxes
 

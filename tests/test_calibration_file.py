@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.sampling import SurfaceSamples
-from planning.audit.prediction import predict_measured
-from planning.errors import CalibrationError
-from planning.plan import RigPlan
-from planning.reconstruction.calibration_file import calibrated_plan
-from planning.reconstruction.captured import Expected, reconstruct_rendered
+from geometry.mesh.sampling import SurfaceSamples
+from planning.model.errors import CalibrationError
+from planning.model.plan import RigPlan
+from planning.verify.audit.coverage.prediction import predict_measured
+from planning.verify.reconstruction.captures.calibration_file import calibrated_plan
+from planning.verify.reconstruction.captures.captured import (
+    Expected,
+    reconstruct_rendered,
+)
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])

@@ -6,11 +6,21 @@ import numpy as np
 import pytest
 
 from geometry.devices import PinholeModel
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import box, cylinder, grid, joined, sphere
-from planning import all_poses, measurable_cells
-from planning.camera_bound import (
+from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
+from planning.cameras.baselines.coverage_triangle import round_body_limit
+from planning.cameras.camera_cover import (
+    LitSamples,
+    camera_stage,
+    lit_samples,
+    offered_cameras,
+    plan_cameras,
+)
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import Existing
+from planning.proofs import all_poses
+from planning.proofs.camera_bound import (
     DEFAULT,
     PROVE,
     CameraCells,
@@ -18,25 +28,16 @@ from planning.camera_bound import (
     bound_cameras,
     bound_stage,
 )
-from planning.cameras import (
-    LitSamples,
-    camera_stage,
-    lit_samples,
-    offered_cameras,
-    plan_cameras,
-)
-from planning.candidates import aimed_poses
-from planning.coverage_triangle import round_body_limit
-from planning.image_cone import image_cone
-from planning.lighting import Light
-from planning.measurability import Rings
-from planning.measurable_cells import MeasurableCells
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.requirements import Existing
-from planning.rig import load_rig
-from planning.rings import ring_frame
-from planning.scene import Scene
-from solvers.cell_bound import CellStatus
+from planning.proofs.cells import measurable_cells
+from planning.proofs.cells.image_cone import image_cone
+from planning.proofs.cells.measurable_cells import MeasurableCells
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import ring_frame
+from planning.scene.lighting import Light
+from planning.scene.measurability import Rings
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import aimed_poses
+from solvers.cells.cell_bound import CellStatus
 
 EFFORT = CameraEffort(finest=5, aims=4, maps=5, budget=1e9, shadows=np.inf)
 UP = np.array([0.0, 0.0, 1.0])
@@ -312,7 +313,7 @@ def _facing(towards, samples):
 
 def _exact(rows, position, device, required):
     """What a camera that looks at the centre measures, but for shadows."""
-    from planning import measurability
+    from planning.scene import measurability
 
     camera = PlannedCamera("", look_at(position, np.zeros(3), UP), device)
     seen = measurability.view(camera, rows.target, required.camera, None)

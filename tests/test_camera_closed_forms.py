@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from geometry.devices import PinholeModel
+from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
-from geometry.sampling import SurfaceSamples
-from planning.baselines import baseline_rows
-from planning.coverage_triangle import (
+from planning.cameras.baselines.baseline_rows import baseline_rows
+from planning.cameras.baselines.coverage_triangle import (
     bent_limit,
     cylinder_limit,
     flat_limit,
     round_body_limit,
     sphere_band_limit,
 )
-from planning.lighting import Target
-from planning.measurability import SEEN, view
-from planning.plan import PlannedCamera
-from planning.requirements import CameraLimits
+from planning.model.plan import PlannedCamera
+from planning.model.requirements import CameraLimits
+from planning.scene.lighting import Target
+from planning.scene.measurability import SEEN, view
 from solvers import CoverProblem, solve_cover
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,36 +8,37 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from planning.verify.audit.audit import audit_plan
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import grid, sphere
-from planning import camera_relaxations, optics
-from planning.audit import audit_plan
-from planning.camera_demands import Demands, demands
-from planning.camera_knobs import knobs
-from planning.camera_relaxations import (
+from geometry.shapes.primitives import grid, sphere
+from planning.cameras.camera_cover import (
+    CameraStage,
+    furthest_failure,
+    lit_samples,
+    measured_by,
+)
+from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.report.advice import camera_relaxations
+from planning.report.advice.camera_demands import Demands, demands
+from planning.report.advice.camera_knobs import knobs
+from planning.report.advice.camera_relaxations import (
     _SPARE,
     _least_enough,
     _Share,
     for_so_many,
     out_of_reach,
 )
-from planning.cameras import (
-    CameraStage,
-    furthest_failure,
-    lit_samples,
-    measured_by,
-)
-from planning.candidates import aimed_poses
-from planning.claims import Devices, make_claims
-from planning.measurability import CAUSES, MEASURED
-from planning.plan import PlannedCamera, PlannedProjector, RigPlan
-from planning.rig import load_rig
-from planning.rings import ring_frame
-from planning.scene import Scene
-from planning.shortfall import shortfalls
-from planning.sights import Sights
+from planning.report.claims import Devices, make_claims
+from planning.report.summary.shortfall import shortfalls
+from planning.rig import optics
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import ring_frame
+from planning.scene.measurability import CAUSES, MEASURED
+from planning.scene.scene import Scene
+from planning.scene.sights import Sights
+from planning.scene.workspace.candidates import aimed_poses
 
 FEW = """
 base = "default"

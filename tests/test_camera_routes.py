@@ -10,38 +10,38 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planning.verify.audit.audit import audit_plan
 
-from geometry.primitives import box, sphere
+from geometry.shapes.primitives import box, sphere
 from planning import RigPlan
-from planning.audit import audit_plan
-from planning.audit.ledger import Ledger
-from planning.audit.routes import audit_routes
-from planning.bodies import Body
-from planning.camera_routes import (
-    _clearly_wider,
-    better_route,
-    cover_by_cover,
-    slide_routes,
-)
-from planning.camera_slides import reached_by_candidates, rows_to_slide_on
-from planning.camera_spread import CameraSpread
-from planning.cameras import (
+from planning.cameras.baselines.camera_spread import CameraSpread
+from planning.cameras.camera_cover import (
     camera_stage,
     lit_samples,
     measured_by,
     offered_cameras,
 )
-from planning.continuous import Effort
-from planning.errors import InfeasibleLimitsError
-from planning.paper_cameras import cover_by_paper, route_among
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.projectors import plan_projectors
-from planning.rig import load_rig
-from planning.rings import uniform_radii
-from planning.routes import Routes
-from planning.scene import Scene
-from planning.selection import required_rows
-from planning.summary import _routes
+from planning.cameras.camera_routes import (
+    _clearly_wider,
+    better_route,
+    cover_by_cover,
+    slide_routes,
+)
+from planning.cameras.camera_slides import reached_by_candidates, rows_to_slide_on
+from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
+from planning.cameras.routes import Routes
+from planning.model.bodies import Body
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.projectors.projector_stage import plan_projectors
+from planning.proofs.projector_bound import Effort
+from planning.proofs.selection import required_rows
+from planning.report.summary.summary import _routes
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import uniform_radii
+from planning.scene.scene import Scene
+from planning.verify.audit.counts.route_claims import audit_routes
+from planning.verify.audit.ledger import Ledger
 
 RADIUS = 0.1
 
@@ -50,8 +50,8 @@ RADIUS = 0.1
 def _few_rows():
     """Fewer samples than a plan rests on: the questions here aren't of exactness."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planning.cameras._ROWS", 800)
-        patch.setattr("planning.cameras._CHECK_ROWS", 1500)
+        patch.setattr("planning.cameras.camera_cover._ROWS", 800)
+        patch.setattr("planning.cameras.camera_cover._CHECK_ROWS", 1500)
         yield
 
 
@@ -188,7 +188,7 @@ def test_what_no_camera_sees_is_refused(ball):
 def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
     ball, fine, monkeypatch
 ):
-    monkeypatch.setattr("planning.camera_slides._ROWS", 600)
+    monkeypatch.setattr("planning.cameras.camera_slides._ROWS", 600)
     scene, projectors, _ = ball
     cover, _, routes = fine
     stage = camera_stage(scene, cover)
@@ -213,7 +213,7 @@ def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
 
     Cameras that slid to where more is measured would owe 95 % of that, too.
     """
-    monkeypatch.setattr("planning.camera_slides._ROWS", 1500)
+    monkeypatch.setattr("planning.cameras.camera_slides._ROWS", 1500)
     scene, projectors, camera = ball
     short = replace(camera, device=replace(camera.device, range_m=(1.0, 1.03)))
     cover = cover_by_cover(scene, projectors, offered_cameras(scene, short, 12))

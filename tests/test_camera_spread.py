@@ -8,26 +8,26 @@ import pytest
 
 from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap, look_at
-from planning.camera_spread import spread_cameras
-from planning.coverage_triangle import round_body_limit
-from planning.measurability import (
-    MEASURED,
-    Rings,
-    View,
-    first_pair_failure,
-    pair_quality,
-)
-from planning.plan import PlannedCamera
-from planning.requirements import TriangulationLimits, Workspace
-from planning.seams import adjacency
-from planning.spread_problem import (
+from planning.cameras.baselines.camera_spread import spread_cameras
+from planning.cameras.baselines.coverage_triangle import round_body_limit
+from planning.cameras.baselines.seams import adjacency
+from planning.cameras.baselines.spread_problem import (
     RingsOnTarget,
     SampledTarget,
     SpreadLimits,
     best_rings,
     spread_problem,
 )
-from planning.zones import Box
+from planning.model.plan import PlannedCamera
+from planning.model.requirements import TriangulationLimits, Workspace
+from planning.model.zones import Box
+from planning.scene.measurability import (
+    MEASURED,
+    Rings,
+    View,
+    first_pair_failure,
+    pair_quality,
+)
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

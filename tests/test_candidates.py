@@ -5,7 +5,10 @@ import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.candidates import (
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import TriangulationLimits, Workspace
+from planning.rings.ring_radii import outer_radius, ring_frame, ring_gap, uniform_radii
+from planning.scene.workspace.candidates import (
     aimed_poses,
     camera_candidates,
     projector_candidates,
@@ -13,9 +16,6 @@ from planning.candidates import (
     rolls_for,
     shell_positions,
 )
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.requirements import TriangulationLimits, Workspace
-from planning.rings import outer_radius, ring_frame, ring_gap, uniform_radii
 
 CENTRE = (0.1, -0.2, 0.3)
 SHIFTED = PinholeModel(

@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from geometry.mesh import TriangleMesh
-from geometry.proximity import closest_points
-from geometry.sampling import SurfaceSamples
-from planning.audit.prediction import predict_measured
-from planning.errors import CapturesError
-from planning.plan import RigPlan
-from planning.reconstruction.captured import (
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
+from geometry.rays.proximity import closest_points
+from planning.model.errors import CapturesError
+from planning.model.plan import RigPlan
+from planning.verify.audit.coverage.prediction import predict_measured
+from planning.verify.reconstruction.captures.captured import (
     Expected,
     reconstruct_captured,
     reconstruct_rendered,
 )
-from planning.reconstruction.captures import CaptureFolder, frame_names
-from planning.reconstruction.result import Reconstruction
+from planning.verify.reconstruction.captures.captures import CaptureFolder, frame_names
+from planning.verify.reconstruction.check.result import Reconstruction
 
 # A point farther off than this is no noise: 20 times the rms of the good cloud.
 WRONG_M = 5e-4
@@ -33,7 +33,9 @@ WRONG_M = 5e-4
 def _without_causes():
     """Leave out the search for causes, which takes longer than all the rest here."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planning.reconstruction.check.explained", lambda said, _: said)
+        patch.setattr(
+            "planning.verify.reconstruction.check.check.explained", lambda said, _: said
+        )
         yield
 
 

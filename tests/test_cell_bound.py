@@ -12,13 +12,13 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import linprog
 
 from solvers.bit_rows import pack_rows, unpack_rows
-from solvers.cell_bound import CellStatus, bound_count, multiplier_bound
-from solvers.cell_multipliers import MultiplierSearch
-from solvers.cell_problem import CellProblem, whole_rows
-from solvers.cell_store import CellStore
-from solvers.cell_tuples import _split, refute_tuples
-from solvers.cell_twigs import Twigs
-from solvers.cells import ArrayTree
+from solvers.cells.cell_bound import CellStatus, bound_count, multiplier_bound
+from solvers.cells.cell_multipliers import MultiplierSearch
+from solvers.cells.cell_problem import CellProblem, whole_rows
+from solvers.cells.cell_store import CellStore
+from solvers.cells.cell_tree import ArrayTree
+from solvers.cells.cell_tuples import _split, refute_tuples
+from solvers.cells.cell_twigs import Twigs
 from solvers.status import WorkBudget
 
 DEG = np.pi / 180.0

@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from solvers import bit_rows, cell_store, cells
+from solvers import bit_rows
 from solvers.bit_rows import BitSum, pack_rows, unpack_rows
-from solvers.cell_bound import CellStatus, bound_count, multiplier_bound
-from solvers.cell_multipliers import MultiplierSearch
-from solvers.cell_problem import CellProblem, whole_rows
-from solvers.cell_store import CellStore
-from solvers.cell_tuples import refute_tuples
-from solvers.cells import ArrayTree, CellBatch
+from solvers.cells import cell_store
+from solvers.cells import cell_tree as cells
+from solvers.cells.cell_bound import CellStatus, bound_count, multiplier_bound
+from solvers.cells.cell_multipliers import MultiplierSearch
+from solvers.cells.cell_problem import CellProblem, whole_rows
+from solvers.cells.cell_store import CellStore
+from solvers.cells.cell_tree import ArrayTree, CellBatch
+from solvers.cells.cell_tuples import refute_tuples
 from solvers.status import WorkBudget
 
 PARENTS = np.array([-1, -1, 0, 0, 1, 1, 2, 2])

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import planning
-from planning.cli import main
-from planning.sample_head import write_sample
-from planning.verification import verify_plan
+from geometry.shapes.sample_head.sample_head import write_sample
+from planning.cli.main import main
+from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data"
@@ -32,7 +32,7 @@ def run(*words, cwd, threads=None, before=""):
     if threads is not None:
         environment["OMP_NUM_THREADS"] = str(threads)
         environment["OPENBLAS_NUM_THREADS"] = str(threads)
-    code = before + "from planning.cli import main; main()"
+    code = before + "from planning.cli.main import main; main()"
     command = [sys.executable, "-c", code, *words]
     return subprocess.run(
         command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300
@@ -146,7 +146,7 @@ def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(
     )
     # What is false shows without the pixels, which the good plan was held against.
     audit_alone = partial(verify_plan, check_pixels=False)
-    monkeypatch.setattr("planning.commands.verify_plan", audit_alone)
+    monkeypatch.setattr("planning.cli.commands.verify_plan", audit_alone)
     code, out, err = in_process(monkeypatch, capsys, "verify", spoiled, "--quiet")
     assert (code, err) == (1, "")
     assert "measured_m2" in out
@@ -169,7 +169,7 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
         "def stop(*a, **k): raise KeyboardInterrupt\n"
         "c.plan_rig = stop\n"
         f"sys.argv = ['plan', '--mesh', {str(face)!r}, '--max-projectors', '3']\n"
-        "from planning.cli import main; main()"
+        "from planning.cli.main import main; main()"
     )
     home = str(Path(planning.__file__).resolve().parents[1])
     done = subprocess.run(

@@ -10,18 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, grid, joined, sphere
-from planning.continuous import Effort, prove_fewest
-from planning.draft import Order
-from planning.lighting import LIT, served_by
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
+from planning.model.progress import Stopwatch
 from planning.prepare import prepared
-from planning.progress import Stopwatch
-from planning.projector_light import lit_stages, margins_of
-from planning.projector_poses import widen_margins
-from planning.projectors import plan_projectors
-from planning.rig import load_rig
-from solvers.cone import max_margin_direction, smallest_cap
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.projector_stage import plan_projectors
+from planning.proofs.projector_bound import Effort, prove_fewest
+from planning.report.draft import Order
+from planning.rig.rig import load_rig
+from planning.scene.lighting import LIT, served_by
+from planning.scene.lit import lit_stages, margins_of
+from solvers.poses.cone import max_margin_direction, smallest_cap
 
 EFFORT = Effort(finest=5, budget=3e8, shadows=0.0, most_samples=2000)
 SHADOWS = replace(EFFORT, finest=6, shadows=np.inf)

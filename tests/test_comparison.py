@@ -6,14 +6,18 @@ import numpy as np
 import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
+from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
-from geometry.sampling import SurfaceSamples
-from planning.audit.floors import receding
-from planning.audit.predicates import Eye, Lamp
-from planning.audit.samples import AuditSamples
-from planning.reconstruction.cloud import Cloud
-from planning.reconstruction.comparison import Confusion, Prediction, compare
-from planning.reconstruction.verdict import Accuracy
+from planning.verify.audit.coverage.floors import receding
+from planning.verify.audit.predicates.predicates import Eye, Lamp
+from planning.verify.audit.samples import AuditSamples
+from planning.verify.reconstruction.check.accuracy import Accuracy
+from planning.verify.reconstruction.check.comparison import (
+    Confusion,
+    Prediction,
+    compare,
+)
+from planning.verify.reconstruction.cloud import Cloud
 
 TAU = 1e-3
 

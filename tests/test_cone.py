@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solvers.cone import max_margin_direction, smallest_cap
-from solvers.pose_program import PoseProgram, solve_pose
+from solvers.poses.cone import max_margin_direction, smallest_cap
+from solvers.poses.pose_program import PoseProgram, solve_pose
 from solvers.status import SolveStatus
 
 METHODS = [max_margin_direction, smallest_cap]
@@ -183,6 +183,8 @@ def test_bad_arrays_are_refused(arguments, message):
 
 
 def test_modelling_library_is_imported_on_use_only():
-    source = importlib.util.find_spec("solvers.cone").loader.get_source("solvers.cone")
+    source = importlib.util.find_spec("solvers.poses.cone").loader.get_source(
+        "solvers.poses.cone"
+    )
     head = source.split("def ", maxsplit=1)[0]
     assert "import cvxpy" not in head

@@ -6,19 +6,19 @@ import igl
 import numpy as np
 import pytest
 
-from geometry.cube_map import CubeMap
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, grid, joined, sphere, torus
-from planning import continuous
-from planning.continuous import DEFAULT, Effort, bound_projectors
-from planning.direction_cells import DirectionTree
-from planning.lighting import Target
-from planning.plan import PlannedProjector
-from planning.rig import load_rig
-from planning.scene import Scene
-from planning.zones import Box
+from geometry.directions.cube_map import CubeMap
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
+from planning.model.plan import PlannedProjector
+from planning.model.zones import Box
+from planning.proofs import projector_bound as continuous
+from planning.proofs.cells.direction_cells import DirectionTree
+from planning.proofs.projector_bound import DEFAULT, Effort, bound_projectors
+from planning.rig.rig import load_rig
+from planning.scene.lighting import Target
+from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
-from solvers.cell_bound import CellStatus
+from solvers.cells.cell_bound import CellStatus
 
 QUICK = Effort(finest=6, budget=1e9, shadows=np.inf)
 SAID = {"n_samples": 300, "row_area_m2": 1e-6}

@@ -11,11 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from solvers import CoverProblem, reductions, solve_cover
-from solvers.cover import reduced_problem, solve_max_coverage
-from solvers.cover_problem import MAX_ENTRIES
-from solvers.reductions import reduce_problem
-from solvers.relaxation import cost_bound, count_bound, coverage_bounds
+from solvers import CoverProblem, solve_cover
+from solvers.covers import reductions
+from solvers.covers.cover import reduced_problem, solve_max_coverage
+from solvers.covers.cover_problem import MAX_ENTRIES
+from solvers.covers.reductions import reduce_problem
+from solvers.covers.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.status import SolveStatus
 
 
@@ -449,7 +450,7 @@ def test_bad_matrices_are_refused(covers, message):
 
 
 def test_too_many_ones_are_refused_before_they_are_worked_on(monkeypatch):
-    monkeypatch.setattr("solvers.cover_problem.MAX_ONES", 3)
+    monkeypatch.setattr("solvers.covers.cover_problem.MAX_ONES", 3)
     CoverProblem(np.eye(3, dtype=bool))
     for covers in (np.eye(4, dtype=bool), sparse.csr_array(np.eye(4, dtype=bool))):
         with pytest.raises(ValueError, match="4 nonzero entries, more than the limit"):

@@ -9,16 +9,16 @@ import pytest
 from scipy import sparse
 
 from solvers import CoverProblem
-from solvers.cover_statements import (
+from solvers.covers.cover_statements import (
     MAX_STATED_ENTRIES,
     StatementError,
     solve_statement,
     state_cover_relaxation,
     state_max_coverage,
 )
-from solvers.mixed_integer import linear_multipliers
-from solvers.reductions import reduce_problem
-from solvers.relaxation import cost_bound, coverage_bounds
+from solvers.covers.mixed_integer import linear_multipliers
+from solvers.covers.reductions import reduce_problem
+from solvers.covers.relaxation import cost_bound, coverage_bounds
 from solvers.status import SolveStatus, WorkBudget
 
 TIGHT = 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from planning.coverage_triangle import (
+from planning.cameras.baselines.coverage_triangle import (
     baseline_parts,
     bent_limit,
     cylinder_limit,
@@ -18,7 +18,7 @@ from planning.coverage_triangle import (
     seam_angles,
     sphere_band_limit,
 )
-from planning.errors import InfeasibleLimitsError, InputError
+from planning.model.errors import InfeasibleLimitsError, InputError
 
 
 def _benchmark():

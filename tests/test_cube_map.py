@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geometry.cube_map import CubeMap, angle_between
-from geometry.cube_segments import mark_segments
-from geometry.widened_maps import WidenedMaps
+from geometry.directions.cube_map import CubeMap, angle_between
+from geometry.directions.cube_segments import mark_segments
+from geometry.directions.widened_maps import WidenedMaps
 
 
 def directions(n: int, seed: int = 0) -> np.ndarray:

@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.curvature import CurvatureField, facet_size, principal_curvatures
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, grid, sphere, torus
+from geometry.curvature.curvature import (
+    CurvatureField,
+    facet_size,
+    principal_curvatures,
+)
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, cylinder, grid, sphere, torus
 
 R, TUBE = 0.1, 0.04
 

@@ -3,17 +3,24 @@
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import grid
-from geometry.rays import RayCaster
-from planning.plan import RigPlan
-from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.defocus import Defocus, defocus_of, through_lens
-from planning.reconstruction.patterns import ring_patterns
-from planning.reconstruction.photometry import Photometry
-from planning.reconstruction.render import render_pair
-from planning.reconstruction.view import view
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.shapes.primitives import grid
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
+from planning.verify.reconstruction.render.defocus import (
+    Defocus,
+    defocus_of,
+    through_lens,
+)
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.render import render_pair
+from planning.verify.reconstruction.render.view import view
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
 LENS = Defocus(focus_m=1.2, aperture_m=0.012)

@@ -7,18 +7,23 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at, transform
-from geometry.rays import RayCaster
-from planning.draw import draw_mesh, draw_rig, region_colours, save_rig_picture
-from planning.draw_devices import best_direction, device_figures
-from planning.draw_marks import Panel, round_length
-from planning.draw_views import BACKGROUND, Shader, View, facing, fitted
-from planning.draw_zones import ZONES, draw_zones, zone_figures
-from planning.geodesic import geodesic_grid
-from planning.plan import RigPlan
-from planning.sample_head import sample_head
-from planning.surface import Surface
+from geometry.rays.rays import RayCaster
+from geometry.shapes.sample_head.geodesic import geodesic_grid
+from geometry.shapes.sample_head.sample_head import sample_head
+from planning.model.plan import RigPlan
+from planning.model.surface import Surface
+from planning.report.drawing.draw import (
+    draw_mesh,
+    draw_rig,
+    region_colours,
+    save_rig_picture,
+)
+from planning.report.drawing.draw_devices import best_direction, device_figures
+from planning.report.drawing.draw_marks import Panel, round_length
+from planning.report.drawing.draw_views import BACKGROUND, Shader, View, facing, fitted
+from planning.report.drawing.draw_zones import ZONES, draw_zones, zone_figures
 
 K_PROJECTOR = [[2100.0, 0, 639.5], [0, 2100.0, 399.5], [0, 0, 1]]
 K_CAMERA = [[3500.0, 0, 1223.5], [0, 3500.0, 1023.5], [0, 0, 1]]

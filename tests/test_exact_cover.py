@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from solvers.cover_problem import CoverProblem
-from solvers.exact_cover import best_tuple
-from solvers.mixed_integer import linear_multipliers, solve_integer
-from solvers.neighbourhood import (
-    cheapest,
-    greedy,
-    most_coverage,
-    prune,
-)
-from solvers.reductions import reduce_problem
-from solvers.relaxation import cost_bound, coverage_bounds, tighten
+from solvers.covers.cover_problem import CoverProblem
+from solvers.covers.exact.exact_cover import best_tuple
+from solvers.covers.mixed_integer import linear_multipliers, solve_integer
+from solvers.covers.neighbourhood import cheapest, greedy, most_coverage, prune
+from solvers.covers.reductions import reduce_problem
+from solvers.covers.relaxation import cost_bound, coverage_bounds, tighten
+from solvers.covers.swaps import Swaps
 from solvers.status import WorkBudget
-from solvers.swaps import Swaps
 
 
 def reduced_cover(covers, weights, costs, required):
@@ -174,7 +169,7 @@ def arcs(rng):
 def test_many_pairs_agree_with_a_dense_product(kind, monkeypatch):
     """More columns than a block, more rows than the first look."""
     if kind == "arcs":  # Else the few that are left are too many to go one by one.
-        monkeypatch.setattr("solvers.exact_cover._FEW_PAIRS", 8)
+        monkeypatch.setattr("solvers.covers.exact.exact_cover._FEW_PAIRS", 8)
     rng = np.random.default_rng(4)
     covers = {
         "even": rng.random((900, 420)) < 0.32,
@@ -295,7 +290,7 @@ def assert_worths_are_true(cover, kept):
 
 @pytest.mark.parametrize("block", [2**18, 40])
 def test_worth_of_swaps_is_kept_to_the_bit_as_sets_come_and_go(block, monkeypatch):
-    monkeypatch.setattr("solvers.swaps._BLOCK", block)
+    monkeypatch.setattr("solvers.covers.swaps._BLOCK", block)
     for seed in range(4):
         cover = random_cover(seed, n_e=60, n_s=12, density=0.4)
         rng = np.random.default_rng(seed)

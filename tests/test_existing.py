@@ -7,19 +7,19 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from geometry.primitives import box, sphere
+from geometry.shapes.primitives import box, sphere
 from planning import load_rig, plan_rig
-from planning.audit.audit import audit_plan
-from planning.claims import Devices, make_claims
-from planning.continuous import Effort, prove_fewest
-from planning.errors import InfeasibleLimitsError, RequirementError, RigError
-from planning.plan import PlannedCamera, PlannedProjector, RigPlan
-from planning.projector_poses import widen_margins
-from planning.projectors import plan_projectors
-from planning.requirements import Existing, Requirements
-from planning.scene import Scene
-from planning.selection import marginals, select_fewest
-from planning.summary import summary
+from planning.model.errors import InfeasibleLimitsError, RequirementError, RigError
+from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.requirements import Existing, Requirements
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.projector_stage import plan_projectors
+from planning.proofs.projector_bound import Effort, prove_fewest
+from planning.proofs.selection import marginals, select_fewest
+from planning.report.claims import Devices, make_claims
+from planning.report.summary.summary import summary
+from planning.scene.scene import Scene
+from planning.verify.audit.audit import audit_plan
 
 CENTRE = np.array([0.3, -0.2, 0.1])
 OLD = (

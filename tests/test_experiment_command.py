@@ -7,12 +7,14 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from planning.cli import commands
-from planning.experiment_command import experiment_of
+from planning.cli.experiment_command import experiment_of
+from planning.cli.main import commands
 from planning.experiments.setups import box_experiment
-from planning.plan import RigPlan
-from planning.reconstruction.causes import rejection
-from planning.reconstruction.single_shot_check import reconstruct_single_shot
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.faults.causes import rejection
+from planning.verify.reconstruction.single_shot.single_shot_check import (
+    reconstruct_single_shot,
+)
 
 PICTURES = {
     "cameras.png": (1280, 390),

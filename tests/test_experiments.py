@@ -7,37 +7,33 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, grid, joined
-from geometry.rays import RayCaster
-from planning.experiments.devices import (
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.shapes.primitives import box, grid, joined
+from planning.experiments.equations import (
+    coordinate_transform,
+    projected,
+    projection_matrix,
+)
+from planning.experiments.one_image import Prior, judged_labels, true_labels
+from planning.experiments.paper_devices import (
     CAMERA_PX,
     PRINTED,
     bearing,
     camera_entry,
     projector_entry,
 )
-from planning.experiments.equations import (
-    coordinate_transform,
-    projected,
-    projection_matrix,
-)
-from planning.experiments.errors import Errors
-from planning.experiments.figures import (
+from planning.experiments.paper_figures import (
     camera_images,
     draw_errors,
     draw_redundancy,
     draw_viewpoints,
 )
-from planning.experiments.one_image import Prior, judged_labels, true_labels
+from planning.experiments.point_errors import Errors
 from planning.experiments.point_panels import RINGS, Stage, signed_colours
 from planning.experiments.ring_fates import lit_and_seen, ring_fates
 from planning.experiments.run import DARK, Outcome, run_experiment
-from planning.experiments.second_sequence import (
-    double_density,
-    midway,
-    second_sequence,
-)
+from planning.experiments.second_sequence import double_density, midway, second_sequence
 from planning.experiments.setups import (
     FACE_RADII_M,
     box_experiment,
@@ -45,22 +41,25 @@ from planning.experiments.setups import (
     single,
 )
 from planning.experiments.table import outcome_document, outcome_lines
-from planning.plan import RigPlan
-from planning.reconstruction.calibration import (
+from planning.model.plan import RigPlan
+from planning.model.surface import Surface
+from planning.verify.reconstruction.calibration import (
     PairCalibration,
     calibrate_camera,
     calibrate_projector,
 )
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.cloud import Cloud
-from planning.reconstruction.patterns import ring_patterns
-from planning.reconstruction.render import Shown, render_lines
-from planning.reconstruction.ring_lines import line_patterns
-from planning.reconstruction.single_shot_rig import drawn_lines, shoot_rig
-from planning.reconstruction.triangulate import intersect_rings
-from planning.reconstruction.verdict import measure_accuracy
-from planning.reconstruction.view import view
-from planning.surface import Surface
+from planning.verify.reconstruction.check.accuracy import measure_accuracy
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.triangulate import intersect_rings
+from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
+from planning.verify.reconstruction.render.render import Shown, render_lines
+from planning.verify.reconstruction.render.view import view
+from planning.verify.reconstruction.single_shot.ring_lines import line_patterns
+from planning.verify.reconstruction.single_shot.single_shot_rig import (
+    drawn_lines,
+    shoot_rig,
+)
 
 # Edges just soft enough for images to be sampled once a pixel, which is quicker.
 SOFT = replace(DARK, projector_blur_m=0.3e-3)

@@ -5,11 +5,11 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from geometry.bearing import bearing
-from geometry.extent import enclosing_ball, main_bodies
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, joined, sphere, torus
-from geometry.readers import load_mesh
+from geometry.files.readers import load_mesh
+from geometry.mesh.bearing import bearing
+from geometry.mesh.extent import enclosing_ball, main_bodies
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, joined, sphere, torus
 
 Z = np.array([0.0, 0.0, 1.0])
 

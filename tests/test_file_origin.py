@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from geometry.file_origin import FileOrigin
-from geometry.mesh import MeshError, TriangleMesh
-from geometry.orientation import orient
-from geometry.primitives import box, sphere
-from geometry.readers import load_mesh
+from geometry.files.readers import load_mesh
+from geometry.mesh.file_origin import FileOrigin
+from geometry.mesh.mesh import MeshError, TriangleMesh
+from geometry.repair.orientation import orient
+from geometry.shapes.primitives import box, sphere
 
 CELL_MM = 10.0
 # Outlines in a cell of side 1, counter-clockwise: a triangle, a square, a pentagon,

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from planning.files import sha256_of, write_atomically, write_together
+from planning.model.files import sha256_of, write_atomically, write_together
 
 
 def test_a_failed_write_keeps_the_old_content_and_leaves_no_litter(tmp_path):

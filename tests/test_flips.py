@@ -10,16 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planning.verify.audit.audit import audit_plan
 
-from geometry import visibility
 from geometry.devices import PinholeModel
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, sphere
-from planning import claims, measurability, pipeline
-from planning.assemble import write_plan
-from planning.audit import audit_plan
-from planning.cameras import lit_samples, measured_by
-from planning.rig import load_rig
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays import visibility
+from geometry.shapes.primitives import box, sphere
+from planning import pipeline
+from planning.cameras.camera_cover import lit_samples, measured_by
+from planning.report import claims
+from planning.report.assemble import write_plan
+from planning.rig.rig import load_rig
+from planning.scene import measurability
 
 RIG = """
 base = "default"

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from solvers.cover_problem import CoverProblem
-from solvers.full_cover import fewest_full
-from solvers.reductions import reduce_problem
-from solvers.row_branching import RowTree
-from solvers.row_dominance import essential, minimal, separate
-from solvers.row_generation import least_count, linear_cover
-from solvers.row_weighting import RowWeighting
+from solvers.covers.cover_problem import CoverProblem
+from solvers.covers.full.full_cover import fewest_full
+from solvers.covers.full.row_branching import RowTree
+from solvers.covers.full.row_dominance import essential, minimal, separate
+from solvers.covers.full.row_generation import least_count, linear_cover
+from solvers.covers.full.row_weighting import RowWeighting
+from solvers.covers.reductions import reduce_problem
 from solvers.status import SolveStatus, WorkBudget
 
 
@@ -193,7 +193,7 @@ def test_rows_taken_in_later_count_as_if_they_had_been_there():
 
 
 def test_ages_that_run_out_begin_again(monkeypatch):
-    monkeypatch.setattr("solvers.row_weighting._AGES", 300.0)
+    monkeypatch.setattr("solvers.covers.full.row_weighting._AGES", 300.0)
     covers = random_rows(3, most_rows=60, most_sets=30)
     fewest = fewest_by_hand(covers)
     for seed in range(5):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.mesh import MeshError
-from geometry.readers import load_mesh
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import MeshError
 
 SEED = 4
 COUNT = 80

@@ -8,7 +8,10 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from geometry.hollow import (
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.repair.hollow import (
     CAVITIES,
     HOLLOW,
     OPEN,
@@ -18,10 +21,7 @@ from geometry.hollow import (
     lies_inside,
     measure_shell,
 )
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, joined, sphere, torus
-from geometry.rays import RayCaster
-from geometry.readers import load_mesh
+from geometry.shapes.primitives import box, cylinder, joined, sphere, torus
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(
@@ -278,7 +278,7 @@ def test_fragments_neither_hide_a_shell_nor_make_one() -> None:
 
 
 def test_the_number_of_threads_changes_nothing(monkeypatch) -> None:
-    monkeypatch.setattr("geometry.hollow._SPOTS", 2000)
+    monkeypatch.setattr("geometry.repair.hollow._SPOTS", 2000)
     mesh = BODIES["narrow mouth"]
     shell = measure_shell(RayCaster(mesh, threads=2))
     assert measure_shell(RayCaster(mesh, threads=1)) == shell

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.hollow import Shell, measure_shell
-from geometry.mesh import TriangleMesh
-from geometry.primitives import sphere
-from geometry.rays import RayCaster
-from planning.audit.inside import audit_inside
-from planning.audit.ledger import Ledger
-from planning.audit.occlusion import Shadow
-from planning.audit.samples import draw_samples
-from planning.document import mesh_entry
-from planning.shortfall import shortfalls
-from planning.summary import shell_line
-from planning.surface import Surface
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.repair.hollow import Shell, measure_shell
+from geometry.shapes.primitives import sphere
+from planning.model.surface import Surface
+from planning.report.entries.device_entries import mesh_entry
+from planning.report.summary.shortfall import shortfalls
+from planning.report.summary.summary import shell_line
+from planning.verify.audit.coverage.inside_claims import audit_inside
+from planning.verify.audit.ledger import Ledger
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.samples import draw_samples
 
 OUTER, INNER = sphere(0.1, subdivisions=3), sphere(0.096, subdivisions=3)
 HOLLOW = TriangleMesh(

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from geometry.interchange import from_trimesh, to_trimesh
-from geometry.mesh import MeshError
-from geometry.primitives import box, sphere, torus
+from geometry.files.interchange import from_trimesh, to_trimesh
+from geometry.mesh.mesh import MeshError
+from geometry.shapes.primitives import box, sphere, torus
 
 
 def test_a_mesh_comes_back_from_trimesh_as_it_went() -> None:

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planning.verify.audit.audit import audit_plan
 
-from geometry.curvature import principal_curvatures
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, sphere
-from geometry.readers import load_mesh
-from geometry.selected_regions import regions_of_faces
+from geometry.curvature.curvature import principal_curvatures
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.regions.selected_regions import regions_of_faces
+from geometry.shapes.primitives import box, sphere
 from planning import RigPlan, load_rig, plan_rig, verify_plan
-from planning.audit import audit_plan
-from planning.cli import main
-from planning.errors import InputError
-from planning.interest import interest_of, read_selection, read_weight
-from planning.summary import summary
+from planning.cli.main import main
+from planning.model.errors import InputError
+from planning.report.summary.summary import summary
+from planning.scene.interest import interest_of, read_selection, read_weight
 
 # Side of the box that is painted: +z, of six with 4 x 4 quads each.
 TOP, N = 4, 4

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_mesh, load_rig, plan_rig
-from planning.sample_head import sample_head
 
 # Up z becomes up -y, with a turn about it: not a symmetry of any world lattice.
 TURN = (

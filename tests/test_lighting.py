@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
-from geometry.primitives import grid, sphere
-from geometry.sampling import sample_surface
-from geometry.visibility import Visibility
-from planning import lighting
-from planning.lighting import CAUSES, LIT, Target
-from planning.plan import PlannedProjector
-from planning.requirements import ProjectorLimits
+from geometry.rays.visibility import Visibility
+from geometry.shapes.primitives import grid, sphere
+from planning.model.plan import PlannedProjector
+from planning.model.requirements import ProjectorLimits
+from planning.scene import lighting
+from planning.scene.lighting import CAUSES, LIT, Target
 
 UP = np.array([0.0, 0.0, 1.0])
 LIMITS = ProjectorLimits(np.radians(60.0), np.radians(40.0))

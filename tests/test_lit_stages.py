@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import transform
-from geometry.primitives import sphere
-from geometry.sampling import SurfaceSamples
-from planning import lighting
-from planning.candidates import projector_candidates
-from planning.claims import Devices, _reachable_by_projectors
-from planning.open_stages import SampleColumns, open_stages
-from planning.plan import PlannedProjector
-from planning.projector_light import lit_stages
-from planning.requirements import ProjectorLimits
-from planning.rig import load_rig
-from planning.rings import uniform_radii
-from planning.scene import Scene
+from geometry.shapes.primitives import sphere
+from planning.model.plan import PlannedProjector
+from planning.model.requirements import ProjectorLimits
+from planning.report.claims import Devices, _reachable_by_projectors
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import uniform_radii
+from planning.scene import lighting
+from planning.scene.lit import lit_stages
+from planning.scene.open_stages import SampleColumns, open_stages
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import projector_candidates
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])

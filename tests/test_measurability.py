@@ -5,12 +5,12 @@ import pytest
 from scipy.optimize import brentq
 
 from geometry.devices import ParallelModel, PinholeModel
+from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import inverse, look_at, transform
-from geometry.sampling import SurfaceSamples
-from planning import lighting, measurability
-from planning.lighting import Target
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.requirements import CameraLimits, TriangulationLimits
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import CameraLimits, TriangulationLimits
+from planning.scene import lighting, measurability
+from planning.scene.lighting import Target
 
 UP = np.array([0.0, 0.0, 1.0])
 CAMERA = PinholeModel(

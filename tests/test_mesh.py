@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from geometry.mesh import MeshError, TriangleMesh
-from geometry.primitives import box, cylinder, grid, sphere, torus
+from geometry.mesh.mesh import MeshError, TriangleMesh
+from geometry.shapes.primitives import box, cylinder, grid, sphere, torus
 
 TRIANGLE = np.array([[0.0, 0, 0], [3, 0, 0], [0, 4, 0]])
 ONE = np.array([[0, 1, 2]])

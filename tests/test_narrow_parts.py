@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.sampling import sample_surface
-from planning.audit.ledger import Ledger
-from planning.audit.rings import _audit_quantile
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.photometry import Photometry
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
+from planning.verify.audit.ledger import Ledger
+from planning.verify.audit.rings.ring_claims import _audit_quantile
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.render.photometry import Photometry
 
 # Two thirds of a gap: 8 pixels in the image.
 WIDTH, APART, HALF = 2.3e-3, 9e-3, 0.03

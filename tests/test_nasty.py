@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from geometry.readers import load_mesh
+from geometry.files.readers import load_mesh
 
 NASTY = Path(__file__).resolve().parents[2] / "shared" / "data" / "nasty"
 needs_shared = pytest.mark.skipif(

@@ -10,18 +10,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.primitives import sphere
-from planning import lighting
-from planning.candidates import projector_candidates
-from planning.margin_search import widest_between
-from planning.one_fewer import Offer, one_fewer
-from planning.plan import PlannedProjector
-from planning.projector_light import lit_margins, lit_stages
-from planning.rig import load_rig
-from planning.rings import uniform_radii
-from planning.scene import Scene
-from planning.selection import select_fewest
-from planning.share_margin import margin_at_share
+from geometry.shapes.primitives import sphere
+from planning.model.plan import PlannedProjector
+from planning.projectors.margin_search import widest_between
+from planning.projectors.one_fewer import Offer, one_fewer
+from planning.projectors.share_margin import margin_at_share
+from planning.proofs.selection import select_fewest
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import uniform_radii
+from planning.scene import lighting
+from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import projector_candidates
 
 OFFSET = (0.0, 0.0)
 
@@ -103,7 +103,7 @@ def test_a_finer_lattice_is_asked_for_where_it_comes_near(
     lattice, count, near, monkeypatch
 ):
     # So coarse a lattice begins farther off than those that are planned with.
-    monkeypatch.setattr("planning.one_fewer._SHORT", 0.1)
+    monkeypatch.setattr("planning.projectors.one_fewer._SHORT", 0.1)
     scene, offer, stages_of = lattice
     reached = (offer.stages == lighting.LIT).any(axis=1)
     # Six caps light 0.879 of the ball, about 1,800 of these; five light far less.

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from solvers import CoverProblem, counts, solve_cover
+from solvers import CoverProblem, solve_cover
+from solvers.covers import counts
 from solvers.one_thread import on_one_thread
 
 

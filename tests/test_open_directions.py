@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from geometry.cube_map import CubeMap
-from geometry.mesh import TriangleMesh
-from geometry.open_directions import DirectionLimits, OpenDirections
-from geometry.primitives import box, grid, joined, sphere, torus
-from geometry.sampling import sample_surface
-from geometry.silhouettes import POINTS, Silhouettes
-from geometry.visibility import Visibility
+from geometry.directions.cube_map import CubeMap
+from geometry.directions.open_directions import DirectionLimits, OpenDirections
+from geometry.directions.silhouettes import POINTS, Silhouettes
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
+from geometry.rays.visibility import Visibility
+from geometry.shapes.primitives import box, grid, joined, sphere, torus
 
 FREE = DirectionLimits(np.deg2rad(80.0), 0.0)
 
@@ -173,7 +173,7 @@ def test_what_a_near_roof_hides_opens_no_cell(monkeypatch):
 
     assert under_the_roof().size > 2000
     assert not under_the_roof().any()
-    monkeypatch.setattr("geometry.open_directions._NEAR", ())
+    monkeypatch.setattr("geometry.directions.open_directions._NEAR", ())
     assert under_the_roof().mean() > 0.1
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from planning import optics
+from planning.rig import optics
 
 LENSES = [
     (0.012, 11.0, 3.45e-6, 1.15),

@@ -5,11 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from solvers import CoverProblem, SolveStatus, solve_cover, symmetry
-from solvers.orbital_branching import OrbitalTree
-from solvers.row_branching import RowTree
+from solvers import CoverProblem, SolveStatus, solve_cover
+from solvers.covers.full import symmetry
+from solvers.covers.full.orbital_branching import OrbitalTree
+from solvers.covers.full.row_branching import RowTree
+from solvers.covers.full.symmetry import column_colours, column_orbits, may_be_symmetric
 from solvers.status import WorkBudget
-from solvers.symmetry import column_colours, column_orbits, may_be_symmetric
 
 PLENTY = 1e11
 # Nine points in three by three: the lines through three of them.

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.mesh import TriangleMesh
-from geometry.nesting import containers
-from geometry.openness import look_out, spots_on
-from geometry.orientation import orient
-from geometry.primitives import box, cylinder, grid, joined, sphere, torus
-from geometry.rays import RayCaster
-from geometry.repair import clean
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.repair.nesting import containers
+from geometry.repair.openness import look_out, spots_on
+from geometry.repair.orientation import orient
+from geometry.repair.repair import clean
+from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
 
 TURNED = "faces turned outwards"
 REWOUND = "faces rewound like their neighbours"

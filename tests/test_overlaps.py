@@ -5,25 +5,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planning.verify.audit.audit import audit_plan
 
 from geometry.devices import ParallelModel
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, grid, joined, sphere
-from planning.audit import audit_plan
-from planning.audit.estimates import Estimator
-from planning.audit.ledger import Ledger
-from planning.audit.occlusion import Shadow
-from planning.audit.overlaps import audit_overlaps, light_falls
-from planning.audit.predicates import Lamp
-from planning.audit.samples import AuditSamples, draw_samples
-from planning.audit.schedule import audit_schedule
-from planning.candidates import aimed_poses
-from planning.firing import schedule_line
-from planning.overlaps import overlap_entries, shared_areas
-from planning.plan import PlannedProjector, RigPlan
-from planning.rig import load_rig
-from planning.rings import ring_frame
-from planning.scene import Scene
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, grid, joined, sphere
+from planning.model.plan import PlannedProjector, RigPlan
+from planning.report.entries.firing import schedule_line
+from planning.report.entries.overlaps import overlap_entries, shared_areas
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import ring_frame
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import aimed_poses
+from planning.verify.audit.counts.overlap_claims import audit_overlaps, light_falls
+from planning.verify.audit.counts.schedule_claims import audit_schedule
+from planning.verify.audit.estimates import Estimator
+from planning.verify.audit.ledger import Ledger
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import Lamp
+from planning.verify.audit.samples import AuditSamples, draw_samples
 
 # A panel of 0.4 m a side.
 WIDE = ParallelModel((2000, 2000), 2e-4, (0.8, 1.2))

@@ -7,22 +7,22 @@ import pytest
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
-from planning.camera_spread import spread_cameras
-from planning.coverage_triangle import (
+from planning.cameras.baselines.camera_spread import spread_cameras
+from planning.cameras.baselines.coverage_triangle import (
     cylinder_limit,
     round_body_limit,
     sphere_band_limit,
 )
-from planning.limit_poses import Parts, limit_poses
-from planning.paper_ground import Ground, Stand
-from planning.paper_route import paper_route
-from planning.paper_seeds import grown
-from planning.plan import PlannedCamera
-from planning.requirements import Workspace
-from planning.ring_seeds import ring_seeds
-from planning.seams import adjacency
-from planning.spread_problem import SpreadLimits
-from planning.zones import Box
+from planning.cameras.baselines.limit_poses import Parts, limit_poses
+from planning.cameras.baselines.seams import adjacency
+from planning.cameras.baselines.spread_problem import SpreadLimits
+from planning.cameras.paper.paper_ground import Ground, Stand
+from planning.cameras.paper.paper_route import paper_route
+from planning.cameras.paper.paper_seeds import grown
+from planning.cameras.paper.ring_seeds import ring_seeds
+from planning.model.plan import PlannedCamera
+from planning.model.requirements import Workspace
+from planning.model.zones import Box
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

@@ -10,10 +10,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from planning.pattern_files import remove_patterns, write_patterns
-from planning.pattern_frames import pattern_sequence
-from planning.pattern_svg import Circle, outline_of, pixels_from_plane
-from planning.plan import RigPlan
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.patterns.pattern_files import (
+    remove_patterns,
+    write_patterns,
+)
+from planning.verify.reconstruction.patterns.pattern_frames import pattern_sequence
+from planning.verify.reconstruction.patterns.pattern_svg import (
+    Circle,
+    outline_of,
+    pixels_from_plane,
+)
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])

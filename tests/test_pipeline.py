@@ -9,19 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planning.verify.audit.audit import audit_plan
 
-from geometry.primitives import box
+from geometry.shapes.primitives import box
+from geometry.shapes.sample_head.sample_head import sample_head
 from planning import RigPlan, load_rig, plan_rig, verify_plan
-from planning.audit import audit_plan
-from planning.errors import (
+from planning.model.errors import (
     InfeasibleLimitsError,
     InputError,
     InterruptedPlanError,
     RequirementError,
     TimeLimitError,
 )
-from planning.sample_head import sample_head
-from planning.summary import summary
+from planning.report.summary.summary import summary
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 

@@ -6,13 +6,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from solvers.pose_nlp import (
+from solvers.poses.pose_nlp import (
     build_pose_nlp,
     pose_of,
     pose_parameters,
     variables_of,
 )
-from solvers.pose_program import (
+from solvers.poses.pose_program import (
     PoseProgram,
     light_directions,
     pose_margins,

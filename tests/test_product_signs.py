@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.product_signs import ProductSigns, packed
+from geometry.directions.product_signs import ProductSigns, packed
 
 
 def unpacked(words, n):

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, sphere
-from planning import lighting
-from planning.candidates import aimed_poses
-from planning.plan import PlannedProjector
-from planning.projector_light import lit_margins, lit_stages
-from planning.projector_poses import _between, widen_margins
-from planning.projectors import ProjectorStage, plan_projectors
-from planning.rig import load_rig
-from planning.rings import ring_frame, uniform_radii
-from planning.scene import Scene
-from planning.share_margin import margin_at_share
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, sphere
+from planning.model.plan import PlannedProjector
+from planning.projectors.projector_poses import _between, widen_margins
+from planning.projectors.projector_stage import ProjectorStage, plan_projectors
+from planning.projectors.share_margin import margin_at_share
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import ring_frame, uniform_radii
+from planning.scene import lighting
+from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import aimed_poses
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +132,7 @@ def test_poses_between_are_taken_if_wider_with_light_to_spare(
             return State(offered)
 
     monkeypatch.setattr(
-        "planning.projector_poses.widest_between", lambda *given: ("Q",)
+        "planning.projectors.projector_poses.widest_between", lambda *given: ("Q",)
     )
     state = State(np.where(np.arange(1000) < 940, 0.2, -np.inf))
     found = _between(state, 900, 940, 640)

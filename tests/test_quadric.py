@@ -5,12 +5,13 @@ import sys
 import numpy as np
 import pytest
 
-from geometry import parallel, two_processes
-from geometry.curvature import principal_curvatures
-from geometry.diffusion import diffused, surface_laplacian, vertex_areas
-from geometry.mesh import TriangleMesh
-from geometry.primitives import sphere
-from geometry.quadric import fit_quadrics
+from geometry import parallel
+from geometry.curvature import two_processes
+from geometry.curvature.curvature import principal_curvatures
+from geometry.curvature.quadric import fit_quadrics
+from geometry.mesh.diffusion import diffused, surface_laplacian, vertex_areas
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import sphere
 
 
 def test_too_few_neighbours_arent_fitted() -> None:

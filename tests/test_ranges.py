@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.best_sphere import BestSphere, fit_sphere
-from geometry.sight_lines import SightLines, locate
-from planning.audit.ledger import Ledger
-from planning.audit.ranges import audit_ranges
-from planning.camera_routes import slide_routes
-from planning.errors import InfeasibleLimitsError, InputError
+from geometry.shapes.best_sphere import BestSphere, fit_sphere
+from geometry.shapes.sight_lines import SightLines, locate
+from planning.cameras.camera_routes import slide_routes
+from planning.model.errors import InfeasibleLimitsError, InputError
+from planning.model.plan import RigPlan
 from planning.pipeline import plan_rig
-from planning.plan import RigPlan
-from planning.range_entries import limits_at, summary_lines, with_spread
-from planning.range_file import read_range_file
-from planning.range_guard import guarded
-from planning.ranges import read_ranges
-from planning.rig import load_rig
+from planning.report.entries.range_entries import limits_at, summary_lines, with_spread
+from planning.rig.range_guard import guarded
+from planning.rig.rig import load_rig
+from planning.scene.ranges.range_file import read_range_file
+from planning.scene.ranges.ranged_body import read_ranges
+from planning.verify.audit.baselines.range_claims import audit_ranges
+from planning.verify.audit.ledger import Ledger
 
 HEADER = "point,x_mm,y_mm,z_mm,dx,dy,dz,sigma_deg"
 RANGED = HEADER + ",range_mm,sigma_mm"

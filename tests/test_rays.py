@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, grid, sphere
-from geometry.rays import RayCaster
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.shapes.primitives import box, grid, sphere
 
 
 def directions(n: int, seed: int = 0) -> np.ndarray:

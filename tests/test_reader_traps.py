@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.gltf_format import read_gltf
-from geometry.mesh import MeshError, TriangleMesh
-from geometry.readers import load_mesh
+from geometry.files.gltf_format import read_gltf
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import MeshError, TriangleMesh
 
 # A unit right triangle times 30 mm, twice over: area 2 * 450 mm² as a 30 mm square.
 SQUARE = ((0, 0, 0), (30, 0, 0), (30, 30, 0), (0, 30, 0))
@@ -481,7 +481,7 @@ def test_a_small_archive_of_much_is_not_set_aside_at_once(
 ) -> None:
     import gzip
 
-    from geometry import readers
+    from geometry.files import readers
 
     path = tmp_path / "a.obj.gz"
     path.write_bytes(gzip.compress(b"\n" * (1 << 21)))

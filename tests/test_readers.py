@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from geometry.mesh import MeshError, TriangleMesh
-from geometry.primitives import box, sphere
-from geometry.readers import load_mesh
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import MeshError, TriangleMesh
+from geometry.shapes.primitives import box, sphere
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 needs_shared = pytest.mark.skipif(

@@ -13,9 +13,9 @@ import trimesh
 from click.testing import CliRunner
 
 import planning
-from geometry.proximity import closest_points
-from planning.cli import commands
-from planning.plan import RigPlan
+from geometry.rays.proximity import closest_points
+from planning.cli.main import commands
+from planning.model.plan import RigPlan
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_saved_images_give_the_same_file_in_a_process_of_its_own(folder, simulat
     home = str(Path(planning.__file__).resolve().parents[1])
     words = ["reconstruct", "plan.json", "--captures", "captures", "-o", "two"]
     done = subprocess.run(
-        [sys.executable, "-c", "from planning.cli import main; main()", *words],
+        [sys.executable, "-c", "from planning.cli.main import main; main()", *words],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": home, "PYTHONWARNINGS": "ignore"},
         capture_output=True,
@@ -238,7 +238,7 @@ def test_a_calibration_moves_devices_in_simulation_and_captures(
 
 
 def test_a_cloud_of_someone_else_is_not_removed(folder, simulated, tmp_path):
-    from planning.reconstruction.cloud_file import remove_cloud
+    from planning.verify.reconstruction.cloud_file import remove_cloud
 
     other = tmp_path / "cloud.ply"
     other.write_text("ply\nformat ascii 1.0\ncomment mine\n")

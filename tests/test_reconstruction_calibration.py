@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from geometry.primitives import sphere
-from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
-from planning.reconstruction.patterns import ring_plane
+from geometry.shapes.primitives import sphere
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
 
 LENS = (-0.12, 0.05, 8e-4, -6e-4, -0.01)
 

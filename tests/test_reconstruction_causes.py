@@ -9,19 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.primitives import sphere
-from geometry.sampling import sample_surface
-from planning.plan import RigPlan
-from planning.reconstruction import rendered as rendered_module
-from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
-from planning.reconstruction.causes import rejection
-from planning.reconstruction.check import reconstruct_plan
-from planning.reconstruction.cloud import Cloud
-from planning.reconstruction.decode import CAUSES, Decoded
-from planning.reconstruction.patterns import ring_plane
-from planning.reconstruction.result import PairCount
-from planning.reconstruction.roots import wrong_roots
-from planning.reconstruction.supposed import Evidence, Supposed, places
+from geometry.mesh.sampling import sample_surface
+from geometry.shapes.primitives import sphere
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.check.result import PairCount
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.decode import CAUSES, Decoded
+from planning.verify.reconstruction.faults.causes import rejection
+from planning.verify.reconstruction.faults.roots import wrong_roots
+from planning.verify.reconstruction.faults.supposed import Evidence, Supposed, places
+from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
+from planning.verify.reconstruction.render import rendered as rendered_module
 
 FOCAL = 1400.0
 

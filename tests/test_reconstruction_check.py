@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
-from geometry.primitives import box, sphere
-from geometry.sampling import sample_surface
-from planning.plan import RigPlan
-from planning.reconstruction import rendered as rendered_module
-from planning.reconstruction.check import Reconstruction, reconstruct_plan
-from planning.reconstruction.patterns import Frames
-from planning.reconstruction.verdict import nearest_distance
+from geometry.shapes.primitives import box, sphere
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.check.accuracy import nearest_distance
+from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan
+from planning.verify.reconstruction.patterns.ring_patterns import Frames
+from planning.verify.reconstruction.render import rendered as rendered_module
 
 KEYS = {
     "n_points",

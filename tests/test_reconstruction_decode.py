@@ -5,20 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import grid
-from geometry.rays import RayCaster
-from planning.reconstruction.calibration import (
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.shapes.primitives import grid
+from planning.verify.reconstruction.calibration import (
     PairCalibration,
     calibrate_camera,
     calibrate_projector,
 )
-from planning.reconstruction.decode import decode
-from planning.reconstruction.edges import find_edges
-from planning.reconstruction.patterns import Frames, RingPatterns, ring_patterns
-from planning.reconstruction.photometry import Photometry
-from planning.reconstruction.render import render_pair
-from planning.reconstruction.view import view
+from planning.verify.reconstruction.decode.decode import decode
+from planning.verify.reconstruction.decode.edges import find_edges
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    Frames,
+    RingPatterns,
+    ring_patterns,
+)
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.render import render_pair
+from planning.verify.reconstruction.render.view import view
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
 

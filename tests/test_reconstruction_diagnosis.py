@@ -13,16 +13,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
-from geometry.rays import RayCaster
-from geometry.sampling import sample_surface
-from planning.plan import RigPlan
-from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
-from planning.reconstruction.cause_words import _two_digits, in_words
-from planning.reconstruction.diagnosis import diagnose_edges
-from planning.reconstruction.patterns import ring_plane
-from planning.reconstruction.supposed import Evidence
+from geometry.rays.rays import RayCaster
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.faults.cause_words import _two_digits, in_words
+from planning.verify.reconstruction.faults.diagnosis import diagnose_edges
+from planning.verify.reconstruction.faults.supposed import Evidence
+from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
 
 NOISE_PX = 0.02
 EDGES = 150

@@ -5,9 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planning.reconstruction.fits import fit, least_change
-from planning.reconstruction.patterns import ring_plane
-from planning.reconstruction.supposed import Evidence, Supposed, mismatches, places
+from planning.verify.reconstruction.faults.fits import fit, least_change
+from planning.verify.reconstruction.faults.supposed import (
+    Evidence,
+    Supposed,
+    mismatches,
+    places,
+)
+from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
 
 RNG = np.random.default_rng(0)
 SLOPES = RNG.normal(size=(300, 3))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from planning.reconstruction.cloud import Cloud
-from planning.reconstruction.merge import merge
+from planning.verify.reconstruction.check.merge import merge
+from planning.verify.reconstruction.cloud import Cloud
 
 GAP_M, PITCH_PX = 3.5e-3, 12.0
 

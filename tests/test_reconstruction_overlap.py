@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import sphere
-from geometry.rays import RayCaster
-from planning.reconstruction.calibration import calibrate_camera, calibrate_projector
-from planning.reconstruction.overlap import (
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.shapes.primitives import sphere
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.faults.overlapping_light import (
     balanced_accuracy,
     best_threshold,
     light_falls,
@@ -17,10 +20,10 @@ from planning.reconstruction.overlap import (
     overlap_by_intensity,
     three_classes,
 )
-from planning.reconstruction.patterns import ring_patterns
-from planning.reconstruction.photometry import Photometry
-from planning.reconstruction.render import Shown, render_whites
-from planning.reconstruction.view import view
+from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.render import Shown, render_whites
+from planning.verify.reconstruction.render.view import view
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from geometry.mesh import MeshSource, TriangleMesh
-from geometry.primitives import box, sphere, torus
-from geometry.refinement import cut_for_curvature, cut_long_edges
-from geometry.topology import mesh_edges
+from geometry.curvature.refinement import cut_for_curvature, cut_long_edges
+from geometry.mesh.mesh import MeshSource, TriangleMesh
+from geometry.mesh.topology import mesh_edges
+from geometry.shapes.primitives import box, sphere, torus
 
 
 def edge_lengths(mesh: TriangleMesh) -> np.ndarray:

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.cones import averaged_normals, normal_cone
-from geometry.curvature import CurvatureField, principal_curvatures
-from geometry.dominance import dominant_faces, face_curvedness
-from geometry.face_curvature import face_curvature, steep_directions
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, grid, joined, sphere, torus
-from geometry.readers import load_mesh
-from geometry.refinement import cut_for_curvature
-from geometry.regions import DominantRegions, dominant_regions
-from geometry.topology import adjacent_faces, components, mesh_edges
+from geometry.curvature.curvature import CurvatureField, principal_curvatures
+from geometry.curvature.face_curvature import face_curvature, steep_directions
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import adjacent_faces, components, mesh_edges
+from geometry.regions.cones import averaged_normals, normal_cone
+from geometry.regions.dominance import dominant_faces, face_curvedness
+from geometry.regions.regions import DominantRegions, dominant_regions
+from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.primitives import grid, sphere
-from planning.lighting import LIT
-from planning.plan import PlannedProjector, RigPlan
-from planning.projectors import plan_projectors
-from planning.rig import load_rig
-from planning.scene import Scene
-from planning.shortfall import shortfalls
+from geometry.shapes.primitives import grid, sphere
+from planning.model.plan import PlannedProjector, RigPlan
+from planning.projectors.projector_stage import plan_projectors
+from planning.report.summary.shortfall import shortfalls
+from planning.rig.rig import load_rig
+from planning.scene.lighting import LIT
+from planning.scene.scene import Scene
 
 
 def plan(small_job, tmp_path, monkeypatch, mesh, rig, words=()):

@@ -3,12 +3,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.mesh import MeshError, TriangleMesh
-from geometry.orientation import orient
-from geometry.primitives import box, cylinder, grid, joined, sphere
-from geometry.readers import load_mesh
-from geometry.repair import clean
-from geometry.topology import adjacent_faces, components, mesh_edges
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import MeshError, TriangleMesh
+from geometry.mesh.topology import adjacent_faces, components, mesh_edges
+from geometry.repair.orientation import orient
+from geometry.repair.repair import clean
+from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(
@@ -76,7 +76,7 @@ def test_welding_survives_places_that_share_a_hash(
         def reduce(values: np.ndarray, axis: int) -> np.ndarray:
             return kept.reduce(values, axis=axis) & np.uint64(7)
 
-    monkeypatch.setattr("geometry.repair.np.bitwise_xor", Colliding)
+    monkeypatch.setattr("geometry.repair.repair.np.bitwise_xor", Colliding)
     ball = sphere(0.1, subdivisions=2)
     soup = ball.corners.reshape(-1, 3)
     vertices, faces, _, _ = clean(soup, np.arange(len(soup)).reshape(-1, 3))

@@ -9,11 +9,11 @@ import pytest
 from pydantic import BaseModel
 
 from geometry.devices import ParallelModel, PinholeModel
-from planning.errors import InfeasibleLimitsError, InputError, RigError
-from planning.requirements import Requirements
-from planning.rig import list_presets, load_rig
-from planning.rig_files import lay_over, preset_names, read_rig
-from planning.rig_models import RigTable
+from planning.model.errors import InfeasibleLimitsError, InputError, RigError
+from planning.model.requirements import Requirements
+from planning.rig.rig import list_presets, load_rig
+from planning.rig.rig_files import lay_over, preset_names, read_rig
+from planning.rig.rig_tables import RigTable
 
 MINIMAL = """
 name = "bench"

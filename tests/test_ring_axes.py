@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.primitives import sphere
-from planning.cameras import (
+from geometry.shapes.primitives import sphere
+from planning.cameras.camera_cover import (
     camera_stage,
     lit_samples,
     measured_by,
     offered_cameras,
     plan_cameras,
 )
-from planning.claims import Devices, make_claims
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.projector_light import lit_stages, margins_of, merged
-from planning.projectors import plan_projectors
-from planning.relaxations import reachability_relaxations
-from planning.rig import load_rig
-from planning.ring_axes import turn_ring_axes, widest_gap
-from planning.rings import ring_frame, uniform_radii
-from planning.scene import Scene
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.projectors.projector_stage import plan_projectors
+from planning.report.advice.relaxations import reachability_relaxations
+from planning.report.claims import Devices, make_claims
+from planning.rig.rig import load_rig
+from planning.rings.ring_axes import turn_ring_axes, widest_gap
+from planning.rings.ring_radii import ring_frame, uniform_radii
+from planning.scene.lit import lit_stages, margins_of, merged
+from planning.scene.scene import Scene
 
 RADIUS = 0.1
 

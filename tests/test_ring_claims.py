@@ -10,27 +10,27 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from planning.verify.audit.audit import audit_plan
 
-from geometry.mesh import TriangleMesh
-from planning.audit import audit_plan
-from planning.audit.chords import random_beam
-from planning.audit.estimates import Estimator
-from planning.audit.ledger import Ledger
-from planning.audit.occlusion import Shadow
-from planning.audit.predicates import Lamp
-from planning.audit.recompute import recompute
-from planning.audit.ring_gaps import audit_gaps
-from planning.audit.ring_light import RingLight, ring_spacing
-from planning.audit.rings import audit_rings
-from planning.audit.samples import draw_samples
-from planning.cameras import lit_samples, measured_by
-from planning.claims import Devices
-from planning.plan import RigPlan
-from planning.ring_creases import find_creases
-from planning.ring_entries import lost_to_rings_m2, with_rings
-from planning.ring_limits import ring_beam
-from planning.ring_stage import RingStage, _report
-from planning.scene import Scene
+from geometry.mesh.mesh import TriangleMesh
+from planning.cameras.camera_cover import lit_samples, measured_by
+from planning.model.plan import RigPlan
+from planning.report.claims import Devices
+from planning.report.entries.ring_entries import lost_to_rings_m2, with_rings
+from planning.rings.ring_creases import find_creases
+from planning.rings.ring_limits import ring_beam
+from planning.rings.ring_stage import RingStage, _report
+from planning.scene.scene import Scene
+from planning.verify.audit.estimates import Estimator
+from planning.verify.audit.ledger import Ledger
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import Lamp
+from planning.verify.audit.predicates.recompute import recompute
+from planning.verify.audit.rings.chords import random_beam
+from planning.verify.audit.rings.ring_claims import audit_rings
+from planning.verify.audit.rings.ring_gaps import audit_gaps
+from planning.verify.audit.rings.ring_light import RingLight, ring_spacing
+from planning.verify.audit.samples import draw_samples
 
 LIGHTS = ["diverging", "parallel"]
 # So many that none stands closer than the plan's where anything is lit.

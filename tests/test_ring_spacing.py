@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from planning.ring_curvature import chord_errors, ring_curvature
-from planning.ring_spacing import GapLimits, spaced_radii
+from planning.rings.ring_curvature import chord_errors, ring_curvature
+from planning.rings.ring_spacing import GapLimits, spaced_radii
 
 RADIUS = 0.1
 DISTANCE = 1.0

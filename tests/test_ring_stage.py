@@ -6,22 +6,23 @@ import numpy as np
 import pytest
 
 from geometry.devices import PinholeModel
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import box, sphere
-from planning import measurability, ring_pitch
-from planning.beam_profile import cast_beam
-from planning.cameras import lit_samples, measured_by
-from planning.measurability import rings_at
-from planning.plan import PlannedCamera, PlannedProjector
-from planning.rig import load_rig
-from planning.ring_axes import widest_gap
-from planning.ring_creases import crease_errors, find_creases
-from planning.ring_pitch import best_pitch, projector_gaps
-from planning.ring_shares import ring_shares
-from planning.ring_stage import space_rings
-from planning.rings import ring_frame, uniform_radii
-from planning.scene import Scene
+from geometry.shapes.primitives import box, sphere
+from planning.cameras.camera_cover import lit_samples, measured_by
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.rig.rig import load_rig
+from planning.rings import ring_pitch
+from planning.rings.beam_profile import cast_beam
+from planning.rings.ring_axes import widest_gap
+from planning.rings.ring_creases import crease_errors, find_creases
+from planning.rings.ring_pitch import best_pitch, projector_gaps
+from planning.rings.ring_radii import ring_frame, uniform_radii
+from planning.rings.ring_shares import ring_shares
+from planning.rings.ring_stage import space_rings
+from planning.scene import measurability
+from planning.scene.measurability import rings_at
+from planning.scene.scene import Scene
 
 RADIUS = 0.1
 AWAY = 1.1

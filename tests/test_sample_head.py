@@ -8,11 +8,11 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from geometry.mesh import TriangleMesh
-from geometry.rays import RayCaster
-from planning.errors import InputError
-from planning.geodesic import geodesic_grid
-from planning.sample_head import HeadShape, sample_head, write_sample
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.shapes.sample_head.geodesic import geodesic_grid
+from geometry.shapes.sample_head.sample_head import HeadShape, sample_head, write_sample
+from planning.model.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, grid, sphere
-from geometry.sampling import sample_surface
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
+from geometry.shapes.primitives import box, grid, sphere
 
 
 def test_every_sample_stands_for_the_same_area_and_lies_in_its_face() -> None:

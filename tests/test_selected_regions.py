@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 
-from geometry.cones import averaged_normals
-from geometry.curvature import principal_curvatures
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, cylinder, grid, sphere
-from geometry.regions import DominantRegions, dominant_regions
-from geometry.selected_regions import heaviest_faces, lightest_corner, regions_of_faces
-from geometry.topology import adjacent_faces, components, mesh_edges
+from geometry.curvature.curvature import principal_curvatures
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import adjacent_faces, components, mesh_edges
+from geometry.regions.cones import averaged_normals
+from geometry.regions.regions import DominantRegions, dominant_regions
+from geometry.regions.selected_regions import (
+    heaviest_faces,
+    lightest_corner,
+    regions_of_faces,
+)
+from geometry.shapes.primitives import box, cylinder, grid, sphere
 
 
 def regions_of(mesh: TriangleMesh, chosen: np.ndarray, **options) -> DominantRegions:

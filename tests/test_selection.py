@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from planning.selection import certificate, marginals, select_fewest
+from planning.proofs.selection import certificate, marginals, select_fewest
 
 
 def brute(covers, required, count):

@@ -5,7 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from planning.share_margin import enough_lit, margin_at_share, widest_selection
+from planning.projectors.share_margin import (
+    enough_lit,
+    margin_at_share,
+    widest_selection,
+)
 
 STEP = np.radians(0.25)
 

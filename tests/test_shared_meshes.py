@@ -10,10 +10,10 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from geometry.curvature import principal_curvatures
-from geometry.mesh import TriangleMesh
-from geometry.readers import load_mesh
-from geometry.regions import dominant_regions
+from geometry.curvature.curvature import principal_curvatures
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.regions.regions import dominant_regions
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(

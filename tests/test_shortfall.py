@@ -5,8 +5,8 @@ import dataclasses
 
 import pytest
 
-from planning.shortfall import area_words, shortfalls
-from planning.summary import _cell
+from planning.report.summary.shortfall import area_words, shortfalls
+from planning.report.summary.summary import _cell
 
 
 @pytest.fixture

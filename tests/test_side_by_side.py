@@ -6,30 +6,30 @@ import numpy as np
 import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
-from geometry.primitives import box, grid, sphere
-from planning.audit.devices import outside_by
-from planning.cameras import offered_cameras
-from planning.candidates import projector_candidates, projectors_towards
-from planning.continuous import Effort, prove_fewest
-from planning.draft import Order
-from planning.field import half_rectangle, middle_ray, overflows
-from planning.lighting import LIT
-from planning.one_fewer import Offer, one_fewer
-from planning.plan import PlannedCamera
+from geometry.shapes.primitives import box, grid, sphere
+from planning.cameras.camera_cover import offered_cameras
+from planning.model.plan import PlannedCamera
+from planning.model.progress import Stopwatch
+from planning.model.requirements import Requirements
+from planning.model.zones import Box
 from planning.prepare import prepared
-from planning.progress import Stopwatch
-from planning.projector_light import lit_margins, lit_stages
-from planning.projector_poses import widen_margins
-from planning.projectors import plan_projectors
-from planning.requirements import Requirements
-from planning.rig import load_rig
-from planning.rings import ring_frame
-from planning.share_margin import margin_at_share
-from planning.view_tiles import poses_beside, tiled_poses
-from planning.wider_field import wider_field
-from planning.zones import Box
+from planning.projectors.one_fewer import Offer, one_fewer
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.projector_stage import plan_projectors
+from planning.projectors.share_margin import margin_at_share
+from planning.proofs.projector_bound import Effort, prove_fewest
+from planning.report.advice.wider_field import wider_field
+from planning.report.draft import Order
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import ring_frame
+from planning.scene.lighting import LIT
+from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.workspace.candidates import projector_candidates, projectors_towards
+from planning.scene.workspace.field import half_rectangle, middle_ray, overflows
+from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
+from planning.verify.audit.devices.device_claims import outside_by
 
 ASKED = dict.fromkeys(
     ("max_cameras", "coverage", "min_reachable", "accuracy_mm", "up"), None
@@ -115,7 +115,7 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
     assert stage.certificate["continuous"]["lower_bound"] <= count
     if light == "parallel":
         return
-    monkeypatch.setattr("planning.projector_poses._SWEEPS", 1)
+    monkeypatch.setattr("planning.projectors.projector_poses._SWEEPS", 1)
     rows = stage.rows
     moved = widen_margins(scene, stage)
     lit = lit_stages(scene, moved, rows) == LIT

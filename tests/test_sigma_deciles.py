@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.primitives import sphere
-from planning.edge_noise import EdgeNoise
+from geometry.shapes.primitives import sphere
+from planning.report.entries.edge_noise import EdgeNoise
 
 
 @pytest.fixture(scope="module")

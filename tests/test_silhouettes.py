@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box, grid, joined
-from geometry.silhouettes import Silhouettes
+from geometry.directions.silhouettes import Silhouettes
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, grid, joined
 
 
 def turned(mesh, angle, by):

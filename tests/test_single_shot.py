@@ -6,18 +6,25 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.primitives import sphere
-from planning.reconstruction.calibration import (
+from geometry.shapes.primitives import sphere
+from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     PairCalibration,
     ProjectorCalibration,
 )
-from planning.reconstruction.patterns import Frames, RingPatterns, ring_patterns
-from planning.reconstruction.prior_labels import label_by_prior
-from planning.reconstruction.ring_lines import find_lines, line_patterns
-from planning.reconstruction.triangulate import intersect_rings
+from planning.verify.reconstruction.decode.triangulate import intersect_rings
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    Frames,
+    RingPatterns,
+    ring_patterns,
+)
+from planning.verify.reconstruction.single_shot.prior_labels import label_by_prior
+from planning.verify.reconstruction.single_shot.ring_lines import (
+    find_lines,
+    line_patterns,
+)
 
 UP = np.array([0.0, 0.0, 1.0])
 BALL = 0.06

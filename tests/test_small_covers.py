@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solvers import CoverProblem, solve_cover
-from solvers.cover import solve_max_coverage
+from solvers.covers.cover import solve_max_coverage
 from solvers.status import SolveStatus
 
 # The benchmark runs 10,000 of them.

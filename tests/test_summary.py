@@ -7,11 +7,11 @@ import pytest
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
-from planning.candidates import aimed_poses
-from planning.cost import cost_entry, cost_lines
-from planning.plan import PlannedCamera
-from planning.progress import Stopwatch
-from planning.summary import aim_angles
+from planning.model.plan import PlannedCamera
+from planning.model.progress import Stopwatch
+from planning.report.entries.cost import cost_entry, cost_lines
+from planning.report.summary.summary import aim_angles
+from planning.scene.workspace.candidates import aimed_poses
 
 Z = np.array([0.0, 0.0, 1.0])
 CAMERA = PinholeModel(

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from planning.reconstruction.calibration import CameraCalibration, ProjectorCalibration
-from planning.reconstruction.patterns import RingPatterns, ring_patterns
-from planning.reconstruction.triangulate import intersect_rings
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+from planning.verify.reconstruction.decode.triangulate import intersect_rings
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    RingPatterns,
+    ring_patterns,
+)
 
 
 def random_turn(rng: np.random.Generator) -> np.ndarray:

@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import sphere
-from planning import verification
-from planning.audit.figures import compare_figures
-from planning.errors import PlanFileError
-from planning.plan import RigPlan
-from planning.verification import compare_meshes, verify_plan
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import sphere
+from planning.model.errors import PlanFileError
+from planning.model.plan import RigPlan
+from planning.verify import verification
+from planning.verify.audit.figure_claims import compare_figures
+from planning.verify.verification import compare_meshes, verify_plan
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +120,9 @@ def test_a_missed_limit_is_a_failure_unless_owned_up(
     handmade, verified, strict_pixels, monkeypatch, change, sentence
 ):
     # What is recorded doesn't change the pixels: they are computed once.
-    monkeypatch.setattr("planning.verification._reconstruct", lambda *_: strict_pixels)
+    monkeypatch.setattr(
+        "planning.verify.verification._reconstruct", lambda *_: strict_pixels
+    )
     figures = verified[0].reconstruction.to_document()
     recorded = None if change is None else figures | change
     found = verify_plan(_strict(handmade, recorded))

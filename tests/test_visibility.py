@@ -7,11 +7,11 @@ import igl
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import grid, sphere
-from geometry.sampling import SurfaceSamples, sample_surface
-from geometry.visibility import Visibility, morton_order
-from geometry.visibility_matrix import BitMatrix, visibility_matrix
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples, sample_surface
+from geometry.rays.visibility import Visibility, morton_order
+from geometry.rays.visibility_matrix import BitMatrix, visibility_matrix
+from geometry.shapes.primitives import grid, sphere
 
 
 def bumpy(radius: float, *, centre: float = 0.0, subdivisions: int = 5) -> TriangleMesh:

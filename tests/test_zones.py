@@ -6,18 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
-from geometry.primitives import box as plate_of
+from geometry.shapes.primitives import box as plate_of
 from planning import load_rig, plan_rig
-from planning.audit.audit import audit_plan
-from planning.audit.zones import zone_excess
-from planning.candidates import camera_candidates, projectors_around, shell_positions
-from planning.errors import InfeasibleLimitsError, RequirementError, RigError
-from planning.plan import PlannedCamera, PlannedProjector, RigPlan
-from planning.requirements import Requirements
-from planning.zone_limits import depth, half_spaces, may_hold, stands
-from planning.zone_positions import admissible, along_rays
+from planning.model.errors import InfeasibleLimitsError, RequirementError, RigError
+from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.requirements import Requirements
+from planning.scene.workspace.candidates import (
+    camera_candidates,
+    projectors_around,
+    shell_positions,
+)
+from planning.scene.workspace.zone_limits import depth, half_spaces, may_hold, stands
+from planning.scene.workspace.zone_positions import admissible, along_rays
+from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.devices.zone_claims import zone_excess
 
 # A ball of 100 mm: devices stand 1050 to 1150 mm from its centre, which is off the
 # origin, so that offsets and positions differ.

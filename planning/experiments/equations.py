@@ -8,7 +8,10 @@ which is what triangulation adds. (6) should read Y2 = J y2.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reconstruction.calibration import CameraCalibration, ProjectorCalibration
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
 
 
 def projection_matrix(camera: CameraCalibration) -> NDArray[np.float64]:

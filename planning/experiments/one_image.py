@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.mesh import TriangleMesh
-from geometry.rays import RayCaster
-
-from ..plan import RigPlan
-from ..reconstruction.calibration import PairCalibration
-from ..reconstruction.single_shot_rig import Shot
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.calibration import PairCalibration
+from planning.verify.reconstruction.single_shot.single_shot_rig import Shot
 
 
 @dataclass(frozen=True)

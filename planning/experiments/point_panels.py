@@ -6,12 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from geometry.mesh import TriangleMesh
-from geometry.rays import RayCaster
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from planning.report.drawing.draw_marks import INK, PALE, Panel, font
+from planning.report.drawing.draw_views import (
+    BACKGROUND,
+    SUPERSAMPLING,
+    Colour,
+    Shader,
+    View,
+    fitted,
+)
 
-from ..draw_marks import INK, PALE, Panel, font
-from ..draw_views import BACKGROUND, SUPERSAMPLING, Colour, Shader, View, fitted
-from .devices import UP, bearing
+from .paper_devices import UP, bearing
 
 # Points stand out against a dark object.
 _OBJECT: Colour = (112, 112, 120)

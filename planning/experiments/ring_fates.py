@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from geometry.rays import RayCaster
-
-from ..plan import PlannedProjector, RigPlan
-from ..reconstruction.calibration import (
+from geometry.rays.rays import RayCaster
+from planning.model.plan import PlannedProjector, RigPlan
+from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
     calibrate_camera,
     calibrate_projector,
 )
-from ..reconstruction.cloud import Cloud
+from planning.verify.reconstruction.cloud import Cloud
 
 # Places on a ring, and how near a measured point makes one measured [m].
 _PLACES = 1440

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.sampling import SurfaceSamples, sample_surface
+from geometry.mesh.sampling import SurfaceSamples, sample_surface
+from planning.verify.reconstruction.check.check import conclude, reconstruct_plan
+from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.rendered import Progress
+from planning.verify.reconstruction.single_shot.single_shot_rig import shoot_rig
 
-from ..reconstruction.check import conclude, reconstruct_plan
-from ..reconstruction.cloud import Cloud
-from ..reconstruction.photometry import Photometry
-from ..reconstruction.rendered import Progress
-from ..reconstruction.result import Reconstruction
-from ..reconstruction.single_shot_rig import shoot_rig
-from .errors import Measured, measured
 from .one_image import LabelCount, Prior, judged_labels
+from .point_errors import Measured, measured
 from .ring_fates import RingFate, lit_and_seen, ring_fates
 from .setups import Experiment
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plan import RigPlan
-from ..reconstruction.check import reconstruct_plan
-from ..reconstruction.cloud import Cloud
-from .errors import Measured, measured
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.cloud import Cloud
+
+from .point_errors import Measured, measured
 from .run import Outcome, observable
 
 

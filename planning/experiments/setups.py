@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from geometry.mesh import TriangleMesh
-from geometry.primitives import box
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box
+from geometry.shapes.sample_head.sample_head import HeadShape, sample_head
+from planning.model.plan import RigPlan
+from planning.model.surface import Surface
 
-from ..plan import RigPlan
-from ..sample_head import HeadShape, sample_head
-from ..surface import Surface
-from .devices import (
+from .paper_devices import (
     FITTING,
     PRINTED,
     STANDOFF_M,

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from .devices import CAMERA_PX, PROJECTOR_PX
-from .errors import Errors, Measured
 from .one_image import LabelCount
+from .paper_devices import CAMERA_PX, PROJECTOR_PX
+from .point_errors import Errors, Measured
 from .run import Outcome
 from .second_sequence import Doubled
 from .setups import Experiment

@@ -1,0 +1,1 @@
+"""Principal curvatures at a physical scale."""

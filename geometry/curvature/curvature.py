@@ -1,0 +1,231 @@
+"""Principal curvatures at a physical scale, and where they can be trusted."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from geometry.mesh.diffusion import diffused
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.tensors import cross, principal, tangent_planes, unpacked
+from geometry.mesh.topology import Edges, components, face_pairs, numbered
+
+from .quadric import RINGS, fit_quadrics
+
+DEFAULT_RADIUS_SHARE = 0.02
+# Tensors are averaged over this share of the scale, but no less than some neighbours:
+# a quadric leaves out what is cubic, which on irregular triangles is as good as noise.
+_AVERAGED_SHARE, _LEAST_EDGES = 0.5, 0.6
+# Positions are averaged over the same before, less the edge that a fit reaches over
+# anyway: where triangles are that large, moving vertices costs more than it wins.
+_FITTED_EDGES = 1.0
+# Turns sharper than this between two faces are creases of the object, not facets.
+_SHARPEST_FACET = np.deg2rad(40.0)
+_LEAST_TURN = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class CurvatureField:
+    """Principal curvatures per vertex; an outward-oriented sphere has positive ones.
+
+    Attributes:
+        radius: Radius of the neighbourhood that was asked for, in [m].
+        scale: The one that holds: `radius`, or the size of the facets where none was
+            asked for and those of a coarse mesh are larger, in [m].
+        k_max: Larger principal curvature in [1/m], shape (n_v,); 0 where not valid.
+        k_min: Smaller one, signed, k_min <= k_max.
+        direction_max: Unit direction of k_max, shape (n_v, 3).
+        direction_min: Unit direction of k_min.
+        valid: Whether the vertex could be fitted, isn't on an edge of more than two
+            faces, and lies farther than ``radius`` and two rings from an open border,
+            shape (n_v,).
+    """
+
+    radius: float
+    scale: float
+    k_max: NDArray[np.float64]
+    k_min: NDArray[np.float64]
+    direction_max: NDArray[np.float64]
+    direction_min: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+
+    @cached_property
+    def steep(self) -> NDArray[np.float64]:
+        """Unit direction T1 of the curvature of larger magnitude, shape (n_v, 3)."""
+        larger = np.abs(self.k_max) >= np.abs(self.k_min)
+        return np.where(larger[:, None], self.direction_max, self.direction_min)
+
+    @cached_property
+    def curvedness(self) -> NDArray[np.float64]:
+        """sqrt((k_max^2 + k_min^2) / 2) in [1/m], shape (n_v,)."""
+        return np.sqrt(0.5 * (self.k_max**2 + self.k_min**2))
+
+    @cached_property
+    def tensors(self) -> NDArray[np.float64]:
+        """k_max d_max d_max^T + k_min d_min d_min^T in [1/m], shape (n_v, 3, 3)."""
+        a, b = self.direction_max, self.direction_min
+        return (
+            self.k_max[:, None, None] * a[:, :, None] * a[:, None, :]
+            + self.k_min[:, None, None] * b[:, :, None] * b[:, None, :]
+        )
+
+
+def principal_curvatures(
+    mesh: TriangleMesh, radius: float | None = None
+) -> CurvatureField:
+    """Return principal curvatures and directions at a physical scale.
+
+    A quadric is fitted to two rings about each vertex, and the curvature tensors are
+    averaged by diffusion over half the scale. On meshes finer than that, positions are
+    averaged over it before, since noise is large beside short edges. So other triangles
+    on the same object give the same curvatures, and noise shorter than the scale is
+    averaged out. Both averages vanish with the radius, down to 0.6 edges for tensors
+    and none for positions: a radius below an edge is the route for clean meshes.
+
+    The scale is a radius that is given; else it is 2 % of the mesh's size, or the size
+    of the facets (`facet_size`) of a coarse mesh where those are larger, since the mesh
+    knows nothing smaller of the shape. Edges should not be longer than it
+    (`refinement.refined` cuts them). Source of the fit: Panozzo, Puppo and Rocca,
+    "Efficient multi-scale curvature and crease estimation", 2010.
+
+    Args:
+        mesh: Repaired and oriented outwards.
+        radius: Of the neighbourhood in [m]; default 2 % of the mesh's size.
+
+    Raises:
+        ValueError: If the radius isn't positive.
+    """
+    if radius is None:
+        radius = DEFAULT_RADIUS_SHARE * mesh.size
+        # Facets are no larger than the longest edge.
+        fine = mesh.longest_edge <= radius
+        return _curvatures(
+            mesh, radius, radius if fine else max(radius, facet_size(mesh))
+        )
+    if not (radius > 0 and np.isfinite(radius)):
+        raise ValueError(f"radius must be a positive number of metres, got {radius}")
+    return _curvatures(mesh, radius, radius)
+
+
+def facet_size(mesh: TriangleMesh) -> float:
+    """Return the length in [m] over which the mesh turns from face to face.
+
+    sum(turn (A1 + A2)) / sum(turn edge) over the edges of two faces with areas A1, A2
+    that turn by less than 40 degrees; sharper ones are creases of the object, and flat
+    surface counts nothing, however large its triangles. 0 without such an edge.
+    """
+    edges = mesh.edges
+    pairs, edge = face_pairs(edges)
+    normals = mesh.face_normals[pairs]
+    sine = np.linalg.norm(cross(normals[:, 0], normals[:, 1]), axis=1)
+    turn = np.arctan2(sine, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
+    # Below, it is the rounding of flat surface.
+    turn[(turn > _SHARPEST_FACET) | (turn < _LEAST_TURN)] = 0.0
+    ends = mesh.vertices[edges.ends[edge]]
+    length = turn @ np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    area = turn @ mesh.face_areas[pairs].sum(axis=1)
+    return float(area / length) if length > 0 else 0.0
+
+
+def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureField:
+    n = len(mesh.vertices)
+    valid = np.zeros(n, dtype=bool)
+    k, directions = np.zeros((2, n)), np.zeros((2, n, 3))
+    directions[0], directions[1] = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
+    solid = mesh.faces[mesh.face_areas > 0]
+    if len(solid):
+        # Unit mean edge about the origin: libigl's thresholds are absolute numbers.
+        edge = mesh.mean_edge
+        used, faces = numbered(solid, n)
+        part = mesh
+        if len(used) < n or len(solid) < len(mesh.faces):
+            part = TriangleMesh(mesh.vertices[used], faces)
+        whole = ~_near_border(part.vertices, part.edges, radius, RINGS)
+        vertices = (part.vertices - mesh.centre) / edge
+        mass = part.vertex_areas / (edge * edge)
+        found, ways, fitted = _averaged_fit(
+            vertices, faces, mass, part.laplacian, whole, scale / edge
+        )
+        valid[used] = fitted
+        k[:, valid] = found[:, fitted] / edge
+        directions[:, valid] = ways[:, fitted]
+    for values in (k, directions, valid):
+        values.setflags(write=False)
+    return CurvatureField(
+        radius, scale, k[0], k[1], directions[0], directions[1], valid
+    )
+
+
+def _averaged_fit(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    mass: NDArray[np.float64],
+    laplacian: csr_array,
+    whole: NDArray[np.bool_],
+    scale: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Fit, averaged over a scale in mean edges; and where there was one.
+
+    Only vertices with a whole neighbourhood take part.
+    """
+    beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
+    if beyond > 0:
+        vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))
+    tensors, normals, fitted, sensible = fit_quadrics(vertices, faces)
+    fitted, sensible = fitted & whole, sensible & whole
+    if np.any(fitted & ~sensible):
+        # Those take over what is around them; where nothing is, they aren't known.
+        fitted &= _joined_to(sensible, laplacian)
+    tensors = diffused(
+        tensors,
+        np.where(sensible, mass, 0.0),
+        laplacian,
+        max(_AVERAGED_SHARE * scale, _LEAST_EDGES),
+    )
+    return *principal(unpacked(tensors), tangent_planes(normals)), fitted
+
+
+def _joined_to(chosen: NDArray[np.bool_], laplacian: csr_array) -> NDArray[np.bool_]:
+    """Which nodes are connected to a chosen one, shape (n,)."""
+    count, label = connected_components(laplacian, directed=False)
+    held = np.zeros(count, dtype=bool)
+    held[label[chosen]] = True
+    return held[label]
+
+
+def _near_border(
+    vertices: NDArray[np.float64], edges: Edges, reach: float, rings: int
+) -> NDArray[np.bool_]:
+    """Vertices on a border or branching edge, or in reach or rings of a long border.
+
+    A neighbourhood that a border cuts in two is fitted on one side only, and the
+    border's own teeth look like curvature. A pinhole, whose rim is shorter than the
+    circumference of the neighbourhood, spoils no more than its rim.
+    """
+    n = len(vertices)
+    near = np.zeros(n, dtype=bool)
+    near[edges.ends[edges.n_faces != 2]] = True
+    rim = edges.ends[edges.border]
+    if len(rim) == 0:
+        return near
+    count, loop = components(rim, n)
+    ends = vertices[rim]
+    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    long = np.bincount(loop[rim[:, 0]], lengths, count) > 2.0 * np.pi * reach
+    sources = np.unique(rim[long[loop[rim[:, 0]]]])
+    if len(sources) == 0:
+        return near
+    a, b = edges.ends.T
+    lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    graph = coo_array((lengths, (a, b)), (n, n)).tocsr()
+    distance = dijkstra(
+        graph, directed=False, indices=sources, min_only=True, limit=reach
+    )
+    touched = np.zeros(n, dtype=bool)
+    touched[sources] = True
+    for _ in range(rings):
+        touched[edges.ends[touched[edges.ends].any(axis=1)]] = True
+    return near | touched | np.isfinite(distance)

@@ -1,0 +1,127 @@
+"""Curvature tensors from libigl's quadrics, fitted to two rings about each vertex."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.tensors import cross, packed
+from geometry.mesh.topology import numbered
+
+from .two_processes import principal_curvature
+
+# A quadric has six coefficients: one ring is too few. More rings would reach farther on
+# coarse meshes than on fine ones; the scale is kept by diffusion instead.
+RINGS = 2
+# Over its shortest edge a surface can't turn by more than half a turn: what is more
+# comes of neighbours that hardly determine a quadric, and may be anything.
+_MOST_TURN = np.pi
+# A vertex normal shorter than this share of its faces' area is none.
+_CANCELLED = 1e-6
+
+
+def fit_quadrics(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]
+]:
+    """Fit a quadric to two rings about each vertex, over the plane of its normals.
+
+    The tensor is k1 d1 d1^T + k2 d2 d2^T; an outward-oriented sphere is positive.
+    Source: Panozzo, Puppo and Rocca, "Efficient multi-scale curvature and crease
+    estimation", 2010, as libigl has it.
+
+    Args:
+        vertices: Shape (n, 3), of about unit edges near the origin: libigl's thresholds
+            are absolute numbers.
+        faces: With area, shape (m, 3).
+
+    Returns:
+        Tensors as six numbers each (`tensors.packed`), (n, 6); the unit normals that
+        they lie across, (n, 3); whether there was a fit, (n,); and where it makes
+        sense: the curvature times the shortest edge is no more than pi, (n,). Tensors
+        are zero elsewhere.
+    """
+    k, ways, fitted = _fit(vertices, faces)
+    turn = np.linalg.norm(k, axis=0) * _shortest_edges(vertices, faces)
+    sensible = fitted & (turn <= _MOST_TURN)
+    k[:, ~sensible] = 0.0
+    # An exactly flat neighbourhood has no direction of its own, hence no normal.
+    normals = cross(ways[0], ways[1])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(
+        length > 0.5,
+        normals / np.maximum(length, 0.5),
+        _vertex_normals(vertices, faces),
+    )
+    return packed((k[0], k[1]), (ways[0], ways[1])), normals, fitted, sensible
+
+
+def _fit(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,).
+
+    Where there is no success, all are zero.
+    """
+    n = len(vertices)
+    k, ways, fitted = np.zeros((2, n)), np.zeros((2, n, 3)), np.zeros(n, dtype=bool)
+    # libigl reads out of bounds at vertices without a face.
+    used, local = numbered(_with_normals(vertices, faces), n)
+    if len(used) == 0:
+        return k, ways, fitted
+    k[:, used], ways[:, used], fitted[used] = principal_curvature(
+        vertices[used], local, RINGS
+    )
+    k[:, ~fitted], ways[:, ~fitted] = 0.0, 0.0
+    return k, ways, fitted
+
+
+def _shortest_edges(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Shortest edge at each vertex, infinite without a face, shape (n,)."""
+    shortest = np.full(len(vertices), np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        edge = vertices[faces[:, a]] - vertices[faces[:, b]]
+        length = np.linalg.norm(edge, axis=1)
+        np.minimum.at(shortest, faces[:, a], length)
+        np.minimum.at(shortest, faces[:, b], length)
+    return shortest
+
+
+def _vertex_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Unit normals averaged over the area of each vertex's faces, (n, 3)."""
+    corners = vertices[faces]
+    weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = [
+        np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
+        for part in weighted.T
+    ]
+    normals = np.stack(sums, axis=1)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.where(length > 0, normals / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
+
+
+def _with_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Leave out faces at vertices whose normals cancel: libigl crashes there.
+
+    Two faces on the same three corners, turned against each other, do that.
+    """
+    while len(faces):
+        corners = vertices[faces]
+        weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(weighted, axis=1)
+        sums = [
+            np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
+            for part in (*weighted.T, size)
+        ]
+        length = np.linalg.norm(sums[:3], axis=0)
+        lost = ~(length > _CANCELLED * sums[3])
+        kept = (size > 0) & ~lost[faces].any(axis=1)
+        if kept.all():
+            break
+        faces = faces[kept]
+    return faces

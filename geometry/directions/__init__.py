@@ -1,0 +1,1 @@
+"""Open directions of samples as cells of cube maps."""

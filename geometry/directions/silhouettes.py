@@ -1,0 +1,301 @@
+"""Edges across which it may change whether a point sees out.
+
+From a point p, the directions in which a surface stands in the way are bounded by
+silhouettes: edges whose two faces p sees from different sides, and edges of one face or
+of more than two. Anywhere else a surface goes on. For p and face f with normal N_f
+through x_f::
+
+    h_f(p) = N_f . (p - x_f),    edge of f, g is a silhouette iff h_f h_g <= 0
+
+(with the sign turned where f and g run along the edge in the same sense). What is too
+near to 0 to call counts as a silhouette.
+
+The border of some of the faces is a silhouette of these alone: what they hide, they
+hide whatever else stands there.
+
+A bit for each of 64 points, so that edges are compared for all of them at once.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.lengths import lengths
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import face_pairs
+
+from .product_signs import WORD, ProductSigns, packed
+
+# Points that are asked about at once.
+POINTS = WORD
+# Height, as a share of the mesh's size, within which a side can't be told.
+_UNSURE = 1e-9
+# What rounding may turn a direction by.
+_ANGLE = 1e-6
+_NONE = np.uint64(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """From which side points see faces, and which edges change for them.
+
+    Attributes:
+        local: The points relative to the middle of the mesh in [m], shape (n, 3).
+        normals: Unit axes of their cones, same shape.
+        close: Bits of the points that lie close to each face's plane.
+        changes: Bits of the points for which an edge of two faces is a silhouette.
+        above: Bits of the points over whose horizon such an edge rises.
+        alone: The same of each edge of one face or of more than two.
+    """
+
+    local: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    close: NDArray[np.uint64]
+    changes: NDArray[np.uint64]
+    above: NDArray[np.uint64]
+    alone: NDArray[np.uint64]
+
+
+class Silhouettes:
+    """The edges of a mesh, ready to be compared.
+
+    Args:
+        mesh: What stands in the way.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        edges = mesh.edges
+        pairs, shared = face_pairs(edges)
+        self._middle = mesh.bounds.mean(axis=0)
+        self._vertices = mesh.vertices - self._middle
+        self._columns = np.ascontiguousarray(self._vertices.T)
+        single = edges.n_faces != 2
+        self._single_ends = edges.ends[single]
+        sides_of_single = np.flatnonzero(single[edges.of_face.ravel()])
+        number = np.cumsum(single) - 1
+        self._single_faces = sides_of_single // 3
+        self._single_of_face = number[edges.of_face.ravel()[sides_of_single]]
+        self._pairs, self._ends = pairs, edges.ends[shared]
+        forwards = [_runs_along(mesh.faces[f], self._ends) for f in pairs.T]
+        self._turned = np.where(forwards[0] == forwards[1], ~_NONE, _NONE)
+        anchors = np.einsum(
+            "ij,ij->i", mesh.face_normals, mesh.corners[:, 0] - self._middle
+        )
+        self._planes = ProductSigns(np.column_stack([mesh.face_normals, -anchors]))
+        self._normals = mesh.face_normals
+        # Vertices that no face uses may lie anywhere.
+        used = np.zeros((len(self._vertices), 1), dtype=bool)
+        used[mesh.faces] = True
+        self._heights = ProductSigns(
+            np.column_stack([np.where(used, self._vertices, 0.0), np.ones(len(used))])
+        )
+        self._faces = mesh.faces
+        # Both orders of two faces that agree on their outside.
+        f, g = pairs[self._turned == _NONE].T
+        n = len(mesh.faces)
+        self._smooth = np.sort(np.concatenate([f * n + g, g * n + f, [-1]]))
+        self._centroids = mesh.face_centroids - self._middle
+        spokes = mesh.corners - mesh.face_centroids[:, None]
+        self._radii = np.linalg.norm(spokes, axis=2).max(axis=1)
+        size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+        self._unsure = _UNSURE * size
+        self._balls: dict[float, ProductSigns] = {}
+
+    def sides(
+        self,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        close: float = 0.0,
+    ) -> Sides:
+        """Return from which side points see each face.
+
+        Args:
+            points: On the mesh in [m], at most `POINTS`, shape (n, 3).
+            normals: Unit axes of the cones that are asked about, same shape.
+            close: How far from a face's plane is close to it, in [m].
+        """
+        local = points - self._middle
+        own = np.einsum("ij,ij->i", normals, local)
+        above, rows, heights = self._heights.over(np.column_stack([normals, -own]))
+        above[rows] = packed(heights > 0.0)
+        over, rows, heights = self._planes.over(
+            np.column_stack([local, np.ones(len(local))]), max(close, self._unsure)
+        )
+        # Above the upper mark: over both; between the marks: not sure.
+        unsure, beside = np.zeros_like(over), np.zeros_like(over)
+        over[rows] = packed(heights > self._unsure)
+        unsure[rows] = over[rows] ^ packed(heights > -self._unsure)
+        beside[rows] = packed(np.abs(heights) <= close)
+        f, g = self._pairs.T
+        return Sides(
+            local,
+            normals,
+            beside,
+            (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g],
+            above[self._ends[:, 0]] | above[self._ends[:, 1]],
+            above[self._single_ends[:, 0]] | above[self._single_ends[:, 1]],
+        )
+
+    def faces_within(self, sides: Sides, reach: float) -> NDArray[np.uint64]:
+        """Return for each face the points to which it comes within reach, as bits.
+
+        A few faces that don't quite are told too, none that does is left out.
+
+        Args:
+            sides: Of the points.
+            reach: How near, in [m].
+        """
+        own = np.einsum("ij,ij->i", sides.local, sides.local)
+        columns = np.column_stack([-2.0 * sides.local, np.ones(len(own)), own])
+        beyond, rows, excess = self._balls_within(reach).over(columns)
+        beyond[rows] = packed(excess > self._unsure**2)
+        return ~beyond
+
+    def _balls_within(self, reach: float) -> ProductSigns:
+        """Return for each face what |p - c|^2 - limit^2 is a product with."""
+        if reach not in self._balls:
+            middle, limit = self._centroids, reach + self._radii + self._unsure
+            square = np.einsum("ij,ij->i", middle, middle) - limit**2
+            rows = np.column_stack([middle, square, np.ones(len(square))])
+            self._balls[reach] = ProductSigns(rows)
+        return self._balls[reach]
+
+    def seen_from(
+        self, sides: Sides, half_angle: float, among: NDArray[np.uint64] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the silhouettes that may cross a cone above each point.
+
+        Args:
+            sides: Of the points.
+            half_angle: Half opening of the cones [rad], at most pi / 2.
+            among: For each face the points for which it counts, as bits; None: all do
+                for every point.
+
+        Returns:
+            The point that each belongs to, (m,), and the edge's ends relative to it in
+            [m], shape (m, 3) each.
+        """
+        words, alone = sides.changes & sides.above, sides.alone
+        if among is not None:
+            f, g = self._pairs.T
+            words = (words & among[f] & among[g]) | (
+                sides.above & (among[f] ^ among[g])
+            )
+            counts = np.zeros_like(alone)
+            np.bitwise_or.at(counts, self._single_of_face, among[self._single_faces])
+            alone = alone & counts
+        n = len(sides.local)
+        owners, edges = _unpacked(words, n)
+        more, singles = _unpacked(alone, n)
+        ends = np.concatenate([self._ends[edges], self._single_ends[singles]])
+        owners = np.concatenate([owners, more])
+        # Column by column: rows of three are too short for numpy's loops.
+        from_points = [own.take(owners) for own in sides.local.T]
+        begin, end = (
+            np.stack([v.take(e) for v in self._columns]) - from_points
+            for e in np.ascontiguousarray(ends.T)
+        )
+        axes = np.stack([own.take(owners) for own in sides.normals.T])
+        near = np.flatnonzero(_may_cross(begin, end, axes, half_angle))
+        return owners[near], begin.take(near, axis=1).T, end.take(near, axis=1).T
+
+    def touched(
+        self,
+        sides: Sides,
+        faces: NDArray[np.int64],
+        reach: float,
+        half_angle: float,
+        among: NDArray[np.uint64] | None = None,
+    ) -> NDArray[np.bool_]:
+        """Return to which points something comes near that may rise into a cone, (n,).
+
+        Every face but their own may, except one that goes on from it across an edge and
+        rises by less than the cone leaves.
+
+        Args:
+            sides: Of the points; what is `close` there mustn't be less than the reach.
+            faces: The face that each lies on, shape (n,).
+            reach: How near, in [m].
+            half_angle: Half opening of the cone about the face's normal [rad].
+            among: For each face the points to which it may come as near, as bits; None:
+                every face may to every point.
+        """
+        local = sides.local
+        close = sides.close if among is None else sides.close & among
+        owner, face = _unpacked(close, len(local))
+        other = face != faces[owner]
+        face, owner = face[other], owner[other]
+        # In the plane of a face, a circle about it leaves few to be looked at.
+        away = np.linalg.norm(self._centroids[face] - local[owner], axis=1)
+        close = away <= self._radii[face] + reach
+        face, owner = face[close], owner[close]
+        near = _distances(local[owner], self._vertices[self._faces[face]]) <= reach
+        face, owner = face[near], owner[near]
+        own = faces[owner]
+        normals = self._normals
+        even = np.einsum("ij,ij->i", normals[face], normals[own]) >= np.sin(half_angle)
+        key = face * len(self._faces) + own
+        place = np.searchsorted(self._smooth, key, side="right") - 1
+        even &= self._smooth[place] == key
+        found = np.zeros(len(local), dtype=bool)
+        found[owner[~even]] = True
+        return found
+
+
+def _distances(
+    points: NDArray[np.float64], corners: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the distance of each point from its triangle, shape (n,)."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    normals /= np.where(length > 0, length, 1.0)[:, None]
+    height = np.einsum("ij,ij->i", points - corners[:, 0], normals)
+    over = length > 0
+    best = np.full(len(points), np.inf)
+    for k in range(3):
+        start, end = corners[:, k], corners[:, (k + 1) % 3]
+        along, off = end - start, points - start
+        square = np.einsum("ij,ij->i", along, along)
+        share = np.einsum("ij,ij->i", off, along) / np.where(square > 0, square, 1.0)
+        foot = np.clip(share, 0.0, 1.0)[:, None] * along
+        best = np.minimum(best, np.linalg.norm(off - foot, axis=1))
+        over &= np.einsum("ij,ij->i", np.cross(along, off), normals) >= 0.0
+    return np.where(over, np.minimum(best, np.abs(height)), best)
+
+
+def _may_cross(
+    begin: NDArray[np.float64],
+    end: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    half_angle: float,
+) -> NDArray[np.bool_]:
+    """Return which segments the ball about their middle lets into a cone; (3, m)."""
+    middle = begin + end
+    distance, size = lengths(middle.T), lengths((end - begin).T)
+    around = size >= distance
+    apart = np.where(around, 1.0, distance)
+    x, y, z = middle * axes
+    cosine = (x + y + z) / apart
+    spread = np.arcsin(np.where(around, 0.0, size) / apart)
+    off = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return around | (off - spread <= half_angle + _ANGLE)
+
+
+def _unpacked(
+    words: NDArray[np.uint64], n: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows and columns of the bits that are set."""
+    some = np.flatnonzero(words)
+    bits = np.unpackbits(
+        words[some].view(np.uint8).reshape(-1, 8), axis=1, count=n, bitorder="little"
+    )
+    # Numpy finds what isn't zero in one dimension five times as fast as in two.
+    column, row = np.divmod(np.flatnonzero(bits.view(np.bool_)), max(n, 1))
+    return row, some[column]
+
+
+def _runs_along(faces: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return whether each face runs along its edge from the first end to the second."""
+    after = faces[:, [1, 2, 0]]
+    return np.any((faces == ends[:, :1]) & (after == ends[:, 1:]), axis=1)

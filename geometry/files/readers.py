@@ -1,0 +1,320 @@
+"""Read a mesh file into a repaired, oriented TriangleMesh in metres."""
+
+import bz2
+import gzip
+import hashlib
+import io
+import lzma
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.file_origin import FileOrigin
+from geometry.mesh.mesh import MeshError, MeshSource, Repair, TriangleMesh
+from geometry.mesh.topology import numbered
+from geometry.repair.orientation import orient
+from geometry.repair.repair import clean
+
+from .formats import SUPPORTED, RawMesh, read_format
+from .text_formats import FormatError
+
+METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
+UNITS = ("mm", "cm", "m", "in", "um")
+SIZE_RANGE_M = (1e-3, 100.0)
+
+_DEFAULT_UNIT = "mm"
+# A tabletop object, to pick the unit that would make sense of an implausible size.
+_LIKELY_SIZE_M = 0.2
+# A small archive can unpack to more than any machine holds.
+_MAX_BYTES = 1 << 32
+# Fragments that stand out by this share of the longest side are reported.
+_STRAY = 0.01
+# Radii from the centre of the main bodies. Rays are precise to about 1e-6 of all that
+# there is, so to 0.1 mm on an object of 1 m.
+_FAR = 100.0
+_PIECE = 1 << 24
+
+
+def load_mesh(
+    path: str | Path, *, unit: str | None = None, size_mm: float | None = None
+) -> TriangleMesh:
+    """Return the mesh of a file in metres, repaired and oriented outwards.
+
+    The file's numbers are taken in ``unit``, else in the unit that the format states
+    (3MF, glTF), else in millimetres. What was repaired is in ``mesh.source.repairs``.
+
+    Args:
+        path: OBJ, PLY, STL, OFF, GLB, glTF or 3MF, also inside .gz, .bz2 or .zip.
+        unit: mm, cm, m, in or um.
+        size_mm: Instead of a unit: the longest side of the bounding box in [mm]. Small
+            floating fragments don't count for it.
+
+    Raises:
+        MeshError: If the file can't be read whole, holds no surface, or has a longest
+            side outside 1 mm to 100 m.
+    """
+    if unit is not None and size_mm is not None:
+        raise MeshError(
+            f"unit {unit} and size {size_mm} mm both fix the scale: give one"
+        )
+    if unit is not None and unit not in UNITS:
+        raise MeshError(f"unit '{unit}' isn't known, use one of {', '.join(UNITS)}")
+    if size_mm is not None and not (size_mm > 0 and np.isfinite(size_mm)):
+        raise MeshError(f"size must be a positive number of millimetres, got {size_mm}")
+    data = _bytes_of(path)
+    digest = hashlib.sha256(data).hexdigest()
+    return usable_mesh(_read(path, data), str(path), digest, unit, size_mm)
+
+
+def usable_mesh(
+    raw: RawMesh,
+    path: str,
+    sha256: str,
+    unit: str | None = None,
+    size_mm: float | None = None,
+) -> TriangleMesh:
+    """Return raw triangles in metres, repaired and oriented outwards.
+
+    Args:
+        raw: What a file holds.
+        path: Its name, for messages and the record.
+        sha256: Digest of its bytes.
+        unit: Of its numbers; else the stated one, else mm.
+        size_mm: Instead of a unit.
+
+    Raises:
+        MeshError: As `load_mesh`.
+    """
+    try:
+        vertices, faces, kept, repairs = clean(raw.vertices, raw.faces)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+    mesh, near, far = _without_far(TriangleMesh(vertices, faces))
+    kept, repairs = kept[near], repairs + far
+    longest, stray = _longest_side(mesh)
+    name, scale = _scale(raw, longest, unit, size_mm)
+    _check_size(path, longest, name, scale)
+    source = MeshSource(
+        path=path,
+        sha256=sha256,
+        unit=name,
+        scale_to_m=scale,
+        n_vertices=len(raw.vertices),
+        n_faces=len(raw.faces),
+        repairs=repairs,
+    )
+    # Orientation turns faces and keeps their order, so that the origin stays theirs.
+    mesh = TriangleMesh(mesh.vertices * scale, mesh.faces)
+    faces, turned = orient(mesh)
+    if not np.array_equal(faces, mesh.faces):
+        mesh = TriangleMesh(mesh.vertices, faces)
+    source = replace(source, repairs=repairs + turned + stray)
+    return mesh.tagged(source, _origin(raw).of_faces(kept))
+
+
+def _without_far(
+    mesh: TriangleMesh,
+) -> tuple[TriangleMesh, NDArray[np.int64], tuple[Repair, ...]]:
+    """Drop fragments so far away that rays at the object would lose their precision.
+
+    Returns:
+        What is left, which of the faces these were, and the repair.
+    """
+    vertices, faces = mesh.vertices, mesh.faces
+    far = np.linalg.norm(vertices - mesh.centre, axis=1) > _FAR * mesh.radius
+    near = np.flatnonzero(~far[faces].any(axis=1))
+    if len(near) == len(faces):
+        return mesh, near, ()
+    used, local = numbered(faces[near], len(vertices))
+    kind = "faces of fragments more than 100 radii away removed"
+    removed = Repair(kind, len(faces) - len(near))
+    return TriangleMesh(vertices[used], local), near, (removed,)
+
+
+def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
+    """Longest side of the box of the main bodies, and what lies well outside of it."""
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.faces[mesh.main]] = True
+    points = mesh.vertices[used]
+    low, high = points.min(axis=0), points.max(axis=0)
+    longest = float((high - low).max())
+    # What stands out by less changes no size that anyone reads.
+    low, high = low - _STRAY * longest, high + _STRAY * longest
+    off = np.any((mesh.vertices < low) | (mesh.vertices > high), axis=1)
+    outside = off[mesh.faces].any(axis=1)
+    kind = "faces of fragments outside the rest, kept but left out of its size"
+    count = int(outside.sum())
+    found = (Repair(kind, count),) if count else ()
+    return longest, found
+
+
+def _origin(raw: RawMesh) -> FileOrigin:
+    if raw.origin is not None:
+        return raw.origin
+    n = len(raw.faces)
+    return FileOrigin(np.arange(n), raw.faces, n, len(raw.vertices))
+
+
+def _scale(
+    raw: RawMesh, longest: float, unit: str | None, size_mm: float | None
+) -> tuple[str, float]:
+    if size_mm is not None:
+        return "size_mm", 1e-3 * size_mm / longest
+    name = unit or raw.unit or _DEFAULT_UNIT
+    return name, METRES[name]
+
+
+def _check_size(path: str | Path, longest: float, unit: str, scale: float) -> None:
+    low, high = SIZE_RANGE_M
+    if low <= longest * scale <= high:
+        return
+    # Nobody models in micrometres by accident: the last resort.
+    likely = min(
+        UNITS,
+        key=lambda name: (
+            abs(np.log(longest * METRES[name] / _LIKELY_SIZE_M))
+            + (3.0 if name == "um" else 0.0)
+        ),
+    )
+    fits = low <= longest * METRES[likely] <= high
+    remedy = (
+        f"--unit {likely} would make it {_length(longest * METRES[likely])}"
+        if fits and likely != unit
+        else "state its true size with --size-mm"
+    )
+    raise MeshError(
+        f"{path}: the longest side is {_length(longest * scale)} in unit {unit}, "
+        f"must be {_length(low)} to {_length(high)}; {remedy}"
+    )
+
+
+def _length(metres: float) -> str:
+    """Return a length in the unit that reads best."""
+    if metres >= 1.0:
+        return f"{metres:.4g} m"
+    return f"{1e3 * metres:.4g} mm"
+
+
+def _bytes_of(path: str | Path) -> bytes:
+    try:
+        data = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise MeshError(f"{path}: no such file; check the path") from None
+    except IsADirectoryError:
+        raise MeshError(f"{path}: is a directory; name one mesh file") from None
+    except (OSError, ValueError) as error:
+        raise MeshError(f"{path}: can't be opened ({error})") from None
+    if not data:
+        raise MeshError(f"{path}: the file is empty (0 bytes); export the mesh again")
+    return data
+
+
+def _read(path: str | Path, data: bytes) -> RawMesh:
+    try:
+        kind, data, fetch = _unpack(Path(path), data)
+    except (
+        OSError,
+        EOFError,
+        zlib.error,
+        lzma.LZMAError,
+        RuntimeError,
+        NotImplementedError,
+        zipfile.BadZipFile,
+    ) as error:
+        raise MeshError(f"{path}: can't be unpacked ({error})") from None
+    if kind not in SUPPORTED:
+        raise MeshError(
+            f"{path}: format '.{kind}' isn't supported; convert it to one of "
+            f"{', '.join(SUPPORTED)}"
+        )
+    try:
+        return _known_unit(read_format(kind, data, fetch))
+    except FormatError as error:
+        raise MeshError(f"{path}: not a usable {kind.upper()} mesh: {error}") from None
+    except Exception as error:
+        # The reader library raises whatever its parsers meet on the way.
+        reason = " ".join(str(error).split())[:160]
+        raise MeshError(
+            f"{path}: can't be read as {kind.upper()} "
+            f"({type(error).__name__}: {reason}); export the mesh again"
+        ) from error
+
+
+def _known_unit(raw: RawMesh) -> RawMesh:
+    if raw.unit is not None and raw.unit not in METRES:
+        raise FormatError(f"it states the unit '{raw.unit}', which isn't known")
+    return raw
+
+
+_Unpacked = tuple[str, bytes, Callable[[str], bytes] | None]
+
+
+def _unpack(path: Path, data: bytes) -> _Unpacked:
+    """Return the format, its bytes, and how to fetch files that it names."""
+    suffixes = [suffix.lower().lstrip(".") for suffix in path.suffixes] or [""]
+    if suffixes[-1] == "zip":
+        return _from_zip(data)
+    if suffixes[-1] in ("gz", "bz2"):
+        if suffixes[-1] == "gz":
+            with gzip.open(io.BytesIO(data)) as stream:
+                content = _at_most(_pieces(stream))
+        else:
+            content = _at_most(_bunzipped(data))
+        return (suffixes[-2] if len(suffixes) > 1 else ""), content, None
+    return suffixes[-1], data, lambda name: (path.parent / name).read_bytes()
+
+
+def _from_zip(data: bytes) -> _Unpacked:
+    archive = zipfile.ZipFile(io.BytesIO(data))
+    meshes = [
+        name
+        for name in archive.namelist()
+        if PurePosixPath(name).suffix.lower().lstrip(".") in SUPPORTED
+        and not name.startswith("__MACOSX/")
+    ]
+    if len(meshes) != 1:
+        held = ", ".join(meshes[:4]) or "none"
+        raise OSError(f"it must hold one mesh, holds {len(meshes)}: {held}")
+    folder = PurePosixPath(meshes[0]).parent
+
+    def member(name: str) -> bytes:
+        with archive.open(name) as stream:
+            return _at_most(_pieces(stream))
+
+    kind = PurePosixPath(meshes[0]).suffix.lower().lstrip(".")
+    content = member(meshes[0])
+    return kind, content, lambda name: member(str(folder / name))
+
+
+def _bunzipped(data: bytes) -> Iterator[bytes]:
+    # The module's own file takes what is behind a stream and no stream for padding.
+    while data:
+        stream = bz2.BZ2Decompressor()
+        yield stream.decompress(data, _PIECE)
+        while not stream.eof:
+            if stream.needs_input:
+                raise EOFError("it ends before the end of its stream")
+            yield stream.decompress(b"", _PIECE)
+        data = stream.unused_data
+
+
+def _pieces(stream: IO[bytes] | gzip.GzipFile) -> Iterator[bytes]:
+    # Asked for everything at once, gzip sets the largest size aside first.
+    return iter(lambda: stream.read(_PIECE), b"")
+
+
+def _at_most(pieces: Iterable[bytes]) -> bytes:
+    held: list[bytes] = []
+    total = 0
+    for piece in pieces:
+        held.append(piece)
+        total += len(piece)
+        if total > _MAX_BYTES:
+            raise OSError(f"it unpacks to more than {_MAX_BYTES >> 30} GiB")
+    return b"".join(held)

@@ -1,0 +1,1 @@
+"""The triangle mesh, its topology, and samples of it."""

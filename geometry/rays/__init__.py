@@ -1,0 +1,1 @@
+"""Rays, occlusion, closest points."""

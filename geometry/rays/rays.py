@@ -1,0 +1,241 @@
+"""The bare ray caster: embree, called directly and threaded.
+
+It answers two questions about rays and holds no policy: where rays start, how far they
+reach and what slack they are given is the caller's business. The planner's visibility
+and the checkers each bring a policy of their own.
+"""
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh as _EmbreeMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+
+# Rays in one call of embree: their arrays stay in the second-level cache.
+CHUNK = 1 << 14
+
+
+class RayCaster:
+    """Casts rays against one mesh.
+
+    Embree computes in float32. Coordinates are therefore taken relative to the middle
+    of the mesh, in float64, and scaled by a power of two (so exactly) to a mesh of
+    about unit size before they are rounded: a mesh far from the origin, or a tiny one,
+    is hit as precisely as any. Rays are traced in chunks, so memory stays bounded, and
+    each ray's answer is independent of the number of threads.
+
+    Args:
+        mesh: The occluder.
+        threads: Worker threads; embree releases the interpreter lock.
+
+    Attributes:
+        middle: Of the bounding box in [m]; the origin of the caster's own frame. (Not
+            `mesh.centre`, which may leave small fragments out of account.)
+        scale: Metres to the caster's own unit.
+        reach: Half the diagonal of the bounding box in the caster's own unit: every
+            vertex of a face lies within it, and it is in [1, 2).
+    """
+
+    def __init__(self, mesh: TriangleMesh, *, threads: int = 2) -> None:
+        if threads < 1:
+            raise ValueError(f"threads must be at least 1, got {threads}")
+        self.mesh = mesh
+        self.threads = threads
+        low, high = mesh.bounds
+        self.middle = 0.5 * (low + high)
+        half = 0.5 * float(np.linalg.norm(high - low))
+        self.scale = float(np.exp2(-np.floor(np.log2(half)))) if half > 0 else 1.0
+        self.reach = half * self.scale
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
+        self._scene = EmbreeScene(robust=True)
+        # Vertices that no face uses may lie anywhere, also beyond float32.
+        used = np.zeros(len(mesh.vertices), dtype=bool)
+        used[mesh.faces] = True
+        vertices = self.local(mesh.vertices[used])
+        number = np.cumsum(used, dtype=np.int32) - 1
+        faces = np.ascontiguousarray(number[mesh.faces], dtype=np.int32)
+        _EmbreeMesh(self._scene, vertices, faces)
+        # The first call commits the scene; do it here, where no thread races.
+        self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+
+    @cached_property
+    def extent(self) -> float:
+        """Length in [m] that offsets of rays are shares of.
+
+        The radius of the object, or a quarter of the bounding box's diagonal: far
+        fragments don't make the object larger, but every ray coarser.
+        """
+        return max(self.mesh.radius, 0.5 * self.reach / self.scale)
+
+    def local(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return points in the caster's own frame, shape (n, 3)."""
+        return np.ascontiguousarray((points - self.middle) * self.scale, np.float32)
+
+    def occluded(
+        self,
+        origins: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        distances: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Return whether anything is hit closer than a distance along each ray.
+
+        Args:
+            origins: Ray origins in [m], shape (n, 3) or (3,) for a common one.
+            directions: Unit directions, shape (n, 3).
+            distances: Reach of each ray in [m], shape (n,).
+
+        Returns:
+            Whether each ray is blocked, shape (n,).
+
+        Raises:
+            ValueError: If shapes disagree or a number isn't finite (embree would read
+                out of bounds, or let the ray through, without a word).
+        """
+        origins, directions = _checked(origins, directions)
+        distances = np.asarray(distances, dtype=np.float64)
+        if distances.shape != (len(directions),) or not np.all(np.isfinite(distances)):
+            raise ValueError(f"distances must be ({len(directions)},) and finite")
+        blocked = np.empty(len(directions), dtype=bool)
+
+        def trace(part: slice) -> None:
+            start, along = self._rays(origins, directions, part)
+            reach = (distances[part] * self.scale).astype(np.float32)
+            blocked[part] = self.blocked_local(start, along, reach)
+
+        self.share(trace, self.chunks(len(directions)))
+        return blocked
+
+    def blocked_local(
+        self,
+        start: NDArray[np.float32],
+        along: NDArray[np.float32],
+        reach: NDArray[np.float32],
+    ) -> NDArray[np.bool_]:
+        """Return whether rays in the caster's own frame are blocked; checks nothing.
+
+        For engines that prepare float32 rays themselves, in their own threads: one call
+        of embree on at most `CHUNK` rays.
+
+        Args:
+            start: Origins, shape (n, 3), any strides.
+            along: Directions of any length, same shape.
+            reach: How far each ray goes in units of its direction, shape (n,).
+        """
+        # embree answers 0 for blocked and -1 for clear.
+        answer = self._scene.run(start, along, reach, query="OCCLUDED")
+        return np.equal(answer, 0)
+
+    def first_hits(
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return the first face that each ray hits, and how far away it is.
+
+        The distance is recomputed in float64 from the plane of the face.
+
+        Args:
+            origins: Ray origins in [m], shape (n, 3) or (3,) for a common one.
+            directions: Unit directions, shape (n, 3).
+
+        Returns:
+            Face indices, -1 for a miss; distances in [m], inf for a miss; (n,) each.
+
+        Raises:
+            ValueError: If shapes disagree or a number isn't finite.
+        """
+        origins, directions = _checked(origins, directions)
+        faces = np.empty(len(directions), dtype=np.int64)
+        distances = np.full(len(directions), np.inf)
+        normals, anchors = self.mesh.face_normals, self.mesh.corners[:, 0]
+
+        def trace(part: slice) -> None:
+            start, along = self._rays(origins, directions, part)
+            hit = np.asarray(self._scene.run(start, along), dtype=np.int64)
+            faces[part] = hit
+            on = np.flatnonzero(hit >= 0)
+            face = hit[on]
+            ray = directions[part][on]
+            begin = origins if origins.ndim == 1 else origins[part][on]
+            towards = np.einsum("ij,ij->i", normals[face], anchors[face] - begin)
+            slope = np.einsum("ij,ij->i", normals[face], ray)
+            slope = np.where(np.abs(slope) < 1e-12, np.copysign(1e-12, slope), slope)
+            distances[part.start + on] = towards / slope
+
+        self.share(trace, self.chunks(len(directions)))
+        return faces, distances
+
+    def chunks(self, n: int) -> list[slice]:
+        """Return n rays in equal parts of at most `CHUNK`, the threads evenly loaded.
+
+        The parts bound memory and spread work; no answer depends on them.
+        """
+        return equal_parts(n, CHUNK, self.threads if n >= 1024 * self.threads else 1)
+
+    def share(
+        self, work: Callable[[slice], None], parts: Iterable[slice], *, least: int = 2
+    ) -> None:
+        """Do work on every part, shared among the threads; the first failure is raised.
+
+        Args:
+            work: What to do with a part; writes to places of its own.
+            parts: The parts.
+            least: Parts below which no thread is worth its while.
+        """
+        parts = list(parts)
+        queue = iter(parts)
+
+        def drain() -> None:
+            for part in queue:
+                work(part)
+
+        helpers = min(self.threads, len(parts)) - 1 if len(parts) >= least else 0
+        others = [self._workers().submit(drain) for _ in range(helpers)]
+        # The caller works too: no thread has to be woken for the last part.
+        try:
+            drain()
+        finally:
+            for other in others:
+                other.result()
+
+    def _workers(self) -> ThreadPoolExecutor:
+        # A forked child has the pool but not its threads.
+        if self._pool is None or self._pool[0] != os.getpid():
+            self._pool = (os.getpid(), ThreadPoolExecutor(self.threads - 1))
+        return self._pool[1]
+
+    def _rays(
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], part: slice
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        along = np.ascontiguousarray(directions[part], dtype=np.float32)
+        if origins.ndim == 1:
+            return np.broadcast_to(self.local(origins), along.shape), along
+        return self.local(origins[part]), along
+
+
+def equal_parts(n: int, most: int, multiple: int = 1) -> list[slice]:
+    """Return n things in equal parts of at most `most`, their number a multiple."""
+    parts = min(-(-n // (most * multiple)) * multiple, n)
+    ends = [n * k // parts for k in range(parts + 1)] if parts else [0]
+    return [slice(a, b) for a, b in pairwise(ends)]
+
+
+def _checked(
+    origins: NDArray[np.float64], directions: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    origins = np.asarray(origins, dtype=np.float64)
+    directions = np.asarray(directions, dtype=np.float64)
+    if directions.ndim != 2 or directions.shape[1] != 3:
+        raise ValueError(f"directions must be (n, 3), got {directions.shape}")
+    if origins.shape not in ((3,), directions.shape):
+        raise ValueError(
+            f"origins must be (3,) or {directions.shape}, got {origins.shape}"
+        )
+    if not (np.all(np.isfinite(origins)) and np.all(np.isfinite(directions))):
+        raise ValueError("ray origins and directions must be finite numbers")
+    return origins, directions

@@ -1,0 +1,1 @@
+"""Dominant regions: the most curved surface in pieces."""

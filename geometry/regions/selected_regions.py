@@ -1,0 +1,117 @@
+"""Target regions that a user chose: given faces, or the highest of given weights."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.curvature.curvature import CurvatureField
+from geometry.curvature.face_curvature import steep_directions
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import adjacent_faces
+
+from .cones import cone_pieces
+from .dominance import face_curvedness
+from .regions import DominantRegions, regions_of_pieces
+
+
+def regions_of_faces(
+    mesh: TriangleMesh,
+    field: CurvatureField,
+    chosen: ArrayLike,
+    *,
+    min_region_share: float = 0.002,
+    cone_half_angle: float = float(np.deg2rad(50.0)),
+) -> DominantRegions:
+    """Return exactly the chosen faces, in regions that one projector can serve.
+
+    Nothing is added and nothing left out: not at an open border, where curvature isn't
+    trusted, nor small pieces. Steep directions come from the curvature as in
+    `dominant_regions`; where it isn't trusted they are zero and bind nothing.
+
+    Args:
+        mesh: The surface.
+        field: Its curvatures.
+        chosen: Whether each face is chosen, bool, shape (n_f,).
+        min_region_share: Pieces below this share of the chosen area are joined to a
+            neighbour if one cone holds both, in [0, 1).
+        cone_half_angle: Half angle in [rad] that a region's normals must fit.
+
+    Raises:
+        ValueError: If `chosen` isn't one bool a face or chooses none, or an option is
+            out of range.
+    """
+    faces = np.asarray(chosen)
+    if faces.dtype != np.bool_ or faces.shape != (len(mesh.faces),):
+        raise ValueError(
+            f"chosen must be {len(mesh.faces)} bool, one a face, "
+            f"got {faces.dtype} {faces.shape}"
+        )
+    if not faces.any():
+        raise ValueError("chosen must hold at least one face, holds none")
+    if not 0 <= min_region_share < 1:
+        raise ValueError(f"min_region_share must lie in [0, 1), got {min_region_share}")
+    if not 0 < cone_half_angle < np.pi:
+        raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
+    curvedness, trusted = face_curvedness(mesh, field)
+    pairs = adjacent_faces(mesh.edges, manifold_only=False)
+    least = min_region_share * float(mesh.face_areas[faces].sum())
+    pieces = cone_pieces(mesh, faces, pairs, least, cone_half_angle, keep_all=True)
+    steep = steep_directions(mesh, field)
+    return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
+
+
+def lightest_corner(
+    weight: ArrayLike, corners: NDArray[np.integer]
+) -> NDArray[np.float64]:
+    """Return for each face the least weight of its corners, shape (n_f,).
+
+    Args:
+        weight: Of each vertex, at least 0, shape (n,).
+        corners: Vertices of each face, in the numbering of `weight`, shape (n_f, 3).
+
+    Raises:
+        ValueError: If the weight of a corner is negative or not finite.
+    """
+    values = np.asarray(weight, dtype=np.float64)[corners]
+    good = (values >= 0) & np.isfinite(values)
+    if not np.all(good):
+        face, corner = np.argwhere(~good)[0]
+        raise ValueError(
+            f"the weight of vertex {corners[face, corner]} is {values[face, corner]}, "
+            "must be a finite number, at least 0"
+        )
+    return values.min(axis=1)
+
+
+def heaviest_faces(
+    mesh: TriangleMesh, weight: ArrayLike, *, area_share: float = 0.2
+) -> NDArray[np.bool_]:
+    """Return the faces of highest weight, a share of the area, shape (n_f,).
+
+    The weight takes the place of the curvedness in `dominant_regions`. Faces of equal
+    weight are taken all or none, so that the share may be exceeded; a face of weight 0
+    is never taken, so that it may be missed: weights of 1 and 0 choose what has 1.
+
+    Args:
+        mesh: The surface.
+        weight: Of each face, at least 0, shape (n_f,).
+        area_share: Share of the mesh's area, in (0, 1].
+
+    Raises:
+        ValueError: If a weight is negative or not finite, all are zero, or the number
+            of weights or the share is out of range.
+    """
+    if not 0 < area_share <= 1:
+        raise ValueError(f"area_share must lie in (0, 1], got {area_share}")
+    values = np.asarray(weight, dtype=np.float64)
+    if values.shape != (len(mesh.faces),):
+        raise ValueError(
+            f"weight must be ({len(mesh.faces)},), one a face, got {values.shape}"
+        )
+    if not np.all((values >= 0) & np.isfinite(values)):
+        raise ValueError("a face's weight must be a finite number, at least 0")
+    if not values.max() > 0:
+        raise ValueError("no face has a weight above 0 at all its corners")
+    order = np.argsort(-values, kind="stable")
+    area = np.cumsum(mesh.face_areas[order])
+    cut = values[order[np.searchsorted(area, area_share * area[-1])]]
+    return (values >= cut) & (values > 0)

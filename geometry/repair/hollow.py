@@ -1,0 +1,196 @@
+"""Hollow or solid, how thick the wall is, and which part of a surface lies inside.
+
+`docs/orientation.md` has the definitions. Nothing here depends on where a mesh lies,
+how it is turned or scaled: rays start from the surface, and lengths are compared with
+lengths of the object.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import adjacent_faces, components
+from geometry.rays.rays import RayCaster
+
+from .openness import Spots, look_out, spots_at, spots_on
+
+SOLID = "solid"
+CAVITIES = "solid with cavities"
+HOLLOW = "hollow shell"
+OPEN = "open surface"
+
+# Seeing less of the outside than this share, or than this part of what the other side
+# of a thin wall sees, is to lie inside.
+HIDDEN = 0.05
+LESS_THAN_BEHIND = 1.0 / 3.0
+# A wall is thin up to this share of the diameter of the object.
+THIN = 0.05
+# Least share of the area that lies inside: of a solid with cavities, of a shell.
+_SOME = 0.01
+_MUCH = 0.1
+# A surface through whose back more light than this escapes encloses nothing.
+_LEAK = 0.1
+
+_SPOTS = 16_000
+_RAYS = 64
+_RAYS_BEHIND = 16
+_MAX_BODIES = 4000
+_OFFSET = 2e-6
+
+
+@dataclass(frozen=True)
+class Shell:
+    """What kind of body a surface bounds.
+
+    Attributes:
+        kind: `solid`, `solid with cavities`, `hollow shell` or `open surface`.
+        wall_m: Median thickness of the material under what lies inside, in [m]; None
+            where nothing does.
+        mean_wall_m: 2 V / A of the whole, in [m]: the same for a thin shell, whatever
+            the rays say; None for an open surface.
+        inside_m2: Area that lies inside.
+        sealed_m2: Area of bodies of which nothing at all can be seen from outside.
+    """
+
+    kind: str
+    wall_m: float | None
+    mean_wall_m: float | None
+    inside_m2: float
+    sealed_m2: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """What is known of each spot.
+
+    Attributes:
+        openness: Share of the cosine-weighted hemisphere that is free, shape (n,).
+        wall: Thickness of the material below in [m], inf where there is none, (n,).
+        inside: Shape (n,).
+    """
+
+    openness: NDArray[np.float64]
+    wall: NDArray[np.float64]
+    inside: NDArray[np.bool_]
+
+
+def measure_shell(caster: RayCaster) -> Shell:
+    """Tell a hollow shell from a solid, from rays at spots all over the surface.
+
+    Args:
+        caster: Of the surface, oriented outwards.
+    """
+    mesh = caster.mesh
+    body = _bodies(mesh)
+    spots = spots_on(mesh, _SPOTS, group=body, least=1)
+    of = np.zeros(len(spots), np.int64) if body is None else body[spots.faces]
+    n_spots = np.bincount(of)
+    area = mesh.face_areas
+    areas = np.array([mesh.area]) if body is None else np.bincount(body, area)
+    weight = (areas[: len(n_spots)] / np.maximum(n_spots, 1))[of]
+    leaks = look_out(caster, spots, _RAYS_BEHIND, behind=True).escaped
+    if weight @ leaks > _LEAK * _RAYS_BEHIND * mesh.area:
+        return Shell(OPEN, None, None, 0.0, 0.0)
+    sight = _sight(caster, spots)
+    seen = np.bincount(of, sight.openness) > 0
+    inside, wall = sight.inside, sight.wall
+    inside_m2 = float(weight @ inside)
+    lining = inside & np.isfinite(wall)
+    wall_m = _weighted_median(wall[lining], weight[lining]) if lining.any() else None
+    return Shell(
+        _kind(inside_m2 / mesh.area, wall_m, THIN * 2.0 * mesh.radius),
+        wall_m,
+        _mean_wall(mesh),
+        inside_m2,
+        float(weight @ ~seen[of]),
+    )
+
+
+def lies_inside(
+    caster: RayCaster, faces: NDArray[np.int64], points: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return whether points of a surface lie inside it, shape (n,).
+
+    A point does if less than a twentieth of its cosine-weighted hemisphere is free, or
+    if it sees less than a third of what the other side of a thin wall sees.
+
+    Args:
+        caster: Of the surface, oriented outwards.
+        faces: Face of each point, shape (n,).
+        points: In [m], shape (n, 3).
+    """
+    return _sight(caster, spots_at(caster.mesh, faces, points)).inside
+
+
+def faces_inside(caster: RayCaster) -> NDArray[np.bool_]:
+    """Return whether each face lies inside, by most of its spots, shape (n_f,).
+
+    A face without a spot takes the verdict of the spot that is nearest, among those
+    that face the same way; so that both sides of a thin wall are kept apart.
+    """
+    mesh = caster.mesh
+    spots = spots_on(mesh, _SPOTS, group=_bodies(mesh), least=1)
+    inside = _sight(caster, spots).inside
+    n = len(mesh.faces)
+    votes = np.bincount(spots.faces, np.where(inside, 1.0, -1.0), n)
+    result = votes > 0
+    bare = np.flatnonzero(np.bincount(spots.faces, minlength=n) == 0)
+    if len(bare):
+        # Opposite normals are as far apart as spots are over the whole object.
+        spread = 2.0 * mesh.radius
+        tree = KDTree(np.hstack([spots.points, spread * spots.normals]))
+        places = np.hstack(
+            [mesh.face_centroids[bare], spread * mesh.face_normals[bare]]
+        )
+        result[bare] = inside[tree.query(places, workers=caster.threads)[1]]
+    return result
+
+
+def _kind(share: float, wall_m: float | None, thin_m: float) -> str:
+    if wall_m is None or not share >= _SOME:
+        return SOLID
+    return HOLLOW if share >= _MUCH and wall_m <= thin_m else CAVITIES
+
+
+def _sight(caster: RayCaster, spots: Spots) -> _Sight:
+    openness = look_out(caster, spots, _RAYS).escaped / _RAYS
+    wall = np.full(len(spots), np.inf)
+    start = spots.points - _OFFSET * caster.extent * spots.normals
+    behind, distance = caster.first_hits(start, -spots.normals)
+    normals = caster.mesh.face_normals[behind]
+    leaves = np.einsum("ij,ij->i", normals, spots.normals) < 0
+    through = (behind >= 0) & leaves
+    wall[through] = distance[through] + _OFFSET * caster.extent
+    inside = openness < HIDDEN
+    thin = wall <= THIN * 2.0 * caster.mesh.radius
+    unsure = np.flatnonzero(thin & ~inside & (openness < LESS_THAN_BEHIND))
+    points = spots.points[unsure] - wall[unsure, None] * spots.normals[unsure]
+    other = spots_at(caster.mesh, behind[unsure], points)
+    beyond = look_out(caster, other, _RAYS).escaped / _RAYS
+    inside[unsure] = openness[unsure] < LESS_THAN_BEHIND * beyond
+    return _Sight(openness, wall, inside)
+
+
+def _bodies(mesh: TriangleMesh) -> NDArray[np.int64] | None:
+    """The body of each face, connected over edges; None where there are too many."""
+    pairs = adjacent_faces(mesh.edges, manifold_only=False)
+    count, body = components(pairs, len(mesh.faces))
+    return body if count <= _MAX_BODIES else None
+
+
+def _mean_wall(mesh: TriangleMesh) -> float:
+    arm = mesh.face_centroids - mesh.centre
+    height = np.einsum("ij,ij->i", arm, mesh.face_normals)
+    return float(2.0 / 3.0 * (mesh.face_areas @ height) / mesh.area)
+
+
+def _weighted_median(
+    values: NDArray[np.float64], weights: NDArray[np.float64]
+) -> float:
+    order = np.argsort(values, kind="stable")
+    cumulated = np.cumsum(weights[order])
+    middle = int(np.searchsorted(cumulated, 0.5 * cumulated[-1]))
+    return float(values[order[min(middle, len(values) - 1)]])

@@ -1,0 +1,151 @@
+"""Which pieces of a surface lie wholly inside which others."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.poses import fibonacci_cap
+from geometry.rays.rays import RayCaster
+
+from .openness import Spots, spots_on
+
+# Spots of a piece, of which this share must lie inside: one may be misjudged.
+_SPOTS = 32
+_WHOLLY = 0.95
+_MAX_SPOTS = 1 << 17
+_CHUNK = 1 << 15
+# A ray that meets more walls than this isn't followed, and its spot counts as outside.
+_MAX_WALLS = 4096
+_STEP = 1e-6
+# Boxes are compared in blocks of this many pairs.
+_MAX_PAIRS = 1 << 24
+
+
+def containers(
+    mesh: TriangleMesh,
+    patch: NDArray[np.int64],
+    holding: NDArray[np.bool_],
+    asked: NDArray[np.bool_],
+    caster: RayCaster,
+) -> list[NDArray[np.int64]]:
+    """Return the patches that wholly hold each patch, the outermost first.
+
+    A point lies inside a patch if a ray from it crosses the patch an odd number
+    of times; three rays vote, since one may pass through an edge. A patch is held if
+    its points, spread over its area, lie inside: a body that sticks out isn't.
+
+    Args:
+        mesh: The surface.
+        patch: Number of the patch of each face, shape (n_f,).
+        holding: Whether each patch may hold others, shape (n,): closed ones, and those
+            open ones that are closed but for a crack.
+        asked: Patches of which the containers are wanted, shape (n,).
+        caster: Of the mesh.
+
+    Returns:
+        For each patch, the patches that hold it; none where it wasn't asked.
+    """
+    n = len(holding)
+    held: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n
+    inner = _in_some_box(mesh, patch, holding, asked)
+    if not inner.any():
+        return held
+    least = int(np.clip(_MAX_SPOTS // int(inner.sum()), 4, _SPOTS))
+    spots = spots_on(mesh, 0, group=patch, least=least, within=inner[patch])
+    pairs = np.concatenate(
+        [
+            _spots_inside(mesh, patch, spots.take(slice_), n, caster)
+            for slice_ in np.array_split(
+                np.arange(len(spots)), -(-len(spots) // _CHUNK)
+            )
+        ]
+    )
+    pairs, counts = np.unique(pairs, return_counts=True)
+    row, holder = np.divmod(pairs, n)
+    keep = (counts >= _WHOLLY * least) & holding[holder] & (row != holder)
+    row, holder = row[keep], holder[keep]
+    depth = np.bincount(row, minlength=n)
+    for index in np.unique(row):
+        mine = holder[row == index] if n < 64 else _span(row, holder, index)
+        held[index] = mine[np.argsort(depth[mine], kind="stable")]
+    return held
+
+
+def _span(
+    row: NDArray[np.int64], holder: NDArray[np.int64], index: int
+) -> NDArray[np.int64]:
+    """Holders of one patch; rows are sorted."""
+    return holder[np.searchsorted(row, index) : np.searchsorted(row, index + 1)]
+
+
+def _in_some_box(
+    mesh: TriangleMesh,
+    patch: NDArray[np.int64],
+    holding: NDArray[np.bool_],
+    asked: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Whether the box of each asked patch lies in that of another that may hold it."""
+    order = np.argsort(patch, kind="stable")
+    start = np.searchsorted(patch[order], np.arange(len(holding)))
+    a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    low = np.minimum.reduceat(low[order], start)
+    high = np.maximum.reduceat(high[order], start)
+    outer, rows = np.flatnonzero(holding), np.flatnonzero(asked)
+    inside = np.zeros(len(holding), dtype=bool)
+    if not len(outer):
+        return inside
+    for part in np.array_split(rows, -(-len(rows) * len(outer) // _MAX_PAIRS) or 1):
+        fits = np.all(low[part, None] >= low[outer], axis=2)
+        fits &= np.all(high[part, None] <= high[outer], axis=2)
+        fits &= part[:, None] != outer
+        inside[part] = fits.any(axis=1)
+    return inside
+
+
+def _spots_inside(
+    mesh: TriangleMesh,
+    patch: NDArray[np.int64],
+    spots: Spots,
+    n: int,
+    caster: RayCaster,
+) -> NDArray[np.int64]:
+    """Keys ``own patch * n + other`` for each spot that lies inside the other."""
+    votes: list[NDArray[np.int64]] = []
+    for direction in fibonacci_cap(3, np.array([0.31, 0.52, 0.8]), 1.2):
+        keys, crossed = np.unique(
+            _crossings(mesh, patch, spots.points, direction, n, caster),
+            return_counts=True,
+        )
+        votes.append(keys[crossed % 2 == 1])
+    keys, counts = np.unique(np.concatenate(votes), return_counts=True)
+    spot, other = np.divmod(keys[counts >= 2], n)
+    return patch[spots.faces[spot]] * n + other
+
+
+def _crossings(
+    mesh: TriangleMesh,
+    patch: NDArray[np.int64],
+    points: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    n: int,
+    caster: RayCaster,
+) -> NDArray[np.int64]:
+    """One key ``point * n + patch`` for each wall that the ray of a point meets."""
+    step = _STEP * caster.extent
+    alive = np.arange(len(points))
+    at = points + step * direction
+    keys: list[NDArray[np.int64]] = []
+    for _ in range(_MAX_WALLS):
+        along = np.broadcast_to(direction, at.shape)
+        faces, distances = caster.first_hits(at, along)
+        hit = faces >= 0
+        alive, at = alive[hit], at[hit]
+        if len(alive) == 0:
+            break
+        keys.append(alive * n + patch[faces[hit]])
+        forward = np.maximum(distances[hit], 0.0) + step
+        at = at + forward[:, None] * direction
+    found = np.concatenate(keys) if keys else np.zeros(0, np.int64)
+    # What is still under way met too many walls: its parity is unknown.
+    return found[~np.isin(found // n, alive)] if len(alive) else found

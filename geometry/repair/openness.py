@@ -1,0 +1,187 @@
+"""How freely faces see out: rays from the surface itself, spread as light would be.
+
+A face of area A whose side is seen over the share f of its cosine-weighted hemisphere
+has, averaged over all directions, the visible projected area A f / 4 (Cauchy). So the
+rays that leave a surface and escape count what an observer who walks all around would
+see of it, without an observer: no view has to be chosen.
+
+Points and directions are laid out in the frame of each face (its corners in the order
+of their indices), so that they move with a mesh that is turned, moved or scaled, and
+don't depend on which way a face is wound.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+# Fractional parts of multiples of these fill a line, a square evenly (Roberts' R2).
+_R1 = 0.6180339887498949
+_R2 = (0.7548776662466927, 0.5698402909980532)
+# In radii of the object: above the rounding of float32, below any wall.
+_OFFSET = 2e-6
+_MAX_RAYS = 1 << 20
+
+
+@dataclass(frozen=True, eq=False)
+class Spots:
+    """Points on faces, each with a frame that follows its face.
+
+    Attributes:
+        faces: Face of each spot, shape (n,).
+        points: Positions in [m], shape (n, 3).
+        frames: Two unit tangents and the unit normal as rows, shape (n, 3, 3).
+        turns: Angle in [rad] by which each spot's rays are turned about its normal.
+    """
+
+    faces: NDArray[np.int64]
+    points: NDArray[np.float64]
+    frames: NDArray[np.float64]
+    turns: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "Spots":
+        """Return some of the spots."""
+        return Spots(
+            self.faces[chosen],
+            self.points[chosen],
+            self.frames[chosen],
+            self.turns[chosen],
+        )
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit normals, shape (n, 3)."""
+        return self.frames[:, 2]
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """What the rays of each spot met.
+
+    Attributes:
+        n_rays: Rays of each spot.
+        escaped: How many met nothing, shape (n,).
+        met_front: How many met a face from its outer side first, shape (n,).
+    """
+
+    n_rays: int
+    escaped: NDArray[np.int64]
+    met_front: NDArray[np.int64]
+
+
+def spots_on(
+    mesh: TriangleMesh,
+    n: int,
+    *,
+    group: NDArray[np.int64] | None = None,
+    least: int = 1,
+    within: NDArray[np.bool_] | None = None,
+) -> Spots:
+    """Return spots spread over faces in proportion to their area.
+
+    Args:
+        mesh: The surface.
+        n: Spots in all, about.
+        group: Number of the group of each face, shape (n_f,); default all in one.
+        least: Spots that every group gets, however small it is.
+        within: Faces that get any, shape (n_f,); default all.
+    """
+    areas = mesh.face_areas
+    used = areas > 0 if within is None else within & (areas > 0)
+    faces = np.flatnonzero(used)
+    label = np.zeros(len(faces), np.int64) if group is None else group[faces]
+    order = np.argsort(label, kind="stable")
+    faces, label = faces[order], label[order]
+    _, start, count = np.unique(label, return_index=True, return_counts=True)
+    sums = np.add.reduceat(areas[faces], start)
+    share = np.ceil(n * sums / sums.sum() - 1e-9).astype(np.int64)
+    share = np.maximum(share, least)
+    # Systematic sampling along the area, in every group on its own.
+    owner = np.repeat(np.arange(len(start)), share)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(share) - share, share) + 0.5
+    cumulated = np.cumsum(areas[faces])
+    ticks = (cumulated[start] - areas[faces][start])[owner]
+    ticks += place * (sums / share)[owner]
+    chosen = np.searchsorted(cumulated, ticks, side="right")
+    chosen = np.clip(chosen, start[owner], (start + count - 1)[owner])
+    return _spots(mesh, faces[chosen])
+
+
+def _spots(mesh: TriangleMesh, faces: NDArray[np.int64]) -> Spots:
+    a, b, c = _ordered_corners(mesh, faces)
+    i = np.arange(len(faces)) + 0.5
+    u, v = (np.modf(i * k)[0] for k in _R2)
+    over = u + v > 1.0
+    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    return spots_at(mesh, faces, a + u[:, None] * (b - a) + v[:, None] * (c - a))
+
+
+def spots_at(
+    mesh: TriangleMesh, faces: NDArray[np.int64], points: NDArray[np.float64]
+) -> Spots:
+    """Return spots at given points of faces.
+
+    Args:
+        mesh: The surface.
+        faces: Face of each point, shape (n,), each with an area.
+        points: In [m], shape (n, 3).
+    """
+    a, b, c = _ordered_corners(mesh, faces)
+    e1 = b - a
+    e1 = e1 / np.linalg.norm(e1, axis=1, keepdims=True)
+    e2 = np.cross(np.cross(e1, c - a), e1)
+    e2 = e2 / np.linalg.norm(e2, axis=1, keepdims=True)
+    turns = 2.0 * np.pi * np.modf((np.arange(len(faces)) + 0.5) * _R1)[0]
+    frames = np.stack([e1, e2, mesh.face_normals[faces]], axis=1)
+    return Spots(faces, points, frames, turns)
+
+
+def _ordered_corners(
+    mesh: TriangleMesh, faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    order = np.argsort(mesh.faces[faces], axis=1)[:, :, None]
+    corners = np.take_along_axis(mesh.corners[faces], order, axis=1)
+    return corners[:, 0], corners[:, 1], corners[:, 2]
+
+
+def look_out(
+    caster: RayCaster, spots: Spots, n_rays: int, *, behind: bool = False
+) -> Outlook:
+    """Cast rays from spots over the cosine-weighted hemisphere and see what they meet.
+
+    Args:
+        caster: Of the mesh that the spots lie on.
+        spots: Where from.
+        n_rays: Rays of each spot, at least 1.
+        behind: From the back of the faces, inwards, instead of the front.
+    """
+    side = -1.0 if behind else 1.0
+    k = (np.arange(n_rays) + 0.5) / n_rays
+    radius, height = np.sqrt(k), np.sqrt(1.0 - k)
+    around = np.arange(n_rays) * _GOLDEN
+    escaped = np.empty(len(spots), dtype=np.int64)
+    met_front = np.empty(len(spots), dtype=np.int64)
+    offset = side * _OFFSET * caster.extent
+    step = max(_MAX_RAYS // n_rays, 1)
+    for begin in range(0, len(spots), step):
+        part = slice(begin, begin + step)
+        e1, e2, normal = np.moveaxis(spots.frames[part], 1, 0)
+        angle = spots.turns[part, None] + around
+        along = (
+            (radius * np.cos(angle))[..., None] * e1[:, None]
+            + (radius * np.sin(angle))[..., None] * e2[:, None]
+            + (side * height)[:, None] * normal[:, None]
+        ).reshape(-1, 3)
+        start = np.repeat(spots.points[part] + offset * normal, n_rays, axis=0)
+        hit, _ = caster.first_hits(start, along)
+        towards = np.einsum("ij,ij->i", caster.mesh.face_normals[hit], along) < 0
+        escaped[part] = (hit < 0).reshape(-1, n_rays).sum(axis=1)
+        met_front[part] = ((hit >= 0) & towards).reshape(-1, n_rays).sum(axis=1)
+    return Outlook(n_rays, escaped, met_front)

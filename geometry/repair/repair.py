@@ -1,0 +1,140 @@
+"""Clean raw triangles: weld, and drop what isn't finite, has no area or is doubled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import MeshError, Repair
+from geometry.mesh.tensors import cross
+
+# A triangle whose height is below this share of its longest side has no normal.
+_FLAT = 1e-10
+# Numbers from here on overflow where areas are squared: as good as infinite.
+_HUGE = 1e60
+# More broken faces than this share, and the rest can't be taken for the object.
+_MAX_BROKEN = 0.1
+
+_Vertices = NDArray[np.float64]
+_Faces = NDArray[np.int64]
+# Vertices, faces, which of the faces handed in stayed (None: all), what was done.
+_Step = tuple[_Vertices, _Faces, NDArray[np.bool_] | None, tuple[Repair, ...]]
+
+
+def clean(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[_Vertices, _Faces, NDArray[np.int64], tuple[Repair, ...]]:
+    """Return a mesh that every later stage can take, and what was changed.
+
+    In this order: faces with a corner that isn't finite, and such vertices, are
+    removed; vertices at identical positions are welded (texture seams, triangle soups);
+    faces without area and faces with the corners of an earlier one are removed;
+    vertices that no face uses are removed. Winding and order of what stays are kept.
+
+    Args:
+        vertices: In any unit, shape (n_v, 3).
+        faces: Indices in range, shape (n_f, 3).
+
+    Returns:
+        Vertices (n, 3), faces (m, 3), the index that each of these had among the faces
+        handed in (m,), ascending, and the repairs.
+
+    Raises:
+        MeshError: If no face stays, or more than a tenth of them isn't finite.
+    """
+    n_faces = len(faces)
+    steps = (_drop_non_finite, _weld, _drop_flat, _drop_doubled, _drop_unused)
+    repairs: list[Repair] = []
+    origin = np.arange(n_faces)
+    for step in steps:
+        vertices, faces, kept, made = step(vertices, faces)
+        if kept is not None:
+            origin = origin[kept]
+        repairs += [repair for repair in made if repair.count]
+        if len(faces) == 0:
+            raise MeshError(
+                f"none of its {n_faces} faces is usable ({_worded(repairs)}); "
+                "export the mesh again"
+            )
+    return vertices, faces, origin, tuple(repairs)
+
+
+def _worded(repairs: list[Repair]) -> str:
+    return ", ".join(f"{r.kind}: {r.count}" for r in repairs)
+
+
+def _drop_non_finite(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+    finite: NDArray[np.bool_] = np.all(np.abs(vertices) < _HUGE, axis=1)
+    if finite.all():
+        return vertices, faces, None, ()
+    keep = np.all(finite[faces], axis=1)
+    broken = len(faces) - int(keep.sum())
+    if 0 < keep.sum() and not broken <= _MAX_BROKEN * len(faces):
+        raise MeshError(
+            f"{broken} of {len(faces)} faces have corners that aren't finite numbers, "
+            f"at most {100 * _MAX_BROKEN:.0f} % may; export the mesh again"
+        )
+    faces = (np.cumsum(finite) - 1)[faces[keep]]
+    repairs = (
+        Repair("non-finite vertices removed", int((~finite).sum())),
+        Repair("non-finite faces removed", broken),
+    )
+    return vertices[finite], faces, keep, repairs
+
+
+def _weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+    first, where = _identical(vertices)
+    repair = Repair("vertices welded", len(vertices) - len(first))
+    return vertices[first], where[faces], None, (repair,)
+
+
+def _identical(
+    vertices: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first of each group of equal rows, in order, and each row's group."""
+    # Adding zero turns -0.0 into 0.0, which has other bits but is the same place.
+    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)
+    mix = np.array(
+        [0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64
+    )
+    key = np.bitwise_xor.reduce((bits ^ (bits >> np.uint64(29))) * mix, axis=1)
+    _, first, where = np.unique(key, return_index=True, return_inverse=True)
+    if not np.array_equal(vertices[first][where], vertices):
+        # Two places share a key: compare the rows themselves.
+        _, first, where = np.unique(
+            vertices + 0.0, axis=0, return_index=True, return_inverse=True
+        )
+    order = np.argsort(first)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[order] = np.arange(len(first))
+    return first[order], rank[where.reshape(-1)]
+
+
+def _drop_flat(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    double_area = np.linalg.norm(cross(b - a, c - a), axis=1)
+    sides = np.stack([b - a, c - b, a - c])
+    longest = np.einsum("kij,kij->ki", sides, sides).max(axis=0)
+    keep = double_area > _FLAT * longest
+    repair = Repair("zero-area faces removed", len(faces) - int(keep.sum()))
+    return vertices, faces[keep], keep, (repair,)
+
+
+def _drop_doubled(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+    low, middle, high = np.sort(faces, axis=1).T
+    n = len(vertices)
+    # The pair key fits 64 bits up to three thousand million vertices.
+    order = np.lexsort((high, low * n + middle))
+    rows = np.stack([low, middle, high], axis=1)[order]
+    same = np.zeros(len(faces), dtype=bool)
+    same[1:] = np.all(rows[1:] == rows[:-1], axis=1)
+    keep = np.ones(len(faces), dtype=bool)
+    # lexsort is stable, so the first of equal faces is the one that was stored first.
+    keep[order[same]] = False
+    repair = Repair("duplicate faces removed", int(same.sum()))
+    return vertices, faces[keep], keep, (repair,)
+
+
+def _drop_unused(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    repair = Repair("unreferenced vertices removed", int((~used).sum()))
+    return vertices[used], (np.cumsum(used) - 1)[faces], None, (repair,)

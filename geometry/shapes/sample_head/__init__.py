@@ -1,0 +1,1 @@
+"""The sample head that ringrig generates."""

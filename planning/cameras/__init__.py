@@ -1,0 +1,1 @@
+"""Section VI of the paper: the fewest cameras, and where they stand."""

@@ -1,0 +1,1 @@
+"""Eqs. (9)-(10): seams, the coverage triangle, the largest baselines."""

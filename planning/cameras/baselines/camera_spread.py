@@ -1,0 +1,394 @@
+"""Slides neighbouring cameras apart to the largest baselines that coverage allows.
+
+`solvers.poses.baseline_program` proposes by eqs. (9)-(10); rays decide: a move counts only if
+the measured area stays at least what it was, and the parts stay registered. Samples
+that a proposal lost are demanded of the next one; steps are halved where that doesn't
+help.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.poses import look_at
+from planning.model.plan import PlannedCamera
+from planning.model.requirements import Workspace
+from planning.scene.workspace.zone_limits import stands
+from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
+from solvers.poses.baseline_program import solve_baseline
+
+from .seams import adjacency, neighbouring_pairs, overlap_components
+from .spread_problem import (
+    RingsOnTarget,
+    SampledTarget,
+    SpreadLimits,
+    at_poses,
+    spread_problem,
+)
+
+_Array = NDArray[np.float64]
+Measure = Callable[[_Array], NDArray[np.bool_]]
+Confirm = Callable[[_Array], float]
+
+_STEPS = (1.0, 0.5, 0.25)
+# Reach of the first proposals, as a share of the largest radius of the shell.
+_REACH = 0.4
+_MIN_REACH = 0.02
+_SHRINK = 0.4
+# Proposals from one state, each knowing what the one before lost.
+_REPEATS = 4
+_DEMANDS = 24
+# Gains below this share of a baseline aren't worth an evaluation.
+_GAIN = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class CameraSpread:
+    """Cameras slid apart.
+
+    Attributes:
+        cameras: As moved.
+        measured_by: Which camera measures which sample there, shape (n, k).
+        smallest_before_m: Smallest baseline of neighbours before; None without any.
+        smallest_after_m: The same after, over all pairs that were neighbours before or
+            are now.
+        n_accepted: Moves that were taken.
+        n_evaluations: Times that coverage was evaluated.
+    """
+
+    cameras: tuple[PlannedCamera, ...]
+    measured_by: NDArray[np.bool_]
+    smallest_before_m: float | None
+    smallest_after_m: float | None
+    n_accepted: int
+    n_evaluations: int
+
+
+def spread_cameras(
+    cameras: Sequence[PlannedCamera],
+    measure: Measure,
+    *,
+    points: _Array,
+    normals: _Array,
+    weights: _Array | float,
+    limits: SpreadLimits,
+    confirm: Confirm | None = None,
+    required: float = 0.0,
+    rings: RingsOnTarget | None = None,
+    min_overlap_share: float = 0.01,
+    max_evaluations: int = 48,
+    max_programs: int | None = None,
+) -> CameraSpread:
+    """Raise the smallest baseline of neighbouring cameras without losing coverage.
+
+    A move is taken iff the measured weight is at least max(required, the weight at the
+    start), `confirm` finds no less than at the start either, the overlap graph falls
+    into no more groups, and the smallest baseline of neighbours rises, or their mean
+    does while the smallest stays.
+
+    Args:
+        cameras: As chosen; each keeps the point that it looks at, and its roll.
+        measure: Maps poses (k, 4, 4) to which camera measures which sample, (n, k), by
+            rays and every limit of the plan.
+        points: Samples in [m], shape (n, 3).
+        normals: Unit face normals, shape (n, 3).
+        weights: Weight of each sample in [m^2], shape (n,) or one number.
+        limits: What binds a camera.
+        confirm: Maps poses to the weight measured of more samples, on which no proposal
+            rests: of many moves, those pass that samples happen to favour.
+        required: Weight that must be measured [m^2].
+        rings: Rings of each projector on the samples; None: no rings.
+        min_overlap_share: Overlap or contact that makes neighbours.
+        max_evaluations: Calls of `measure` at most.
+        max_programs: Programs solved at most; None: no limit of their own.
+    """
+    n = len(points)
+    target = SampledTarget(
+        points,
+        normals,
+        np.broadcast_to(np.asarray(weights, np.float64), (n,)),
+        adjacency(points, normals),
+        rings,
+    )
+    search = _Search(
+        list(cameras),
+        measure,
+        confirm,
+        target,
+        limits,
+        min_overlap_share,
+        max_evaluations,
+    )
+    return search.run(required, max_programs)
+
+
+class _Search:
+    """The state of one spread: poses, what they measure, and the budget."""
+
+    def __init__(
+        self,
+        cameras: list[PlannedCamera],
+        measure: Measure,
+        confirm: Confirm | None,
+        target: SampledTarget,
+        limits: SpreadLimits,
+        share: float,
+        max_evaluations: int,
+    ) -> None:
+        self.cameras, self.target, self.limits = cameras, target, limits
+        self._measure, self._share, self._budget = measure, share, max_evaluations
+        self._confirm = confirm
+        self._confirmed: float | None = None
+        self.spent = self.accepted = self.solved = 0
+        self.poses = np.stack([camera.world_from_device for camera in cameras])
+        self.measured = self._evaluate(self.poses)
+        self.aims = aims_of(self.poses, self.measured, target.points, limits.workspace)
+        self.rolls = rolls_of(self.poses, self.aims, np.array(limits.workspace.up))
+        self.pairs = self._neighbours(self.measured)
+        self._groups = self._count_groups(self.measured)
+        self._free = np.array([not camera.existing for camera in cameras])
+
+    def run(self, required: float, max_programs: int | None) -> CameraSpread:
+        before = self._smallest(self.poses)
+        self._programs = np.inf if max_programs is None else max_programs
+        self._floor = max(required, self._weight(self.measured))
+        reach = _REACH * self.limits.workspace.camera_radius_m[1]
+        least = _MIN_REACH * self.limits.workspace.camera_radius_m[1]
+        while self.pairs and self._affords() and reach >= least:
+            if not self._free.any():
+                break
+            taken, proposed = self._improve(reach)
+            if not taken:
+                reach = _SHRINK * min(reach, proposed)
+        return CameraSpread(
+            tuple(at_poses(self.cameras, self.poses)),
+            self.measured,
+            before,
+            self._smallest(self.poses),
+            self.accepted,
+            self.spent,
+        )
+
+    def _affords(self) -> bool:
+        return self.spent < self._budget and self.solved < self._programs
+
+    def _improve(self, reach: float) -> tuple[bool, float]:
+        """Whether a proposal within reach was taken, whole or in part; its reach."""
+        demanded = np.zeros((0, 2), dtype=np.int64)
+        proposals: list[_Array] = []
+        for _ in range(_REPEATS):
+            if not self._affords():
+                break
+            self.solved += 1
+            solution = solve_baseline(self._problem(demanded, reach))
+            if not (solution.status.has_point and self._gains(solution.centres)):
+                break
+            proposals.append(solution.centres)
+            whole = self._between(solution.centres, np.ones(len(solution.centres)))
+            taken, lost = self._attempt(whole)
+            if taken:
+                return True, reach
+            fresh = self._demand(lost, solution.centres, demanded)
+            if not len(fresh):
+                break
+            demanded = np.concatenate([demanded, fresh])
+        # The first is the boldest, the last loses least: part of either may do.
+        ends = proposals[-1:] + proposals[:-1][:1]
+        moves = [np.linalg.norm(c - self.poses[:, :3, 3], axis=1).max() for c in ends]
+        taken = any(self._step_back(centres) for centres in ends)
+        return taken, float(max(moves, default=0.0))
+
+    def _step_back(self, centres: _Array) -> bool:
+        """Try part of the way for all, then for one camera at a time."""
+        k = len(centres)
+        alone = [np.eye(k)[c] for c in self._by_baseline()]
+        shares = [np.full(k, step) for step in _STEPS[1:]]
+        shares += [step * one for one in alone for step in _STEPS]
+        for share in shares:
+            part = self._between(centres, share)
+            if self._gains(part) and self._attempt(part)[0]:
+                return True
+        return False
+
+    def _attempt(self, centres: _Array) -> tuple[bool, NDArray[np.int64]]:
+        """Take a move if rays allow it; else which samples it loses."""
+        none = np.zeros(0, dtype=np.int64)
+        if self.spent >= self._budget or not self._admissible(centres):
+            return False, none
+        up = np.array(self.limits.workspace.up)
+        poses = np.stack(
+            [
+                look_at(centre, aim, up, roll=float(roll))
+                for centre, aim, roll in zip(
+                    centres, self.aims, self.rolls, strict=True
+                )
+            ]
+        )
+        poses[~self._free] = self.poses[~self._free]
+        measured = self._evaluate(poses)
+        lost = np.flatnonzero(self.measured.any(axis=1) & ~measured.any(axis=1))
+        if not self._weight(measured) >= self._floor:
+            return False, lost
+        pairs = sorted({*self.pairs, *self._neighbours(measured)})
+        index = np.array(pairs, dtype=np.int64)
+        held = smallest_baseline(centres, index) >= smallest_baseline(
+            self.poses[:, :3, 3], index
+        )
+        if not held or self._count_groups(measured) > self._groups:
+            return False, none
+        if not self._is_confirmed(poses):
+            return False, none
+        self.poses, self.measured, self.pairs = poses, measured, pairs
+        self.accepted += 1
+        return True, none
+
+    def _is_confirmed(self, poses: _Array) -> bool:
+        """Whether more samples agree that nothing is lost since the start."""
+        if self._confirm is None:
+            return True
+        if self._confirmed is None:
+            # Until a move is taken, the poses are those of the start.
+            self._confirmed = self._confirm(self.poses)
+        return self._confirm(poses) >= self._confirmed
+
+    def _demand(
+        self, lost: NDArray[np.int64], centres: _Array, known: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """(camera, sample) pairs that would hold some of the lost samples."""
+        if len(lost) > _DEMANDS:
+            lost = lost[np.linspace(0, len(lost) - 1, _DEMANDS).astype(np.int64)]
+        ray = self.target.points[lost][:, None] - centres[None]
+        facing = -np.einsum("ikj,ij->ik", ray, self.target.normals[lost])
+        facing = facing / np.linalg.norm(ray, axis=2)
+        holder = np.argmax(np.where(self.measured[lost], facing, -2.0), axis=1)
+        pairs = np.column_stack([holder, lost]).astype(np.int64)
+        seen = {(int(c), int(i)) for c, i in known}
+        fresh = [p for p in pairs if (int(p[0]), int(p[1])) not in seen]
+        return np.array(fresh, dtype=np.int64).reshape(-1, 2)
+
+    def _problem(self, demanded: NDArray[np.int64], reach: float) -> BaselineProblem:
+        return spread_problem(
+            at_poses(self.cameras, self.poses),
+            self.aims,
+            self.measured,
+            self.pairs,
+            self.target,
+            self.limits,
+            demanded=demanded,
+            max_step=reach,
+        )
+
+    def _between(self, centres: _Array, share: _Array) -> _Array:
+        """Centres part of the way, on arcs about the centre or straight on a plane."""
+        if self.limits.workspace.mounting:
+            # An arc would leave the plane.
+            now = self.poses[:, :3, 3]
+            return now + share[:, None] * (centres - now)
+        middle = np.array(self.limits.workspace.centre)
+        start, end = self.poses[:, :3, 3] - middle, centres - middle
+        r0, r1 = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
+        mixed = _arc(start / r0[:, None], end / r1[:, None], share)
+        return middle + (r0 + share * (r1 - r0))[:, None] * mixed
+
+    def _gains(self, centres: _Array) -> bool:
+        index = np.array(self.pairs, dtype=np.int64)
+        old, new = (
+            np.linalg.norm(c[index[:, 0]] - c[index[:, 1]], axis=1)
+            for c in (self.poses[:, :3, 3], centres)
+        )
+        if new.min() >= old.min() * (1.0 + _GAIN):
+            return True
+        return bool(new.min() >= old.min() and new.mean() >= old.mean() * (1.0 + _GAIN))
+
+    def _admissible(self, centres: _Array) -> bool:
+        space = self.limits.workspace
+        centres = centres[self._free]
+        offset = centres - np.array(space.centre)
+        distance = np.linalg.norm(offset, axis=1)
+        low, high = space.camera_radius_m
+        inside = (distance >= low * (1 - 1e-7)) & (distance <= high * (1 + 1e-7))
+        # Every direction is within pi, whatever the rounding of its cosine.
+        if space.half_angle < np.pi:
+            inside &= offset @ np.array(space.axis) >= distance * (
+                np.cos(space.half_angle) - 1e-9
+            )
+        if space.floor_m is not None:
+            inside &= offset @ np.array(space.up) >= space.floor_m - 1e-9
+        inside &= stands(space, offset)
+        return bool(np.all(inside))
+
+    def _by_baseline(self) -> list[int]:
+        """Cameras, those of the shortest baselines first."""
+        index = np.array(self.pairs, dtype=np.int64)
+        centres = self.poses[:, :3, 3]
+        apart = np.linalg.norm(centres[index[:, 0]] - centres[index[:, 1]], axis=1)
+        order = index[np.argsort(apart, kind="stable")].ravel()
+        return [int(c) for c in dict.fromkeys(order.tolist())]
+
+    def _evaluate(self, poses: _Array) -> NDArray[np.bool_]:
+        self.spent += 1
+        return self._measure(poses)
+
+    def _weight(self, measured: NDArray[np.bool_]) -> float:
+        return float(self.target.weights[measured.any(axis=1)].sum())
+
+    def _neighbours(self, measured: NDArray[np.bool_]) -> list[tuple[int, int]]:
+        return neighbouring_pairs(
+            measured,
+            self.target.weights,
+            self.target.adjacent,
+            min_overlap_share=self._share,
+        )
+
+    def _count_groups(self, measured: NDArray[np.bool_]) -> int:
+        return len(
+            overlap_components(
+                measured, self.target.weights, min_overlap_share=self._share
+            )
+        )
+
+    def _smallest(self, poses: _Array) -> float | None:
+        if not self.pairs:
+            return None
+        index = np.array(self.pairs, dtype=np.int64)
+        return smallest_baseline(poses[:, :3, 3], index)
+
+
+def aims_of(
+    poses: _Array,
+    measured: NDArray[np.bool_],
+    points: _Array,
+    workspace: Workspace,
+) -> _Array:
+    """Return points on the axes at the mean depth of what each camera measures."""
+    centre = np.array(workspace.centre)
+    aims = np.empty((len(poses), 3))
+    for c, pose in enumerate(poses):
+        mine = measured[:, c]
+        looked = points[mine].mean(axis=0) if mine.any() else centre
+        depth = (looked - pose[:3, 3]) @ pose[:3, 2]
+        aims[c] = pose[:3, 3] + depth * pose[:3, 2]
+    return aims
+
+
+def rolls_of(poses: _Array, aims: _Array, up: _Array) -> _Array:
+    """Return the turn of each device about its axis against `look_at` without roll."""
+    level = look_at(poses[:, :3, 3], aims, up)
+    x = poses[:, :3, 0]
+    return np.arctan2(
+        np.einsum("ij,ij->i", x, level[:, :3, 1]),
+        np.einsum("ij,ij->i", x, level[:, :3, 0]),
+    )
+
+
+def _arc(start: _Array, end: _Array, share: _Array) -> _Array:
+    """Unit vectors part of the way from start to end on great circles."""
+    angle = np.arccos(np.clip(np.einsum("ij,ij->i", start, end), -1.0, 1.0))
+    sine = np.maximum(np.sin(angle), 1e-12)
+    near = angle < 1e-9
+    a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
+    b = np.where(near, share, np.sin(share * angle) / sine)
+    mixed = a[:, None] * start + b[:, None] * end
+    return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)

@@ -1,0 +1,353 @@
+"""Eqs. (9)-(10): how far apart two cameras may stand and still cover a seam.
+
+E is where the parts of two cameras meet. In the triangle O1, E, O2::
+
+    d_max^2 = D1^2 + D2^2 - 2 D1 D2 cos(phi_max)                              (9)
+    covered <=> d'^2 < d_max^2 - d''^2 <=> d < d_max <=> phi < phi_max       (10)
+
+(the last step for phi and phi_max in (0, pi); outside, the signed phi decides).
+`docs/baselines.md` derives what stands here. Source: Lee and Krim, 2014, section VI.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.errors import InfeasibleLimitsError, InputError
+
+_Array = NDArray[np.float64]
+
+# Below this, relative to the lengths involved, a direction counts as undefined.
+_TINY = 1e-9
+# A seam that runs this close to the plane O1, E, O2 (cosine) names no side there.
+_UNDECIDED = 0.1
+
+
+def largest_baseline(
+    d1: _Array | float, d2: _Array | float, phi_max: _Array | float
+) -> _Array:
+    """Return d_max of eq. (9).
+
+    Args:
+        d1: D1 = |O1 E| in [m].
+        d2: D2 = |O2 E| in [m].
+        phi_max: Largest angle O1 E O2 at which both cameras reach E, in [rad].
+
+    Returns:
+        d_max in [m]; NaN where phi_max lies outside (0, pi): there no length of the
+        baseline decides, and the signed phi has to be tested.
+    """
+    d1, d2, phi_max = (np.asarray(a, dtype=np.float64) for a in (d1, d2, phi_max))
+    square = d1**2 + d2**2 - 2.0 * d1 * d2 * np.cos(phi_max)
+    decides = (phi_max > 0.0) & (phi_max < np.pi)
+    return np.where(decides, np.sqrt(np.maximum(square, 0.0)), np.nan)
+
+
+def baseline_parts(
+    centre1: _Array, axis1: _Array, centre2: _Array
+) -> tuple[_Array, _Array]:
+    """Return d' and d'', the lateral and axial parts of a baseline, eq. (10).
+
+    With O the foot of O2 on camera 1's optical axis, d' = |O O2| and d'' = |O O1|.
+
+    Args:
+        centre1: O1 in [m], shape (..., 3).
+        axis1: Camera 1's unit optical axis, shape (..., 3).
+        centre2: O2 in [m], shape (..., 3).
+    """
+    baseline = np.asarray(centre2) - centre1
+    axial = np.sum(baseline * axis1, axis=-1)
+    lateral = np.linalg.norm(baseline - axial[..., None] * axis1, axis=-1)
+    return lateral, np.abs(axial)
+
+
+@dataclass(frozen=True, eq=False)
+class SeamAngles:
+    """The signed angles of formulation section 6 at n seam points, all in [rad].
+
+    phi = beta_1 + delta_axes + beta_2 = iota_1 + delta_surface + iota_2. Angles are
+    positive away from the other camera's stretch.
+
+    Attributes:
+        phi: Angle O1 E O2; negative where the sight lines cross, shape (n,).
+        beta1: Off-axis angle of E in camera 1.
+        beta2: Off-axis angle of E in camera 2.
+        iota1: Incidence at E on camera 1's side of the seam.
+        iota2: Incidence at E on camera 2's side of the seam.
+        delta_axes: Turn from camera 1's optical axis to camera 2's.
+        delta_surface: Turn of the surface at E, convex positive.
+        outward: Unit direction of the surface normal in the plane, shape (n, 3).
+        onward: Unit direction in the plane, square to `outward`, from camera 1's
+            stretch into camera 2's, shape (n, 3).
+    """
+
+    phi: _Array
+    beta1: _Array
+    beta2: _Array
+    iota1: _Array
+    iota2: _Array
+    delta_axes: _Array
+    delta_surface: _Array
+    outward: _Array
+    onward: _Array
+
+    def largest(self, half_field2: _Array, max_incidence2: float | _Array) -> _Array:
+        """Return phi_max, camera 1 held at the end of its coverage.
+
+        ::
+
+            phi_max = min(beta_1 + delta_axes + b_2, iota_1 + delta_surface + theta_2)
+
+        Args:
+            half_field2: b_2, half field of camera 2 beyond E in the plane [rad].
+            max_incidence2: theta_2, incidence that camera 2 accepts [rad].
+        """
+        return np.minimum(
+            self.beta1 + self.delta_axes + half_field2,
+            self.iota1 + self.delta_surface + max_incidence2,
+        )
+
+
+def seam_angles(
+    points: _Array,
+    onward: _Array,
+    *,
+    centres: tuple[_Array, _Array],
+    axes: tuple[_Array, _Array],
+    normals: tuple[_Array, _Array],
+) -> SeamAngles:
+    """Return the angles at seam points, each in its own plane O1, E, O2.
+
+    Axes and normals that leave the plane are projected onto it, so that off the plane
+    phi < phi_max is necessary for camera 2 to reach E and no longer sufficient.
+
+    Args:
+        points: E in [m], shape (n, 3).
+        onward: Direction along the surface from camera 1's stretch into camera 2's,
+            any length, shape (3,) or (n, 3); where it is square to the plane's trace
+            on the surface (within 6 degrees), the side of O2 takes its place.
+        centres: O1 and O2 in [m], shape (3,) or (n, 3).
+        axes: Unit optical axes of both, shape (3,) or (n, 3).
+        normals: Unit normals at E on camera 1's and camera 2's side, (n, 3).
+    """
+    points = np.asarray(points, dtype=np.float64)
+    onward = np.broadcast_to(onward, points.shape)
+    to1, to2 = centres[0] - points, centres[1] - points
+    plane = _plane(to1, to2, onward, normals[0])
+    out, on = _plane_axes(plane, to1, to2, onward, normals[0])
+
+    def bearing(direction: _Array) -> _Array:
+        return np.arctan2(_dot(direction, on), _dot(direction, out))
+
+    delta = bearing(_on_plane(normals[1], plane, out))
+    iota1, iota2 = -bearing(to1), _wrapped(bearing(to2) - delta)
+    # The sum, not the wrapped difference of bearings: round a sharp edge phi passes pi.
+    phi = iota1 + delta + iota2
+    back1 = bearing(_on_plane(-np.asarray(axes[0]), plane, to1))
+    back2 = bearing(_on_plane(-np.asarray(axes[1]), plane, to2))
+    beta1 = _wrapped(back1 + iota1)
+    beta2 = _wrapped(bearing(to2) - back2)
+    return SeamAngles(
+        phi, beta1, beta2, iota1, iota2, phi - beta1 - beta2, delta, out, on
+    )
+
+
+def _plane(to1: _Array, to2: _Array, onward: _Array, normals: _Array) -> _Array:
+    """Unit normals of the planes O1, E, O2; of N and onward where these are in line."""
+    plane = np.cross(to1, to2)
+    size = np.linalg.norm(to1, axis=1) * np.linalg.norm(to2, axis=1)
+    for spare in (onward, *np.eye(3)):
+        flat = ~(np.linalg.norm(plane, axis=1) > _TINY * size)
+        if not np.any(flat):
+            break
+        along = np.broadcast_to(spare, plane.shape)
+        plane = np.where(flat[:, None], np.cross(normals, along) * size[:, None], plane)
+    return plane / np.linalg.norm(plane, axis=1, keepdims=True)
+
+
+def _plane_axes(
+    plane: _Array, to1: _Array, to2: _Array, onward: _Array, normals: _Array
+) -> tuple[_Array, _Array]:
+    spare = to1 / np.linalg.norm(to1, axis=1, keepdims=True)
+    out = _on_plane(normals, plane, spare)
+    on = np.cross(plane, out)
+    seam = _dot(onward, on)
+    undecided = ~(np.abs(seam) > _UNDECIDED * np.linalg.norm(onward, axis=1))
+    side = np.where(undecided, _dot(to2 - to1, on), seam)
+    return out, np.where(side[:, None] < 0.0, -on, on)
+
+
+def _on_plane(vectors: _Array, plane: _Array, spare: _Array) -> _Array:
+    """Unit vectors along the projections; `spare` takes the place of a null one."""
+    vectors = np.broadcast_to(vectors, plane.shape)
+    flat = vectors - _dot(vectors, plane)[:, None] * plane
+    flat = np.where(np.linalg.norm(flat, axis=1, keepdims=True) > _TINY, flat, spare)
+    return flat / np.linalg.norm(flat, axis=1, keepdims=True)
+
+
+def _dot(a: _Array, b: _Array) -> _Array:
+    return np.sum(a * b, axis=-1)
+
+
+def _wrapped(angle: _Array) -> _Array:
+    return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
+
+
+def flat_limit(half_extent1: float, half_extent2: float) -> float:
+    """Return d'_max = C1 + C2 of a flat wall, axes square to it, field-limited [m]."""
+    return half_extent1 + half_extent2
+
+
+def bent_limit(
+    standoff1: float,
+    half_extent1: float,
+    standoff2: float,
+    half_extent2: float,
+    turn: float,
+) -> float:
+    """Return d_max over an edge, each axis square to its own plane, field-limited.
+
+    ::
+
+        d_max^2 = s1^2 + C1^2 + s2^2 + C2^2
+                  - 2 [(s1 s2 - C1 C2) cos(turn) - (C1 s2 + C2 s1) sin(turn)]
+
+    Args:
+        standoff1: s1, the paper's d_1, in [m].
+        half_extent1: C1 = s1 tan(b_1) in [m].
+        standoff2: s2 in [m].
+        half_extent2: C2 in [m].
+        turn: Angle between the planes' normals, convex positive [rad].
+    """
+    s1, c1, s2, c2 = standoff1, half_extent1, standoff2, half_extent2
+    mixed = (s1 * s2 - c1 * c2) * np.cos(turn) - (c1 * s2 + c2 * s1) * np.sin(turn)
+    return float(np.sqrt(s1**2 + c1**2 + s2**2 + c2**2 - 2.0 * mixed))
+
+
+@dataclass(frozen=True)
+class RingLimit:
+    """Cameras on a ring about a round body.
+
+    Attributes:
+        half_angle: eta, azimuth that a camera covers on either side of itself [rad].
+        n_min: Fewest cameras that cover the whole turn, floor(pi / eta) + 1.
+        d_max: Largest baseline of neighbours, 2 S sin(eta) [m].
+    """
+
+    half_angle: float
+    n_min: int
+    d_max: float
+
+
+def round_body_limit(
+    radius: float,
+    ring_radius: float,
+    max_incidence: float,
+    half_field: float | None = None,
+) -> RingLimit:
+    """Return the limits for a disc or cylinder section, cameras facing its centre.
+
+    ::
+
+        eta = min(theta - asin(rho/S sin theta), asin(S/rho sin alpha) - alpha)
+
+    The second only if sin(alpha) < rho/S: else the whole body is in the field.
+
+    Args:
+        radius: rho in [m].
+        ring_radius: S, of the camera centres about the body's centre, in [m].
+        max_incidence: theta in [rad].
+        half_field: alpha in [rad]; None: no limit.
+
+    Raises:
+        InputError: If a length or angle is out of range.
+    """
+    _check_round(radius, ring_radius, max_incidence)
+    ratio = radius / ring_radius
+    eta = max_incidence - np.arcsin(ratio * np.sin(max_incidence))
+    if half_field is not None:
+        if not 0.0 < half_field < np.pi / 2:
+            raise InputError(f"half field is {half_field} rad, must be in (0, pi/2)")
+        if np.sin(half_field) < ratio:
+            eta = min(eta, np.arcsin(np.sin(half_field) / ratio) - half_field)
+    return _ring(float(eta), ring_radius)
+
+
+def sphere_band_limit(
+    radius: float,
+    ring_radius: float,
+    max_incidence: float,
+    latitude: float,
+    half_field: float | None = None,
+) -> RingLimit:
+    """Return the limits for the band within a latitude of a sphere's equator.
+
+    ::
+
+        cos(eta_l) = cos(eta) / cos(latitude)
+
+    Raises:
+        InputError: If a length or angle is out of range.
+        InfeasibleLimitsError: If no camera in the equator's plane reaches the latitude.
+    """
+    cap = round_body_limit(radius, ring_radius, max_incidence, half_field).half_angle
+    if not 0.0 <= latitude < np.pi / 2:
+        raise InputError(f"latitude is {latitude} rad; it must lie in [0, pi/2)")
+    cosine = np.cos(cap) / np.cos(latitude)
+    if not cosine < 1.0:
+        raise InfeasibleLimitsError(
+            f"a camera in the equator's plane covers a cap of {np.degrees(cap):.1f} "
+            f"deg, the band reaches {np.degrees(latitude):.1f} deg: no number of "
+            f"cameras on this ring covers it; stand farther off or accept more "
+            f"incidence"
+        )
+    return _ring(float(np.arccos(cosine)), ring_radius)
+
+
+def cylinder_limit(
+    radius: float, ring_radius: float, max_incidence: float, half_height: float
+) -> RingLimit:
+    """Return the limits for an upright cylinder, cameras at its mid height.
+
+    ::
+
+        cos(eta) = [rho sin^2 theta
+                    + cos theta sqrt(S^2 - rho^2 sin^2 theta + z^2)] / S
+
+    Raises:
+        InputError: If a length or angle is out of range.
+        InfeasibleLimitsError: If the ends are seen too obliquely from anywhere.
+    """
+    _check_round(radius, ring_radius, max_incidence)
+    if not 0.0 <= half_height < np.inf:
+        raise InputError(f"half height is {half_height} m; it must be 0 or more")
+    s2 = np.sin(max_incidence) ** 2
+    root = np.sqrt(ring_radius**2 - radius**2 * s2 + half_height**2)
+    cosine = (radius * s2 + np.cos(max_incidence) * root) / ring_radius
+    if not cosine < 1.0:
+        raise InfeasibleLimitsError(
+            f"the ends of a cylinder of half height {1e3 * half_height:.4g} mm are "
+            f"seen beyond {np.degrees(max_incidence):.1f} deg of incidence from every "
+            f"camera at mid height {1e3 * ring_radius:.4g} mm from its axis; stand "
+            f"farther off, accept more incidence or use several heights"
+        )
+    return _ring(float(np.arccos(cosine)), ring_radius)
+
+
+def _ring(eta: float, ring_radius: float) -> RingLimit:
+    # Parts that only touch don't cover: pi/eta = 4 takes five cameras, however rounded.
+    n_min = int(np.floor(np.pi / eta + 1e-9)) + 1
+    return RingLimit(eta, n_min, float(2.0 * ring_radius * np.sin(eta)))
+
+
+def _check_round(radius: float, ring_radius: float, max_incidence: float) -> None:
+    if not 0.0 < radius < ring_radius < np.inf:
+        raise InputError(
+            f"body radius {radius} m and ring radius {ring_radius} m: "
+            f"the cameras must stand outside the body"
+        )
+    if not 0.0 < max_incidence < np.pi / 2:
+        raise InputError(
+            f"max_incidence is {max_incidence} rad; it must lie in (0, pi/2)"
+        )

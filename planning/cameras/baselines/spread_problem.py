@@ -1,0 +1,355 @@
+"""States the baseline program of `solvers` for cameras as they stand.
+
+Seams and kept samples are drawn from what is measured now; samples that a trial move
+lost come back as kept ones, so that the next proposal knows of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.plan import PlannedCamera
+from planning.model.requirements import Workspace
+from planning.scene.workspace.zone_limits import half_spaces
+from planning.scene.workspace.zone_positions import is_zoned
+from solvers.poses.baseline_problem import (
+    BaselineProblem,
+    HalfSpaces,
+    KeptPoints,
+    SeamPoints,
+    Shell,
+)
+
+from .baseline_rows import check_seam, half_field
+from .seams import Adjacency, find_seam
+
+_Array = NDArray[np.float64]
+
+# Few, since a step of the program costs what its rows cost, and what they don't hold
+# is demanded when a trial loses it: 16 and 24 end no higher, in three times the time.
+_SEAM_POINTS = 6
+_KEPT_POINTS = 8
+# Proposals stay this far inside the limits, since the samples between the kept ones
+# are held only by them.
+_SPARE_INCIDENCE = np.radians(0.3)
+_SPARE_FIELD = np.radians(0.1)
+_SPARE_CONDITIONING = 0.002
+_SPARE_RINGS = 0.002
+_COMFORT = np.radians(5.0)
+_EASE = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class RingsOnTarget:
+    """The rings of every projector on n samples.
+
+    Attributes:
+        normals: Unit normals m of the ring surfaces, shape (n_p, n, 3).
+        spacing: h, ring spacing along m in [m], shape (n_p, n).
+        noise_px: s_px, edge noise in [px], shape (n_p, n).
+        lit: Whether a projector lights a sample, shape (n, n_p).
+    """
+
+    normals: _Array
+    spacing: _Array
+    noise_px: _Array
+    lit: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class SampledTarget:
+    """Samples that cameras measure, and the rings on them.
+
+    Attributes:
+        points: In [m], shape (n, 3).
+        normals: Unit face normals, shape (n, 3).
+        weights: Area behind each sample in [m^2], shape (n,).
+        adjacent: Near samples of each.
+        rings: What each projector draws on them; None: no rings.
+    """
+
+    points: _Array
+    normals: _Array
+    weights: _Array
+    adjacent: Adjacency
+    rings: RingsOnTarget | None
+
+
+@dataclass(frozen=True, eq=False)
+class SpreadLimits:
+    """What binds a camera that slides.
+
+    Attributes:
+        max_incidence: theta in [rad].
+        min_conditioning: Least |r.m|.
+        workspace: Where cameras may stand.
+        min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
+        max_sigma_m: Largest s_N [m].
+        spare_field: What seams keep free of the half fields [rad], at least that by
+            which proposals stay inside their limits.
+    """
+
+    max_incidence: float
+    min_conditioning: float
+    workspace: Workspace
+    min_ring_pitch_px: float | None = None
+    max_sigma_m: float | None = None
+    spare_field: float = 0.0
+
+
+def camera_shell(workspace: Workspace) -> Shell:
+    """Return where camera centres may stand."""
+    return Shell(
+        np.array(workspace.centre),
+        workspace.camera_radius_m,
+        np.array(workspace.axis),
+        workspace.half_angle,
+        np.array(workspace.up),
+        workspace.floor_m,
+    )
+
+
+def spread_problem(
+    cameras: Sequence[PlannedCamera],
+    aims: _Array,
+    measured_by: NDArray[np.bool_],
+    pairs: Sequence[tuple[int, int]],
+    target: SampledTarget,
+    limits: SpreadLimits,
+    *,
+    demanded: NDArray[np.int64],
+    max_step: float,
+) -> BaselineProblem:
+    """Return the program for cameras as they stand.
+
+    Args:
+        cameras: As they stand.
+        aims: Points that they look at in [m], shape (k, 3).
+        measured_by: Which camera measures which sample now, shape (n, k).
+        pairs: Neighbours.
+        target: The samples.
+        limits: What binds.
+        demanded: (camera, sample) pairs that must be kept besides the drawn ones,
+            shape (q, 2).
+        max_step: Farthest that a centre may move in [m].
+    """
+    centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras])
+    kept = [
+        np.column_stack([np.full(len(rows), c), rows])
+        for c, rows in enumerate(_sole_samples(cameras, measured_by, target, limits))
+    ]
+    return BaselineProblem(
+        centres=centres,
+        aims=aims,
+        pairs=np.array(pairs, dtype=np.int64),
+        shell=camera_shell(limits.workspace),
+        seams=_seam_points(cameras, measured_by, pairs, target, limits),
+        kept=_kept_points(cameras, np.concatenate([*kept, demanded]), target, limits),
+        max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
+        range_m=cameras[0].device.range_m,
+        min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
+        max_step=max_step,
+        half_spaces=_held_in(limits.workspace, cameras),
+        fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
+    )
+
+
+def _held_in(
+    workspace: Workspace, cameras: Sequence[PlannedCamera]
+) -> HalfSpaces | None:
+    """The convex part of the zones about each camera that may move."""
+    free = [c for c, camera in enumerate(cameras) if not camera.existing]
+    if not (is_zoned(workspace) and free):
+        return None
+    centres = np.stack([cameras[c].world_from_device[:3, 3] for c in free])
+    offsets = centres - np.array(workspace.centre)
+    parts = [half_spaces(workspace, offset) for offset in offsets]
+    return HalfSpaces(
+        np.repeat(free, [len(normals) for normals, _ in parts]),
+        np.concatenate([normals for normals, _ in parts]),
+        np.concatenate([least for _, least in parts]),
+    )
+
+
+def _seam_points(
+    cameras: Sequence[PlannedCamera],
+    measured_by: NDArray[np.bool_],
+    pairs: Sequence[tuple[int, int]],
+    target: SampledTarget,
+    limits: SpreadLimits,
+) -> SeamPoints:
+    parts: list[SeamPoints] = []
+    for pair in pairs:
+        for first, second in (pair, pair[::-1]):
+            seam = find_seam(first, second, target.points, measured_by, target.adjacent)
+            if not (len(seam.points) and seam.shares_border):
+                continue
+            test = check_seam(
+                cameras, target.points, target.normals, seam, limits.max_incidence
+            )
+            rows = _tight_and_spread(test.slack, test.points, _SEAM_POINTS)
+            fields = np.column_stack([test.half_field1, test.half_field2])
+            parts.append(
+                SeamPoints(
+                    np.tile(np.array([first, second]), (len(rows), 1)),
+                    test.points[rows],
+                    test.angles.outward[rows],
+                    test.angles.onward[rows],
+                    test.angles.delta_surface[rows],
+                    fields[rows] - max(_SPARE_FIELD, limits.spare_field),
+                )
+            )
+    if not parts:
+        none = np.zeros((0, 3))
+        pair = np.zeros((0, 2))
+        return SeamPoints(pair.astype(np.int64), none, none, none, np.zeros(0), pair)
+    names = ("cameras", "points", "outward", "onward", "turn", "half_fields")
+    return SeamPoints(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+
+
+def _sole_samples(
+    cameras: Sequence[PlannedCamera],
+    measured_by: NDArray[np.bool_],
+    target: SampledTarget,
+    limits: SpreadLimits,
+) -> list[NDArray[np.int64]]:
+    """Some of what each camera alone measures, the most oblique and well apart.
+
+    Samples right at the limit are left out: on a noisy surface they lie everywhere and
+    would hold the cameras where they are. What a move really loses is demanded later.
+    """
+    sole = measured_by.sum(axis=1) == 1
+    least = np.cos(limits.max_incidence - _COMFORT)
+    chosen: list[NDArray[np.int64]] = []
+    for c, camera in enumerate(cameras):
+        rows = np.flatnonzero(sole & measured_by[:, c])
+        ray = target.points[rows] - camera.world_from_device[:3, 3]
+        facing = -np.einsum("ij,ij->i", ray, target.normals[rows])
+        facing /= np.linalg.norm(ray, axis=1)
+        eased = facing >= least
+        if target.rings is not None and len(rows):
+            eased &= best_rings(camera, rows, target, target.rings, limits)[3] >= _EASE
+        rows, facing = rows[eased], facing[eased]
+        chosen.append(
+            rows[_tight_and_spread(facing, target.points[rows], _KEPT_POINTS)]
+        )
+    return chosen
+
+
+def _kept_points(
+    cameras: Sequence[PlannedCamera],
+    kept: NDArray[np.int64],
+    target: SampledTarget,
+    limits: SpreadLimits,
+) -> KeptPoints:
+    kept = np.unique(kept.astype(np.int64).reshape(-1, 2), axis=0)
+    index, rows = kept[:, 0], kept[:, 1]
+    points = target.points[rows]
+    cosine, sigma, pitch = (np.zeros(len(kept)) for _ in range(3))
+    rings = np.zeros((len(kept), 3))
+    for c, camera in enumerate(cameras):
+        mine = np.flatnonzero(index == c)
+        if not len(mine):
+            continue
+        cosine[mine] = _field_cosines(camera, points[mine])
+        if target.rings is not None:
+            rings[mine], sigma[mine], pitch[mine], _ = best_rings(
+                camera, rows[mine], target, target.rings, limits
+            )
+    normals = target.normals[rows]
+    return KeptPoints(index, points, normals, cosine, rings, sigma, pitch)
+
+
+def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
+    """Cosine of the half field in the plane of the axis and each point."""
+    axis = camera.world_from_device[:3, 2]
+    ray = points - camera.world_from_device[:3, 3]
+    depth = ray @ axis
+    aside = ray - depth[:, None] * axis
+    distance = np.linalg.norm(aside, axis=1)
+    centred = distance <= 1e-12
+    aside = np.where(centred[:, None], camera.world_from_device[:3, 0], aside)
+    towards = aside / np.linalg.norm(aside, axis=1, keepdims=True)
+    along = np.broadcast_to(axis, towards.shape)
+    half = half_field(camera, along, towards, np.arctan2(distance, depth))
+    return np.cos(half - _SPARE_FIELD)
+
+
+def best_rings(
+    camera: PlannedCamera,
+    rows: NDArray[np.int64],
+    target: SampledTarget,
+    rings: RingsOnTarget,
+    limits: SpreadLimits,
+) -> tuple[_Array, _Array, _Array, _Array]:
+    """Return the ring normals that measure samples best, and what s_N and pitch ask.
+
+    With g = J_r^T v, |g| = c |v| / f, where c is 1 on the optical axis and hardly
+    changes as the camera slides; so the limits become m.r >= q t |v| and
+    -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f).
+
+    Args:
+        camera: As it stands.
+        rows: Samples, shape (q,).
+        target: All samples.
+        rings: On all samples.
+        limits: What binds.
+
+    Returns:
+        Ring normals with m.r > 0, (q, 3); q and p in [1/m], 0 where the limit doesn't
+        bind; what the tightest of these limits leaves, in units of a cosine; (q,) each.
+    """
+    pose = camera.world_from_device
+    ray = target.points[rows] - pose[:3, 3]
+    distance = np.linalg.norm(ray, axis=1)
+    r, normal = ray / distance[:, None], target.normals[rows]
+    m = rings.normals[:, rows]
+    along = np.einsum("ij,pij->pi", r, m)
+    facing = -np.einsum("ij,ij->i", r, normal)
+    v = normal * along[..., None] + m * facing[:, None]
+    jacobian = pose[:3, :3] @ camera.device.ray_jacobian(ray @ pose[:3, :3])
+    g = np.linalg.norm(np.einsum("ijk,pij->pik", jacobian, v), axis=2)
+    per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
+    sigma, pitch = np.zeros(along.shape), np.zeros(along.shape)
+    if limits.max_sigma_m is not None:
+        sigma = rings.noise_px[:, rows] * per_length / limits.max_sigma_m
+    if limits.min_ring_pitch_px is not None:
+        pitch = limits.min_ring_pitch_px * per_length / rings.spacing[:, rows]
+    spread = distance * np.linalg.norm(v, axis=2)
+    spare = np.minimum(
+        np.abs(along) - np.maximum(limits.min_conditioning, sigma * spread),
+        facing - pitch * spread,
+    )
+    best = np.argmax(np.where(rings.lit[rows].T, spare, -np.inf), axis=0)
+    each = np.arange(len(rows))
+    sign = np.where(along[best, each] < 0.0, -1.0, 1.0)
+    spared = 1.0 + _SPARE_RINGS
+    return (
+        sign[:, None] * m[best, each],
+        spared * sigma[best, each],
+        spared * pitch[best, each],
+        spare[best, each],
+    )
+
+
+def _tight_and_spread(tightness: _Array, points: _Array, n: int) -> NDArray[np.int64]:
+    """Half of n the tightest (least), half farthest from each other; all if fewer."""
+    if len(points) <= n:
+        return np.arange(len(points))
+    chosen = list(np.argsort(tightness, kind="stable")[: n // 2])
+    gap = np.min(np.linalg.norm(points[:, None] - points[chosen][None], axis=2), axis=1)
+    while len(chosen) < n:
+        farthest = int(np.argmax(gap))
+        chosen.append(farthest)
+        gap = np.minimum(gap, np.linalg.norm(points - points[farthest], axis=1))
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def at_poses(cameras: Sequence[PlannedCamera], poses: _Array) -> list[PlannedCamera]:
+    """Return the cameras at other poses, shape (k, 4, 4)."""
+    return [
+        replace(camera, world_from_device=pose)
+        for camera, pose in zip(cameras, poses, strict=True)
+    ]

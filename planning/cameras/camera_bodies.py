@@ -1,0 +1,165 @@
+"""Cameras among each other's bodies: what they measure then, and whose light they take.
+
+A camera's body may stand in a beam as well as in a view. Cameras whose bodies keep a
+sample dark aren't taken: what is lit is what the number of cameras was proved for.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.proofs.conflicts import settle
+from planning.scene.scene import Scene
+from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
+
+from .camera_cover import CameraCover, LitSamples, measured_by
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredCrowd:
+    """Cameras, and the lit samples that they measure.
+
+    Attributes:
+        scene: With the bodies of the projectors.
+        projectors: As planned.
+        devices: The candidates.
+        rows: Samples that the projectors light, were there no cameras.
+        measured: Which candidate measures which, but for bodies of others, (n, m).
+    """
+
+    scene: Scene
+    projectors: tuple[PlannedProjector, ...]
+    devices: Sequence[PlannedCamera]
+    rows: LitSamples
+    measured: NDArray[np.bool_]
+
+    @property
+    def bodied(self) -> bool:
+        """Whether any candidate that isn't given has a body."""
+        return moves_bodies(self.devices)
+
+    def covers(
+        self, standing: Sequence[int], columns: Sequence[int]
+    ) -> NDArray[np.bool_]:
+        """Return which rows candidates measure among the bodies of others."""
+        chosen = [self.devices[i] for i in standing]
+        bodies = bodies_of(device for device in chosen if not device.existing)
+        scene = self.scene.among((*self.projectors, *chosen))
+        lit = lit_among(self.projectors, self.rows, chosen)
+        changed = np.flatnonzero((lit != self.rows.lit).any(axis=1))
+        dimmed = taken(self.rows, changed, lit)
+        points = self.rows.target.samples.points
+        measured = self.measured[:, columns]
+        for k, column in enumerate(columns):
+            device = self.devices[column]
+            others = column not in standing
+            if collide(device, bodies) or (others and self._shades[column]):
+                measured[:, k] = False
+                continue
+            own = np.flatnonzero(measured[:, k])
+            blocked = blocked_by(bodies, device, points[own]).any(axis=1)
+            measured[own[blocked], k] = False
+            if len(changed):
+                measured[changed, k] = measured_by(scene, [device], dimmed)[:, 0]
+        return measured
+
+    def stand_together(self, chosen: Sequence[int]) -> bool:
+        """Return whether no bodies collide and all that is lit stays lit."""
+        devices = [self.devices[i] for i in chosen]
+        bodies = bodies_of(devices)
+        if any(collide(device, bodies) for device in devices):
+            return False
+        return not self._darkens(devices)
+
+    @cached_property
+    def _shades(self) -> NDArray[np.bool_]:
+        """Whether each candidate alone keeps a sample dark."""
+        return np.array(
+            [
+                device.body is not None
+                and not device.existing
+                and self._darkens([device])
+                for device in self.devices
+            ]
+        )
+
+    def _darkens(self, cameras: Sequence[PlannedCamera]) -> bool:
+        lit = lit_among(self.projectors, self.rows, cameras)
+        return not lit.any(axis=1).all()
+
+
+def lit_among(
+    projectors: Sequence[PlannedProjector],
+    rows: LitSamples,
+    cameras: Sequence[PlannedCamera],
+) -> NDArray[np.bool_]:
+    """Return which projector lights which sample past the bodies of planned cameras.
+
+    Args:
+        projectors: As planned.
+        rows: Samples lit without these cameras.
+        cameras: As they stand; those that stand already were in the way before.
+
+    Returns:
+        Shape (n, n_projectors).
+    """
+    bodies = bodies_of(camera for camera in cameras if not camera.existing)
+    lit = rows.lit.copy()
+    for p, projector in enumerate(projectors):
+        own = np.flatnonzero(lit[:, p])
+        points = rows.target.samples.points[own]
+        lit[own[blocked_by(bodies, projector, points).any(axis=1)], p] = False
+    return lit
+
+
+def taken(
+    rows: LitSamples, chosen: NDArray[np.int64], lit: NDArray[np.bool_]
+) -> LitSamples:
+    """Return some of the samples, lit as stated for all."""
+    return LitSamples(
+        rows.target.take(chosen),
+        lit[chosen],
+        tuple(light.take(chosen) for light in rows.lights),
+        tuple(rings.take(chosen) for rings in rows.rings),
+    )
+
+
+def settled_cover(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    cover: CameraCover,
+) -> CameraCover:
+    """Return a cover whose cameras bear each other's bodies, as `settle` says.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As the cover was made for.
+        cover: Chosen without regard to bodies of cameras.
+
+    Raises:
+        InfeasibleLimitsError: If the body of every camera is in the way.
+    """
+    required = scene.requirements
+    crowd = MeasuredCrowd(
+        scene, projectors, cover.offered.cameras, cover.rows, cover.measured
+    )
+    selection = settle(
+        crowd,
+        cover.measured,
+        cover.selection,
+        max_count=required.max_cameras,
+        seed=scene.seed,
+        given=len(required.existing_of("camera")),
+    )
+    if not len(selection.chosen):
+        raise InfeasibleLimitsError(
+            f"each of {len(cover.offered.cameras)} camera bodies collides, or keeps "
+            f"something dark that the projectors light; make [camera.body] smaller, or "
+            f"let cameras stand elsewhere"
+        )
+    return replace(cover, selection=selection, crowd=crowd)

@@ -1,0 +1,423 @@
+"""Section VI of the paper: the fewest cameras that measure what is lit."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.proofs.conflicts import Crowd, settle_others
+from planning.proofs.selection import (
+    BODIES_LEFT_OUT,
+    Selection,
+    certificate,
+    marginals,
+    others_instead,
+    select_fewest,
+)
+from planning.report.summary.shortfall import area_words
+from planning.scene import lighting, measurability
+from planning.scene.clearance import offered_with_room
+from planning.scene.existing import existing_cameras
+from planning.scene.lighting import Light, Target
+from planning.scene.lit import lit_stages, merged
+from planning.scene.measurability import Rings
+from planning.scene.scene import Scene
+from planning.scene.sights import Sight, Sights, joined_sight, sights_of, view_of
+from planning.scene.workspace.candidates import camera_candidates
+
+from .routes import Routes
+
+_ROWS = 2000
+_CHECK_ROWS = 4000
+# Seen by several cameras and worked on together: many calls on few rows are slow, and
+# much more leaves the cache.
+_PAIRS = 8192
+ROUNDS = 3
+_STREAM = 200
+
+
+@dataclass(frozen=True, eq=False)
+class LitSamples:
+    """Samples with the light of every projector of the plan on them.
+
+    Attributes:
+        target: The samples that at least one projector lights.
+        lit: Which projector lights which, shape (n, n_projectors).
+        lights: Light of each projector.
+        rings: Ring surfaces of each projector.
+    """
+
+    target: Target
+    lit: NDArray[np.bool_]
+    lights: tuple[Light, ...]
+    rings: tuple[Rings, ...]
+
+
+class NothingMeasuredError(InfeasibleLimitsError):
+    """No candidate measures any lit sample.
+
+    Attributes:
+        cameras: The candidates.
+        rows: The lit samples.
+    """
+
+    def __init__(
+        self, message: str, cameras: tuple[PlannedCamera, ...], rows: LitSamples
+    ) -> None:
+        super().__init__(message)
+        self.cameras, self.rows = cameras, rows
+
+
+@dataclass(frozen=True, eq=False)
+class CameraCover:
+    """Cameras chosen for projectors as they are.
+
+    Attributes:
+        offered: Candidates, which are the reference set, and what they see.
+        rows: Lit samples that the cover was solved on.
+        measured: Which candidate measures which sample, shape (n, m).
+        selection: Candidates taken, and what was proved of their number.
+        crowd: The candidates among each other's bodies, where they have any.
+        by_count: Candidates for each number of them, where a route of its own found
+            them; None: the best there are.
+    """
+
+    offered: Sights
+    rows: LitSamples
+    measured: NDArray[np.bool_]
+    selection: Selection
+    crowd: Crowd | None = None
+    by_count: Mapping[int, NDArray[np.int64]] | None = None
+
+    @property
+    def cameras(self) -> tuple[PlannedCamera, ...]:
+        """The cameras taken."""
+        return tuple(self.offered.cameras[i] for i in self.selection.chosen)
+
+
+@dataclass(frozen=True, eq=False)
+class CameraStage:
+    """What the camera stage found; the attributes are those of `ProjectorStage`.
+
+    `offered` keeps what the reference cameras see, to prove the count again after ring
+    axes have moved; `measured`, which of them measures which row, (n, m); `routes` says
+    what either route needs.
+    """
+
+    cameras: tuple[PlannedCamera, ...]
+    offered: Sights
+    rows: LitSamples
+    measured: NDArray[np.bool_]
+    by_count: dict[int, tuple[PlannedCamera, ...]]
+    certificate: dict[str, Any]
+    routes: Routes | None = None
+
+    @property
+    def reference(self) -> tuple[PlannedCamera, ...]:
+        """The candidates."""
+        return self.offered.cameras
+
+
+def lit_samples(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> LitSamples:
+    """Return the samples that the projectors light, with their light and rings."""
+    lit = lit_stages(scene, projectors, target) == lighting.LIT
+    some = np.flatnonzero(lit.any(axis=1))
+    kept = target.take(some)
+    return LitSamples(
+        kept,
+        lit[some],
+        tuple(lighting.light_on(projector, kept) for projector in projectors),
+        rings_of(projectors, kept),
+    )
+
+
+def rings_of(
+    projectors: Sequence[PlannedProjector], target: Target
+) -> tuple[Rings, ...]:
+    """Return the ring surfaces of every projector at samples."""
+    points = target.samples.points
+    return tuple(measurability.rings_at(projector, points) for projector in projectors)
+
+
+def measured_by(
+    scene: Scene,
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    sights: Sequence[Sight] | None = None,
+) -> NDArray[np.bool_]:
+    """Return which camera measures which sample with any projector, (n, n_cameras).
+
+    Args:
+        scene: Surface and requirements.
+        cameras: As they stand.
+        rows: Lit samples.
+        sights: Of these cameras on these samples, where they are at hand.
+    """
+    if sights is None:
+        sights = sights_of(scene, cameras, rows.target)
+    measured = np.zeros((len(rows.target), len(cameras)), dtype=bool)
+    for first, last in _chunks(sights):
+        scene.pulse()
+        column = np.repeat(
+            np.arange(first, last), [len(s.rows) for s in sights[first:last]]
+        )
+        seen = joined_sight(sights[first:last])
+        measured[seen.rows, column] = _measured(scene, seen, rows)
+    return measured
+
+
+def _chunks(sights: Sequence[Sight]) -> Iterator[tuple[int, int]]:
+    """Ranges of cameras that together see about `_PAIRS` samples, or of one."""
+    ends = np.cumsum([len(sight.rows) for sight in sights])
+    first = 0
+    while first < len(sights):
+        before = ends[first - 1] if first else 0
+        last = int(np.searchsorted(ends, before + _PAIRS, side="right"))
+        last = max(last, first + 1)
+        yield first, last
+        first = last
+
+
+def _measured(scene: Scene, sight: Sight, rows: LitSamples) -> NDArray[np.bool_]:
+    """Return which of the samples that are seen, by whatever cameras, are measured."""
+    limits = scene.requirements.triangulation
+    normals = rows.target.samples.normals
+    measured = np.zeros(len(sight.rows), dtype=bool)
+    for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
+        pairs = np.flatnonzero(rows.lit[sight.rows, p] & ~measured)
+        own = sight.rows[pairs]
+        quality = measurability.pair_quality(
+            normals[own],
+            light.take(own),
+            rings.take(own),
+            sight.view.take(pairs),
+            limits,
+        )
+        stage = measurability.first_pair_failure(quality, limits)
+        measured[pairs[stage == measurability.MEASURED]] = True
+    return measured
+
+
+def offered_cameras(scene: Scene, template: PlannedCamera, n_candidates: int) -> Sights:
+    """Return the candidates, those that stand already first: they are in every cover.
+
+    Args:
+        scene: Surface and requirements.
+        template: Optics of the camera.
+        n_candidates: Poses offered.
+    """
+    required = scene.requirements
+    candidates = existing_cameras(required, template)
+    site = scene.site("camera", template.device)
+
+    def lattice(n: int) -> tuple[PlannedCamera, ...]:
+        return camera_candidates(template, required.workspace, n, site)
+
+    candidates += offered_with_room(scene, n_candidates, lattice)
+    return Sights(scene, candidates)
+
+
+def plan_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    offered: Sights,
+    known: NDArray[np.int64] | None = None,
+) -> CameraCover:
+    """Choose the fewest cameras that measure the required share of what is lit.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with their rings.
+        offered: Candidates, from `offered_cameras`; what they saw they see again.
+        known: Candidates that may do with fewer than the search finds.
+
+    Raises:
+        NothingMeasuredError: If no candidate measures any lit sample.
+    """
+    required = scene.requirements
+    target = first_target(scene)
+    rows, measured = rows_for(scene, projectors, offered, target)
+    refuse_unmeasured(scene, offered, rows, measured)
+    attempt = 0
+    while True:
+        attempt += 1
+        selection = select_fewest(
+            measured,
+            required.coverage,
+            max_count=required.max_cameras,
+            seed=scene.seed,
+            known=known,
+            given=n_given(scene),
+        )
+        fresh = fresh_target(scene, attempt)
+        _, seen = rows_for(scene, projectors, offered, fresh)
+        if (
+            selection.status == "infeasible"
+            or confirms(seen, selection.chosen, required.coverage)
+            or attempt == ROUNDS
+        ):
+            break
+        target = merged(target, fresh)
+        rows = lit_samples(scene, projectors, target)
+        measured = np.concatenate([measured, seen])
+    return CameraCover(offered, rows, measured, selection)
+
+
+def first_target(scene: Scene) -> Target:
+    """Return the samples of the target to plan cameras on."""
+    return scene.target_samples(_ROWS, _STREAM)
+
+
+def fresh_target(scene: Scene, attempt: int) -> Target:
+    """Return samples that no attempt, counted from 1, has seen before."""
+    return scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
+
+
+def rows_for(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    offered: Sights,
+    target: Target,
+) -> tuple[LitSamples, NDArray[np.bool_]]:
+    """Return the samples that are lit, and which candidate measures which.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with their rings.
+        offered: Candidates.
+        target: Samples.
+    """
+    rows = lit_samples(scene, projectors, target)
+    return rows, measured_by(scene, offered.cameras, rows, offered.on(rows.target))
+
+
+def refuse_unmeasured(
+    scene: Scene, offered: Sights, rows: LitSamples, measured: NDArray[np.bool_]
+) -> None:
+    """Refuse to plan where no candidate measures any lit sample.
+
+    Args:
+        scene: Surface and requirements.
+        offered: Candidates.
+        rows: Lit samples.
+        measured: Which candidate measures which, shape (n, m).
+
+    Raises:
+        NothingMeasuredError: It names the limits that stop most samples.
+    """
+    if not measured.any():
+        said = _nothing_measured(scene, offered.cameras, rows)
+        raise NothingMeasuredError(said, offered.cameras, rows)
+
+
+def confirms(seen: NDArray[np.bool_], chosen: NDArray[np.int64], share: float) -> bool:
+    """Return whether candidates measure a share of what all of them do.
+
+    Args:
+        seen: Which candidate measures which fresh sample, shape (n, m).
+        chosen: Candidates taken.
+        share: In (0, 1].
+    """
+    covered = seen[:, chosen].any(axis=1).sum()
+    return bool(covered >= share * seen.any(axis=1).sum())
+
+
+def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
+    """Return what the stage found, with the best cameras for every other count."""
+    given = n_given(scene)
+    others = marginals(cover.measured, cover.selection, seed=scene.seed, given=given)
+    if cover.by_count is not None:
+        others = others_instead(others, cover.by_count, cover.measured)
+    bodied = cover.crowd is not None and cover.crowd.bodied
+    if cover.crowd is not None:
+        others = settle_others(
+            cover.crowd,
+            cover.measured,
+            others,
+            len(cover.selection.chosen),
+            seed=scene.seed,
+            given=given,
+        )
+    target, candidates = cover.rows.target, cover.offered.cameras
+    return CameraStage(
+        cover.cameras,
+        cover.offered,
+        cover.rows,
+        cover.measured,
+        {
+            number: tuple(candidates[i] for i in chosen)
+            for number, chosen in others.by_count.items()
+        },
+        certificate(
+            cover.selection,
+            others,
+            n_rows=len(target),
+            row_area_m2=target.samples.weight,
+            n_candidates=len(candidates),
+            given=given,
+        )
+        | ({"bounds_leave_out": BODIES_LEFT_OUT} if bodied else {}),
+    )
+
+
+def n_given(scene: Scene) -> int:
+    """Return how many cameras stand already."""
+    return len(scene.requirements.existing_of("camera"))
+
+
+def furthest_failure(
+    scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
+) -> NDArray[np.int8]:
+    """Return how far each sample comes over all pairs: an index in `CAUSES`.
+
+    It is `MEASURED` where some pair measures the sample.
+    """
+    furthest = np.zeros(len(rows.target), dtype=np.int8)
+    required = scene.requirements
+    for camera in cameras:
+        scene.pulse()
+        seen = view_of(scene, camera, rows.target)
+        furthest = np.maximum(furthest, seen.stage)
+        clear = np.flatnonzero(seen.stage == measurability.SEEN)
+        for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
+            pairs = clear[rows.lit[clear, p]]
+            quality = measurability.pair_quality(
+                rows.target.samples.normals[pairs],
+                light.take(pairs),
+                rings.take(pairs),
+                seen.take(pairs),
+                required.triangulation,
+            )
+            stage = measurability.first_pair_failure(quality, required.triangulation)
+            furthest[pairs] = np.maximum(furthest[pairs], stage)
+    return furthest
+
+
+def _nothing_measured(
+    scene: Scene, candidates: Sequence[PlannedCamera], rows: LitSamples
+) -> str:
+    causes = furthest_failure(scene, candidates, rows)
+    if len(causes) == 0:
+        return (
+            "the projectors that were chosen light none of the target's fresh samples, "
+            "so no camera measures any; the object may be too small for this rig"
+        )
+    counts = np.bincount(causes, minlength=measurability.MEASURED)
+    order = np.argsort(-counts, kind="stable")
+    weight = rows.target.samples.weight
+    named = ", ".join(
+        f"{measurability.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} % "
+        f"({area_words(float(weight * counts[i]))})"
+        for i in order
+        if counts[i] >= 0.01 * len(causes)
+    )
+    return (
+        f"no camera of {len(candidates)} poses measures any lit sample; the limit that "
+        f"stops each sample where it comes furthest is {named}"
+    )

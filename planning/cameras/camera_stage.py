@@ -1,0 +1,206 @@
+"""Cameras and ring axes together: each is best only given the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.proofs.selection import Selection
+from planning.rings.axis_moves import move_ring_axes
+from planning.rings.ring_axes import turn_ring_axes
+from planning.scene.scene import Scene
+from planning.scene.sights import Sights
+
+from .camera_cover import CameraCover, CameraStage, camera_stage, offered_cameras
+from .camera_routes import better_route, chooser, passed_by
+from .routes import CamerasBy
+
+_ROUNDS = 3
+# Share of the measured area for which other cameras aren't worth larger errors.
+_SPARE = 0.002
+
+
+@dataclass(frozen=True, eq=False)
+class CameraSolution:
+    """Cameras as placed, and the projectors with their ring axes turned for them.
+
+    Attributes:
+        projectors: With the ring axes that the cameras were chosen for.
+        stage: Candidates, cover and certificate, for exactly these ring axes.
+    """
+
+    projectors: tuple[PlannedProjector, ...]
+    stage: CameraStage
+
+
+def place_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    template: PlannedCamera,
+    n_candidates: int,
+    tilt: float,
+    by: CamerasBy = "both",
+) -> CameraSolution:
+    """Choose cameras and ring axes: azimuths of one tilt first, then any axis.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned.
+        template: Optics of the camera.
+        n_candidates: Poses offered.
+        tilt: Tilt of the ring axes, or their shift, to search azimuths of.
+        by: Route to the cameras.
+    """
+    scene = scene.among(projectors)
+    offered = offered_cameras(scene, template, n_candidates)
+    turned, cover = choose_cameras(scene, projectors, offered, tilt, by)
+    moved, cover = move_axes(scene, turned, cover, by)
+    cover, routes = better_route(scene, moved, cover, by)
+    stage = replace(camera_stage(scene, cover), routes=routes)
+    return CameraSolution(moved, stage)
+
+
+def choose_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    offered: Sights,
+    tilt: float,
+    by: CamerasBy = "cover",
+) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
+    """Choose cameras, turn the ring axes for them, and choose again until it settles.
+
+    A later round counts only if it needs no more cameras and measures no less, so the
+    certificate always belongs to the ring axes that are kept.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned.
+        offered: Candidates, from `offered_cameras`.
+        tilt: Tilt of the ring axes, or their shift.
+        by: Route to the cameras.
+    """
+    kept = tuple(projectors)
+    choose = chooser(by)
+    best = choose(scene, kept, offered, None)
+    for _ in range(_ROUNDS):
+        turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
+        if not _differ(turned, kept):
+            break
+        cover = choose(scene, turned, best.offered, best.by_count)
+        if not _better(cover, best):
+            break
+        kept, best = turned, cover
+    return kept, best
+
+
+def move_axes(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cover: CameraCover,
+    by: CamerasBy = "cover",
+) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
+    """Move the ring axes to where errors are smallest, and choose cameras again.
+
+    The cameras stay, for which the axes were moved, unless others measure notably more;
+    then the axes move for these. All stays as it was where more cameras would be needed
+    or less is measured.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned.
+        cover: Cameras chosen for these ring axes.
+        by: Route to the cameras.
+    """
+    kept = tuple(projectors)
+    for _ in range(_ROUNDS):
+        among = scene.among((*kept, *cover.cameras))
+        moved = move_ring_axes(among, kept, cover.cameras, cover.rows)
+        if not _differ(moved, kept):
+            break
+        again = chooser(by)(scene, moved, cover.offered, cover.by_count)
+        if _better(cover, again):
+            break
+        as_chosen = with_cameras(again, cover)
+        if as_chosen is not None:
+            return moved, as_chosen
+        kept, cover = moved, again
+    return kept, cover
+
+
+def with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
+    """Return a cover with the cameras of one before; None where that loses too much."""
+    selection, chosen = cover.selection, before.selection.chosen
+    measured = cover.measured[:, chosen]
+    if cover.crowd is not None and cover.crowd.bodied:
+        each = chosen.tolist()
+        measured = cover.crowd.covers(each, each)
+    rows = int(measured.any(axis=1).sum())
+    least = min(selection.required, selection.best_rows)
+    least = max(least, int(np.ceil((1.0 - _SPARE) * selection.best_rows)))
+    if len(chosen) != len(selection.chosen) or rows < least:
+        return None
+    return replace(cover, selection=replace(selection, chosen=chosen, best_rows=rows))
+
+
+def follow_cameras(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    stage: CameraStage,
+    by: CamerasBy = "both",
+) -> CameraSolution:
+    """Move the ring axes for cameras that have left the candidates' poses.
+
+    What was proved of the number of cameras holds for one set of ring axes, so it is
+    proved again; axes under which it no longer is this number, or less is proved, are
+    dropped.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with even rings.
+        cameras: As they stand.
+        stage: Of these projectors; as many cameras as these.
+        by: Route to the cameras.
+    """
+    among = scene.among((*projectors, *cameras))
+    moved = move_ring_axes(among, projectors, cameras, stage.rows)
+    if _differ(moved, projectors):
+        scene = scene.among(projectors)
+        cover = chooser(by)(scene, moved, stage.offered, passed_by(stage))
+        if proves_as_much(cover.selection, stage.certificate, len(cameras)):
+            proved = replace(camera_stage(scene, cover), routes=stage.routes)
+            return CameraSolution(moved, proved)
+    return CameraSolution(tuple(projectors), stage)
+
+
+def proves_as_much(new: Selection, old: dict[str, Any], count: int) -> bool:
+    """Return whether a selection takes so many cameras, met and bounded no worse.
+
+    Args:
+        new: Selection under other ring axes.
+        old: Certificate under those before.
+        count: Cameras that stand.
+    """
+    taken = len(new.chosen)
+    return (
+        taken == count
+        and new.status in (old["status"], "optimal")
+        and min(new.lower_bound, taken) >= old["candidates"]["lower_bound"]
+    )
+
+
+def _differ(a: Sequence[PlannedProjector], b: Sequence[PlannedProjector]) -> bool:
+    return any(new is not old for new, old in zip(a, b, strict=True))
+
+
+def _better(new: CameraCover, old: CameraCover) -> bool:
+    """Whether fewer cameras are needed, or as many measure more area."""
+    if new.selection.needed != old.selection.needed:
+        return new.selection.needed < old.selection.needed
+    a, b = (
+        cover.selection.best_rows * cover.rows.target.samples.weight
+        for cover in (new, old)
+    )
+    return a > b

@@ -1,0 +1,1 @@
+"""The paper's own route to the cameras: largest baselines first."""

@@ -1,0 +1,98 @@
+"""Rings of cameras about a target, from the closed forms on its section.
+
+About an axis through the centre of the workspace, the target's section is taken for a
+disc of radius rho, that of its farthest sample from the axis. Cameras on a ring of
+radius S that face the centre then cover eta to either side of themselves, so n_min of
+them stand at a pitch of at most 2 eta, neighbours d_max = 2 S sin(eta) apart at most
+(`round_body_limit`, `docs/baselines.md`).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
+from geometry.poses import fibonacci_cap
+from planning.cameras.baselines.coverage_triangle import RingLimit, round_body_limit
+from planning.model.requirements import Workspace
+from planning.scene.workspace.field import half_rectangle
+
+_Array = NDArray[np.float64]
+
+_AXES = 16
+# More cameras than the section asks for, at a closer pitch: ends and hollows are
+# steeper than the disc.
+_MORE = 2
+_PHASES = 2
+# Rings of more cameras than this are no seeds but floods: the field is too narrow.
+_MOST = 36
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Directions of cameras on one ring.
+
+    Attributes:
+        axis: Unit vector.
+        limit: From the section across the axis.
+        directions: From the centre of the workspace, shape (n, 3).
+    """
+
+    axis: _Array
+    limit: RingLimit
+    directions: _Array
+
+
+def ring_seeds(
+    points: _Array,
+    workspace: Workspace,
+    device: PinholeModel,
+    ring_radius: float,
+    max_incidence: float,
+) -> Iterator[Ring]:
+    """Yield rings about several axes: of n_min cameras and of some more, turned.
+
+    Args:
+        points: Samples of the target in [m], shape (n, 3).
+        workspace: Its centre, and the frame from which axes and azimuths count.
+        device: Optics; its narrower field counts.
+        ring_radius: S, of the camera centres, in [m].
+        max_incidence: theta in [rad].
+    """
+    offsets = points - np.array(workspace.centre)
+    # The image's shorter side, as if it were 1 m away.
+    alpha = float(np.arctan(half_rectangle(device, 1.0).min()))
+    for axis, e1 in _axes(workspace):
+        along = offsets @ axis
+        rho = float(np.sqrt(np.max((offsets**2).sum(axis=1) - along**2)))
+        if not 0.0 < rho < ring_radius:
+            continue
+        limit = round_body_limit(rho, ring_radius, max_incidence, alpha)
+        e2 = np.cross(axis, e1)
+        for n in range(limit.n_min, min(limit.n_min + _MORE, _MOST) + 1):
+            pitch = 2.0 * np.pi / n
+            for phase in range(_PHASES):
+                azimuth = pitch * (np.arange(n) + phase / _PHASES)
+                directions = (
+                    np.cos(azimuth)[:, None] * e1 + np.sin(azimuth)[:, None] * e2
+                )
+                yield Ring(axis, limit, directions)
+
+
+def _axes(workspace: Workspace) -> Iterator[tuple[_Array, _Array]]:
+    """Axes and unit vectors across them: the vertical, then a lattice of half of all.
+
+    Azimuth 0 lies in the plane of the ring's axis and the workspace's: where that is a
+    cone, one camera stands as near to the middle of it as the ring does.
+    """
+    towards = np.array(workspace.axis)
+    start = None if workspace.bearing is None else np.array(workspace.bearing)
+    lattice = fibonacci_cap(_AXES, towards, np.pi / 2, start=start)
+    for axis in (np.array(workspace.up), *lattice):
+        across = towards - (towards @ axis) * axis
+        if not np.linalg.norm(across) > 1e-6:
+            spare = np.eye(3)[np.argmin(np.abs(axis))] if start is None else start
+            across = spare - (spare @ axis) * axis
+        yield axis, across / np.linalg.norm(across)

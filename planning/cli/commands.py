@@ -1,0 +1,212 @@
+"""What each subcommand does; everything heavy is imported from here on."""
+
+import json
+import signal
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from geometry.files.readers import UNITS, load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.sample_head.sample_head import HeadShape, write_sample
+from planning.model.errors import InterruptedPlanError, RequirementError
+from planning.model.plan import RigPlan
+from planning.model.progress import Report
+from planning.pipeline import plan_rig
+from planning.report.drawing.draw import save_rig_picture
+from planning.report.entries.range_entries import ranges_lines
+from planning.report.face_status import face_status
+from planning.report.summary.summary import summary
+from planning.rig.rig import list_presets, load_rig
+from planning.scene.interest import Interest, read_selection, read_weight
+from planning.scene.ranges.ranged_body import read_ranges
+from planning.verify.reconstruction.patterns.pattern_files import (
+    remove_patterns,
+    write_patterns,
+)
+from planning.verify.verification import verify_plan
+
+from .console import cores, reporter
+from .writable import writable
+
+
+def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
+    """Plan, write the output folder, print the result; return the exit code."""
+    begin = time.monotonic()
+    report = reporter(quiet=options["quiet"])
+    path = Path(options["ranges"] or options["meshes"][0])
+    folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
+    with writable(folder):
+        rig = load_rig(options["rig_name"], light=options["light"])
+        if report is not None:
+            report(f"reading {path}")
+        selection = weight = None
+        if options["ranges"] is not None:
+            surface = read_ranges(path)
+            _say_lines(report, ranges_lines(surface))
+        else:
+            surface = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
+            _say_size(report, surface)
+            selection, weight = _interest(options, surface, report)
+        missed: tuple[str, ...] = ()
+        code = 0
+        try:
+            plan = plan_rig(
+                surface,
+                rig,
+                max_projectors=options["max_projectors"],
+                max_cameras=options["max_cameras"],
+                target=options["target"],
+                select=selection,
+                weight=weight,
+                dominant_coverage=options["dominant_coverage"],
+                coverage=options["coverage"],
+                min_reachable=options["min_reachable"],
+                accuracy_mm=options["accuracy_mm"],
+                up=options["up"],
+                seed=options["seed"],
+                threads=options["threads"] or cores(),
+                check=not options["no_check"],
+                prove=options["prove"],
+                cameras_by=options["cameras_by"],
+                time_limit=_left(options["time_limit"], begin),
+                progress=report,
+                command=("plan", *command),
+            )
+        except RequirementError as error:
+            plan, missed, code = error.plan, error.shortfalls, error.exit_code
+        except InterruptedPlanError as error:
+            plan, code = error.plan, error.exit_code
+        # From here on the work is done; a second Ctrl-C must not lose it.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        files = _save(plan, folder, report, patterns=not options["no_patterns"])
+    if options["as_json"]:
+        _print_json(plan.document | {"files": files, "missed": list(missed)})
+    else:
+        click.echo(summary(plan, files, missed))
+    return code
+
+
+def _interest(
+    options: Mapping[str, Any], mesh: TriangleMesh, report: Report | None
+) -> tuple[Interest | None, Interest | None]:
+    """Read the user's own target, by faces or by weight, and say what it holds."""
+    selection = weight = None
+    if options["select"] is not None:
+        selection = read_selection(options["select"], mesh)
+    if options["weight"] is not None:
+        weight = read_weight(options["weight"], mesh)
+    interest = selection or weight
+    if interest is not None and report is not None:
+        share = mesh.face_areas[interest.chosen].sum() / mesh.area
+        report(
+            f"{interest.source}: {interest.chosen.sum()} of {len(mesh.faces)} "
+            f"triangles are the target, {share:.1%} of the area"
+        )
+        if interest.n_removed:
+            report(f"  {interest.n_removed} chosen faces were removed by repair")
+    return selection, weight
+
+
+def _left(limit: float | None, begin: float) -> float | None:
+    """What is left of a time limit; reading the mesh counts too."""
+    if limit is None:
+        return None
+    return max(limit - (time.monotonic() - begin), 1e-9)
+
+
+def verify_command(options: Mapping[str, Any]) -> int:
+    """Audit and check a plan; return 0 if every claim holds, 1 if not."""
+    report = reporter(quiet=options["quiet"])
+    plan = RigPlan.load(options["plan_file"])
+    mesh = None
+    if options["mesh"] is not None:
+        mesh = _same_scale(options["mesh"], plan)
+    truth = None if options["truth"] is None else RigPlan.load(options["truth"])
+    seed = {} if options["seed"] is None else {"seed": options["seed"]}
+    found = verify_plan(
+        plan,
+        mesh,
+        truth=truth,
+        threads=options["threads"] or cores(),
+        progress=report,
+        **seed,
+    )
+    if options["as_json"]:
+        _print_json(found.to_document())
+    else:
+        click.echo(found.summary())
+    return 0 if found.passed else 1
+
+
+def _same_scale(path: Path, plan: RigPlan) -> TriangleMesh:
+    """Read a mesh in the unit of the plan's, or at its size where a size was given."""
+    unit = plan.document["meshes"][0]["unit"]
+    if unit in UNITS:
+        return load_mesh(path, unit=unit)
+    size = np.ptp(plan.surface.mesh.bounds, axis=0).max()
+    return load_mesh(path, size_mm=1e3 * float(size))
+
+
+def rigs_command() -> int:
+    """Print the presets with the source of every number."""
+    for preset in list_presets():
+        click.echo(f"{preset.name}: {preset.description}")
+        for role, device in preset.devices.items():
+            click.echo(f"  {role}: {device}")
+            for figure in preset.figures:
+                if figure.device == role:
+                    click.echo(f"    {figure.key} = {figure.value}")
+                    click.echo(f"        {figure.source}")
+    return 0
+
+
+def sample_command(output: Path, faces: int, variant: int | None) -> int:
+    """Write the sample head."""
+    shape = HeadShape() if variant is None else HeadShape.random(variant)
+    write_sample(output, shape=shape, n_faces=faces)
+    click.echo(f"wrote {output}: a head in millimetres, face along -y, up z")
+    return 0
+
+
+def _say_size(report: Report | None, mesh: Any) -> None:  # noqa: ANN401
+    if report is None:
+        return
+    size = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
+    source = mesh.source
+    report(
+        f"{source.path}: {size[0]:.1f} x {size[1]:.1f} x {size[2]:.1f} mm "
+        f"(unit {source.unit}), {len(mesh.faces)} faces"
+    )
+    for repair in source.repairs:
+        report(f"  repaired: {repair.kind}, {repair.count}")
+
+
+def _say_lines(report: Report | None, lines: Sequence[str]) -> None:
+    if report is not None:
+        for line in lines:
+            report(line)
+
+
+def _save(
+    plan: RigPlan, folder: Path, report: Report | None, *, patterns: bool
+) -> list[str]:
+    names = [folder / name for name in ("plan.json", "surface.npz", "rig.png")]
+    plan.save(names[0])
+    if report is not None:
+        report("drawing")
+    save_rig_picture(plan, names[2], face_status=face_status(plan))
+    if patterns:
+        names.append(write_patterns(plan, folder))
+    else:
+        # Those of an earlier plan in this folder aren't of this one.
+        remove_patterns(folder)
+    return [str(name) for name in names]
+
+
+def _print_json(document: Mapping[str, Any]) -> None:
+    click.echo(json.dumps(document, indent=1, allow_nan=False))

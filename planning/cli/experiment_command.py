@@ -1,0 +1,143 @@
+"""`plan reconstruct --experiment box|face`: section VII of the paper, simulated.
+
+Writes figures, the merged cloud and every number; exit 0, for nothing is asked of the
+experiments but to be seen as they are.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+from PIL import Image
+
+from planning.experiments.one_image import Prior
+from planning.experiments.paper_figures import (
+    draw_camera_images,
+    draw_densities,
+    draw_errors,
+    draw_redundancy,
+    draw_viewpoints,
+)
+from planning.experiments.point_panels import Stage
+from planning.experiments.run import DARK, Outcome, run_experiment
+from planning.experiments.second_sequence import Doubled, double_density
+from planning.experiments.setups import Experiment, box_experiment, face_experiment
+from planning.experiments.table import (
+    cloud_lines,
+    doubled_document,
+    outcome_document,
+    outcome_lines,
+)
+from planning.model.files import write_atomically
+from planning.verify.reconstruction.cloud_file import (
+    CloudFile,
+    LengthUnit,
+    remove_cloud,
+)
+
+from .writable import writable
+
+_MM = LengthUnit("mm", 1e-3)
+_EXPERIMENTS = {"box": box_experiment, "face": face_experiment}
+# How near to a prior the object is known to lie, where the user doesn't say.
+_PRIOR_MM = 6.0
+
+
+def experiment_command(options: Mapping[str, Any]) -> int:
+    """Run an experiment, write its folder, print its table; return the exit code."""
+    experiment = experiment_of(options)
+    folder = Path(options["output"] or f"{experiment.name}-experiment")
+    photometry = replace(DARK, ambient=options["ambient"] or 0.0)
+    seed, quiet = options["seed"] or 0, options["quiet"]
+    threads = options["threads"] or 2
+    prior = None
+    if options["single_shot"]:
+        near = 1e-3 * (options["prior_mm"] or _PRIOR_MM)
+        prior = Prior.moved(experiment.mesh, near)
+
+    def say(line: str) -> None:
+        if not quiet:
+            click.echo(f"plan: {line}", err=True)
+
+    with writable(folder):
+        outcome = run_experiment(
+            experiment,
+            photometry=photometry,
+            seed=seed,
+            threads=threads,
+            prior=prior,
+            progress=lambda done, total: say(f"pair {done} of {total}"),
+        )
+        doubled = None
+        if options["second_sequence"]:
+            say("second sequence")
+            doubled = double_density(outcome, seed=seed, threads=threads)
+        say("drawing")
+        files = _save(outcome, doubled, folder)
+    _print(outcome, doubled, files, as_json=options["as_json"])
+    return 0
+
+
+def experiment_of(options: Mapping[str, Any]) -> Experiment:
+    """Return the experiment that was asked for; the paper's own where nothing was."""
+    make = _EXPERIMENTS[options["experiment"]]
+    return make(
+        light=options["light"] or "parallel",
+        variant=options["variant"] or "printed",
+        distortion=options["distortion"] or 0.0,
+    )
+
+
+def _save(outcome: Outcome, doubled: Doubled | None, folder: Path) -> list[str]:
+    stage = Stage(outcome.experiment.mesh)
+    pictures = {
+        "cameras.png": draw_camera_images(outcome),
+        "viewpoints.png": draw_viewpoints(outcome, stage),
+        "redundancy.png": draw_redundancy(outcome, stage),
+        "errors.png": draw_errors(outcome, stage),
+    }
+    if doubled is not None:
+        pictures["densities.png"] = draw_densities(doubled.first, doubled.both, stage)
+    for name, picture in pictures.items():
+        _write_picture(picture, folder / name)
+    files = [str(folder / name) for name in pictures]
+    cloud = folder / "cloud.ply"
+    if len(outcome.merged.cloud):
+        CloudFile.of(outcome.reconstruction.merged, _MM).save(cloud)
+        files.append(str(cloud))
+    else:
+        remove_cloud(cloud)
+    result = folder / "result.json"
+    text = json.dumps(_document(outcome, doubled), indent=1, allow_nan=False) + "\n"
+    write_atomically(result, lambda file: file.write(text.encode()))
+    return [*files, str(result)]
+
+
+def _write_picture(picture: Image.Image, path: Path) -> None:
+    write_atomically(path, lambda file: picture.save(file, format="PNG"))
+
+
+def _document(outcome: Outcome, doubled: Doubled | None) -> dict[str, Any]:
+    document = outcome_document(outcome)
+    if doubled is not None:
+        document["second_sequence"] = doubled_document(doubled)
+    return document
+
+
+def _print(
+    outcome: Outcome, doubled: Doubled | None, files: list[str], *, as_json: bool
+) -> None:
+    if as_json:
+        document = _document(outcome, doubled) | {"files": files}
+        click.echo(json.dumps(document, indent=1, allow_nan=False))
+        return
+    click.echo("\n".join(outcome_lines(outcome)))
+    if doubled is not None:
+        click.echo("")
+        click.echo("\n".join(cloud_lines((doubled.first, doubled.both))))
+    click.echo("")
+    for name in files:
+        click.echo(f"wrote {name}")

@@ -1,0 +1,166 @@
+"""Figures after the paper's 5 to 10, drawn from what an experiment gave."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.render import Shown, render_lines
+from planning.verify.reconstruction.render.view import view
+from planning.verify.reconstruction.single_shot.single_shot_rig import drawn_lines
+
+from .paper_devices import CAMERA_PX
+from .point_errors import Measured
+from .point_panels import (
+    KEPT,
+    PROJECTORS,
+    REMOVED,
+    RINGS,
+    Stage,
+    captioned,
+    chosen_colours,
+    colour_bar,
+    side_by_side,
+    signed_colours,
+)
+from .run import Outcome
+from .setups import Experiment
+
+_SMOOTH = Image.Resampling.LANCZOS
+# In the dark nothing shows but the rings; the eye wants to see the object too.
+_ROOM_LIGHT = 0.1
+_ERROR_MM = 0.1
+_MM = 1e3
+
+
+def camera_images(
+    experiment: Experiment, photometry: Photometry, *, seed: int = 0
+) -> tuple[NDArray[np.uint8], ...]:
+    """Return what each camera sees under bright rings of all projectors, (h, w) each.
+
+    Where rings of both projectors cross, their light adds up: the paper's Fig. 3.
+
+    Args:
+        experiment: Object and devices.
+        photometry: Light and sensor.
+        seed: Of the pixel noise.
+    """
+    mesh, plan = experiment.mesh, experiment.plan
+    caster = RayCaster(mesh, threads=1)
+    images: list[NDArray[np.uint8]] = []
+    for c, planned in enumerate(plan.cameras):
+        camera = calibrate_camera(planned)
+        whole = np.zeros(CAMERA_PX[::-1], dtype=np.uint8)
+        seen = view(camera, mesh, caster, photometry)
+        if seen is not None:
+            shown: list[Shown] = []
+            for source in plan.projectors:
+                projector = calibrate_projector(source)
+                patterns = ring_patterns(projector, source.ring_radii, camera)
+                _, lines = drawn_lines(source, patterns, mesh)
+                shown.append(Shown(projector, projector, lines, caster))
+            frames = render_lines(seen, shown, photometry, (seed, 9, c))
+            part = np.clip(np.rint(frames.stack[0]), 0, 255).astype(np.uint8)
+            left, top = frames.corner
+            whole[top : top + part.shape[0], left : left + part.shape[1]] = part
+        images.append(whole)
+    return tuple(images)
+
+
+def draw_camera_images(outcome: Outcome) -> Image.Image:
+    """Return what the cameras see, side by side: the paper's Figs. 5 and 6."""
+    experiment = outcome.experiment
+    ambient = max(outcome.photometry.ambient, _ROOM_LIGHT)
+    images = camera_images(experiment, replace(outcome.photometry, ambient=ambient))
+    names = [camera.id for camera in experiment.plan.cameras]
+    added = ambient > outcome.photometry.ambient
+    seen_by = f"; {ambient:.0%} room light added for the eye" if added else ""
+    field = " x ".join(f"{_MM * side:.0f}" for side in experiment.optics.field_m)
+    panels = [
+        captioned(
+            Image.fromarray(image).convert("RGB").resize((640, 360), _SMOOTH),
+            f"{name}: rings of both projectors; {field} mm at 1 m{seen_by}",
+        )
+        for name, image in zip(names, images, strict=True)
+    ]
+    return side_by_side(panels, columns=2)
+
+
+def draw_viewpoints(outcome: Outcome, stage: Stage) -> Image.Image:
+    """Return the points of each viewpoint, coloured by ring: the paper's Fig. 7."""
+    clouds = (outcome.single, *outcome.viewpoints)
+    legend = [
+        (f"{_MM * radius:.4g} mm", RINGS[k % len(RINGS)])
+        for k, radius in enumerate(outcome.experiment.radii_m)
+    ]
+    panels = [
+        stage.panel(
+            f"{one.name}: {len(one.cloud)} points",
+            one.cloud.points,
+            chosen_colours(RINGS, one.cloud.ring),
+            legend,
+        )
+        for one in clouds
+    ]
+    return side_by_side(panels, columns=3)
+
+
+def draw_redundancy(outcome: Outcome, stage: Stage) -> Image.Image:
+    """Return what is removed and what stays, merged: the paper's Figs. 8 and 9."""
+    everything, merged = outcome.union.cloud, outcome.merged.cloud
+    stays = outcome.stays
+    colours = np.where(stays[:, None], np.array(KEPT), np.array(REMOVED))
+    ids = [projector.id for projector in outcome.experiment.plan.projectors]
+    panels = [
+        stage.panel(
+            f"Removed as redundant: {int(np.sum(~stays))} of {len(stays)}",
+            everything.points,
+            colours.astype(np.float64),
+            [("stays", KEPT), ("removed", REMOVED)],
+        ),
+        stage.panel(
+            f"Merged: {len(merged)} points",
+            merged.points,
+            chosen_colours(PROJECTORS, merged.projector),
+            list(zip(ids, PROJECTORS, strict=True)),
+        ),
+    ]
+    return side_by_side(panels, columns=2)
+
+
+def draw_errors(outcome: Outcome, stage: Stage) -> Image.Image:
+    """Return signed errors of one viewpoint and of the merged cloud, and their scale.
+
+    The ground truth that the authors did not have.
+    """
+
+    def panel(one: Measured) -> Image.Image:
+        p95 = one.errors.p95_m
+        far = "no point" if p95 is None else f"95 % within {_MM * p95:.3f} mm"
+        colours = signed_colours(_MM * one.distances, _ERROR_MM)
+        return stage.panel(f"{one.name}: {far}", one.cloud.points, colours)
+
+    panels = [panel(outcome.single), panel(outcome.merged)]
+    bar = colour_bar(2 * stage.width, _ERROR_MM)
+    return side_by_side(panels, columns=2, foot=bar)
+
+
+def draw_densities(first: Measured, both: Measured, stage: Stage) -> Image.Image:
+    """Return the points of one sequence beside those of two."""
+    panels = [
+        stage.panel(
+            f"{title}: {len(one.cloud)} points",
+            one.cloud.points,
+            chosen_colours(RINGS, one.cloud.ring),
+        )
+        for title, one in (("One sequence", first), ("Two, the second shifted", both))
+    ]
+    return side_by_side(panels, columns=2)

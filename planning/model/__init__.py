@@ -1,0 +1,1 @@
+"""Values that planner and checkers share: devices, plan, surface, requirements."""

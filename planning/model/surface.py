@@ -1,0 +1,108 @@
+"""The surface as planned: what every claim in a plan speaks about."""
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from io import BytesIO
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import MeshError, TriangleMesh
+
+from .errors import PlanFileError
+
+_ARRAYS = (
+    "vertices",
+    "faces",
+    "member",
+    "region",
+    "steep",
+    "reference_projectors",
+    "reference_rings",
+    "reference_cameras",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The repaired, oriented mesh in metres, and the reference poses (`surface.npz`).
+
+    Attributes:
+        mesh: The mesh as planned.
+        member: Index of the mesh that each face came from, shape (n_f,).
+        region: Dominant region of each face, -1 for none, shape (n_f,).
+        steep: Unit T1 of each face, zero where the direction is arbitrary or the face
+            isn't in the target, shape (n_f, 3).
+        reference_projectors: ``world_from_device`` of the reference set, (n, 4, 4).
+        reference_rings: ``world_from_ring`` of the same poses, shape (n, 4, 4).
+        reference_cameras: ``world_from_device`` of the reference set, (n, 4, 4).
+    """
+
+    mesh: TriangleMesh
+    member: NDArray[np.int64]
+    region: NDArray[np.int64]
+    steep: NDArray[np.float64]
+    reference_projectors: NDArray[np.float64]
+    reference_rings: NDArray[np.float64]
+    reference_cameras: NDArray[np.float64]
+
+    @cached_property
+    def in_dominant(self) -> NDArray[np.bool_]:
+        """Whether each face belongs to a dominant region, shape (n_f,)."""
+        return self.region >= 0
+
+    def target_faces(self, target: str) -> NDArray[np.bool_]:
+        """Return whether each face is in the target, `dominant` or `surface`."""
+        return (
+            self.in_dominant if target == "dominant" else np.ones_like(self.in_dominant)
+        )
+
+    def sha256(self) -> str:
+        """Return the hexadecimal SHA-256 digest of `content`."""
+        return hashlib.sha256(self.content).hexdigest()
+
+    @cached_property
+    def content(self) -> bytes:
+        """What `surface.npz` holds, the same bytes for equal values."""
+        buffer = BytesIO()
+        np.savez_compressed(
+            buffer,
+            vertices=self.mesh.vertices,
+            faces=self.mesh.faces,
+            **{name: getattr(self, name) for name in _ARRAYS[2:]},
+        )
+        return buffer.getvalue()
+
+    @classmethod
+    def load(cls, path: Path) -> "Surface":
+        """Read `surface.npz`.
+
+        Raises:
+            PlanFileError: If the file is missing, broken or lacks an array.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                arrays = {name: archive[name] for name in _ARRAYS}
+        except FileNotFoundError:
+            raise PlanFileError(
+                f"{path}: no such file; the surface must stand beside the plan, "
+                f"copy both from the output folder"
+            ) from None
+        except KeyError as error:
+            raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
+        except (OSError, ValueError, EOFError, BadZipFile) as error:
+            raise PlanFileError(f"{path}: not a readable .npz ({error})") from None
+        try:
+            mesh = TriangleMesh(arrays.pop("vertices"), arrays.pop("faces"))
+        except MeshError as error:
+            raise PlanFileError(f"{path}: {error}") from None
+        n = len(mesh.faces)
+        for name in ("member", "region", "steep"):
+            if len(arrays[name]) != n:
+                raise PlanFileError(
+                    f"{path}: `{name}` has {len(arrays[name])} rows for {n} faces"
+                )
+        return cls(mesh, **arrays)

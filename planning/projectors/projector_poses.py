@@ -1,0 +1,245 @@
+"""The pose program of section III: each projector moves to the largest margins."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from geometry.devices import PinholeModel
+from geometry.poses import inverse
+from planning.model.plan import PlannedProjector
+from planning.model.requirements import Workspace
+from planning.proofs.selection import required_rows
+from planning.rings.ring_radii import moved_to
+from planning.scene import lighting
+from planning.scene.clearance import lacks_room
+from planning.scene.lighting import Target
+from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.scene import Scene
+from planning.scene.standing import moves_bodies
+from planning.scene.workspace.zone_limits import half_spaces
+from planning.scene.workspace.zone_positions import is_zoned
+from solvers.poses.pose_program import PoseProgram, pose_margins, pose_slack, solve_pose
+
+from .margin_search import widest_between
+from .projector_stage import ProjectorStage
+from .share_margin import enough_lit, margin_at_share
+
+_SWEEPS = 6
+# Gains below this aren't worth a move [rad].
+_GAIN = 1e-4
+_STEPS = (1.0, 0.5, 0.25)
+# A pixel of the image border stays free, so that rounding the pose loses nothing.
+_PIXEL_MARGIN = 1.0
+_MAX_MOVE_M = 0.3
+# Samples on which poses between the candidates are compared; all of them decide.
+_SEARCHED = 2000
+# Of the samples that candidates reach: so many others a pose may light.
+_STRAY = 0.002
+
+
+def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector, ...]:
+    """Return the projectors at the poses where what counts is lit with most margin.
+
+    What counts are the samples that have the margin at the required share
+    (`share_margin`). First poses between the candidates are offered
+    (`margin_search`). Then each projector in turn solves the pose program over those
+    of them that it serves. Occlusion isn't part of that program, so rays decide after
+    every move: the whole way is tried, then half, then a quarter, and a move that
+    lowers the margin at the share isn't taken, nor one that leaves too few samples lit,
+    nor one that reaches what no candidate does: what is required, and was proved, is a
+    share of what they reach.
+
+    Args:
+        scene: Surface and requirements.
+        stage: Projectors from the cover, and its rows.
+    """
+    rows = stage.rows
+    reached = np.any(stage.stages == lighting.LIT, axis=1)
+    state = _Lit(scene, rows, list(stage.projectors), reached)
+    lit = int(np.isfinite(state.margin).any(axis=1).sum())
+    required = required_rows(reached, scene.requirements.dominant_coverage)
+    # With too few devices, what they light is what counts.
+    required = min(required, lit)
+    if required == 0:
+        return stage.projectors
+    if not moves_bodies(state.projectors):
+        # What bodies stand in the way of was settled for the poses chosen.
+        state = _between(state, required, lit, len(stage.reference))
+    for _ in range(_SWEEPS):
+        moved = [
+            _improve(state, p, required, lit)
+            for p, projector in enumerate(state.projectors)
+            if not projector.existing
+        ]
+        if not any(moved):
+            break
+    return tuple(state.projectors)
+
+
+def _between(state: "_Lit", required: int, lit: int, n_lattice: int) -> "_Lit":
+    """Projectors at poses between the candidates, if what counts has more margin."""
+    some = np.arange(0, len(state.rows), -(-len(state.rows) // _SEARCHED))
+    part = state.on(some)
+    among = int(np.isfinite(part.margin).any(axis=1).sum())
+    offered = widest_between(
+        state.scene,
+        tuple(state.projectors),
+        part.margins,
+        max(1, min(among, required * len(some) // len(state.rows))),
+        n_lattice,
+    )
+    moved = state.with_all(list(offered))
+    wider = margin_at_share(moved.margin, required) > margin_at_share(
+        state.margin, required
+    )
+    return moved if wider and enough_lit(moved.margin, required, lit) else state
+
+
+class _Lit:
+    """Projectors as they stand, and the margin of what each lights."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        rows: Target,
+        projectors: list[PlannedProjector],
+        reached: NDArray[np.bool_],
+    ) -> None:
+        self.scene, self.rows, self.projectors = scene, rows, projectors
+        self._reached = reached
+        self.margin = self._margins(projectors)
+
+    def margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
+        """Margin of each row and projector in [rad], -inf where unlit.
+
+        Those that stray light nothing.
+        """
+        margin = self._margins(projectors)
+        beyond = np.isfinite(margin[~self._reached]).sum(axis=0)
+        margin[:, beyond > _STRAY * self._reached.sum()] = -np.inf
+        return margin
+
+    def on(self, some: NDArray[np.int64]) -> "_Lit":
+        """The same projectors, on some of the rows."""
+        rows, reached = self.rows.take(some), self._reached[some]
+        return _Lit(self.scene, rows, self.projectors, reached)
+
+    def with_all(self, projectors: list[PlannedProjector]) -> "_Lit":
+        """Other projectors, on the same rows."""
+        return _Lit(self.scene, self.rows, projectors, self._reached)
+
+    def _margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
+        scene = self.scene.among(projectors)
+        lit = lit_stages(scene, projectors, self.rows) == lighting.LIT
+        return lit_margins(scene, projectors, self.rows, lit)
+
+    def with_moved(
+        self, p: int, offered: PlannedProjector
+    ) -> NDArray[np.float64] | None:
+        """Margins with one projector elsewhere; None if its body has no room there."""
+        if offered.body is None:
+            margin = self.margin.copy()
+            margin[:, p] = self.margins([offered])[:, 0]
+            return margin
+        # Its body moves along, and what others light may change.
+        projectors = [*self.projectors]
+        projectors[p] = offered
+        if lacks_room(self.scene.among(projectors), offered):
+            return None
+        return self.margins(projectors)
+
+
+def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
+    """Move one projector to where what it serves of the share has more margin."""
+    level = margin_at_share(state.margin, required)
+    best = state.margin.max(axis=1)
+    served = (best >= level) & (np.argmax(state.margin, axis=1) == p)
+    if not served.any():
+        return False
+    projector = state.projectors[p]
+    program = pose_program(state.scene, projector, state.rows.take(served))
+    solution = solve_pose(program)
+    if not solution.moved:
+        return False
+    before = float(pose_margins(program, projector.world_from_device).min())
+    for step in _STEPS:
+        pose = _part_of_the_way(
+            projector.world_from_device, solution.world_from_device, step
+        )
+        # On a straight way between two poses the shell may be left in between.
+        inside = float(pose_slack(program, pose).min()) >= 0.0
+        if not (inside and float(pose_margins(program, pose).min()) > before + _GAIN):
+            continue
+        offered = moved_to(projector, pose)
+        margin = state.with_moved(p, offered)
+        if margin is None:
+            continue
+        kept = margin_at_share(margin, required) >= level
+        if kept and enough_lit(margin, required, lit_before):
+            state.projectors[p], state.margin = offered, margin
+            return True
+    return False
+
+
+def pose_program(
+    scene: Scene, projector: PlannedProjector, served: Target
+) -> PoseProgram:
+    """State the pose program of one projector over the samples that it serves."""
+    required, device = scene.requirements, projector.device
+    workspace = scene.safe_workspace
+    pinhole = isinstance(device, PinholeModel)
+    up = np.array(workspace.up)
+    centre = np.array(workspace.centre)
+    return PoseProgram(
+        points=served.samples.points,
+        normals=served.samples.normals,
+        steep=served.steep,
+        light=projector.light,
+        world_from_device=projector.world_from_device,
+        max_incidence=required.projector.max_incidence,
+        min_tangent_angle=required.projector.min_tangent_angle,
+        range_m=device.range_m,
+        shell_m=workspace.projector_radius_m,
+        centre=centre,
+        axis=np.array(workspace.axis),
+        half_angle=workspace.half_angle,
+        camera_matrix=device.camera_matrix if pinhole else None,
+        resolution=device.resolution if pinhole else None,
+        half_panel_m=None if pinhole else tuple(device.half_panel),
+        pixel_margin=_PIXEL_MARGIN,
+        beam_radius_m=np.inf if pinhole else device.beam_radius or np.inf,
+        ring_radius=float(projector.ring_radii[-1]),
+        ring_from_device=inverse(projector.world_from_ring)
+        @ projector.world_from_device,
+        up=up,
+        floor=-np.inf
+        if workspace.floor_m is None
+        else workspace.floor_m + float(up @ centre),
+        max_move_m=_MAX_MOVE_M,
+        half_spaces=_held_in(workspace, projector.world_from_device[:3, 3]),
+    )
+
+
+def _held_in(
+    workspace: Workspace, position: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Rows (n, d) of the convex part of the zones about a position, n.Q >= d."""
+    if not is_zoned(workspace):
+        return None
+    centre = np.array(workspace.centre)
+    normals, offsets = half_spaces(workspace, position - centre)
+    return np.column_stack([normals, offsets + normals @ centre])
+
+
+def _part_of_the_way(
+    start: NDArray[np.float64], end: NDArray[np.float64], share: float
+) -> NDArray[np.float64]:
+    if share == 1.0:
+        return end
+    turns = Rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
+    pose = np.eye(4)
+    pose[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
+    pose[:3, 3] = (1.0 - share) * start[:3, 3] + share * end[:3, 3]
+    return pose

@@ -1,0 +1,229 @@
+"""The bound over all poses for cameras, given the projectors.
+
+Rows are the samples that the projectors light and some candidate measures, frozen as a
+set, and how many of them must be measured: the cover's own. Cells hold every position
+of the workspace, each with a superset of what a camera anywhere inside it measures with
+these projectors, however it is aimed and rolled (`measurable_cells`). Where the object
+overflows the image, cells are cut by aim as well (`aim_cells`).
+
+Shadows are counted only if the bound without them stays below the count: they cost
+most, and what is proved without them holds with them. So with cells by aim.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
+from geometry.directions.cube_map import CubeMap
+from geometry.directions.open_directions import DirectionLimits
+from geometry.directions.widened_maps import WidenedMaps
+from geometry.lengths import lengths
+from planning.cameras.camera_bodies import taken
+from planning.cameras.camera_cover import CameraStage, LitSamples
+from planning.proofs.cells.aim_cells import AimTree
+from planning.proofs.cells.image_cone import image_cone
+from planning.proofs.cells.measurable_cells import MeasurableCells
+from planning.proofs.cells.position_cells import PositionTree
+from planning.scene.scene import Scene
+from planning.scene.workspace.field import holds_ball
+from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
+from solvers.cells.cell_problem import CellProblem
+
+from .all_poses import ContinuousBound, joined
+from .existing_bound import enough
+from .open_rows import mesh_reach, open_rows
+from .selection import required_rows
+
+
+@dataclass(frozen=True)
+class CameraEffort:
+    """What is spent on the bound.
+
+    Attributes:
+        finest: Cells of positions are parts of a cube map of 2^finest cells an edge;
+            of one twice as fine where the first search leaves room.
+        aims: The same of aims, where the object overflows the image; None: cells
+            aren't cut by aim.
+        maps: The same of the maps in which shadows are drawn.
+        budget: Counted work of a search.
+        shadows: Pairs of sample and face above which shadows are left out.
+        most_samples: Lit samples at most; None: all that the cover has.
+    """
+
+    finest: int
+    aims: int | None
+    maps: int
+    budget: float
+    shadows: float
+    most_samples: int | None = None
+
+
+DEFAULT = CameraEffort(
+    finest=7, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
+)
+PROVE = CameraEffort(finest=8, aims=5, maps=7, budget=1e10, shadows=np.inf)
+
+
+def bound_stage(
+    scene: Scene, stage: CameraStage, device: PinholeModel, effort: CameraEffort
+) -> CameraStage:
+    """Return the stage with the bound over all poses in its certificate.
+
+    Args:
+        scene: Surface and requirements.
+        stage: Cameras from the cover, for the projectors and ring axes of its rows.
+        device: Optics of the cameras.
+        effort: What to spend.
+    """
+    proof = stage.certificate
+    given = int(proof.get("given", 0))
+    n = min(len(stage.rows.target), effort.most_samples or len(stage.rows.target))
+    reached = np.any(stage.measured[:n], axis=1)
+    free = np.any(stage.measured[:n, :given], axis=1)
+    rest = np.flatnonzero(reached & ~free)
+    if proof["needed"]["count"] <= given or not rest.size:
+        entry = enough(proof, np.any(stage.measured, axis=1))
+        return replace(stage, certificate=proof | {"continuous": entry})
+    required = required_rows(reached, scene.requirements.coverage)
+    bound = bound_cameras(
+        scene,
+        device,
+        taken(stage.rows, rest, stage.rows.lit),
+        max(required - int(free.sum()), 0),
+        proof["needed"]["count"] - given,
+        effort,
+        n_samples=n,
+        row_area_m2=stage.rows.target.samples.weight * len(stage.rows.target) / n,
+    )
+    bound = replace(bound, given=given, n_free=int(free.sum()))
+    return replace(stage, certificate=joined(proof, bound.entry()))
+
+
+def bound_cameras(
+    scene: Scene,
+    device: PinholeModel,
+    rows: LitSamples,
+    required: int,
+    count: int,
+    effort: CameraEffort,
+    *,
+    n_samples: int,
+    row_area_m2: float,
+) -> ContinuousBound:
+    """Bound the cameras over every pose of the workspace, for given projectors.
+
+    Args:
+        scene: Surface and requirements.
+        device: Optics of the cameras.
+        rows: Samples that some candidate measures, with light and rings on them.
+        required: How many of them must be measured.
+        count: Cameras that are enough.
+        effort: What to spend.
+        n_samples: Lit samples, reached or not, for the record.
+        row_area_m2: Area that each stands for.
+    """
+    if count <= 1:
+        # What is required takes one, with shadows or without: no cell is looked at.
+        effort = replace(effort, finest=0, aims=None, shadows=0.0)
+    problem = CellProblem(np.ones(len(rows.target)), np.array([float(required)]))
+
+    cells = CameraCells(scene, device, rows, effort)
+
+    def search(tree: PositionTree | AimTree) -> CellBound:
+        return bound_count(problem, tree, count, budget=effort.budget)
+
+    found, shadows = search(cells.in_the_open), False
+    for tree in cells.finer:
+        if found.status is CellStatus.PROVED:
+            break
+        better = search(tree())
+        # Cut short, a finer search may have proved less.
+        if better.lower_bound >= found.lower_bound:
+            found, shadows = better, cells.shadows
+    told = shadows or found.status is CellStatus.PROVED
+    nowhere: NDArray[np.float64] = np.empty((0, 3))
+    return ContinuousBound(found, told, nowhere, n_samples, row_area_m2)
+
+
+class CameraCells:
+    """The trees that are searched, one after the other; each made when it is wanted.
+
+    Args:
+        scene: Surface and requirements.
+        device: Optics of the cameras.
+        rows: Samples, with light and rings on them.
+        effort: How fine they are.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        device: PinholeModel,
+        rows: LitSamples,
+        effort: CameraEffort,
+    ) -> None:
+        self._scene, self._device, self._rows = scene, device, rows
+        self._effort = effort
+        self._limits = MeasurableCells(
+            rows, scene.requirements, device, pulse=scene.pulse
+        )
+        near = scene.requirements.workspace.camera_radius_m[0]
+        pairs = len(rows.target) * len(scene.mesh.faces)
+        self.shadows = pairs <= effort.shadows and near >= mesh_reach(scene)
+
+    @property
+    def in_the_open(self) -> PositionTree:
+        """Cells of positions without shadows."""
+        return self._positions(self._effort.finest, None)
+
+    @property
+    def finer(self) -> list[Callable[[], PositionTree | AimTree]]:
+        """Finer cells among shadows; then cells by aim, where that is of any use."""
+        found: list[Callable[[], PositionTree | AimTree]] = [self.among_shadows]
+        if self._effort.aims is not None and self.field_binds:
+            found.append(self.by_aim)
+        return found
+
+    def among_shadows(self) -> PositionTree:
+        """Return finer cells of positions, among shadows if these count."""
+        return self._positions(self._effort.finest + 1, self._maps)
+
+    def by_aim(self) -> AimTree:
+        """Return the same, cut by aim as well."""
+        assert self._effort.aims is not None
+        half = image_cone(self._device).half_angle
+        return AimTree(self.among_shadows(), half, finest=self._effort.aims)
+
+    @property
+    def field_binds(self) -> bool:
+        """Whether a camera that looks at the centre may miss some sample."""
+        space = self._scene.requirements.workspace
+        offsets = self._rows.target.samples.points - np.array(space.centre)
+        reach = float(lengths(offsets).max())
+        return not holds_ball(self._device, reach, space.camera_radius_m[0])
+
+    def _positions(self, finest: int, maps: WidenedMaps | None) -> PositionTree:
+        space = self._scene.requirements.workspace
+        return PositionTree(
+            space,
+            space.camera_radius_m,
+            self._device.range_m,
+            self._rows.target.samples.points,
+            maps,
+            finest=finest,
+            limits=self._limits,
+        )
+
+    @cached_property
+    def _maps(self) -> WidenedMaps | None:
+        if not self.shadows:
+            return None
+        cube = CubeMap(1 << self._effort.maps)
+        # Of the direction itself, cameras have no limit but incidence.
+        limits = DirectionLimits(self._scene.requirements.camera.max_incidence, 0.0)
+        opened = open_rows(self._scene, limits, self._rows.target, cube, shadows=True)
+        return WidenedMaps(opened, cube)

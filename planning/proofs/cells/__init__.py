@@ -1,0 +1,1 @@
+"""Cells of device poses, each with a superset of what is covered from inside it."""

@@ -1,0 +1,88 @@
+"""Cells of directions for parallel light: a tree that `solvers.bound_count` asks.
+
+A projector of parallel light lights what its one direction allows, wherever else its
+beam stands. So the space of its poses is the sphere of directions u = -L, cut into the
+cells of a cube map; a cell's row holds each sample to which it is open
+(`geometry.directions.open_directions`). Beam, panel and range are left out: that only adds
+samples, and what is proved holds for beams of any width.
+
+The workspace leaves out directions. A device at Q that lights a sample at P by a beam
+of half width h stands at Q - C = t u + (P - C) + o, |o| <= h, about the centre C. With
+e = |P - C| + h, at a distance of at least r::
+
+    angle(Q - C, u) <= asin(e / r)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.directions.cube_map import FACES, CubeMap, middles, quarters
+from solvers.cells.cell_tree import CellBatch
+
+# Cells of 2.8 degrees, 6,144 of them.
+_SPREAD = 5
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionTree:
+    """A quadtree of directions on each face of a cube.
+
+    Attributes:
+        levels: Bit rows of the cells of cube maps of 1, 2, 4, ... cells an edge.
+        n_rows: Number of samples.
+    """
+
+    levels: tuple[NDArray[np.uint64], ...]
+    n_rows: int
+
+    @classmethod
+    def over(cls, leaves: NDArray[np.uint64], n_rows: int) -> "DirectionTree":
+        """Return the tree over the cells of the finest map."""
+        levels = [leaves]
+        while len(levels[-1]) > FACES:
+            n = round((len(levels[-1]) // FACES) ** 0.5)
+            levels.append(CubeMap(n).halved(levels[-1]))
+        return cls(tuple(levels[::-1]), n_rows)
+
+    def roots(self) -> CellBatch:
+        """Return the six faces."""
+        cells = np.arange(FACES)
+        return CellBatch(cells, np.full(FACES, -1), self.levels[0])
+
+    def children(self, cells: NDArray[np.int64], /) -> CellBatch:
+        """Return the four parts of each cell."""
+        level, cell = self.place(cells)
+        split = level < len(self.levels) - 1
+        parents = np.repeat(np.flatnonzero(split), 4)
+        own = quarters(level[split], cell[split]).ravel()
+        level = level[parents]
+        rows = np.empty((parents.size, self.levels[0].shape[1]), dtype=np.uint64)
+        for finer in np.unique(level):
+            some = level == finer
+            rows[some] = self.levels[finer + 1][own[some]]
+        return CellBatch(_first(level + 1) + own, parents, rows)
+
+    def spread_cells(self) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
+        """Return cells of one size that hold every direction, and their rows."""
+        level = min(_SPREAD, len(self.levels) - 1)
+        rows = self.levels[level]
+        return _first(np.array(level)) + np.arange(len(rows)), rows
+
+    def directions(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the middle of each cell, shape (n, 3)."""
+        return middles(*self.place(cells))
+
+    def place(
+        self, cells: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the level of cells named, and their number on the map of 2^level."""
+        starts = _first(np.arange(len(self.levels)))
+        level = np.searchsorted(starts, cells, side="right") - 1
+        return level, cells - starts[level]
+
+
+def _first(level: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the name of the first cell of a level: 6 (1 + 4 + ...) cells precede."""
+    return 2 * (4**level - 1)

@@ -1,0 +1,157 @@
+"""What may be measured from anywhere in a cell of camera positions: a superset.
+
+Seen from sample P, the cell lies within psi of the direction u_c, at t_c -+ e. A limit
+keeps a sample out only if it fails for every direction in that cone, at every distance,
+and wherever in the image the sample may appear. With w = N x m, |v| = |r x w| and the
+image's bounds on |g| / |v| and on z / t (`image_cone`)::
+
+    incidence <= theta + psi
+    |r.m|   <= cos(max(0, acos|u_c.m| - psi))               must reach min_conditioning
+    |N.r|   <= cos(max(0, incidence_c - psi))
+    |g|     >= |w| sin(max(0, angle(u_c, line of w) - psi)) least_turn
+    s_N     >= s_px (t_c - e) |g| / |r.m|                   must not exceed the limit
+    pitch   <= h |N.r| / ((t_c - e) |g|)                    must reach min_ring_pitch
+    z       >= (t_c - e) cos(off axis),  z / (f |N.r|)      must not exceed the limit
+
+A sample stays if that holds for some projector that lights it. Bodies of devices are
+left out. The symbols and limits are those of `measurability`.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
+from planning.cameras.camera_cover import LitSamples
+from planning.model.requirements import Requirements
+
+from .image_cone import image_cone
+
+_Array = NDArray[np.float64]
+# Products of a few cosines and lengths are exact to this.
+_ROUNDING = 1e-9
+
+
+class MeasurableCells:
+    """Says which samples a camera in a cell may measure; the `limits` of its tree.
+
+    Args:
+        rows: Lit samples, with light and rings of every projector on them.
+        required: Limits of camera and triangulation.
+        device: Optics of the camera.
+        pulse: Called between pieces of work.
+    """
+
+    def __init__(
+        self,
+        rows: LitSamples,
+        required: Requirements,
+        device: PinholeModel,
+        *,
+        pulse: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._pulse = pulse
+        self._camera, self._pair = required.camera, required.triangulation
+        self._image, self._focal = image_cone(device), device.focal_px
+        normals = rows.target.samples.normals
+        self._normals, self._lit = normals, rows.lit
+        self._across = np.stack([ring.normals for ring in rows.rings])
+        self._spacing = np.stack([ring.spacing for ring in rows.rings])
+        cosines = np.stack([light.incidence_cos for light in rows.lights])
+        self._noise = self._pair.noise_px / np.maximum(cosines, 1e-9)
+        along = np.cross(normals, self._across)
+        self._width = np.linalg.norm(along, axis=2)
+        self._along = along / np.where(self._width > 0.0, self._width, 1.0)[..., None]
+
+    def admits(
+        self,
+        samples: NDArray[np.int64],
+        towards: _Array,
+        nearest: _Array,
+        psi: _Array,
+    ) -> NDArray[np.bool_]:
+        """Return which samples a camera in a cell may measure, as `CellLimits` says."""
+        self._pulse()
+        cosine, sine = np.cos(psi), np.sin(psi)
+        facing = _nearest(_dot(self._normals[samples], towards), cosine, sine)
+        seen = facing >= np.cos(self._camera.max_incidence) - _ROUNDING
+        finest = self._camera.max_sample_distance_m
+        if finest is not None:
+            step = nearest * np.cos(self._image.off_axis) * (1.0 - _ROUNDING)
+            seen &= step <= finest * self._focal * np.maximum(facing, 1e-9)
+        some = np.flatnonzero(seen)
+        found = np.zeros(samples.size, dtype=bool)
+        found[some] = self._paired(
+            samples[some],
+            towards[some],
+            nearest[some],
+            facing[some],
+            cosine[some],
+            sine[some],
+        )
+        return found
+
+    def _paired(
+        self,
+        samples: NDArray[np.int64],
+        towards: _Array,
+        nearest: _Array,
+        facing: _Array,
+        cosine: _Array,
+        sine: _Array,
+    ) -> NDArray[np.bool_]:
+        """Return which samples some projector may measure with the camera."""
+        found = np.zeros(samples.size, dtype=bool)
+        for p in range(self._lit.shape[1]):
+            left = np.flatnonzero(self._lit[samples, p] & ~found)
+            own, u = samples[left], towards[left]
+            c, s = cosine[left], sine[left]
+            crossing = _nearest(np.abs(_dot(self._across[p, own], u)), c, s)
+            turn = _least_sine(np.abs(_dot(self._along[p, own], u)), c, s)
+            g = nearest[left] * self._image.least_turn * self._width[p, own] * turn
+            found[left] = self._passes(p, own, crossing, facing[left], g)
+        return found
+
+    def _passes(
+        self,
+        p: int,
+        own: NDArray[np.int64],
+        crossing: _Array,
+        facing: _Array,
+        shift: _Array,
+    ) -> NDArray[np.bool_]:
+        """Return which limits of a pair hold at best.
+
+        Args:
+            p: Projector.
+            own: Samples, shape (k,).
+            crossing: |r.m| at most, shape (k,).
+            facing: |N.r| at most, shape (k,).
+            shift: t |g| at least, shape (k,).
+        """
+        pair = self._pair
+        good = crossing >= pair.min_conditioning - _ROUNDING
+        if pair.max_sigma_m is not None:
+            edge = self._noise[p, own] * shift * (1.0 - _ROUNDING)
+            good &= edge <= pair.max_sigma_m * np.maximum(crossing, 1e-12)
+        if pair.min_ring_pitch_px is not None:
+            wide = self._spacing[p, own] * facing * (1.0 + _ROUNDING)
+            good &= wide >= pair.min_ring_pitch_px * shift
+        return good
+
+
+def _nearest(c: _Array, cosine: _Array, sine: _Array) -> _Array:
+    """Return the largest cosine within psi of a direction whose own is c."""
+    s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
+    return np.where(c >= cosine, 1.0, c * cosine + s * sine)
+
+
+def _least_sine(c: _Array, cosine: _Array, sine: _Array) -> _Array:
+    """Return the least sine to a line within psi of a direction of cosine c to it."""
+    s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
+    return np.where(c >= cosine, 0.0, np.maximum(s * cosine - c * sine, 0.0))
+
+
+def _dot(a: _Array, b: _Array) -> _Array:
+    return np.einsum("ij,ij->i", a, b)

@@ -1,0 +1,1 @@
+"""From a draft to a plan: claims recomputed, entries written, summary and advice."""

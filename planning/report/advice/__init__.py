@@ -1,0 +1,1 @@
+"""Which limit, relaxed by how little, would make a plan meet its requirements."""

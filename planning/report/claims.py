@@ -1,0 +1,336 @@
+"""What a plan may claim: areas recomputed from its poses on fresh samples."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.repair.hollow import lies_inside
+from planning.cameras.camera_cover import (
+    LitSamples,
+    furthest_failure,
+    lit_samples,
+    measured_by,
+)
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.scene import lighting, measurability
+from planning.scene.lighting import Target
+from planning.scene.lit import lit_stages, margins_of
+from planning.scene.scene import Scene
+from planning.scene.sights import view_of
+from planning.scene.standing import Device, blocked_by
+
+N_SAMPLES = 12_000
+_TARGET_STREAM = 900
+_SURFACE_STREAM = 901
+
+
+@dataclass(frozen=True, eq=False)
+class Devices:
+    """The devices of a plan and the reference sets that reachability refers to."""
+
+    projectors: tuple[PlannedProjector, ...]
+    cameras: tuple[PlannedCamera, ...]
+    reference_projectors: tuple[PlannedProjector, ...]
+    reference_cameras: tuple[PlannedCamera, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Areas:
+    """The five areas that belong together, in [m²]."""
+
+    area_m2: float
+    reachable_by_projectors_m2: float
+    lit_m2: float
+    reachable_by_cameras_m2: float
+    measured_m2: float
+
+    def to_document(self) -> dict[str, float]:
+        """Return plain JSON values."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True, eq=False)
+class Claims:
+    """All that a plan claims about areas.
+
+    Attributes:
+        surface: Areas of the whole surface.
+        target: Areas of the target.
+        uncovered_by_cause: Target area that isn't measured, by cause [m²].
+        unreachable_by_cause: Target area that no reference projector lights [m²].
+        unreachable_inside_m2: The part of it that lies inside the body.
+        lit_area_m2: Target area that each projector lights.
+        min_margin_rad: Least margin over what each projector serves, None for nothing.
+        seen_area_m2: Target area that each camera measures.
+        sole_area_m2: Target area that only this camera measures.
+        regions: `lit_by` and `lit_fraction` of each region.
+        target_samples: The samples behind the target's figures.
+        measured_by: Which camera measures which of those, (n, n_cameras).
+        blocked_by_body_m2: Target area that isn't measured and from which the body of
+            each device keeps light or a view.
+    """
+
+    surface: Areas
+    target: Areas
+    uncovered_by_cause: dict[str, float]
+    unreachable_by_cause: dict[str, float]
+    unreachable_inside_m2: float
+    lit_area_m2: tuple[float, ...]
+    min_margin_rad: tuple[float | None, ...]
+    seen_area_m2: tuple[float, ...]
+    sole_area_m2: tuple[float, ...]
+    regions: tuple[dict[str, Any], ...]
+    target_samples: Target
+    measured_by: NDArray[np.bool_]
+    blocked_by_body_m2: dict[str, float]
+
+
+def make_claims(scene: Scene, devices: Devices) -> Claims:
+    """Recompute every area from poses as they will be written."""
+    planned = scene.among((*devices.projectors, *devices.cameras))
+    target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
+    weight = target.samples.weight
+    stages = lit_stages(planned, devices.projectors, target)
+    lit = stages == lighting.LIT
+    seen = _measured_by(planned, devices, target, lit)
+    measured = _any(seen)
+    reachable, furthest = _reachable_by_projectors(scene, devices, target, _any(lit))
+    areas = _areas(scene, devices, target, reachable, lit, measured)
+    served = lighting.served_by(lit, margins_of(scene, devices.projectors, target))
+    return Claims(
+        _surface_areas(scene, devices),
+        areas,
+        _by_cause(_uncovered(planned, devices, target, stages, measured), weight),
+        _by_cause([lighting.CAUSES[stage] for stage in furthest[~reachable]], weight),
+        weight * _n_inside(scene, target.take(~reachable)),
+        tuple(weight * lit.sum(axis=0)),
+        _least_margins(scene, devices, target, served),
+        tuple(weight * seen.sum(axis=0)),
+        tuple(weight * (seen & (seen.sum(axis=1) == 1)[:, None]).sum(axis=0)),
+        _regions(scene, devices, target, lit, served),
+        target,
+        seen,
+        _blocked_by_body(planned, devices, target, stages, measured),
+    )
+
+
+def lit_area(
+    scene: Scene, projectors: Sequence[PlannedProjector]
+) -> tuple[float, float]:
+    """Return the area of target and surface that projectors light, in [m²]."""
+    among = scene.among(projectors)
+    return _union(scene, lambda target: _lit(among, projectors, target))
+
+
+def measured_area(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+) -> tuple[float, float]:
+    """Return the area of target and surface that devices measure, in [m²]."""
+    among = scene.among((*projectors, *cameras))
+
+    def measured(target: Target) -> NDArray[np.bool_]:
+        rows = lit_samples(among, projectors, target)
+        return _any(measured_by(among, cameras, rows))
+
+    return _union(scene, measured)
+
+
+def _union(
+    scene: Scene, covered: Callable[[Target], NDArray[np.bool_]]
+) -> tuple[float, float]:
+    sets = (
+        scene.target_samples(N_SAMPLES, _TARGET_STREAM),
+        scene.surface_samples(N_SAMPLES, _SURFACE_STREAM),
+    )
+    a, b = (float(s.samples.weight * covered(s).sum()) for s in sets)
+    return a, b
+
+
+def _surface_areas(scene: Scene, devices: Devices) -> Areas:
+    surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
+    planned = scene.among((*devices.projectors, *devices.cameras))
+    lit = lit_stages(planned, devices.projectors, surface) == lighting.LIT
+    measured = _any(_measured_by(planned, devices, surface, lit))
+    reachable, _ = _reachable_by_projectors(scene, devices, surface, _any(lit))
+    return _areas(scene, devices, surface, reachable, lit, measured)
+
+
+def _areas(
+    scene: Scene,
+    devices: Devices,
+    target: Target,
+    reachable: NDArray[np.bool_],
+    lit: NDArray[np.bool_],
+    measured: NDArray[np.bool_],
+) -> Areas:
+    weight = target.samples.weight
+    by_cameras = measured.copy()
+    # Another camera needn't stand among those that were chosen.
+    among = scene.among(devices.projectors)
+    for camera in devices.reference_cameras:
+        left = np.flatnonzero(_any(lit) & ~by_cameras)
+        if not len(left):
+            break
+        rows = _lit_rows(devices.projectors, target.take(left), lit[left])
+        by_cameras[left] = measured_by(among, [camera], rows)[:, 0]
+    counts = (
+        len(target),
+        reachable.sum(),
+        _any(lit).sum(),
+        by_cameras.sum(),
+        measured.sum(),
+    )
+    return Areas(*(float(weight * count) for count in counts))
+
+
+def _lit(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.bool_]:
+    return _any(lit_stages(scene, projectors, target) == lighting.LIT)
+
+
+def _lit_rows(
+    projectors: Sequence[PlannedProjector], target: Target, lit: NDArray[np.bool_]
+) -> LitSamples:
+    points = target.samples.points
+    return LitSamples(
+        target,
+        lit,
+        tuple(lighting.light_on(p, target) for p in projectors),
+        tuple(measurability.rings_at(p, points) for p in projectors),
+    )
+
+
+def _measured_by(
+    scene: Scene, devices: Devices, target: Target, lit: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    return measured_by(
+        scene, devices.cameras, _lit_rows(devices.projectors, target, lit)
+    )
+
+
+def _reachable_by_projectors(
+    scene: Scene, devices: Devices, target: Target, lit: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
+    """Which samples some pose lights, and how far the others came over all poses."""
+    reachable = lit.copy()
+    furthest = np.zeros(len(target), dtype=np.int8)
+    for projector in devices.reference_projectors:
+        left = np.flatnonzero(~reachable)
+        if not len(left):
+            break
+        rest = target.take(left)
+        # What shows its back comes no further than it did before.
+        idle = furthest[left] >= lighting.INCIDENCE
+        idle &= lighting.faces_away(projector, rest)
+        left, rest = left[~idle], rest.take(~idle)
+        stage = lighting.first_failure(
+            projector,
+            rest,
+            scene.requirements.projector,
+            scene.visibility,
+            bodies=scene.standing,
+        )
+        reachable[left] = stage == lighting.LIT
+        furthest[left] = np.maximum(furthest[left], stage)
+    return reachable, furthest
+
+
+def _least_margins(
+    scene: Scene, devices: Devices, target: Target, served: NDArray[np.int64]
+) -> tuple[float | None, ...]:
+    margin = margins_of(scene, devices.projectors, target)
+    return tuple(
+        float(margin[served == p, p].min()) if np.any(served == p) else None
+        for p in range(len(devices.projectors))
+    )
+
+
+def _uncovered(
+    scene: Scene,
+    devices: Devices,
+    target: Target,
+    stages: NDArray[np.int8],
+    measured: NDArray[np.bool_],
+) -> list[str]:
+    """The cause of each sample that isn't measured."""
+    lit = stages == lighting.LIT
+    dark = ~_any(lit)
+    causes = [lighting.CAUSES[stage] for stage in stages[dark].max(axis=1)]
+    left = np.flatnonzero(_any(lit) & ~measured)
+    rows = _lit_rows(devices.projectors, target.take(left), lit[left])
+    furthest = furthest_failure(scene, devices.cameras, rows)
+    return causes + [measurability.CAUSES[stage] for stage in furthest]
+
+
+def _blocked_by_body(
+    scene: Scene,
+    devices: Devices,
+    target: Target,
+    stages: NDArray[np.int8],
+    measured: NDArray[np.bool_],
+) -> dict[str, float]:
+    """Unmeasured area on which nothing but a body stops some device, by body."""
+    if not scene.standing:
+        return {}
+    stopped = np.zeros((len(target), len(scene.standing)), dtype=bool)
+
+    def note(device: Device, rows: NDArray[np.int64]) -> None:
+        points = target.samples.points[rows]
+        stopped[rows] |= blocked_by(scene.standing, device, points)
+
+    for p, projector in enumerate(devices.projectors):
+        note(projector, np.flatnonzero(~measured & (stages[:, p] == lighting.BLOCKED)))
+    left = np.flatnonzero(~measured & _any(stages == lighting.LIT))
+    for camera in devices.cameras:
+        stage = view_of(scene, camera, target.take(left)).stage
+        note(camera, left[stage == measurability.BLOCKED])
+    areas = target.samples.weight * stopped.sum(axis=0)
+    every = (*devices.projectors, *devices.cameras)
+    return {
+        next(d.id for d in every if body.is_of(d)): float(area)
+        for body, area in zip(scene.standing, areas, strict=True)
+    }
+
+
+def _n_inside(scene: Scene, target: Target) -> int:
+    """How many samples lie inside the body, where no pose can be expected to reach."""
+    if not len(target):
+        return 0
+    samples = target.samples
+    caster = scene.visibility.caster
+    return int(lies_inside(caster, samples.faces, samples.points).sum())
+
+
+def _any(table: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether any column holds, for each row."""
+    return np.asarray(np.any(table, axis=1))
+
+
+def _by_cause(causes: list[str], weight: float) -> dict[str, float]:
+    order = lighting.CAUSES + measurability.CAUSES
+    return {c: weight * causes.count(c) for c in order if c in causes}
+
+
+def _regions(
+    scene: Scene,
+    devices: Devices,
+    target: Target,
+    lit: NDArray[np.bool_],
+    served: NDArray[np.int64],
+) -> tuple[dict[str, Any], ...]:
+    region = scene.region[target.samples.faces]
+    entries: list[dict[str, Any]] = []
+    for index in range(int(scene.region.max()) + 1):
+        inside = region == index
+        by = np.unique(served[inside & (served >= 0)])
+        share = float(lit[inside].any(axis=1).mean()) if inside.any() else 0.0
+        entries.append(
+            {"lit_by": [devices.projectors[p].id for p in by], "lit_fraction": share}
+        )
+    return tuple(entries)

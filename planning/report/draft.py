@@ -1,0 +1,72 @@
+"""A plan in the making: what was ordered, and the stages as far as they came."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.regions.regions import DominantRegions
+from planning.cameras.camera_cover import CameraStage
+from planning.cameras.routes import CamerasBy
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.projectors.projector_stage import ProjectorStage
+from planning.rig.range_guard import Guard
+from planning.rig.rig import Rig
+from planning.rings.ring_stage import RingStage
+from planning.scene.interest import Interest
+from planning.scene.ranges.ranged_body import RangedBody
+from planning.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What was ordered: the mesh, the rig, and how to go about it.
+
+    Attributes:
+        mesh: The surface.
+        rig: Devices and limits.
+        asked: Keyword arguments of `Rig.requirements`.
+        seed: Of every random draw.
+        threads: Worker threads.
+        command: Words of the command line, for the record.
+        interest: The user's own target; None: the dominant regions by curvature.
+        prove: Whether more work is spent on the bounds over all poses.
+        ranges: The body whose sphere the mesh is, and what the rig's limits keep free
+            for it; None: the mesh was known.
+        cameras_by: Route to the cameras.
+    """
+
+    mesh: TriangleMesh
+    rig: Rig
+    asked: dict[str, Any]
+    seed: int
+    threads: int
+    command: tuple[str, ...]
+    interest: Interest | None = None
+    prove: bool = False
+    ranges: tuple[RangedBody, Guard] | None = None
+    cameras_by: CamerasBy = "both"
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """All stages as far as they came; enough to write a plan from.
+
+    `projectors` have evenly spaced rings; `rings` holds those that cameras let finer.
+    """
+
+    order: Order
+    scene: Scene
+    regions: DominantRegions
+    curvature_radius_m: float
+    tilt: float
+    stage: ProjectorStage
+    projectors: tuple[PlannedProjector, ...]
+    camera_stage: CameraStage
+    cameras: tuple[PlannedCamera, ...]
+    truncated: bool = False
+    rings: RingStage | None = None
+
+    @property
+    def final_projectors(self) -> tuple[PlannedProjector, ...]:
+        """The projectors with their own rings, once the cameras stand."""
+        return self.projectors if self.rings is None else self.rings.projectors

@@ -1,0 +1,1 @@
+"""`rig.png`: the planned rig in one picture."""

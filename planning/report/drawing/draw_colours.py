@@ -1,0 +1,72 @@
+"""Colours of faces: by what a plan measures, or by dominant region."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.surface import Surface
+
+from .draw_views import CLAY, Colour
+
+# Values of `face_status`.
+OUTSIDE_TARGET, MEASURED, NOT_MEASURED, NOT_LIT = 0, 1, 2, 3
+
+# Told apart by lightness as well as by hue, so that colour blindness loses nothing.
+_STATUS: tuple[tuple[str, Colour], ...] = (
+    ("outside the target", CLAY),
+    ("measured", (120, 190, 235)),
+    ("target, lit but not measured", (240, 40, 140)),
+    ("target, not lit", (120, 0, 80)),
+)
+_REGIONS: tuple[Colour, ...] = (
+    (230, 190, 100),
+    (120, 190, 235),
+    (110, 190, 160),
+    (205, 150, 190),
+    (235, 150, 110),
+    (150, 160, 220),
+    (190, 200, 110),
+    (225, 175, 175),
+)
+
+
+def face_colours(
+    surface: Surface, face_status: NDArray[np.int8] | None
+) -> tuple[NDArray[np.float64], Sequence[tuple[str, Colour]]]:
+    """Return a colour for each face, by status or else by region, and their legend.
+
+    Raises:
+        ValueError: If the status doesn't fit the faces.
+    """
+    if face_status is None:
+        legend = [("dominant regions", _REGIONS[0]), ("rest of the surface", CLAY)]
+        return region_colours(surface.region), legend
+    expected = (len(surface.mesh.faces),)
+    if np.shape(face_status) != expected:
+        raise ValueError(f"face_status must be {expected}, got {np.shape(face_status)}")
+    colours = status_colours(face_status)
+    order = (MEASURED, NOT_MEASURED, NOT_LIT, OUTSIDE_TARGET)
+    return colours, [_STATUS[k] for k in order if np.any(face_status == k)]
+
+
+def region_colours(region: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return a colour for each face by its dominant region, clay for none; (n_f, 3).
+
+    Args:
+        region: Dominant region of each face, -1 for none, shape (n_f,).
+    """
+    palette = np.array([*_REGIONS, CLAY], dtype=np.float64)
+    return palette[np.where(region >= 0, region % len(_REGIONS), len(_REGIONS))]
+
+
+def status_colours(face_status: NDArray[np.int8]) -> NDArray[np.float64]:
+    """Return a colour for each face by its status, as in `draw_rig`; (n_f, 3).
+
+    Raises:
+        ValueError: If a value isn't one of 0 to 3.
+    """
+    status = np.asarray(face_status)
+    if not np.all((status >= 0) & (status < len(_STATUS))):
+        raise ValueError(f"face_status must hold 0 to 3, got {np.unique(status)}")
+    return np.array([colour for _, colour in _STATUS], dtype=np.float64)[status]

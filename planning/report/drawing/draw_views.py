@@ -1,0 +1,266 @@
+"""Pictures of a mesh without OpenGL: parallel rays, smooth shading, flat colours."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+
+Colour: TypeAlias = tuple[int, int, int]
+
+# Everything is drawn so many times finer and then reduced, which smooths its edges.
+SUPERSAMPLING = 2
+BACKGROUND: Colour = (255, 255, 255)
+CLAY: Colour = (214, 205, 196)
+
+# A corner whose mean normal is turned by more than this lies on a crease.
+_CREASE = np.cos(np.deg2rad(40.0))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """An orthographic view of the world, +x right and +y down in the picture.
+
+    Attributes:
+        focus: World point at the centre of the picture [m], shape (3,).
+        right: World direction of +x in the picture, unit, shape (3,).
+        up: World direction of -y in the picture, unit, shape (3,).
+        size: Width and height in [px].
+        m_per_px: Metres that a pixel spans.
+    """
+
+    focus: NDArray[np.float64]
+    right: NDArray[np.float64]
+    up: NDArray[np.float64]
+    size: tuple[int, int]
+    m_per_px: float
+
+    @property
+    def to_viewer(self) -> NDArray[np.float64]:
+        """World direction from the scene to the viewer, unit, shape (3,)."""
+        return np.cross(self.right, self.up)
+
+    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return picture coordinates of world points; (..., 3) to (..., 2)."""
+        centre = 0.5 * np.array(self.size)
+        plane = (points - self.focus) @ np.stack([self.right, -self.up], axis=1)
+        return centre + plane / self.m_per_px
+
+
+def facing(
+    direction: Sequence[float] | NDArray[np.float64],
+    up: Sequence[float] | NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the right and up directions of a view from somewhere.
+
+    Seen straight along `up`, the world axis that follows up's own in the order
+    x, y, z, x points right: x where z is up, as on a map.
+
+    Args:
+        direction: From the scene to the viewer, shape (3,).
+        up: What is up in the picture, as far as it can be, shape (3,).
+
+    Raises:
+        ValueError: If a direction has no length or isn't finite.
+    """
+    back, upward = np.array(direction, dtype=float), np.array(up, dtype=float)
+    for name, vector in (("direction", back), ("up", upward)):
+        length = np.linalg.norm(vector)
+        if not (length > 0 and np.isfinite(length)):
+            raise ValueError(f"{name} must have a length, got {vector.tolist()}")
+    back, upward = back / np.linalg.norm(back), upward / np.linalg.norm(upward)
+    right = np.cross(upward, back)
+    if np.linalg.norm(right) < 1e-6:
+        right = np.eye(3)[(int(np.argmax(np.abs(upward))) + 1) % 3]
+        right = right - (right @ back) * back
+    right /= np.linalg.norm(right)
+    return right, np.cross(back, right)
+
+
+def fitted(
+    points: NDArray[np.float64],
+    direction: Sequence[float] | NDArray[np.float64],
+    up: Sequence[float] | NDArray[np.float64],
+    size: tuple[int, int],
+    *,
+    margin_px: float,
+) -> View:
+    """Return the view from a direction that holds all points, as large as can be.
+
+    Args:
+        points: What must be in the picture [m], shape (n, 3).
+        direction: From the scene to the viewer, shape (3,).
+        up: What is up in the picture, shape (3,).
+        size: Width and height in [px].
+        margin_px: Free border in [px].
+    """
+    right, upward = facing(direction, up)
+    plane = points @ np.stack([right, upward], axis=1)
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    room = np.maximum(np.array(size) - 2.0 * margin_px, 1.0)
+    m_per_px = float(np.max((high - low) / room))
+    back = np.cross(right, upward)
+    middle = 0.5 * (low + high)
+    focus = middle[0] * right + middle[1] * upward + points.mean(axis=0) @ back * back
+    return View(focus, right, upward, size, m_per_px or 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Shader:
+    """Shades one mesh from any side.
+
+    Attributes:
+        caster: Ray caster over the mesh.
+        colours: Colour of each face, 0 to 255, shape (n_f, 3).
+    """
+
+    caster: RayCaster
+    colours: NDArray[np.float64]
+
+    def shade(self, view: View) -> Image.Image:
+        """Return the mesh as seen in a view, on the background colour."""
+        mesh, (width, height) = self.caster.mesh, view.size
+        picture = np.empty((height, width, 3), dtype=np.uint8)
+        picture[:] = BACKGROUND
+        window = _window(view, mesh.vertices[np.unique(mesh.faces)])
+        columns, rows = np.meshgrid(np.arange(*window[0]), np.arange(*window[1]))
+        columns, rows = columns.ravel(), rows.ravel()
+        if len(rows):
+            colours, hit = self._rays(view, columns, rows)
+            picture[rows[hit], columns[hit]] = colours
+        return Image.fromarray(picture)
+
+    def _rays(
+        self, view: View, columns: NDArray[np.int64], rows: NDArray[np.int64]
+    ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        mesh, back = self.caster.mesh, view.to_viewer
+        centre = 0.5 * np.array(view.size)
+        across = (columns + 0.5 - centre[0]) * view.m_per_px
+        down = (rows + 0.5 - centre[1]) * view.m_per_px
+        origins = view.focus + across[:, None] * view.right - down[:, None] * view.up
+        start = (mesh.centre - view.focus) @ back + 2.0 * mesh.reach
+        origins += start * back
+        faces, distances = self.caster.first_hits(
+            origins, np.broadcast_to(-back, origins.shape)
+        )
+        hit = np.flatnonzero(faces >= 0)
+        points = origins[hit] - distances[hit, None] * back
+        normals = self._normals(faces[hit], points)
+        # The back of an open surface is lit like its front.
+        normals *= np.where(normals @ back < 0.0, -1.0, 1.0)[:, None]
+        light = _brightness(normals, view)
+        colours = np.clip(self.colours[faces[hit]] * light[:, None], 0.0, 255.0)
+        return colours.astype(np.uint8), hit
+
+    def _normals(
+        self, faces: NDArray[np.int64], points: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Unit normals at points of faces, interpolated between the faces' corners."""
+        mesh, (slope_b, slope_c) = self.caster.mesh, self._slopes
+        from_a = points - mesh.corners[faces, 0]
+        b = np.einsum("ij,ij->i", slope_b[faces], from_a)
+        c = np.einsum("ij,ij->i", slope_c[faces], from_a)
+        flat = mesh.face_normals[faces]
+        smooth = np.zeros_like(flat)
+        for weight, corner in zip(
+            (1.0 - b - c, b, c), mesh.faces[faces].T, strict=True
+        ):
+            normal = self._vertex_normals[corner]
+            crease = np.einsum("ij,ij->i", normal, flat) < _CREASE
+            normal[crease] = flat[crease]
+            smooth += weight[:, None] * normal
+        return _unit(smooth)
+
+    @cached_property
+    def _slopes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Gradients of the barycentric coordinates of b and c, (n_f, 3) each."""
+        mesh = self.caster.mesh
+        a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
+        double = np.maximum(2.0 * mesh.face_areas, 1e-30)[:, None]
+        normals = mesh.face_normals / double
+        return np.cross(normals, a - c), np.cross(normals, b - a)
+
+    @cached_property
+    def _vertex_normals(self) -> NDArray[np.float64]:
+        """Mean normals weighted by angle, so that how a face is cut doesn't count."""
+        mesh = self.caster.mesh
+        total = np.zeros_like(mesh.vertices)
+        for k, corner in enumerate(mesh.faces.T):
+            here = mesh.corners[:, k]
+            to_next = _unit(mesh.corners[:, (k + 1) % 3] - here)
+            to_last = _unit(mesh.corners[:, (k + 2) % 3] - here)
+            cosine = np.einsum("ij,ij->i", to_next, to_last)
+            weighted = mesh.face_normals * np.arccos(np.clip(cosine, -1, 1))[:, None]
+            for axis in range(3):
+                total[:, axis] += np.bincount(corner, weighted[:, axis], len(total))
+        return _unit(total)
+
+
+def draw_mesh(
+    mesh: TriangleMesh,
+    *,
+    direction: Sequence[float] = (-0.5, -0.8, 0.3),
+    up: Sequence[float] = (0.0, 0.0, 1.0),
+    size: tuple[int, int] = (800, 800),
+    face_colours: NDArray[np.float64] | None = None,
+) -> Image.Image:
+    """Return a shaded picture of a mesh.
+
+    Args:
+        mesh: The mesh.
+        direction: From the mesh to the viewer, any length.
+        up: World direction that is up in the picture.
+        size: Width and height in [px].
+        face_colours: Red, green, blue of each face, 0 to 255, shape (n_f, 3); default
+            clay.
+
+    Raises:
+        ValueError: If the colours don't fit the faces or a direction has no length.
+    """
+    shader = Shader(RayCaster(mesh), checked_colours(mesh, face_colours))
+    fine = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
+    points = mesh.corners.reshape(-1, 3)
+    view = fitted(points, direction, up, fine, margin_px=0.05 * min(fine))
+    return shader.shade(view).resize(size, Image.Resampling.BOX)
+
+
+def checked_colours(
+    mesh: TriangleMesh, face_colours: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Return one colour a face, clay where none are given."""
+    if face_colours is None:
+        return np.tile(np.array(CLAY, dtype=np.float64), (len(mesh.faces), 1))
+    colours = np.asarray(face_colours, dtype=np.float64)
+    expected = (len(mesh.faces), 3)
+    if colours.shape != expected or not np.all((colours >= 0) & (colours <= 255)):
+        raise ValueError(f"face_colours must be {expected} in 0..255: {colours.shape}")
+    return colours
+
+
+def _window(view: View, points: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Columns and rows of the picture that the points fall into."""
+    pixels = view.project(points)
+    low = np.clip(np.floor(pixels.min(axis=0)), 0, view.size).astype(int)
+    high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, view.size).astype(int)
+    return list(zip(low.tolist(), high.tolist(), strict=True))
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors over their length, zero where they have none; (n, 3)."""
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def _brightness(normals: NDArray[np.float64], view: View) -> NDArray[np.float64]:
+    back = view.to_viewer
+    key = 0.62 * back - 0.5 * view.right + 0.6 * view.up
+    fill = 0.5 * back + 0.8 * view.right - 0.1 * view.up
+    key, fill = key / np.linalg.norm(key), fill / np.linalg.norm(fill)
+    lit = np.clip(normals @ key, 0.0, 1.0)
+    return 0.30 + 0.66 * lit + 0.18 * np.clip(normals @ fill, 0.0, 1.0)

@@ -1,0 +1,92 @@
+"""Which projectors put light on the same surface, and which may fire together.
+
+A ring code is read from how bright a pixel is in a sequence of images. Where a second
+projector shines while it runs, the images hold the sum of two codes, and neither can be
+read. So it counts where light *falls*, not where it is good enough to measure with: an
+incidence of 80 degrees or a blurred ring spoils another's code as well. Light falls on
+a point that lies inside the image (or beam), no more than one gap beyond the outermost
+ring (the annulus around it is drawn, too), faces the projector and isn't in shadow.
+Light that grazes it at over 89 degrees is left out.
+
+Two projectors overlap if any sample, of the target or of the whole surface, gets light
+from both. Those that don't may fire in one go. The fewest goes are the fewest colours
+of the graph of overlaps.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.plan import PlannedProjector
+from planning.model.requirements import ProjectorLimits
+from planning.report.claims import N_SAMPLES
+from planning.scene import lighting
+from planning.scene.lighting import LIT, Target
+from planning.scene.scene import Scene
+
+from .firing import firing_schedule
+
+# Rays and rounding can't tell on which side light passes that runs along a face.
+_ANY_LIGHT = ProjectorLimits(float(np.radians(89.0)), 0.0)
+_TARGET_STREAM = 902
+_SURFACE_STREAM = 903
+
+
+def overlap_entries(
+    scene: Scene, projectors: Sequence[PlannedProjector]
+) -> dict[str, Any]:
+    """Return the plan's `overlaps` and `firing_schedule`, from fresh samples."""
+    n = len(projectors)
+    shared = {
+        "target_m2": scene.target_samples(N_SAMPLES, _TARGET_STREAM),
+        "surface_m2": scene.surface_samples(N_SAMPLES, _SURFACE_STREAM),
+    }
+    areas = {part: shared_areas(scene, projectors, s) for part, s in shared.items()}
+    overlaps = [
+        {
+            "projectors": [projectors[i].id, projectors[j].id],
+            **{part: float(areas[part][i, j]) for part in areas},
+        }
+        for i, j in combinations(range(n), 2)
+    ]
+    conflicts = (areas["target_m2"] > 0.0) | (areas["surface_m2"] > 0.0)
+    np.fill_diagonal(conflicts, val=False)
+    names = [projector.id for projector in projectors]
+    return {"overlaps": overlaps, "firing_schedule": firing_schedule(names, conflicts)}
+
+
+def shared_areas(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.float64]:
+    """Return the area that each two projectors put light on [m²], shape (k, k).
+
+    On the diagonal stands what each puts light on.
+    """
+    falls = np.zeros((len(target), len(projectors)))
+    for column, projector in enumerate(projectors):
+        scene.pulse()
+        falls[:, column] = light_falls(scene, projector, target)
+    return target.samples.weight * (falls.T @ falls)
+
+
+def light_falls(
+    scene: Scene, projector: PlannedProjector, target: Target
+) -> NDArray[np.bool_]:
+    """Return on which samples any light of a projector falls, shape (n,)."""
+    anywhere = replace(projector.device, range_m=(0.0, np.inf))
+    radii = projector.ring_radii
+    drawn = np.append(radii, radii[-1] + np.diff(radii, prepend=0.0)[-1])
+    # No steep direction: along it, light is poor, but it is light.
+    plain = replace(target, steep=np.zeros_like(target.steep))
+    stages = lighting.first_failure(
+        replace(projector, device=anywhere, ring_radii=drawn),
+        plain,
+        _ANY_LIGHT,
+        scene.visibility,
+        bodies=scene.standing,
+    )
+    return stages == LIT

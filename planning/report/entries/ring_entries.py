@@ -1,0 +1,132 @@
+"""What a plan's document and its summary say of rings."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from planning.cameras.camera_cover import lit_samples, measured_by
+from planning.model.plan import RigPlan
+from planning.report.claims import Claims, Devices
+from planning.rings.ring_shares import ring_shares
+from planning.rings.ring_stage import RingStage
+from planning.scene.scene import Scene
+
+# As many of the chords between rings may err by more than was asked.
+_STRAY = 0.01
+_MM = 1e3
+
+
+def with_rings(
+    entries: Sequence[dict[str, Any]],
+    scene: Scene,
+    devices: Devices,
+    stage: RingStage | None,
+) -> list[dict[str, Any]]:
+    """Return the plan's `projectors` with `rings` and `ring_shares` added.
+
+    Args:
+        entries: What `document.projector_entries` returned.
+        scene: Surface and requirements.
+        devices: As written.
+        stage: How the rings were spaced; None: the run was cut before that.
+    """
+    return [
+        entry
+        | {"rings": None if stage is None else stage.reports[p]}
+        | {"ring_shares": ring_shares(scene, projector, devices.cameras).to_document()}
+        for p, (entry, projector) in enumerate(
+            zip(entries, devices.projectors, strict=True)
+        )
+    ]
+
+
+def evenly_ringed(devices: Devices, stage: RingStage | None) -> Devices:
+    """Return the devices with evenly spaced rings, as for cameras not yet known."""
+    if stage is None:
+        return devices
+    projectors = tuple(
+        replace(projector, ring_radii=radii)
+        for projector, radii in zip(devices.projectors, stage.even_radii, strict=True)
+    )
+    return replace(devices, projectors=projectors)
+
+
+def lost_to_rings_m2(
+    scene: Scene, devices: Devices, stage: RingStage | None, claims: Claims
+) -> float:
+    """Return the target area that even rings measure and those of the plan don't."""
+    even = evenly_ringed(devices, stage).projectors
+    target = claims.target_samples
+    unmeasured = np.flatnonzero(~claims.measured_by.any(axis=1))
+    rows = lit_samples(scene, even, target.take(unmeasured))
+    lost = int(measured_by(scene, devices.cameras, rows).any(axis=1).sum())
+    return target.samples.weight * lost
+
+
+def rings_lines(plan: RigPlan) -> list[str]:
+    """Return the summary's lines on rings; none for plans that don't speak of them."""
+    entries = plan.document["projectors"]
+    if any(entry.get("ring_shares") is None for entry in entries):
+        return []
+    lines = [_line(entry) for entry in entries]
+    lines += [note for entry in entries for note in _notes(entry)]
+    lost = plan.coverage.get("lost_to_rings_m2", 0.0)
+    if lost > 0.0:
+        share = 100.0 * lost / plan.coverage["target"]["area_m2"]
+        lines.append(f"{share:.2f} % of the target is measured by even rings only")
+    return [f"{'RINGS' if k == 0 else '':<9}{line}" for k, line in enumerate(lines)]
+
+
+def _line(entry: dict[str, Any]) -> str:
+    shares, rings = entry["ring_shares"], entry["rings"]
+    n = len(entry["ring_radii"])
+    gap = ""
+    if rings is not None and rings["gap_m"] is not None:
+        low, high = (_MM * value for value in rings["gap_m"])
+        gap = f", {low:.1f} to {high:.1f} mm apart on the object"
+    words = ", ".join(
+        f"{100 * np.mean(shares[key]):.0f} % ({100 * min(shares[key]):.0f} %) {name}"
+        for name, key in (
+            ("on the object", "on_object"),
+            ("on the target", "on_target"),
+            ("measured", "measured"),
+        )
+    )
+    missing = sum(share == 0.0 for share in shares["on_object"])
+    return (
+        f"{entry['id']:<4} {n} rings{gap}, {missing} of them miss it; mean (least) "
+        f"share of a ring: {words}"
+    )
+
+
+def _notes(entry: dict[str, Any]) -> list[str]:
+    rings = entry["rings"]
+    if rings is None:
+        return []
+    name, found = entry["id"], []
+    if rings["kept_even"]:
+        found.append(f"{name}: rings stay even, others would lose measured samples")
+    if rings["over_tolerance"] > _STRAY:
+        found.append(
+            f"{name}: between rings {100 * rings['over_tolerance']:.1f} % of the "
+            f"target strays more than {_MM * rings['error_tolerance_m']:g} mm from a "
+            f"straight line: {_remedy(rings)}"
+        )
+    creases = rings["creases"]
+    if creases["length_m"] > 0.0:
+        found.append(
+            f"{name}: {_MM * creases['length_m']:.0f} mm of creases are lit; between "
+            f"rings they are cut by up to {_MM * creases['max_error_m']:.2f} mm"
+        )
+    return found
+
+
+def _remedy(rings: dict[str, Any]) -> str:
+    if rings["limits_cross"] <= _STRAY and rings["spacing"] == "uniform":
+        return 'write spacing = "curvature" under [rings]'
+    return (
+        "finer rings can't be told apart; a longer focal length, more views, or a "
+        "second sequence with shifted radii would help"
+    )

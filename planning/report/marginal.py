@@ -1,0 +1,66 @@
+"""What one device more or fewer would change."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.scene.scene import Scene
+
+from .claims import Claims, Devices, lit_area, measured_area
+
+_D = TypeVar("_D")
+
+
+def projector_table(
+    scene: Scene,
+    devices: Devices,
+    by_count: Mapping[int, Sequence[PlannedProjector]],
+    claims: Claims,
+) -> list[dict[str, Any]]:
+    """Return the lit areas with 1, 2, ... projectors, on the claims' own samples."""
+    areas = _areas(
+        by_count,
+        len(devices.projectors),
+        (claims.target.lit_m2, claims.surface.lit_m2),
+        lambda projectors: lit_area(scene, projectors),
+    )
+    return [
+        {"n_projectors": n, "lit_target_m2": target, "lit_surface_m2": surface}
+        for n, (target, surface) in areas.items()
+    ]
+
+
+def camera_table(
+    scene: Scene,
+    devices: Devices,
+    by_count: Mapping[int, Sequence[PlannedCamera]],
+    claims: Claims,
+) -> list[dict[str, Any]]:
+    """Return the measured areas with 1, 2, ... cameras, given the projectors."""
+    areas = _areas(
+        by_count,
+        len(devices.cameras),
+        (claims.target.measured_m2, claims.surface.measured_m2),
+        lambda cameras: measured_area(scene, devices.projectors, cameras),
+    )
+    return [
+        {"n_cameras": n, "measured_target_m2": target, "measured_surface_m2": surface}
+        for n, (target, surface) in areas.items()
+    ]
+
+
+def _areas(
+    by_count: Mapping[int, Sequence[_D]],
+    planned: int,
+    claimed: tuple[float, float],
+    area_of: Callable[[Sequence[_D]], tuple[float, float]],
+) -> dict[int, tuple[float, float]]:
+    areas: dict[int, tuple[float, float]] = {}
+    for n, devices in sorted(by_count.items()):
+        target, surface = claimed if n == planned else area_of(devices)
+        if n > planned:
+            # A device added to the planned ones can't cover less than they do.
+            target = max(target, areas[n - 1][0])
+            surface = max(surface, areas[n - 1][1])
+        areas[n] = (target, surface)
+    return areas

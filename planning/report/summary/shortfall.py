@@ -1,0 +1,225 @@
+"""Which requirements a plan misses, why, and what would help."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from planning.model.requirements import Requirements
+
+# Areas below this are told in mm² [m²].
+_SMALL_M2 = 1e-4
+# Causes that take less than this share of what is left aren't told.
+_TOLD = 0.01
+_OF_PROJECTORS = ("projector_", "tangent_angle")
+_OF_CAMERAS = ("camera_", "sample_distance", "conditioning", "sigma", "pitch")
+_CAUSE_WORDS = {
+    "projector_beam": "outside the beam or the image of every projector",
+    "projector_range": "out of the projectors' range",
+    "projector_incidence": "met by the light at too large an angle",
+    "tangent_angle": "lit along the steep direction (tangent angle too small)",
+    "projector_occlusion": "shadowed from every projector that faces it",
+    "projector_body": "kept from the light by a device's body",
+    "camera_field": "outside the image of every camera",
+    "camera_range": "out of the cameras' depth of field",
+    "camera_incidence": "seen at too large an angle",
+    "camera_occlusion": "hidden from every camera that faces it",
+    "camera_body": "hidden by a device's body",
+    "sample_distance": "sampled too coarsely",
+    "conditioning": "on a blind curve (|r.m| too small)",
+    "sigma": "measured with too large a deviation",
+    "pitch": "with rings too close in the image",
+}
+
+
+def cause_words(cause: str) -> str:
+    """Return a cause of the plan file as a phrase."""
+    return _CAUSE_WORDS.get(cause, cause)
+
+
+def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
+    """Return the largest causes with their share of an area, as one line."""
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])[:most]
+    return "; ".join(
+        f"{_percent(area / whole)} {cause_words(cause)}" for cause, area in ranked
+    )
+
+
+def shortfalls(document: dict[str, Any], requirements: Requirements) -> tuple[str, ...]:
+    """Return one sentence for each requirement that a plan misses.
+
+    Args:
+        document: The plan, with its claims and, where it was made, its check.
+        requirements: What was asked.
+    """
+    return (
+        *_reachable(document, requirements),
+        *_measurable(document, requirements),
+        *_covered(document, requirements),
+        *_check(document),
+    )
+
+
+def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+    areas = document["coverage"]["target"]
+    share = areas["reachable_by_projectors_m2"] / areas["area_m2"]
+    if share >= asked.min_reachable:
+        return ()
+    causes = document["coverage"]["unreachable_by_cause"]
+    helps = document["coverage"].get("relaxations", [])
+    line = (
+        f"only {_percent(share)} of the target can be lit from anywhere in the "
+        f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
+        f"{area_words(areas['area_m2'] - areas['reachable_by_projectors_m2'])} of "
+        f"{area_words(areas['area_m2'])} can't be reached: "
+        f"{causes_line(causes, areas['area_m2'])}{_inside(document)}"
+    )
+    steps = [
+        f"{step['change']} would reach {_percent(step['reachable_share'])}"
+        for step in helps
+    ]
+    steps.append(f"--min-reachable {_down(share)} accepts what there is")
+    return (f"{line}. What would help: {'; '.join(steps)}",)
+
+
+def _measurable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+    """Whether enough of what is lit is within the cameras' reach."""
+    areas = document["coverage"]["target"]
+    lit, reached = areas["lit_m2"], areas["reachable_by_cameras_m2"]
+    if not lit > 0.0 or reached >= asked.min_reachable * lit:
+        return ()
+    share = reached / lit
+    steps = [
+        f"{step['change']} would reach {_percent(step['reachable_share'])}"
+        for step in document["coverage"].get("camera_relaxations", [])
+    ]
+    steps.append(f"--min-reachable {_down(share)} accepts what there is")
+    return (
+        f"only {_percent(share)} of what is lit can be measured from anywhere in the "
+        f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
+        f"{area_words(lit - reached)} of {area_words(lit)} can't be: "
+        f"{_areas_line(document['coverage'].get('unmeasurable_by_cause', {}))}. What "
+        f"would help: {'; '.join(steps)}",
+    )
+
+
+def _areas_line(areas: dict[str, float]) -> str:
+    """The causes with their areas, the largest first, but for what is next to none."""
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
+    told = [pair for pair in ranked if pair[1] >= _TOLD * sum(areas.values())]
+    return "; ".join(f"{area_words(area)} {cause_words(c)}" for c, area in told)
+
+
+def _inside(document: dict[str, Any]) -> str:
+    """How much of what can't be reached lies inside the body."""
+    inside = document["coverage"].get("unreachable_inside_m2", 0.0)
+    if not inside > 0.0:
+        return ""
+    shell = document["meshes"][0].get("shell", {})
+    hollow = shell.get("kind") == "hollow shell"
+    where = "lies inside the hollow body" if hollow else "lies in cavities"
+    return f"; {area_words(inside)} of it {where}"
+
+
+def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
+    areas = document["coverage"]["target"]
+    for kind, part, whole, required, deed in (
+        (
+            "projectors",
+            areas["lit_m2"],
+            areas["reachable_by_projectors_m2"],
+            asked.dominant_coverage,
+            "light {} of the reachable target",
+        ),
+        (
+            "cameras",
+            areas["measured_m2"],
+            areas["reachable_by_cameras_m2"],
+            asked.coverage,
+            "measure {} of what is lit and measurable",
+        ),
+    ):
+        share = part / whole if whole > 0 else 0.0
+        if share >= required:
+            continue
+        proof = document["certificates"][kind]
+        devices = kind if proof["count"] > 1 else kind.removesuffix("s")
+        verb = deed if proof["count"] > 1 else deed.replace(" ", "s ", 1)
+        yield (
+            f"{proof['count']} {devices} {verb.format(_percent(share))}, "
+            f"{_percent(required)} is required; {area_words(whole - part)} of "
+            f"{area_words(whole)} are left{_bodies(document, proof)}. "
+            f"{_why(kind, document)}What would help: {_more(kind, proof, asked, share)}"
+        )
+
+
+def _why(kind: str, document: dict[str, Any]) -> str:
+    """What keeps devices of a kind from the target, with areas, as a sentence."""
+    prefixes = _OF_PROJECTORS if kind == "projectors" else _OF_CAMERAS
+    areas = {
+        cause: area
+        for cause, area in document["coverage"]["uncovered_by_cause"].items()
+        if cause.startswith(prefixes)
+    }
+    if not areas:
+        return ""
+    of = "target" if kind == "projectors" else "lit target"
+    return f"Of the {of}: {_areas_line(areas)}. "
+
+
+def _bodies(document: dict[str, Any], proof: dict[str, Any]) -> str:
+    """Whose bodies stand in the way of how much, the largest area first."""
+    areas = document["coverage"].get("blocked_by_body_m2", {})
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
+    told = [
+        f"{1e6 * area:.0f} mm² blocked by the body of {name}"
+        for name, area in ranked
+        if area > 0.0
+    ]
+    if "but_for_bodies" in proof:
+        told.append(
+            f"{proof['but_for_bodies']} would do if their bodies didn't collide or "
+            f"stand in each other's way"
+        )
+    return f" ({', '.join(told)})" if told else ""
+
+
+def _more(kind: str, proof: dict[str, Any], asked: Requirements, share: float) -> str:
+    needed = proof["needed"]
+    allowed = getattr(asked, f"max_{kind}")
+    option = "dominant-coverage" if kind == "projectors" else "coverage"
+    accept = f"--{option} {_down(share)} accepts this plan"
+    # Where bodies are in the way, more devices may be no help.
+    in_vain = needed["count"] <= proof.get("but_for_bodies", 0)
+    if allowed is None or needed["count"] <= allowed or in_vain:
+        return accept
+    bound = (
+        "proved over the candidates"
+        if needed["lower_bound"] == needed["count"]
+        else f"at least {needed['lower_bound']} proved over the candidates"
+    )
+    more = f"--max-{kind} {needed['count']} ({bound})"
+    field = needed.get("wider_field")
+    single = [*needed.get("relaxations", []), *([] if field is None else [field])]
+    return ", ".join([more, *single, f"or {accept}"])
+
+
+def _check(document: dict[str, Any]) -> tuple[str, ...]:
+    check = document["reconstruction"]
+    return () if check is None or check["passed"] else tuple(check["failures"])
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _down(share: float) -> str:
+    """Rounded down to hundredths, or to one digit: no option takes a share of 0."""
+    places = 2 if not 0.0 < share < 0.01 else -math.floor(math.log10(share))
+    return f"{math.floor(10.0**places * share) / 10.0**places:.{places}f}"
+
+
+def area_words(area_m2: float) -> str:
+    """Return an area in cm², or a small one in mm²."""
+    if area_m2 < _SMALL_M2:
+        return f"{1e6 * area_m2:.3g} mm²"
+    return f"{1e4 * area_m2:.1f} cm²"

@@ -1,0 +1,425 @@
+"""The result that a person reads in ten seconds."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.requirements import Workspace
+from planning.report.entries.cost import cost_lines
+from planning.report.entries.firing import schedule_line
+from planning.report.entries.range_entries import summary_lines
+from planning.report.entries.ring_entries import rings_lines
+
+from .check_lines import check_lines
+from .shortfall import causes_line
+
+_AXES = "xyz"
+# Surfaces below this are told in mm² [m²].
+_SMALL_M2 = 1e-3
+
+
+def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
+    """Return the plan as text, in millimetres, degrees and square centimetres.
+
+    Args:
+        plan: The plan.
+        files: Where it was written.
+        missed: What `shortfalls` returned.
+    """
+    parts = [
+        _head(plan),
+        _devices(plan),
+        _proofs(plan),
+        _coverage(plan),
+        *_ranges(plan),
+        *_rings(plan),
+        _marginal(plan),
+        check_lines(plan),
+        *cost_lines(plan.document["cost"]),
+        *(f"MISSED   {line}" for line in missed),
+        *(f"files    {name}" for name in files[:1]),
+        *(f"         {name}" for name in files[1:]),
+    ]
+    return "\n".join(parts)
+
+
+def _head(plan: RigPlan) -> str:
+    document, workspace = plan.document, plan.requirements.workspace
+    mesh = document["meshes"][0]
+    size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
+    cut = (
+        "; TRUNCATED, not the best that could be found" if document["truncated"] else ""
+    )
+    where = _where(workspace)
+    return (
+        f"PLAN     {_number(plan.projectors, 'projector')}, "
+        f"{_number(plan.cameras, 'camera')} for "
+        f"{mesh['path']}{cut}\n"
+        f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
+        f"{_unit(mesh)}, up {_axis(workspace.up)}; rig {document['rig']['name']}, "
+        f"{document['rig']['light']} light\n"
+        f"{shell_line(mesh)}"
+        f"         devices may stand in {where}"
+    )
+
+
+_EXCLUDED = {
+    "projector_beam": "lie outside the beam",
+    "projector_range": "out of range",
+    "projector_incidence": "beyond the incidence limit",
+    "tangent_angle": "too near the steep direction",
+    "projector_occlusion": "in shadow",
+    "projector_body": "behind a device's body",
+}
+
+
+def shell_line(mesh: dict[str, Any]) -> str:
+    """Return what kind of body a mesh of the plan is, as a line; none for a solid."""
+    shell = mesh.get("shell", {"kind": "solid"})
+    if shell["kind"] == "solid":
+        return ""
+    if shell["wall_m"] is None:
+        return f"         {shell['kind']}\n"
+    share = 100.0 * shell["inside_m2"] / mesh["area_m2"]
+    sealed = 100.0 * shell["sealed_m2"] / mesh["area_m2"]
+    closed = f", {sealed:.1f} % in sealed cavities" if sealed > 0.05 else ""
+    return (
+        f"         {shell['kind']}, wall about {1e3 * shell['wall_m']:.2g} mm; "
+        f"{share:.1f} % of the surface lies inside{closed}\n"
+    )
+
+
+def _number(devices: Sequence[object], name: str) -> str:
+    return f"{len(devices)} {name}{'s' * (len(devices) != 1)}"
+
+
+def _where(workspace: Workspace) -> str:
+    zones = zone_phrases(workspace)
+    if workspace.half_angle >= np.pi and workspace.floor_m is None and not zones:
+        return "the whole shell about it (no floor)"
+    parts: list[str] = []
+    if workspace.half_angle < np.pi:
+        x, y, z = workspace.axis
+        parts.append(
+            f"within {np.degrees(workspace.half_angle):.0f} degrees of the axis "
+            f"({x:.3g}, {y:.3g}, {z:.3g}) from its centre"
+        )
+    if workspace.floor_m is not None:
+        parts.append(f"at least {1e3 * workspace.floor_m:.0f} mm above its centre")
+    return f"the shell about it, {', '.join(parts + zones)}"
+
+
+def zone_phrases(workspace: Workspace) -> list[str]:
+    """Return what a box, keep-out volumes and mounting planes leave, a phrase each."""
+    found: list[str] = []
+    if workspace.box is not None:
+        size = " x ".join(f"{2e3 * half:.0f}" for half in workspace.box.half_m)
+        found.append(f"in a box of {size} mm")
+    if workspace.mounting:
+        names = [plane.name for plane in workspace.mounting]
+        found.append(f"on {' or '.join(names)}")
+    if workspace.keep_out:
+        found.append(f"not in {' or '.join(zone.name for zone in workspace.keep_out)}")
+    return found
+
+
+def _unit(mesh: dict[str, Any]) -> str:
+    if mesh["unit"] == "size_mm":
+        return f"scaled to that size ({1e3 * mesh['scale_to_m']:.6g} mm a file unit)"
+    return f"unit {mesh['unit']}"
+
+
+def _axis(up: Sequence[float]) -> str:
+    index = int(np.argmax(np.abs(up)))
+    return f"{'-' if up[index] < 0 else '+'}{_AXES[index]}"
+
+
+def _devices(plan: RigPlan) -> str:
+    lines = [
+        "\n     position x, y, z [mm]            image centre aims along         roll"
+        "   standoff",
+        "                                      azimuth   elevation [deg]     [deg]   "
+        "to centre [mm]",
+    ]
+    centre = np.array(plan.requirements.workspace.centre)
+    up = np.array(plan.requirements.workspace.up)
+    for device in (*plan.projectors, *plan.cameras):
+        position = device.world_from_device[:3, 3]
+        azimuth, elevation, roll = aim_angles(device, up)
+        x, y, z = 1e3 * position
+        distance = 1e3 * np.linalg.norm(position - centre)
+        lines.append(
+            f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {azimuth:12.1f} "
+            f"{elevation:10.1f}   {roll:12.1f}   {distance:10.1f}"
+            + (f"   existing: {device.existing}" if device.existing else "")
+        )
+    k = int(np.argmax(np.abs(up)))
+    lines.append(
+        f"     azimuth counts about {_axis(tuple(up))} from +{_AXES[(k + 1) % 3]}; the "
+        f"axes are those of the mesh file"
+    )
+    return "\n".join(lines)
+
+
+def aim_angles(
+    device: PlannedProjector | PlannedCamera, up: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return azimuth, elevation and roll of a device in degrees.
+
+    Azimuth counts about `up` from the first world axis that isn't along it towards
+    the next (x towards y for up z); elevation is the angle above the horizontal; roll
+    turns the image clockwise as the device sees it, 0 with the image upright.
+    """
+    pose = device.world_from_device
+    axis = _middle(device)
+    k = int(np.argmax(np.abs(up)))
+    e1 = np.eye(3)[(k + 1) % 3]
+    e2 = np.cross(up, e1)
+    azimuth = np.degrees(np.arctan2(axis @ e2, axis @ e1))
+    elevation = np.degrees(np.arcsin(np.clip(axis @ up, -1.0, 1.0)))
+    level = np.cross(axis, up)
+    if np.linalg.norm(level) < 1e-6:
+        return float(azimuth), float(elevation), 0.0
+    level /= np.linalg.norm(level)
+    roll = np.arctan2(pose[:3, 0] @ np.cross(axis, level), pose[:3, 0] @ level)
+    return float(azimuth), float(elevation), float(np.degrees(roll)) + 0.0
+
+
+def _middle(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
+    pose = device.world_from_device
+    if isinstance(device, PlannedProjector) and device.light == "parallel":
+        return pose[:3, 2]
+    width, height = device.device.resolution
+    k = device.device.camera_matrix  # type: ignore[union-attr]
+    ray = np.array(
+        [
+            ((width - 1) / 2 - k[0, 2]) / k[0, 0],
+            ((height - 1) / 2 - k[1, 2]) / k[1, 1],
+            1.0,
+        ]
+    )
+    return pose[:3, :3] @ (ray / np.linalg.norm(ray))
+
+
+def _proofs(plan: RigPlan) -> str:
+    asked = plan.requirements
+    proofs = plan.document["certificates"]
+    lines = [
+        _proof("projector", proofs["projectors"], asked.dominant_coverage, "light"),
+        _continuous(proofs["projectors"], _freedom(plan)),
+        _proof("camera", proofs["cameras"], asked.coverage, "measure")
+        + " (given these projectors)",
+        _continuous(proofs["cameras"], "position, aim and roll"),
+        *_routes(proofs["cameras"]),
+        f"         {_regions(plan)}",
+        *_excluded(proofs["projectors"]),
+    ]
+    return "\n" + "\n".join(lines)
+
+
+def _routes(proof: dict[str, Any]) -> list[str]:
+    """Return how many cameras either route needs and which is taken, in a line."""
+    routes = proof.get("routes")
+    if routes is None:
+        return []
+    names = {"cover": "the cover", "paper": "the paper's largest baselines"}
+    counts = [
+        f"{'none' if routes[kind] is None else routes[kind]} by {name}"
+        for kind, name in names.items()
+        if routes["asked"] in (kind, "both")
+    ]
+    told = f"ROUTES   cameras: {', '.join(counts)}"
+    if routes["asked"] != "both":
+        return [told]
+    return [f"{told}; taken {names[routes['taken']]}: {routes['why']}"]
+
+
+def _excluded(proof: dict[str, Any]) -> list[str]:
+    """Return which limit of eq. (2) took how many pairs of pose and sample, in a line.
+
+    A pair counts for the first limit that it fails, in the order in which they stand.
+    """
+    pairs = proof["n_samples"] * proof["candidates"]["n_candidates"]
+    excluded = proof.get("excluded_pairs")
+    if not excluded or not pairs:
+        return []
+    told = [
+        f"{100.0 * excluded[cause] / pairs:.1f} % {words}"
+        for cause, words in _EXCLUDED.items()
+        if cause in excluded
+    ]
+    lit = 100.0 * (1.0 - sum(excluded.values()) / pairs)
+    return [
+        f"         of {pairs:,} pairs of pose and sample {', '.join(told)}; "
+        f"{lit:.1f} % are lit"
+    ]
+
+
+def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
+    candidates, needed = proof["candidates"], proof["needed"]
+    count = proof["count"]
+    scope = (
+        f"to {verb} {100 * share:g} % of what the {candidates['n_candidates']} "
+        f"candidate poses reach of {proof['n_samples']} samples{_given(proof)}"
+    )
+    name = f"{kind}s"
+    if needed["count"] > count:
+        have = f"at least {needed['lower_bound']} {name} are needed"
+        enough = f"{needed['count']} suffice"
+        if needed["count"] <= proof.get("but_for_bodies", 0):
+            enough += " but for their bodies"
+        return f"PROVED   {have}, {enough}, {scope}"
+    if proof["status"] == "optimal":
+        one = count == 1
+        return (
+            f"PROVED   {count} {kind if one else name} {'is' if one else 'are'} the "
+            f"fewest {scope}"
+        )
+    least = candidates["lower_bound"]
+    return f"BOUND    {count} {name}; at least {least} are needed {scope}"
+
+
+def _given(proof: dict[str, Any]) -> str:
+    return f", given {proof['given']} existing" if "given" in proof else ""
+
+
+def _freedom(plan: RigPlan) -> str:
+    """Return what of a projector's pose counts for its light."""
+    parallel = plan.projectors[0].light == "parallel"
+    return "direction" if parallel else "position and aim"
+
+
+def _continuous(proof: dict[str, Any], poses: str) -> str:
+    """Return what was proved over all poses of the workspace, in a line."""
+    bound = proof["continuous"]
+    if bound is None:
+        return f"         nothing is proved over every {poses} in the workspace"
+    scope = (
+        f"over every {poses} in the workspace, for {bound['n_samples']} samples"
+        f"{_given(proof)}"
+    )
+    blind = "" if bound["occlusion"] else ", shadows left out"
+    least = bound["lower_bound"]
+    if least >= proof["needed"]["count"]:
+        return f"PROVED   fewer are too few {scope}{blind}"
+    return f"BOUND    at least {least} are needed {scope}{blind}"
+
+
+def _coverage(plan: RigPlan) -> str:
+    coverage = plan.coverage
+    target, surface = coverage["target"], coverage["surface"]
+    rows = [
+        ("area", "area_m2"),
+        ("reachable by projectors", "reachable_by_projectors_m2"),
+        ("lit", "lit_m2"),
+        ("reachable by cameras", "reachable_by_cameras_m2"),
+        ("measured", "measured_m2"),
+    ]
+    name = _target_name(plan)
+    lines = [
+        f"\n{'':<9}{'':<25}{'target (' + name + ')':>24}{'whole surface':>24}",
+        *(
+            f"{'':<9}{label:<25}{_cell(target, key):>24}{_cell(surface, key):>24}"
+            for label, key in rows
+        ),
+    ]
+    lit = _ratio(target["lit_m2"], target["reachable_by_projectors_m2"])
+    measured = _ratio(target["measured_m2"], target["reachable_by_cameras_m2"])
+    lines.append(
+        f"COVERAGE lit / reachable by projectors {lit}, measured / reachable by "
+        f"cameras {measured}, on the target, {coverage['samples']} fresh samples"
+    )
+    left = coverage["uncovered_by_cause"]
+    if left:
+        lines.append(f"         not measured: {causes_line(left, target['area_m2'])}")
+    idle = {e["id"] for e in plan.document["cameras"] if e["seen_area_m2"] == 0.0}
+    groups = [g for g in plan.document["camera_groups"] if not idle.issuperset(g)]
+    if len(groups) > 1:
+        names = ", ".join("{" + " ".join(group) + "}" for group in groups)
+        lines.append(
+            f"         the parts of {names} don't overlap: register them by the "
+            f"calibrated poses, not by the surface"
+        )
+    lines += [
+        f"         {entry['id']} {does} none of the target"
+        for does, kind, area in (
+            ("lights", "projectors", "lit_area_m2"),
+            ("measures", "cameras", "seen_area_m2"),
+        )
+        for entry in plan.document[kind]
+        if entry[area] == 0.0
+    ]
+    if firing := schedule_line(plan.document):
+        lines.append(firing)
+    return "\n".join(lines)
+
+
+def _target_name(plan: RigPlan) -> str:
+    return "your selection" if _own(plan) else plan.requirements.target
+
+
+def _regions(plan: RigPlan) -> str:
+    """Return how many regions there are, and what chose their faces."""
+    regions = plan.document["regions"]
+    many = f"region{'s' * (len(regions) != 1)}"
+    own = _own(plan)
+    if own is None:
+        return f"{len(regions)} dominant {many}"
+    by = "highest weight" if own["kind"] == "vertex_weight" else "selection"
+    source = f" by {own['source']}" if own["source"] else ""
+    removed = own["n_removed_by_repair"]
+    gone = f" ({removed} chosen ones removed by repair)" if removed else ""
+    return f"{len(regions)} {many} of your {by}{source}: {own['n_faces']} faces{gone}"
+
+
+def _own(plan: RigPlan) -> dict[str, Any] | None:
+    """Return `surface.selection` if the user made it; older plans have none."""
+    found = plan.document["surface"].get("selection")
+    return None if found is None or found["kind"] == "curvature" else found
+
+
+def _cell(areas: dict[str, float], key: str) -> str:
+    share = 100.0 * areas[key] / areas["area_m2"]
+    area, unit = 1e4 * areas[key], "cm²"
+    if areas["area_m2"] < _SMALL_M2:
+        area, unit = 1e6 * areas[key], "mm²"
+    return f"{area:9.1f} {unit} {share:6.1f} %"
+
+
+def _ratio(part: float, whole: float) -> str:
+    return f"{100.0 * part / whole:.1f} %" if whole > 0 else "undefined"
+
+
+def _ranges(plan: RigPlan) -> list[str]:
+    lines = summary_lines(plan.document)
+    return ["\n" + "\n".join(lines)] if lines else []
+
+
+def _rings(plan: RigPlan) -> list[str]:
+    lines = rings_lines(plan)
+    return ["\n" + "\n".join(lines)] if lines else []
+
+
+def _marginal(plan: RigPlan) -> str:
+    area = plan.coverage["target"]["area_m2"]
+    rows = plan.document["marginal"]
+    lines: list[str] = []
+    for kind, key, verb, planned in (
+        ("n_projectors", "lit_target_m2", "lit", len(plan.projectors)),
+        ("n_cameras", "measured_target_m2", "measured", len(plan.cameras)),
+    ):
+        cells = [
+            f"{row[kind]}{'*' if row[kind] == planned else ''}: "
+            f"{100.0 * row[key] / area:.1f} %"
+            for row in rows
+            if kind in row
+        ]
+        label = kind.removeprefix("n_")
+        lines.append(f"         {label:<10} {verb} of the target   {'   '.join(cells)}")
+    return (
+        "\nMARGINAL what one more or fewer would change (* as planned)\n"
+        + "\n".join(lines)
+    )

@@ -1,0 +1,363 @@
+"""The rig: which devices there are, where they may stand, and what counts as measured.
+
+A rig is a preset or a TOML file (`docs/rig-files.md`); `load_rig` gives the devices in
+pixels, metres and radians and the requirements that a plan is held to.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import ParallelModel, PinholeModel
+from planning.model.bodies import Body
+from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.requirements import Requirements
+from planning.scene.existing import build_existing, check_existing
+from planning.scene.workspace.field import overflows
+
+from . import optics
+from .rig_devices import (
+    parallel_device,
+    parallel_document,
+    pinhole_device,
+    pinhole_document,
+)
+from .rig_files import Figure, Preset, list_presets, read_rig
+from .rig_requirements import Pattern, Target, build_requirements
+from .rig_tables import RigTable
+
+__all__ = ["Figure", "Preset", "Rig", "list_presets", "load_rig"]
+
+Light = Literal["diverging", "parallel"]
+
+_WARN_INCIDENCE_DEG = 70.0
+
+
+def load_rig(name: str | Path = "default", light: Light | None = None) -> "Rig":
+    """Load a preset or a rig file.
+
+    Args:
+        name: Name of a preset, or path of a TOML file.
+        light: `diverging` or `parallel`; None: what the rig says.
+
+    Raises:
+        RigError: One line for each fault: where it is, the value, the rule, what to do.
+        InfeasibleLimitsError: If a device isn't sharp at the standoff.
+    """
+    if light not in (None, "diverging", "parallel"):
+        raise RigError(f"light = {light!r} must be 'diverging' or 'parallel'")
+    table = read_rig(name)
+    rig = Rig(table, light or table.light)
+    _check_devices(rig)
+    return rig
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Devices, placement and limits of one rig, in metres and radians.
+
+    Attributes:
+        table: The rig as written, in millimetres and degrees.
+        light: `diverging` or `parallel`.
+    """
+
+    table: RigTable
+    light: Light
+
+    @property
+    def name(self) -> str:
+        """Name of the rig."""
+        return self.table.name
+
+    @property
+    def standoff_m(self) -> float:
+        """Distance of devices from the surface in [m]."""
+        return self.table.placement.standoff_mm * 1e-3
+
+    @property
+    def standoff_play_m(self) -> float:
+        """How much nearer or farther than the standoff a device may be in [m]."""
+        return self.table.placement.standoff_play_mm * 1e-3
+
+    @property
+    def ring_tilt_rad(self) -> float:
+        """Turn of the ring axis against the projector's optical axis in [rad]."""
+        return math.radians(self.table.rings.tilt_deg)
+
+    @property
+    def ring_shift_m(self) -> float:
+        """Shift of the ring axis in the panel's plane, parallel light, in [m].
+
+        ``standoff tan(tilt)``: as far on the object as the turned axis would move.
+        """
+        return self.standoff_m * math.tan(self.ring_tilt_rad)
+
+    @property
+    def ring_gap_m(self) -> float | None:
+        """Distance of neighbouring rings at the standoff in [m]; None: not fixed."""
+        gap = self.table.rings.gap_mm
+        return None if gap is None else gap * 1e-3
+
+    @property
+    def ring_spacing(self) -> Literal["uniform", "curvature"]:
+        """Whether rings are evenly spaced, or finer where the surface bends."""
+        return self.table.rings.spacing
+
+    @property
+    def n_candidate_projectors(self) -> int:
+        """Projector poses offered to the cover."""
+        return self.table.placement.n_candidate_projectors
+
+    @property
+    def n_candidate_cameras(self) -> int:
+        """Camera poses offered to the cover."""
+        return self.table.placement.n_candidate_cameras
+
+    @property
+    def n_reference_projectors(self) -> int:
+        """Projector poses that define what is reachable."""
+        return self.table.placement.n_reference_projectors
+
+    @property
+    def n_reference_cameras(self) -> int:
+        """Camera poses that define what is reachable."""
+        return self.table.placement.n_reference_cameras
+
+    def projector_device(self) -> PinholeModel | ParallelModel:
+        """Return the optics of a projector.
+
+        Raises:
+            RigError: If the rig has no projector for this light.
+        """
+        return self._projector[0]
+
+    def camera_device(self) -> PinholeModel:
+        """Return the optics of a camera."""
+        return self._camera
+
+    def projector_body(self) -> Body | None:
+        """Return the body of a projector of this light, None where none is given."""
+        table, parallel = self.table, self.table.parallel_projector
+        device = parallel if self.light == "parallel" else table.projector
+        return None if device is None else Body.of(device.body)
+
+    def camera_body(self) -> Body | None:
+        """Return the body of a camera, None where none is given."""
+        return Body.of(self.table.camera.body)
+
+    def projector_centre_ray(self) -> NDArray[np.float64]:
+        """Return the unit direction of the image centre in the projector's frame, (3,).
+
+        With a vertical offset the optical axis misses the image: aim this ray.
+        """
+        device = self.projector_device()
+        if isinstance(device, ParallelModel):
+            return np.array([0.0, 0.0, 1.0])
+        return device.rays(0.5 * (np.array(device.resolution) - 1.0))
+
+    def outer_ring_radius(self) -> float:
+        """Return the outermost ring, wherever the ring axis is turned or shifted to.
+
+        Diverging: tangent of the angle between ring axis and farthest image corner,
+        ``tan(corner + tilt)``. Parallel: half the panel's diagonal (the beam's radius
+        if that is less) plus the shift, in [m].
+        """
+        device = self.projector_device()
+        if isinstance(device, PinholeModel):
+            return optics.largest_corner_tangent(
+                device.camera_matrix, device.resolution, self.ring_tilt_rad
+            )
+        reach = float(np.hypot(*device.half_panel))
+        if device.beam_radius is not None:
+            reach = min(reach, device.beam_radius)
+        return reach + self.ring_shift_m
+
+    def notes(self, object_radius_m: float | None = None) -> tuple[str, ...]:
+        """Return what a user should know of these limits, a sentence each.
+
+        Args:
+            object_radius_m: Radius of the ball that holds the object in [m]; given,
+                the depth that is sharp is compared with it.
+        """
+        limits = self.table.limits
+        theta, tau = limits.projector_max_incidence_deg, limits.min_tangent_angle_deg
+        found: list[str] = []
+        if tau <= 90.0 - theta:
+            found.append(
+                f"the tangent limit of {tau:g} degrees doesn't bind: at an incidence "
+                f"of {theta:g} degrees or less the angle is {90.0 - theta:g} or more"
+            )
+        if theta > _WARN_INCIDENCE_DEG:
+            found.append(
+                f"projector incidence up to {theta:g} degrees: errors triple at 75, "
+                f"and at 84 only 0.6 of the surface is measured"
+            )
+        if object_radius_m is not None:
+            found += self._depth_notes(object_radius_m)
+        return tuple(found)
+
+    def _depth_notes(self, radius: float) -> list[str]:
+        """Compare the rim of a ball, the farthest it shows, with what is sharp."""
+        centre = self.standoff_m + self.standoff_play_m + radius
+        rim = math.sqrt(centre**2 - radius**2)
+        # Along a parallel beam the rim is as deep as the ball's centre.
+        depth = rim if self.light == "diverging" else centre
+        cases = (
+            ("camera", self.camera_device(), rim),
+            ("projector", self.projector_device(), depth),
+        )
+        return [
+            f"the {role} is sharp to {device.range_m[1]:.2f} m, and the rim of an "
+            f"object of radius {radius * 1e3:.0f} mm can be {far:.2f} m away"
+            for role, device, far in cases
+            if far > device.range_m[1]
+        ]
+
+    def requirements(
+        self,
+        mesh_centre: Sequence[float] | NDArray[np.float64],
+        object_radius_m: float,
+        *,
+        max_projectors: int,
+        tau_m: float,
+        max_cameras: int | None = None,
+        target: Target = "dominant",
+        pattern: Pattern = "rings",
+        dominant_coverage: float | None = None,
+        coverage: float | None = None,
+        min_reachable: float | None = None,
+        accuracy_mm: float | None = None,
+        up: str | None = None,
+    ) -> Requirements:
+        """Return what a plan of this rig must reach for one object.
+
+        Args:
+            mesh_centre: Centre of the smallest ball that holds the object in [m], (3,).
+            object_radius_m: Radius of that ball in [m].
+            max_projectors: Projectors at most.
+            tau_m: Distance within which a sample must have a measured point in [m].
+            max_cameras: Cameras at most; None: as many as needed.
+            target: `dominant` regions or the whole `surface`.
+            pattern: `rings`, `dense` or `none`.
+            dominant_coverage: Lit over reachable; None: what the rig says.
+            coverage: Measured over reachable; None: what the rig says.
+            min_reachable: Reachable over target; None: what the rig says.
+            accuracy_mm: Largest s_N in [mm]; None: what the rig says.
+            up: x, y, z, -x, -y or -z; None: what the rig says.
+
+        Raises:
+            InputError: If an argument isn't usable.
+            InfeasibleLimitsError: If no position in the workspace is admissible, or
+                more devices stand already than are allowed.
+        """
+        projector, camera = self.projector_device(), self.camera_device()
+        required = build_requirements(
+            self.table,
+            self.outer_ring_radius(),
+            mesh_centre,
+            object_radius_m,
+            max_projectors=max_projectors,
+            tau_m=tau_m,
+            max_cameras=max_cameras,
+            target=target,
+            pattern=pattern,
+            dominant_coverage=dominant_coverage,
+            coverage=coverage,
+            min_reachable=min_reachable,
+            accuracy_mm=accuracy_mm,
+            up=up,
+            overflowing=(
+                overflows(projector, object_radius_m, self.standoff_m),
+                overflows(camera, object_radius_m, self.standoff_m),
+            ),
+        )
+        tables = self.table.existing
+        existing = build_existing(tables, required.workspace, projector, camera)
+        bodies = {"projector": self.projector_body(), "camera": self.camera_body()}
+        existing = tuple(
+            replace(device, body=device.body or bodies[device.kind])
+            for device in existing
+        )
+        required = replace(required, existing=existing)
+        check_existing(required)
+        return required
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the resolved rig for `plan.json`: plain values, metres, radians.
+
+        Tables whose keys end in _mm or _deg are as written in the rig file.
+        """
+        table, parallel = self.table, self.light == "parallel"
+        return {
+            "name": self.name,
+            "description": table.description,
+            "light": self.light,
+            "projector": {**self._projector[1], "light": self.light},
+            "camera": pinhole_document(table.camera, self.camera_device()),
+            "standoff_m": self.standoff_m,
+            "standoff_play_m": self.standoff_play_m,
+            "n_candidate_projectors": self.n_candidate_projectors,
+            "n_candidate_cameras": self.n_candidate_cameras,
+            "rings": {
+                "tilt": None if parallel else self.ring_tilt_rad,
+                "shift_m": self.ring_shift_m if parallel else None,
+                "gap_m": self.ring_gap_m,
+                "spacing": self.ring_spacing,
+                "outer_radius": self.outer_ring_radius(),
+            },
+            "workspace": table.workspace.to_document(),
+            "limits": table.limits.model_dump(mode="json"),
+            "requirements": table.requirements.model_dump(mode="json"),
+            "check": table.check.model_dump(mode="json"),
+            "notes": list(self.notes()),
+            **self._existing_document(),
+        }
+
+    def _existing_document(self) -> dict[str, Any]:
+        """Return the existing devices as written; no key where there are none."""
+        tables = [table.to_document() for table in self.table.existing]
+        return {"existing": tables} if tables else {}
+
+    @cached_property
+    def _camera(self) -> PinholeModel:
+        return pinhole_device(self.table.camera, "camera")
+
+    @cached_property
+    def _projector(self) -> tuple[PinholeModel | ParallelModel, dict[str, Any]]:
+        """The projector of this light and its plain values."""
+        if self.light == "diverging" and self.table.projector is not None:
+            pinhole = pinhole_device(self.table.projector, "projector")
+            return pinhole, pinhole_document(self.table.projector, pinhole)
+        beam_table = self.table.parallel_projector
+        if self.light == "parallel" and beam_table is not None:
+            beam = parallel_device(beam_table)
+            return beam, parallel_document(beam_table, beam)
+        key = "projector" if self.light == "diverging" else "parallel_projector"
+        raise RigError(
+            f"rig {self.name}: light '{self.light}' needs a table [{key}]; "
+            f'add it, or lay the file over one that has it: base = "default"'
+        )
+
+
+def _check_devices(rig: Rig) -> None:
+    """Refuse a rig whose devices can't be sharp at the standoff."""
+    devices = {"projector": rig.projector_device(), "camera": rig.camera_device()}
+    for role, device in devices.items():
+        low, high = device.range_m
+        if not low <= rig.standoff_m <= high:
+            raise InfeasibleLimitsError(
+                f"rig {rig.name}: placement.standoff_mm = {rig.standoff_m * 1e3:g} is "
+                f"outside the distances at which the {role} is sharp, {low * 1e3:.0f} "
+                f"to {high * 1e3:.0f} mm; move the standoff or refocus"
+            )
+    if not math.isfinite(rig.outer_ring_radius()):
+        raise RigError(
+            f"rig {rig.name}: rings.tilt_deg = {rig.table.rings.tilt_deg:g} turns the "
+            f"ring axis 90 degrees or more away from an image corner; turn it less"
+        )

@@ -1,0 +1,145 @@
+"""Devices of a rig file, turned into optical models in pixels and metres."""
+
+import math
+from typing import Any, cast
+
+import numpy as np
+
+from geometry.devices import ParallelModel, PinholeModel
+from planning.model.bodies import Body, body_entry
+from planning.model.errors import RigError
+
+from . import optics
+from .rig_tables import ParallelTable, PinholeTable
+
+_UNSAID = "stated in the rig file, without a source"
+
+
+def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
+    """Return the model of a camera or a diverging projector.
+
+    Args:
+        table: Its figures.
+        role: Name of the table, for messages.
+
+    Raises:
+        RigError: If no distance is sharp, or sharpness has no far end.
+    """
+    width, height = table.resolution_px
+    fx, fy = _focal_px(table)
+    if table.principal_point_px is not None:
+        cx, cy = table.principal_point_px
+    else:
+        cx = 0.5 * (width - 1)
+        cy = optics.principal_row(height, table.vertical_offset_percent or 0.0)
+    k1, k2, p1, p2, k3 = table.distortion
+    camera_matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    camera_matrix.setflags(write=False)
+    return PinholeModel(
+        camera_matrix,
+        (width, height),
+        _sharp_range(table, math.sqrt(fx * fy), role),
+        (k1, k2, p1, p2, k3),
+    )
+
+
+def parallel_device(table: ParallelTable) -> ParallelModel:
+    """Return the model of a projector of parallel light."""
+    width, height = table.resolution_px
+    low, high = table.range_mm
+    radius = table.beam_radius_mm
+    return ParallelModel(
+        (width, height),
+        table.pixel_pitch_mm * 1e-3,
+        (low * 1e-3, high * 1e-3),
+        None if radius is None else radius * 1e-3,
+    )
+
+
+def pinhole_document(table: PinholeTable, device: PinholeModel) -> dict[str, Any]:
+    """Return a pinhole device as plain values, with figures as written and sources."""
+    return {
+        "name": table.name,
+        "K": device.camera_matrix.tolist(),
+        "resolution": list(device.resolution),
+        "distortion": list(device.distortion),
+        "range_m": list(device.range_m),
+        "pixel_pitch_m": None,
+        "beam_radius": None,
+        "figures": _figures(table),
+        "sources": _sources(table),
+        **body_entry(Body.of(table.body)),
+    }
+
+
+def parallel_document(table: ParallelTable, device: ParallelModel) -> dict[str, Any]:
+    """Return a parallel beam as plain values, with figures as written and sources."""
+    return {
+        "name": table.name,
+        "K": None,
+        "resolution": list(device.resolution),
+        "distortion": None,
+        "range_m": list(device.range_m),
+        "pixel_pitch_m": device.pixel_pitch_m,
+        "beam_radius": device.beam_radius,
+        "figures": _figures(table),
+        "sources": _sources(table),
+        **body_entry(Body.of(table.body)),
+    }
+
+
+def _focal_px(table: PinholeTable) -> tuple[float, float]:
+    if table.focal_px is not None:
+        return table.focal_px[0], table.focal_px[1]
+    if table.throw_ratio is not None:
+        f = optics.focal_length_from_throw(table.throw_ratio, table.resolution_px[0])
+    else:
+        f = optics.focal_length_px(
+            cast(float, table.focal_mm) * 1e-3, cast(float, table.pixel_um) * 1e-6
+        )
+    return f, f
+
+
+def _sharp_range(table: PinholeTable, focal: float, role: str) -> tuple[float, float]:
+    """Meet of the distances the lens can be set to and the depth of field it has."""
+    low, high = (x * 1e-3 for x in table.range_mm or (0.0, math.inf))
+    near, far = _depth_of_field(table, focal, role)
+    if not max(low, near) < min(high, far):
+        raise RigError(
+            f"[{role}] no distance is sharp: the depth of field, {near * 1e3:.0f} to "
+            f"{far * 1e3:.0f} mm, and range_mm = {table.range_mm} don't meet; refocus"
+        )
+    low, high = max(low, near), min(high, far)
+    if not math.isfinite(high):
+        raise RigError(
+            f"[{role}] the depth of field has no far end; write range_mm with the "
+            f"farthest distance that is wanted"
+        )
+    return low, high
+
+
+def _depth_of_field(
+    table: PinholeTable, focal: float, role: str
+) -> tuple[float, float]:
+    if table.focus is None:
+        return 0.0, math.inf
+    pixel_m = cast(float, table.pixel_um) * 1e-6
+    try:
+        return optics.depth_of_field(
+            focal * pixel_m,
+            table.focus.f_number,
+            table.focus.blur_px * pixel_m,
+            table.focus.distance_mm * 1e-3,
+        )
+    except ValueError as error:
+        raise RigError(f"[{role}.focus] {error}; correct distance_mm") from None
+
+
+def _figures(table: PinholeTable | ParallelTable) -> dict[str, Any]:
+    return table.model_dump(
+        mode="json", exclude={"name", "sources"}, exclude_none=True, exclude_unset=True
+    )
+
+
+def _sources(table: PinholeTable | ParallelTable) -> dict[str, str]:
+    return {key: table.sources.get(key, _UNSAID) for key in table.figures()}

@@ -1,0 +1,239 @@
+"""Rig files and presets: found, read, laid over their base, checked.
+
+Every fault becomes one line that says where it stands, what was written, the rule and
+what to do.
+"""
+
+import difflib
+import tomllib
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from planning.model.errors import RigError
+
+from .rig_tables import RigTable
+
+_DEVICES = ("projector", "parallel_projector", "camera")
+# Ways to say one thing: a figure laid over a base replaces the base's other ways.
+_SAME = (
+    ("focal_px", "focal_mm", "throw_ratio"),
+    ("principal_point_px", "vertical_offset_percent"),
+)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure of a device and where it was read.
+
+    Attributes:
+        device: Table that holds it, such as `camera`.
+        key: Dotted key in that table.
+        value: As written in the file.
+        source: What was read where, or `assumed`.
+    """
+
+    device: str
+    key: str
+    value: object
+    source: str
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A rig that comes with the program.
+
+    Attributes:
+        name: What `--rig` takes.
+        description: One line.
+        devices: Name of each device, by table.
+        figures: Every figure with its source.
+    """
+
+    name: str
+    description: str
+    devices: dict[str, str]
+    figures: tuple[Figure, ...]
+
+
+def list_presets() -> tuple[Preset, ...]:
+    """Return the rigs that come with the program, by name."""
+    return tuple(_preset(name) for name in preset_names())
+
+
+def preset_names() -> tuple[str, ...]:
+    """Return the names that `load_rig` takes without a file."""
+    folder = files("planning.rig").joinpath("presets")
+    names = (entry.name for entry in folder.iterdir())
+    return tuple(sorted(name[:-5] for name in names if name.endswith(".toml")))
+
+
+def read_rig(name_or_path: str | Path) -> RigTable:
+    """Read and check a preset or a rig file.
+
+    Args:
+        name_or_path: Name of a preset, or a path: a `Path`, or text that ends in
+            `.toml` or holds a separator.
+
+    Raises:
+        RigError: One line for each fault.
+    """
+    if _is_path(name_or_path):
+        where, tables = str(name_or_path), _read_file(Path(name_or_path))
+    else:
+        where, tables = f"rig {name_or_path}", _read_preset(str(name_or_path))
+    base = tables.pop("base", None)
+    if base is not None:
+        if not isinstance(base, str) or base not in preset_names():
+            raise RigError(
+                f"{where}: base = {base!r} must name a preset: "
+                f"{', '.join(preset_names())}"
+            )
+        tables = lay_over(_read_preset(base), tables)
+    try:
+        return RigTable.model_validate(tables)
+    except ValidationError as error:
+        raise RigError("\n".join(_faults(where, error))) from None
+
+
+def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
+    """Return a preset's tables with a file's laid over them, key by key.
+
+    A device that the file names is taken whole from the file; without a name its
+    figures replace those of the preset, whose sources for them no longer hold.
+    """
+    merged = {**base}
+    for key, value in tables.items():
+        old = base.get(key)
+        if not (isinstance(value, dict) and isinstance(old, dict)):
+            merged[key] = value
+        elif key not in _DEVICES:
+            merged[key] = {**old, **value}
+        else:
+            merged[key] = value if "name" in value else _lay_device_over(old, value)
+    return merged
+
+
+def _lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    replaced = {key for key in given if not isinstance(given[key], dict)}
+    for group in _SAME:
+        if replaced & set(group):
+            replaced |= set(group)
+    device = {key: value for key, value in base.items() if key not in replaced}
+    focus = given.get("focus")
+    if isinstance(focus, dict):
+        replaced |= {f"focus.{key}" for key in focus}
+        device["focus"] = {**base.get("focus", {}), **focus}
+    if "body" in given:
+        replaced |= {key for key in base.get("sources", {}) if key.startswith("body.")}
+    sources = {k: v for k, v in base.get("sources", {}).items() if k not in replaced}
+    own = given.get("sources", {})
+    device |= {key: given[key] for key in given if key not in ("focus", "sources")}
+    device["sources"] = {**sources, **own} if isinstance(own, dict) else own
+    return device
+
+
+def _is_path(name: str | Path) -> bool:
+    if isinstance(name, Path):
+        return True
+    return name.lower().endswith(".toml") or "/" in name or "\\" in name
+
+
+def _read_file(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RigError(
+            f"{path}: no such file; give a rig file or a preset "
+            f"({', '.join(preset_names())})"
+        ) from None
+    except OSError as error:
+        raise RigError(
+            f"{path}: can't be read ({error.strerror}); check the path and its rights"
+        ) from None
+    except ValueError as error:
+        raise RigError(f"{path}: not TOML ({error}); correct that line") from None
+
+
+def _read_preset(name: str) -> dict[str, Any]:
+    known = preset_names()
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"presets: {', '.join(known)}"
+        raise RigError(
+            f"rig {name}: no such preset; {hint} A file's name ends in .toml"
+        )
+    file = files("planning.rig").joinpath("presets", f"{name}.toml")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+def _preset(name: str) -> Preset:
+    table = read_rig(name)
+    devices: dict[str, str] = {}
+    figures: list[Figure] = []
+    for role in _DEVICES:
+        device = getattr(table, role)
+        if device is None:
+            continue
+        devices[role] = device.name
+        for key in device.figures():
+            value: object = device
+            for part in key.split("."):
+                value = getattr(value, part)
+            figures.append(Figure(role, key, value, device.sources.get(key, "assumed")))
+    return Preset(name, table.description, devices, tuple(figures))
+
+
+def _faults(where: str, error: ValidationError) -> list[str]:
+    return [
+        f"{where}: {_fault(tuple(entry['loc']), entry)}"
+        for entry in error.errors(include_url=False)
+    ]
+
+
+def _fault(loc: tuple[int | str, ...], entry: ErrorDetails) -> str:
+    kind, message, path = entry["type"], entry["msg"], _dotted(loc)
+    if kind == "missing":
+        return f"`{path}` is missing; write it"
+    if kind == "extra_forbidden":
+        return f"`{path}` is not a known key; {_nearest_key(loc)}"
+    if kind == "value_error":
+        rule = message.removeprefix("Value error, ")
+        return f"[{path}] {rule}" if path else rule
+    value = repr(entry["input"])
+    value = value if len(value) <= 60 else f"{value[:57]}..."
+    rule = message.removeprefix("Input ")
+    return f"`{path}` = {value}: {rule}; write such a value, or remove the key"
+
+
+def _dotted(loc: tuple[int | str, ...]) -> str:
+    text = ""
+    for part in loc:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return text.removeprefix(".")
+
+
+def _nearest_key(loc: tuple[int | str, ...]) -> str:
+    """Say which key of the same table may have been meant."""
+    model: type[BaseModel] = RigTable
+    for part in loc[:-1]:
+        if isinstance(part, str):  # a number is a place in a list of tables
+            model = _table_of(model, part)
+    known = list(model.model_fields)
+    close = difflib.get_close_matches(str(loc[-1]), known, n=1)
+    return f"did you mean {close[0]}?" if close else f"keys here: {', '.join(known)}"
+
+
+def _table_of(model: type[BaseModel], key: str) -> type[BaseModel]:
+    """Return the table type that a field holds, bare, beside None or in a list."""
+    annotation: Any = model.model_fields[key].annotation
+    options = getattr(annotation, "__args__", (annotation,))
+    return next(
+        kind
+        for kind in options
+        if isinstance(kind, type) and issubclass(kind, BaseModel)
+    )

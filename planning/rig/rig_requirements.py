@@ -1,0 +1,246 @@
+"""The limits of a rig file and the wishes of a user, turned into requirements."""
+
+import math
+from collections.abc import Sequence
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.errors import InfeasibleLimitsError, InputError
+from planning.model.requirements import (
+    CameraLimits,
+    CheckLimits,
+    ProjectorLimits,
+    Requirements,
+    TriangulationLimits,
+    Workspace,
+)
+from planning.scene.workspace.zone_conflicts import check_zones
+
+from .rig_tables import CheckTable, LimitsTable, RigTable
+from .zone_tables import build_zones
+
+Pattern = Literal["rings", "dense", "none"]
+Target = Literal["dominant", "surface"]
+Overflowing = tuple[bool, bool]
+
+UP_VECTORS: dict[str, tuple[float, float, float]] = {
+    "x": (1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+    "-z": (0.0, 0.0, -1.0),
+}
+
+
+def build_requirements(
+    table: RigTable,
+    reference_ring_radius: float,
+    mesh_centre: Sequence[float] | NDArray[np.float64],
+    object_radius_m: float,
+    *,
+    max_projectors: int,
+    tau_m: float,
+    max_cameras: int | None,
+    target: Target,
+    pattern: Pattern,
+    dominant_coverage: float | None,
+    coverage: float | None,
+    min_reachable: float | None,
+    accuracy_mm: float | None,
+    up: str | None,
+    overflowing: Overflowing = (False, False),
+) -> Requirements:
+    """Return what a plan must reach; `Rig.requirements` documents the arguments.
+
+    But for `overflowing`: whether the object is wider than the field of projectors, and
+    of cameras.
+
+    Raises:
+        InputError: If an argument isn't usable.
+        InfeasibleLimitsError: If no position in the workspace is admissible.
+    """
+    shares = table.requirements
+    _check_choice("target", target, ("dominant", "surface"))
+    _check_choice("pattern", pattern, ("rings", "dense", "none"))
+    _check_count("max_projectors", max_projectors)
+    if max_cameras is not None:
+        _check_count("max_cameras", max_cameras)
+    _check_positive("tau_m", tau_m)
+    workspace = build_workspace(
+        table, reference_ring_radius, mesh_centre, object_radius_m, up, overflowing
+    )
+    return Requirements(
+        max_projectors=max_projectors,
+        max_cameras=max_cameras,
+        coverage=_share("coverage", coverage, shares.coverage),
+        dominant_coverage=_share(
+            "dominant_coverage", dominant_coverage, shares.dominant_coverage
+        ),
+        min_reachable=_share("min_reachable", min_reachable, shares.min_reachable),
+        target=target,
+        pattern=pattern,
+        projector=_projector_limits(table.limits),
+        camera=_camera_limits(table.limits),
+        triangulation=_triangulation_limits(table.limits, accuracy_mm),
+        check=_check_limits(table.check, tau_m),
+        workspace=workspace,
+    )
+
+
+def build_workspace(
+    table: RigTable,
+    reference_ring_radius: float,
+    mesh_centre: Sequence[float] | NDArray[np.float64],
+    object_radius_m: float,
+    up: str | None,
+    overflowing: Overflowing = (False, False),
+) -> Workspace:
+    """Return where devices may stand about an object.
+
+    The standoff s is counted to the surface, play p either way, so that with object
+    radius R both kinds of device keep::
+
+        s + R - p <= |Q - centre| <= s + R + p
+
+    Over an object that is wider than their field devices stand side by side, s from
+    the part of it that they look at, which may be as near to the centre as it likes::
+
+        s - p <= |Q - centre| <= s + R + p
+
+    Raises:
+        InputError: If an argument isn't usable.
+        InfeasibleLimitsError: If the floor lies above every admissible position, or the
+            box or every mounting plane lies outside the shell.
+    """
+    _check_positive("object_radius_m", object_radius_m)
+    placement, spec = table.placement, table.workspace
+    _check_choice("up", up or spec.up, tuple(UP_VECTORS))
+    up_vector = UP_VECTORS[up or spec.up]
+    axis = np.array(spec.axis or up_vector, dtype=np.float64)
+    axis /= np.linalg.norm(axis)
+    standoff = placement.standoff_mm * 1e-3
+    middle = standoff + float(object_radius_m)
+    play = placement.standoff_play_mm * 1e-3
+    projector, camera = (
+        (standoff - play if wide else middle - play, middle + play)
+        for wide in overflowing
+    )
+    workspace = Workspace(
+        centre=_three("mesh_centre", mesh_centre),
+        object_radius_m=float(object_radius_m),
+        up=up_vector,
+        axis=_three("axis", axis),
+        half_angle=math.radians(spec.half_angle_deg or 180.0),
+        projector_radius_m=projector,
+        camera_radius_m=camera,
+        floor_m=None if spec.floor_mm is None else spec.floor_mm * 1e-3,
+        n_reference_projectors=placement.n_reference_projectors,
+        n_reference_cameras=placement.n_reference_cameras,
+        reference_ring_radius=reference_ring_radius,
+        projector_standoff_m=standoff if overflowing[0] else None,
+        camera_standoff_m=standoff if overflowing[1] else None,
+        **build_zones(spec, up_vector),
+    )
+    _check_floor(workspace)
+    check_zones(workspace)
+    return workspace
+
+
+def _check_floor(workspace: Workspace) -> None:
+    """Refuse a floor above the highest position of shell and cone."""
+    if workspace.floor_m is None:
+        return
+    cosine = float(np.clip(np.dot(workspace.axis, workspace.up), -1.0, 1.0))
+    off_up = max(0.0, math.acos(cosine) - workspace.half_angle)
+    near, far = workspace.projector_radius_m
+    highest = math.cos(off_up) * (far if off_up < 0.5 * math.pi else near)
+    if not highest >= workspace.floor_m:
+        raise InfeasibleLimitsError(
+            f"workspace.floor_mm = {workspace.floor_m * 1e3:g} lies above the highest "
+            f"position that shell and cone allow, {highest * 1e3:.0f} mm over the "
+            f"object's centre; lower the floor or widen the cone"
+        )
+
+
+def _projector_limits(limits: LimitsTable) -> ProjectorLimits:
+    return ProjectorLimits(
+        max_incidence=math.radians(limits.projector_max_incidence_deg),
+        min_tangent_angle=math.radians(limits.min_tangent_angle_deg),
+    )
+
+
+def _camera_limits(limits: LimitsTable) -> CameraLimits:
+    return CameraLimits(
+        max_incidence=math.radians(limits.camera_max_incidence_deg),
+        max_sample_distance_m=_metres(limits.max_sample_distance_mm),
+    )
+
+
+def _triangulation_limits(
+    limits: LimitsTable, accuracy_mm: float | None
+) -> TriangulationLimits:
+    if accuracy_mm is not None:
+        _check_positive("accuracy_mm", accuracy_mm)
+    sigma_mm = limits.max_sigma_mm if accuracy_mm is None else accuracy_mm
+    return TriangulationLimits(
+        min_conditioning=limits.min_conditioning,
+        noise_px=limits.noise_px,
+        max_sigma_m=_metres(sigma_mm),
+        min_ring_pitch_px=limits.min_ring_pitch_px,
+        ring_sigma_m=_metres(limits.ring_sigma_mm),
+        min_angle=_radians(limits.min_angle_deg),
+        max_angle=_radians(limits.max_angle_deg),
+    )
+
+
+def _check_limits(check: CheckTable, tau_m: float) -> CheckLimits:
+    return CheckLimits(
+        max_rms_m=check.max_rms_mm * 1e-3,
+        max_p95_m=check.max_p95_mm * 1e-3,
+        max_bias_m=check.max_bias_mm * 1e-3,
+        tau_m=tau_m,
+        min_completeness=check.min_completeness,
+        max_predicted_missing=check.max_predicted_missing,
+    )
+
+
+def _three(
+    name: str, vector: Sequence[float] | NDArray[np.float64]
+) -> tuple[float, float, float]:
+    values = np.asarray(vector, dtype=np.float64)
+    if values.shape != (3,) or not np.all(np.isfinite(values)):
+        raise InputError(f"{name} must be three finite numbers, got {vector}")
+    return cast(tuple[float, float, float], tuple(values.tolist()))
+
+
+def _check_choice(name: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}")
+
+
+def _check_count(name: str, value: int) -> None:
+    if not value >= 1:
+        raise InputError(f"{name} = {value} must be 1 or more")
+
+
+def _check_positive(name: str, value: float) -> None:
+    if not 0.0 < value < math.inf:
+        raise InputError(f"{name} = {value} must be positive and finite")
+
+
+def _share(name: str, value: float | None, default: float) -> float:
+    share = default if value is None else float(value)
+    if not 0.0 < share <= 1.0:
+        raise InputError(f"{name} = {share} must be a share, over 0 and at most 1")
+    return share
+
+
+def _metres(millimetres: float | None) -> float | None:
+    return None if millimetres is None else millimetres * 1e-3
+
+
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else math.radians(degrees)

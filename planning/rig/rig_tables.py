@@ -1,0 +1,273 @@
+"""The schema of rig files: TOML tables in millimetres and degrees, checked by pydantic.
+
+Unknown keys, numbers out of range, text for numbers and NaN are refused. The tables
+say what was written; `planning.rig.rig` turns them into devices and requirements.
+"""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from planning.model.bodies import BodyTable
+from planning.model.table_types import (
+    Acute,
+    Limit,
+    Name,
+    Pair,
+    Positive,
+    PositivePair,
+    Share,
+    Table,
+)
+
+from .existing_tables import ExistingTable
+from .workspace_tables import WorkspaceTable
+
+# Far beyond any device, and any table of poses and samples that memory holds.
+MOST_PIXELS, MOST_POSES = 100_000, 100_000
+Resolution = Annotated[
+    list[Annotated[int, Field(ge=2, le=MOST_PIXELS)]],
+    Field(min_length=2, max_length=2),
+]
+Five = Annotated[list[float], Field(min_length=5, max_length=5)]
+
+
+class FocusTable(Table):
+    """A lens set to one distance, `[projector.focus]` or `[camera.focus]`.
+
+    Attributes:
+        distance_mm: Plane in focus, from the optical centre.
+        f_number: Focal length over aperture.
+        blur_px: Largest blur circle that counts as sharp.
+    """
+
+    distance_mm: Positive
+    f_number: Positive
+    blur_px: Positive
+
+
+class SourcedTable(Table):
+    """A device whose figures name their sources, with a body if one is given."""
+
+    name: Name
+    body: BodyTable | None = None
+    sources: dict[str, Name] = Field(default={})
+
+    def figures(self) -> tuple[str, ...]:
+        """Return the dotted names of the figures that were written."""
+        names: list[str] = []
+        for key in sorted(self.model_fields_set - {"name", "sources"}):
+            value = getattr(self, key)
+            if isinstance(value, Table):
+                names += [f"{key}.{inner}" for inner in sorted(value.model_fields_set)]
+            else:
+                names.append(key)
+        return tuple(names)
+
+    @model_validator(mode="after")
+    def _check_sources(self) -> Self:
+        for key in self.sources:
+            if key not in self.figures():
+                raise ValueError(
+                    f"`sources` names `{key}`, which the table doesn't give; "
+                    f"remove that source or write the figure"
+                )
+        return self
+
+
+class PinholeTable(SourcedTable):
+    """A camera or a diverging projector, `[camera]` or `[projector]`.
+
+    The focal length comes in exactly one of three ways; `docs/rig-files.md` defines
+    each key.
+    """
+
+    resolution_px: Resolution
+    focal_px: PositivePair | None = None
+    focal_mm: Positive | None = None
+    throw_ratio: Positive | None = None
+    principal_point_px: Pair | None = None
+    vertical_offset_percent: float | None = None
+    distortion: Five = Field(default=[0.0, 0.0, 0.0, 0.0, 0.0])
+    pixel_um: Positive | None = None
+    range_mm: PositivePair | None = None
+    focus: FocusTable | None = None
+
+    @model_validator(mode="after")
+    def _check_focal(self) -> Self:
+        ways = ("focal_px", "focal_mm", "throw_ratio")
+        given = [name for name in ways if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"needs exactly one of focal_px, focal_mm and throw_ratio, "
+                f"has {' and '.join(given) or 'none'}"
+            )
+        if self.pixel_um is None and (self.focal_mm is not None or self.focus):
+            raise ValueError("needs pixel_um beside focal_mm or [focus]; write it")
+        return self
+
+    @model_validator(mode="after")
+    def _check_principal_point(self) -> Self:
+        if (
+            self.principal_point_px is not None
+            and self.vertical_offset_percent is not None
+        ):
+            raise ValueError(
+                "has principal_point_px and vertical_offset_percent, which say the "
+                "same; keep one"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_range(self) -> Self:
+        if self.range_mm is None and self.focus is None:
+            raise ValueError("needs range_mm or [focus], the distances that are sharp")
+        _check_rising(self.range_mm)
+        return self
+
+
+class ParallelTable(SourcedTable):
+    """A projector of parallel light, `[parallel_projector]`.
+
+    Attributes:
+        resolution_px: Width and height of the panel.
+        pixel_pitch_mm: Side of a pixel, on the panel and on the object.
+        range_mm: Depths from the panel's plane that are sharp.
+        beam_radius_mm: Radius of the beam about the panel's centre.
+    """
+
+    resolution_px: Resolution
+    pixel_pitch_mm: Positive
+    range_mm: PositivePair
+    beam_radius_mm: Positive | None = None
+
+    @model_validator(mode="after")
+    def _check_range(self) -> Self:
+        _check_rising(self.range_mm)
+        return self
+
+
+def _check_rising(bounds: list[float] | None) -> None:
+    if bounds is not None and not bounds[0] < bounds[1]:
+        raise ValueError(
+            f"range_mm = {bounds} must rise: nearest distance first, farthest second"
+        )
+
+
+class PlacementTable(Table):
+    """Where devices may stand and how many poses are tried, `[placement]`."""
+
+    standoff_mm: Positive = 1000.0
+    standoff_play_mm: Annotated[float, Field(ge=0.0)] = 50.0
+    n_candidate_projectors: Annotated[int, Field(ge=1, le=MOST_POSES)] = 640
+    n_candidate_cameras: Annotated[int, Field(ge=1, le=MOST_POSES)] = 480
+    n_reference_projectors: Annotated[int, Field(ge=600, le=MOST_POSES)] = 640
+    n_reference_cameras: Annotated[int, Field(ge=400, le=MOST_POSES)] = 480
+
+    @model_validator(mode="after")
+    def _check_play(self) -> Self:
+        if not self.standoff_play_mm < self.standoff_mm:
+            raise ValueError(
+                f"standoff_play_mm = {self.standoff_play_mm} must be less than "
+                f"standoff_mm = {self.standoff_mm}"
+            )
+        return self
+
+
+class RingsTable(Table):
+    """The ring pattern, `[rings]`.
+
+    Attributes:
+        tilt_deg: Turn of the ring axis against the device's axis; in parallel light
+            the axis is shifted by standoff x tan(tilt) instead.
+        gap_mm: Distance of neighbouring rings on a plane at the standoff; absent: the
+            planner chooses.
+        spacing: `uniform`, or `curvature`: finer where the surface bends.
+    """
+
+    tilt_deg: Annotated[float, Field(ge=0.0, lt=45.0)] = 8.0
+    gap_mm: Annotated[float, Field(ge=0.01)] | None = None
+    spacing: Literal["uniform", "curvature"] = "curvature"
+
+
+class LimitsTable(Table):
+    """When a point counts as lit, seen and measurable, `[limits]`."""
+
+    projector_max_incidence_deg: Acute = 60.0
+    min_tangent_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 40.0
+    camera_max_incidence_deg: Acute = 70.0
+    max_sample_distance_mm: Limit = None
+    min_conditioning: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
+    noise_px: Positive = 0.1
+    min_ring_pitch_px: Limit = 6.0
+    max_sigma_mm: Limit = 0.3
+    ring_sigma_mm: Limit = None
+    min_angle_deg: Annotated[float, Field(ge=0.0, lt=180.0)] | None = None
+    max_angle_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = None
+
+    @model_validator(mode="after")
+    def _check_tangent(self) -> Self:
+        """The tangent limit must bind, formulation section 2."""
+        rest = 90.0 - self.projector_max_incidence_deg
+        if "min_tangent_angle_deg" in self.model_fields_set:
+            if 0.0 < self.min_tangent_angle_deg <= rest:
+                raise ValueError(
+                    f"min_tangent_angle_deg = {self.min_tangent_angle_deg:g} never "
+                    f"binds: the angle between light and tangent is always at least "
+                    f"90 - projector_max_incidence_deg = {rest:g}; raise it above "
+                    f"{rest:g}, or remove it"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _check_angles(self) -> Self:
+        low, high = self.min_angle_deg, self.max_angle_deg
+        if low is not None and high is not None and not low < high:
+            raise ValueError(
+                f"min_angle_deg = {low:g} must be less than max_angle_deg = {high:g}"
+            )
+        return self
+
+
+class RequirementsTable(Table):
+    """What share of the target a plan must reach, `[requirements]`."""
+
+    coverage: Share = 0.95
+    dominant_coverage: Share = 0.90
+    min_reachable: Share = 0.90
+
+
+class CheckTable(Table):
+    """What the reconstruction from pixels must reach, `[check]`."""
+
+    max_rms_mm: Positive = 0.1
+    max_p95_mm: Positive = 0.3
+    max_bias_mm: Positive = 0.03
+    min_completeness: Share = 0.90
+    max_predicted_missing: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.01
+
+
+class RigTable(Table):
+    """A whole rig file."""
+
+    name: Name
+    description: str = ""
+    light: Literal["diverging", "parallel"] = "diverging"
+    camera: PinholeTable
+    projector: PinholeTable | None = None
+    parallel_projector: ParallelTable | None = None
+    placement: PlacementTable = PlacementTable()
+    rings: RingsTable = RingsTable()
+    workspace: WorkspaceTable = WorkspaceTable()
+    limits: LimitsTable = LimitsTable()
+    requirements: RequirementsTable = RequirementsTable()
+    check: CheckTable = CheckTable()
+    existing: list[ExistingTable] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _check_existing(self) -> Self:
+        names = [device.name for device in self.existing]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"existing names {name!r} twice; name them apart")
+        return self

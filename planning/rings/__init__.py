@@ -1,0 +1,1 @@
+"""Section IV of the paper: ring axes and radii."""

@@ -1,0 +1,273 @@
+"""Move the ring axes, tilt and azimuth, to where the cameras measure most exactly.
+
+`solvers.poses.axis_program` proposes from where `ring_axes` turned them; the exact predicate
+decides, on the cover's rows and on samples that neither has seen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.poses import inverse, transform
+from planning.cameras.camera_cover import LitSamples, lit_samples
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import TriangulationLimits
+from planning.scene import measurability
+from planning.scene.lighting import ring_coordinate
+from planning.scene.measurability import PairQuality, View
+from planning.scene.scene import Scene
+from planning.scene.sights import view_of
+from solvers.poses.axis_program import PITCH_POWER, AxisProgram, best_start, solve_axis
+
+from .ring_radii import ring_axis, ring_frame, ring_frame_of_axis
+
+_SWEEPS = 2
+_STEPS = (1.0, 0.5, 0.25)
+# Samples that a program sees; the decision sees all.
+_ROWS = 250
+_FRESH = 4000
+_STREAM = 250
+# Fresh samples reach a little farther than those that the program holds.
+_RING_SHARE = 0.99
+# Errors that shrink by less aren't worth another axis.
+_GAIN = 1e-3
+# Where no limit is set the smooth count still needs one.
+_LEAST_CONDITIONING = 0.02
+
+
+def move_ring_axes(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+) -> tuple[PlannedProjector, ...]:
+    """Return the projectors with the ring axes under which errors are smallest.
+
+    Each projector in turn solves the axis program over samples that it lights; the
+    whole way is tried, then a half and a quarter. A move counts only if no fewer
+    samples are measured, neither of the rows nor of fresh ones, all that is lit of the
+    surface stays inside the largest ring, and more are measured or the rms of s_N of
+    each sample's best pair falls.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with even rings.
+        cameras: As planned.
+        rows: Lit samples that the cameras were chosen on.
+    """
+    fresh = lit_samples(scene, projectors, scene.target_samples(_FRESH, _STREAM))
+    judges = tuple(AxisJudge(scene, projectors, cameras, r) for r in (rows, fresh))
+    around = lit_samples(scene, projectors, scene.surface_samples(_FRESH, _STREAM + 1))
+    points = around.target.samples.points
+    held = [points[around.lit[:, p]] for p in range(len(projectors))]
+    moved = list(projectors)
+    for _ in range(_SWEEPS):
+        if not any([_move(judges, moved, p, held[p]) for p in range(len(moved))]):
+            break
+    return tuple(moved)
+
+
+class AxisJudge:
+    """Samples, how the cameras see them, and the best s_N by each projector."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        projectors: Sequence[PlannedProjector],
+        cameras: Sequence[PlannedCamera],
+        rows: LitSamples,
+    ) -> None:
+        self.scene, self.rows = scene, rows
+        self.views = tuple(view_of(scene, c, rows.target) for c in cameras)
+        self.sigma = np.stack(
+            [self.sigma_with(projector, p) for p, projector in enumerate(projectors)]
+        )
+
+    def sigma_with(self, projector: PlannedProjector, p: int) -> NDArray[np.float64]:
+        """Least s_N of projector p over the cameras in [m]; inf if not measured."""
+        limits = self.scene.requirements.triangulation
+        samples = self.rows.target.samples
+        rings = measurability.rings_at(projector, samples.points)
+        least = np.full(len(self.rows.target), np.inf)
+        for seen in self.views:
+            pairs = np.flatnonzero(
+                (seen.stage == measurability.SEEN) & self.rows.lit[:, p]
+            )
+            quality = measurability.pair_quality(
+                samples.normals[pairs],
+                self.rows.lights[p].take(pairs),
+                rings.take(pairs),
+                seen.take(pairs),
+                limits,
+            )
+            stage = measurability.first_pair_failure(quality, limits)
+            good = stage == measurability.MEASURED
+            least[pairs[good]] = np.minimum(least[pairs[good]], quality.sigma[good])
+        return least
+
+    def with_axis(self, projector: PlannedProjector, p: int) -> NDArray[np.float64]:
+        """Return `sigma` with another axis of projector p, shape (projectors, n)."""
+        trial = self.sigma.copy()
+        trial[p] = self.sigma_with(projector, p)
+        return trial
+
+    def holds(self, projector: PlannedProjector, p: int) -> bool:
+        """Whether what a projector lights is inside its largest ring."""
+        return inside(projector, self.rows.target.samples.points[self.rows.lit[:, p]])
+
+
+def inside(projector: PlannedProjector, points: NDArray[np.float64]) -> bool:
+    """Return whether all points are inside the largest ring."""
+    return bool(np.all(ring_coordinate(projector, points) <= projector.ring_radii[-1]))
+
+
+def _move(
+    judges: tuple[AxisJudge, ...],
+    moved: list[PlannedProjector],
+    p: int,
+    held: NDArray[np.float64],
+) -> bool:
+    """Move one axis if that is better; the judges keep what it then measures."""
+    scene, projector = judges[0].scene, moved[p]
+    scene.pulse()
+    for axis in proposals(
+        axis_program(scene, moved, p, judges[0].rows, judges[0].views)
+    ):
+        frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
+        offered = replace(projector, world_from_ring=frame)
+        lit = all(judge.holds(offered, p) for judge in judges)
+        if not (lit and inside(offered, held)):
+            continue
+        trials = [judge.with_axis(offered, p) for judge in judges]
+        if better(trials, [judge.sigma for judge in judges]):
+            moved[p] = offered
+            for judge, trial in zip(judges, trials, strict=True):
+                judge.sigma = trial
+            return True
+    return False
+
+
+def proposals(program: AxisProgram) -> list[NDArray[np.float64]]:
+    """Axes to try, the one of largest value first: near, partly there, and far."""
+    here, elsewhere = program.start, best_start(program)
+    near = solve_axis(program)
+    offers = [here + step * (near.axis - here) for step in _STEPS] if near.moved else []
+    if not np.array_equal(here, elsewhere):
+        far = solve_axis(replace(program, start=elsewhere))
+        offers.insert(0 if far.value > near.value else len(offers), far.axis)
+    return offers
+
+
+def better(
+    trials: Sequence[NDArray[np.float64]], kept: Sequence[NDArray[np.float64]]
+) -> bool:
+    """Whether no set has fewer measured, and more are or errors fall, over all sets."""
+    after, before = ([np.min(s, axis=0) for s in sets] for sets in (trials, kept))
+    now, then = (
+        np.array([np.count_nonzero(np.isfinite(least)) for least in sets])
+        for sets in (after, before)
+    )
+    gains = now - then
+    if np.any(gains < 0):
+        return False
+    return bool(np.any(gains > 0)) or _rms(after) < (1.0 - _GAIN) * _rms(before)
+
+
+def _rms(sigma: Sequence[NDArray[np.float64]]) -> float:
+    """Of what is measured, in [m]."""
+    every = np.concatenate(sigma)
+    measured = every[np.isfinite(every)]
+    return float(np.sqrt(np.mean(measured**2))) if len(measured) else 0.0
+
+
+def axis_program(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    p: int,
+    rows: LitSamples,
+    views: Sequence[View],
+) -> AxisProgram:
+    """State the axis program of projector p.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As they stand, with even rings.
+        p: Whose axis moves.
+        rows: Lit samples.
+        views: How each camera sees them.
+    """
+    limits, projector = scene.requirements.triangulation, projectors[p]
+    pose, device = projector.world_from_device, projector.device
+    middle = ring_frame(pose, device, 0.0, 0.0)
+    turn, into = middle[:3, :3], inverse(middle)
+    lit = np.flatnonzero(rows.lit[:, p])
+    chosen = lit[:: max(1, -(-len(lit) // _ROWS))]
+    points = rows.target.samples.points
+    normals = rows.target.samples.normals[chosen]
+    seen = [view.take(chosen) for view in views]
+    rays = np.stack([view.rays for view in seen], axis=1)
+    facing = np.stack([view.facing for view in seen], axis=1)
+    distances = np.stack([view.distances for view in seen], axis=1)
+    # g = J_r^T (N r^T + facing I) m, as in `measurability.pair_quality`.
+    spread = np.einsum("ij,ikl->ikjl", normals, rays)
+    spread += facing[:, :, None, None] * np.eye(3)
+    jacobians = np.stack([view.jacobian for view in seen], axis=1)
+    slopes = np.einsum("ikja,ikjl->ikal", jacobians, spread)
+    noise = limits.noise_px / np.maximum(rows.lights[p].incidence_cos[chosen], 1e-9)
+    rest = [q for q in range(len(projectors)) if q != p]
+    return AxisProgram(
+        light=projector.light,
+        points=transform(into, points[chosen]),
+        rays=rays @ turn,
+        slopes=slopes @ turn,
+        seen=np.stack([view.stage == measurability.SEEN for view in seen], axis=1),
+        noise=noise[:, None] * distances,
+        placement_m=(limits.ring_sigma_m or 0.0) * np.abs(facing),
+        facing=np.abs(facing) / distances,
+        others=_scores_of(scene, projectors, rest, rows, chosen, seen),
+        held=transform(into, points[lit]),
+        start=ring_axis(pose, device, projector.world_from_ring),
+        ring_radius=_RING_SHARE * float(projector.ring_radii[-1]),
+        gap=float(projector.ring_radii[1] - projector.ring_radii[0]),
+        min_conditioning=max(limits.min_conditioning, _LEAST_CONDITIONING),
+        max_sigma_m=limits.max_sigma_m or np.inf,
+        min_pitch_px=limits.min_ring_pitch_px or 0.0,
+    )
+
+
+def _scores_of(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    which: Sequence[int],
+    rows: LitSamples,
+    chosen: NDArray[np.int64],
+    seen: Sequence[View],
+) -> NDArray[np.float64]:
+    """Largest 1/(1 + e) of chosen samples by some projectors and every camera."""
+    limits = scene.requirements.triangulation
+    samples = rows.target.samples.take(chosen)
+    score = np.zeros(len(chosen))
+    for p in which:
+        rings = measurability.rings_at(projectors[p], samples.points)
+        light = rows.lights[p].take(chosen)
+        for view in seen:
+            quality = measurability.pair_quality(
+                samples.normals, light, rings, view, limits
+            )
+            own = smooth_count(quality, limits)
+            pair = rows.lit[chosen, p] & (view.stage == measurability.SEEN)
+            score = np.maximum(score, np.where(pair, own, 0.0))
+    return score
+
+
+def smooth_count(
+    quality: PairQuality, limits: TriangulationLimits
+) -> NDArray[np.float64]:
+    """Return 1/(1 + e) of a pair at samples, as `solvers.poses.axis_program` has it, (n,)."""
+    least = max(limits.min_conditioning, _LEAST_CONDITIONING)
+    excess = (least / np.maximum(quality.conditioning, 1e-12)) ** 2
+    excess += (quality.sigma / (limits.max_sigma_m or np.inf)) ** 2
+    pitch = (limits.min_ring_pitch_px or 0.0) / np.maximum(quality.pitch, 1e-12)
+    return 1.0 / (1.0 + excess + pitch ** (2 * PITCH_POWER))

@@ -1,0 +1,125 @@
+"""Turn the ring axes so that no blind curve (r.m = 0) crosses the target."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.cameras.camera_cover import LitSamples, lit_samples, rings_of
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.scene import measurability
+from planning.scene.lighting import Target, ring_coordinate
+from planning.scene.measurability import Rings, View
+from planning.scene.scene import Scene
+from planning.scene.sights import view_of
+
+from .ring_radii import ring_frame
+
+_AZIMUTHS = 16
+_SWEEPS = 2
+
+
+def turn_ring_axes(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    rows: LitSamples,
+    tilt: float,
+) -> tuple[PlannedProjector, ...]:
+    """Return the projectors with the ring axes under which the cameras measure most.
+
+    Each projector in turn tries a number of azimuths of its tilted (or shifted) axis;
+    among equals the one with the largest mean |r.m| of each sample's best pair wins.
+    An axis that leaves a lit sample outside the last ring isn't offered, so what is
+    lit stays lit.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned.
+        cameras: As planned.
+        rows: Lit samples.
+        tilt: Tilt of the axes, or their shift, as `ring_frame` takes it.
+    """
+    views = [view_of(scene, c, rows.target) for c in cameras]
+    turned = list(projectors)
+    scores = np.stack(
+        [_scores(scene, rows, p, views, rings) for p, rings in enumerate(rows.rings)]
+    )
+    points = rows.target.samples.points
+    for _ in range(_SWEEPS):
+        before = list(turned)
+        for p in range(len(turned)):
+            best = _value(scores)
+            for azimuth in np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS):
+                offered = _with_axis(turned[p], tilt, float(azimuth))
+                if not _inside_rings(offered, points[rows.lit[:, p]]):
+                    continue
+                trial = scores.copy()
+                rings = measurability.rings_at(offered, points)
+                trial[p] = _scores(scene, rows, p, views, rings)
+                value = _value(trial)
+                if value > best:
+                    best, scores, turned[p] = value, trial, offered
+        if all(a is b for a, b in zip(before, turned, strict=True)):
+            break
+    return tuple(turned)
+
+
+def widest_gap(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> float:
+    """Return the largest ring spacing h on samples that are lit, in [m].
+
+    It is the distance tau within which a check must find a point. Where nothing is
+    lit, the spacing over all samples stands in.
+    """
+    rows = lit_samples(scene, projectors, target)
+    if not len(rows.target):
+        rings = rings_of(projectors, target)
+        return float(max(ring.spacing.max() for ring in rings))
+    return float(
+        max(
+            ring.spacing[rows.lit[:, p]].max(initial=0.0)
+            for p, ring in enumerate(rows.rings)
+        )
+    )
+
+
+def _with_axis(
+    projector: PlannedProjector, tilt: float, azimuth: float
+) -> PlannedProjector:
+    frame = ring_frame(projector.world_from_device, projector.device, tilt, azimuth)
+    return replace(projector, world_from_ring=frame)
+
+
+def _inside_rings(projector: PlannedProjector, points: NDArray[np.float64]) -> bool:
+    coordinate = ring_coordinate(projector, points)
+    return bool(np.all(coordinate <= projector.ring_radii[-1]))
+
+
+def _scores(
+    scene: Scene, rows: LitSamples, p: int, views: Sequence[View], rings: Rings
+) -> NDArray[np.float64]:
+    """Best |r.m| of projector p at each sample over the cameras; 0 if not measured."""
+    limits = scene.requirements.triangulation
+    score = np.zeros(len(rows.target))
+    for seen in views:
+        pairs = np.flatnonzero((seen.stage == measurability.SEEN) & rows.lit[:, p])
+        quality = measurability.pair_quality(
+            rows.target.samples.normals[pairs],
+            rows.lights[p].take(pairs),
+            rings.take(pairs),
+            seen.take(pairs),
+            limits,
+        )
+        stage = measurability.first_pair_failure(quality, limits)
+        good = stage == measurability.MEASURED
+        kept = pairs[good]
+        score[kept] = np.maximum(score[kept], quality.conditioning[good])
+    return score
+
+
+def _value(scores: NDArray[np.float64]) -> tuple[int, float]:
+    best = scores.max(axis=0)
+    return int(np.count_nonzero(best)), round(float(best.mean()), 9)

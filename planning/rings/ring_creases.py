@@ -1,0 +1,97 @@
+"""Creases of the surface in a projector's light: a slope jump has no kappa."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
+from geometry.mesh.topology import face_pairs
+from planning.model.plan import PlannedProjector
+from planning.scene import measurability
+from planning.scene.lighting import LIT, Target, first_failure, light_on
+from planning.scene.scene import Scene
+
+# As in geometry.curvature: sharper turns are creases of the object, not facets.
+_SHARPEST_FACET = np.deg2rad(40.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Creases:
+    """Points spread along the creases of a mesh, each for a piece of equal length.
+
+    Attributes:
+        points: In the world in [m], shape (n, 3).
+        faces: The two faces that meet there, shape (n, 2).
+        length: Of each piece in [m], shape (n,).
+    """
+
+    points: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    length: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def find_creases(mesh: TriangleMesh, step: float) -> Creases:
+    """Return points at most `step` [m] apart along all edges that turn by over 40 deg.
+
+    Args:
+        mesh: The surface.
+        step: Longest piece [m].
+    """
+    pairs, edge = face_pairs(mesh.edges)
+    one, other = mesh.face_normals[pairs[:, 0]], mesh.face_normals[pairs[:, 1]]
+    sharp = np.einsum("ij,ij->i", one, other) < np.cos(_SHARPEST_FACET)
+    ends = mesh.vertices[mesh.edges.ends[edge[sharp]]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    n = np.maximum(1, np.ceil(length / step).astype(np.int64))
+    which = np.repeat(np.arange(len(n)), n)
+    place = np.arange(len(which)) - np.repeat(np.cumsum(n) - n, n)
+    share = ((place + 0.5) / n[which])[:, None]
+    points = (1.0 - share) * ends[which, 0] + share * ends[which, 1]
+    return Creases(points, pairs[sharp][which], (length / n)[which])
+
+
+def crease_errors(
+    scene: Scene, projector: PlannedProjector, creases: Creases
+) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+    """Return which points a projector lights, their slope jump J and error J h / 4.
+
+    Along the beam, radially: a face of normal n rises by -(n.m)/(n.L) a metre across
+    the rings; J is the difference of both faces', h the gap of the rings there.
+
+    Args:
+        scene: Surface and limits.
+        projector: With its rings.
+        creases: Of the surface.
+
+    Returns:
+        Lit on both sides; J; J h / 4 in [m], (n,) each.
+    """
+    mesh = scene.mesh
+    rings = measurability.rings_at(projector, creases.points)
+    lit = np.ones(len(creases), dtype=bool)
+    slopes: list[NDArray[np.float64]] = []
+    for side in (0, 1):
+        faces = creases.faces[:, side]
+        # Moved aside a little, a point lies on its own face and not on the edge.
+        centroids = mesh.face_centroids[faces]
+        points = creases.points + 0.02 * (centroids - creases.points)
+        samples = SurfaceSamples(points, mesh.face_normals[faces], faces, 0.0)
+        target = Target(samples, scene.steep[faces])
+        stage = first_failure(
+            projector,
+            target,
+            scene.requirements.projector,
+            scene.visibility,
+            bodies=scene.standing,
+        )
+        lit &= stage == LIT
+        light = light_on(projector, target)
+        across = np.einsum("ij,ij->i", samples.normals, rings.normals)
+        slopes.append(across / np.maximum(light.incidence_cos, 1e-9))
+    jump = np.abs(slopes[0] - slopes[1])
+    return lit, jump, 0.25 * jump * rings.spacing

@@ -1,0 +1,131 @@
+"""How fine rings may be before a camera can't separate them where it measures."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
+from geometry.poses import inverse
+from planning.cameras.camera_cover import LitSamples
+from planning.model.plan import PlannedProjector
+from planning.scene import measurability
+from planning.scene.lighting import served_by
+from planning.scene.lit import margins_of
+from planning.scene.measurability import View
+from planning.scene.scene import Scene
+
+MIN_PROJECTOR_PX = 3.0
+_AZIMUTHS = 72
+# Rings are planned this much wider than they must be: samples are but samples.
+_ROOM = 1.08
+
+
+def best_pitch(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    views: Sequence[View],
+    rows: LitSamples,
+) -> NDArray[np.float64]:
+    """Return each projector's largest pitch among the cameras that measure a sample.
+
+    Args:
+        scene: Surface and limits.
+        projectors: With their rings.
+        views: What each camera sees of the samples.
+        rows: Lit samples; their light is used, their rings are computed anew.
+
+    Returns:
+        In [px], 0 where no pair of this projector measures, shape (n, n_projectors).
+    """
+    required, samples = scene.requirements, rows.target.samples
+    rings = [measurability.rings_at(p, samples.points) for p in projectors]
+    best = np.zeros((len(rows.target), len(projectors)))
+    for seen in views:
+        for p, light in enumerate(rows.lights):
+            pairs = np.flatnonzero((seen.stage == measurability.SEEN) & rows.lit[:, p])
+            quality = measurability.pair_quality(
+                samples.normals[pairs],
+                light.take(pairs),
+                rings[p].take(pairs),
+                seen.take(pairs),
+                required.triangulation,
+            )
+            stage = measurability.first_pair_failure(quality, required.triangulation)
+            pitch = np.where(stage == measurability.MEASURED, quality.pitch, 0.0)
+            best[pairs, p] = np.maximum(best[pairs, p], pitch)
+    return best
+
+
+def users(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    rows: LitSamples,
+    pitch: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """Return the projector that each sample is measured by, -1 for none, shape (n,).
+
+    The one that serves it, if a camera measures the sample with it, else the one whose
+    rings lie widest in some camera's image.
+    """
+    served = served_by(rows.lit, margins_of(scene, projectors, rows.target))
+    own = pitch[np.arange(len(served)), served] > 0
+    best = np.where(own, served, np.argmax(pitch, axis=1))
+    return np.where(pitch.max(axis=1) > 0, best, -1)
+
+
+def least_gaps(
+    coordinates: NDArray[np.float64],
+    gaps: NDArray[np.float64],
+    pitch: NDArray[np.float64],
+    min_pitch: float,
+    edges: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the least gap of rings in each cell that leaves every sample its pitch.
+
+    The pitch is proportional to the gap: h_min = h min_pitch / pitch.
+
+    Args:
+        coordinates: Ring coordinates of samples, shape (n,).
+        gaps: Gap at each of them, shape (n,).
+        pitch: Pitch of each at that gap in [px], shape (n,).
+        min_pitch: Least pitch [px].
+        edges: Borders of equal cells of the ring coordinate, shape (n_cells + 1,).
+
+    Returns:
+        0 where a cell holds no sample, shape (n_cells,).
+    """
+    least = np.zeros(len(edges) - 1)
+    cell = np.searchsorted(edges, coordinates) - 1
+    cell = np.clip(cell, 0, len(least) - 1)
+    np.maximum.at(least, cell, _ROOM * gaps * min_pitch / pitch)
+    return least
+
+
+def projector_gaps(
+    projector: PlannedProjector, coordinates: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the gap of rings that is 3 projector pixels wide or more all round, (n,).
+
+    Args:
+        projector: Optics and ring frame.
+        coordinates: Ring coordinates, shape (n,).
+    """
+    device = projector.device
+    if not isinstance(device, PinholeModel):
+        return np.full(
+            len(coordinates), _ROOM * MIN_PROJECTOR_PX * device.pixel_pitch_m
+        )
+    turn = inverse(projector.world_from_device) @ projector.world_from_ring
+    angle = np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS)
+    spoke = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_AZIMUTHS)])
+    rays = coordinates[:, None, None] * spoke + np.array([0.0, 0.0, 1.0])
+    step = 1e-6
+    pixels, beyond = (
+        device.project(ray @ turn[:3, :3].T) for ray in (rays, rays + step * spoke)
+    )
+    rate = np.linalg.norm(beyond - pixels, axis=2) / step
+    rate = np.where(device.contains(pixels), rate, np.inf)
+    least = rate.min(axis=1)
+    # A ring that misses the panel altogether isn't drawn.
+    return np.where(np.isfinite(least), _ROOM * MIN_PROJECTOR_PX / least, 0.0)

@@ -1,0 +1,176 @@
+"""The rings of a projector: their frame, their radii, and the gap between them.
+
+The ring axis need not be the device's axis. Turned aside (parallel light: shifted), it
+moves the curves on which a camera is blind (|r.m| = 0) off the object.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import ParallelModel, PinholeModel
+from geometry.poses import inverse
+from planning.model.plan import PlannedProjector
+from planning.model.requirements import TriangulationLimits
+from solvers.poses.axis_program import axis_direction
+
+_MIN_GAP_PROJECTOR_PX = 3.0
+# The gap is chosen for a camera that meets the surface at 60 degrees.
+_GAP_FACING = 0.5
+
+
+def ring_frame(
+    world_from_device: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    tilt: float,
+    azimuth: float,
+) -> NDArray[np.float64]:
+    """Return ``world_from_ring``.
+
+    Args:
+        world_from_device: Pose of the projector, shape (4, 4).
+        device: Its optics; a pinhole's rings are turned against the ray of its image
+            centre, so that lens shift doesn't move them off the object.
+        tilt: Angle of the ring axis against that ray in [rad] (diverging), or shift of
+            the axis in the device plane in [m] (parallel).
+        azimuth: Direction of the tilt, from the device's +x towards +y in [rad].
+    """
+    c, s = np.cos(azimuth), np.sin(azimuth)
+    if isinstance(device, ParallelModel):
+        return world_from_device @ _shifted(np.array([tilt * c, tilt * s]))
+    width, height = device.resolution
+    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
+    aside = np.array([c, s, 0.0])
+    aside -= middle * (aside @ middle)
+    aside /= np.linalg.norm(aside)
+    return world_from_device @ _along(np.cos(tilt) * middle + np.sin(tilt) * aside)
+
+
+def ring_frame_of_axis(
+    world_from_device: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    axis: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return ``world_from_ring`` of an axis in the coordinates of `ring_axis`.
+
+    Args:
+        world_from_device: Pose of the projector, shape (4, 4).
+        device: Its optics.
+        axis: a, shape (2,).
+    """
+    if isinstance(device, ParallelModel):
+        return world_from_device @ _shifted(axis)
+    middle = ring_frame(np.eye(4), device, 0.0, 0.0)[:3, :3]
+    return world_from_device @ _along(middle @ axis_direction(axis))
+
+
+def ring_axis(
+    world_from_device: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    world_from_ring: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the ring axis as two numbers a, (0, 0) in the middle of the beam.
+
+    Parallel: where it meets the device plane, in [m]. Diverging: tan(tilt/2) times the
+    unit vector towards which it is turned against the ray of the image centre, so that
+    `solvers.poses.axis_program.axis_direction` is its inverse.
+    """
+    middle = ring_frame(world_from_device, device, 0.0, 0.0)
+    frame = inverse(middle) @ world_from_ring
+    if isinstance(device, ParallelModel):
+        return frame[:2, 3]
+    return frame[:2, 2] / (1.0 + frame[2, 2])
+
+
+def _shifted(shift: NDArray[np.float64]) -> NDArray[np.float64]:
+    frame = np.eye(4)
+    frame[:2, 3] = shift
+    return frame
+
+
+def _along(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    x = np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    frame = np.eye(4)
+    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    return frame
+
+
+def outer_radius(
+    device: PinholeModel | ParallelModel,
+    tilt: float,
+    object_radius: float,
+    least_distance: float,
+    corner_radius: float,
+) -> float:
+    """Return the outermost ring: it holds the whole object, or the whole image.
+
+    Args:
+        device: Optics.
+        tilt: As in `ring_frame`.
+        object_radius: Radius of the sphere that holds the object [m].
+        least_distance: From the projector to the sphere's centre, at least [m].
+        corner_radius: The ring that reaches the farthest corner of the image.
+
+    Returns:
+        Tangent R (diverging), or radius in [m] (parallel).
+    """
+    if isinstance(device, ParallelModel):
+        return min(corner_radius, tilt + object_radius)
+    if object_radius >= least_distance:
+        return corner_radius
+    reach = tilt + np.arcsin(object_radius / least_distance)
+    return corner_radius if reach >= np.pi / 2 else min(corner_radius, np.tan(reach))
+
+
+def ring_gap(
+    projector: PinholeModel | ParallelModel,
+    camera: PinholeModel,
+    limits: TriangulationLimits,
+    distance: float,
+) -> float:
+    """Return the spacing of rings along m in [m] at a distance from the devices.
+
+    The finest that a camera at 60 degrees of incidence still separates and that the
+    projector draws with three pixels or more::
+
+        h = max(pitch t / (f cos 60), 3 z / f_projector)
+
+    Args:
+        projector: Optics of the projector.
+        camera: Optics of the cameras.
+        limits: Its `min_ring_pitch_px`; 6 px where it doesn't bind.
+        distance: From the devices to the surface [m].
+    """
+    pitch = limits.min_ring_pitch_px or 6.0
+    for_camera = pitch * distance / (camera.focal_px * _GAP_FACING)
+    pixel = (
+        projector.pixel_pitch_m
+        if isinstance(projector, ParallelModel)
+        else distance / projector.focal_px
+    )
+    return max(for_camera, _MIN_GAP_PROJECTOR_PX * pixel)
+
+
+def uniform_radii(outer: float, gap: float) -> NDArray[np.float64]:
+    """Return equally spaced radii up to the outermost, increasing, shape (n,).
+
+    Args:
+        outer: Largest radius (or tangent).
+        gap: Largest step; it is shrunk so that equal steps end at `outer`.
+    """
+    n = max(2, int(np.ceil(outer / gap)))
+    return outer * np.arange(1, n + 1) / n
+
+
+def moved_to(
+    projector: PlannedProjector, world_from_device: NDArray[np.float64]
+) -> PlannedProjector:
+    """Return a projector at another pose; its ring frame moves along."""
+    device_from_ring = inverse(projector.world_from_device) @ projector.world_from_ring
+    return replace(
+        projector,
+        world_from_device=world_from_device,
+        world_from_ring=world_from_device @ device_from_ring,
+    )

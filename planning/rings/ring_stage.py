@@ -1,0 +1,229 @@
+"""Section 4 of the formulation: the rings of each projector, once cameras are known.
+
+Rings are as dense as sqrt(kappa) asks, never wider apart than the planner's even
+spacing where light was found, and never finer than the cameras and the projector
+separate. So what is measured stays measured. Light is found by rays on a grid, by
+samples, and by those for which the number of cameras was proved with evenly spaced
+rings: of a pair's limits only the pitch knows the gap, and a finer gap passes nothing
+that a wider one didn't, so fewer cameras are too few for the final rings, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.cameras.camera_cover import LitSamples, lit_samples
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.scene import measurability
+from planning.scene.lighting import ring_coordinate
+from planning.scene.lit import merged
+from planning.scene.measurability import View
+from planning.scene.scene import Scene
+from planning.scene.sights import view_of
+
+from .ring_creases import Creases, crease_errors, find_creases
+from .ring_limits import RingBeam, least_pitch_px, ring_beam
+from .ring_pitch import best_pitch, users
+
+Spacing = Literal["uniform", "curvature"]
+
+_SAMPLES = 6000
+_STREAM = 400
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class RingStage:
+    """The projectors with their final rings, and what is to be said of each.
+
+    Attributes:
+        projectors: As placed, with their own radii.
+        even_radii: Those that each had before.
+        reports: `rings` of each projector in the plan: plain JSON values.
+    """
+
+    projectors: tuple[PlannedProjector, ...]
+    even_radii: tuple[NDArray[np.float64], ...]
+    reports: tuple[dict[str, Any], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Draw:
+    """Lit samples of target and surface, how cameras see them, and their best pitch."""
+
+    rows: LitSamples
+    views: tuple[View, ...]
+    pitch: NDArray[np.float64]
+
+
+def space_rings(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    spacing: Spacing,
+    proved: LitSamples | None = None,
+) -> RingStage:
+    """Return the projectors with rings spaced for the surface and the cameras.
+
+    A projector keeps its even rings where others would lose a measured sample.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As placed, with evenly spaced rings.
+        cameras: As placed.
+        spacing: `curvature`, or `uniform`: leave the rings, but report on them.
+        proved: Samples for which fewer cameras were proved too few; None: none.
+    """
+    even = tuple(projectors)
+    creases = find_creases(scene.mesh, 0.5 * scene.mesh.mean_edge)
+    beams = tuple(ring_beam(scene, projector, creases) for projector in even)
+    if proved is not None:
+        beams = tuple(b.with_lit(_lit_at(b, proved, p)) for p, b in enumerate(beams))
+    final, kept, beams = _spaced(scene, even, cameras, beams)
+    if spacing == "uniform":
+        final, kept = even, frozenset[int]()
+    reports = tuple(
+        {
+            "spacing": "uniform" if final[p] is even[p] else "curvature",
+            "kept_even": p in kept,
+            **_report(scene, beams[p], final[p], creases),
+        }
+        for p in range(len(even))
+    )
+    return RingStage(final, tuple(p.ring_radii for p in even), reports)
+
+
+def tolerance_m(scene: Scene) -> float:
+    """Return e_tol, the largest error between rings that is accepted, in [m].
+
+    The accuracy that was asked for along the normal (`max_sigma_m`), else the check's
+    95th percentile.
+    """
+    asked = scene.requirements.triangulation.max_sigma_m
+    return scene.requirements.check.max_p95_m if asked is None else asked
+
+
+def _spaced(
+    scene: Scene,
+    even: tuple[PlannedProjector, ...],
+    cameras: Sequence[PlannedCamera],
+    beams: tuple[RingBeam, ...],
+) -> tuple[tuple[PlannedProjector, ...], frozenset[int], tuple[RingBeam, ...]]:
+    """Space rings; samples of a fresh draw that this loses join those that bind.
+
+    Returns:
+        The projectors; those that keep even rings, since samples were lost to the last;
+        and the beams with the gaps that cameras separate.
+    """
+    every, tolerance = range(len(even)), tolerance_m(scene)
+    draw = _draw(scene, even, cameras, 0)
+    binding = _binding(scene, even, draw, np.ones(len(draw.rows.target), dtype=bool))
+    lost = np.zeros(0, dtype=bool)
+    final = even
+    for attempt in range(1, _ROUNDS + 1):
+        beams = tuple(
+            beam.with_lit(_lit_at(beam, draw.rows, p)).bound(
+                binding[p][0], binding[p][1], least_pitch_px(scene)
+            )
+            for p, beam in enumerate(beams)
+        )
+        final = tuple(beam.respaced(tolerance) for beam in beams)
+        draw = _draw(scene, even, cameras, attempt)
+        lost = _lost(scene, draw, final)
+        if not lost.any():
+            break
+        more = _binding(scene, even, draw, lost)
+        binding = [np.hstack([binding[p], more[p]]) for p in every]
+    kept: set[int] = set()
+    while lost.any():
+        kept |= set(np.flatnonzero((draw.pitch[lost] > 0).any(axis=0)).tolist())
+        final = tuple(even[p] if p in kept else final[p] for p in every)
+        lost = _lost(scene, draw, final)
+    return final, frozenset(kept), beams
+
+
+def _draw(
+    scene: Scene,
+    even: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    number: int,
+) -> _Draw:
+    """Samples of the target and of the surface: what is claimed of either counts."""
+    stream = _STREAM + 2 * number
+    both = merged(
+        scene.target_samples(_SAMPLES, stream),
+        scene.surface_samples(_SAMPLES, stream + 1),
+    )
+    rows = lit_samples(scene, even, both)
+    views = tuple(view_of(scene, c, rows.target) for c in cameras)
+    return _Draw(rows, views, best_pitch(scene, even, views, rows))
+
+
+def _binding(
+    scene: Scene,
+    even: Sequence[PlannedProjector],
+    draw: _Draw,
+    chosen: NDArray[np.bool_],
+) -> list[NDArray[np.float64]]:
+    """Ring coordinates and pitches of chosen samples, by their user, (2, n) each."""
+    user = np.where(chosen, users(scene, even, draw.rows, draw.pitch), -1)
+    return [
+        np.stack(
+            [
+                draw.rows.lights[p].ring_coordinate[user == p],
+                draw.pitch[user == p, p],
+            ]
+        )
+        for p in range(len(even))
+    ]
+
+
+def _lit_at(beam: RingBeam, rows: LitSamples, p: int) -> NDArray[np.float64]:
+    return ring_coordinate(beam.projector, rows.target.samples.points[rows.lit[:, p]])
+
+
+def _lost(
+    scene: Scene, draw: _Draw, projectors: Sequence[PlannedProjector]
+) -> NDArray[np.bool_]:
+    """Samples that even rings measure and these don't, shape (n,)."""
+    after = best_pitch(scene, projectors, draw.views, draw.rows)
+    return np.asarray((draw.pitch > 0).any(axis=1) & ~(after > 0).any(axis=1))
+
+
+def _report(
+    scene: Scene, beam: RingBeam, final: PlannedProjector, creases: Creases
+) -> dict[str, Any]:
+    """What a plan says of a projector's rings; gaps h along m and errors in [m]."""
+    lit, jump, error = crease_errors(scene, final, creases)
+    tolerance = tolerance_m(scene)
+    shone = beam.profile.points[beam.profile.lit]
+    spacing = measurability.rings_at(final, shone).spacing
+    own, even = beam.errors_under(final), beam.errors_under(beam.projector)
+    over = _share(own > tolerance)
+    # Where rings are as fine as may be anyway, their places alone tell the two apart.
+    cross = min(_share(beam.errors_at_floor() > tolerance), over)
+    return {
+        "n_even": len(beam.projector.ring_radii),
+        "gap_m": [float(spacing.min()), float(spacing.max())] if len(spacing) else None,
+        "error_tolerance_m": tolerance,
+        "error_p99_m": _quantile(own),
+        "error_p99_even_m": _quantile(even),
+        "over_tolerance": over,
+        "limits_cross": cross,
+        "creases": {
+            "length_m": float(creases.length[lit].sum()),
+            "max_slope_jump": float(jump[lit].max(initial=0.0)),
+            "max_error_m": float(error[lit].max(initial=0.0)),
+        },
+    }
+
+
+def _quantile(values: NDArray[np.float64]) -> float | None:
+    return float(np.quantile(values, 0.99)) if len(values) else None
+
+
+def _share(values: NDArray[np.bool_]) -> float:
+    return float(values.mean()) if len(values) else 0.0

@@ -1,0 +1,1 @@
+"""What is lit, seen and measured of a surface, by rays and the limits."""

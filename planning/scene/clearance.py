@@ -1,0 +1,155 @@
+"""Where a device's body has room: beside others, off the object, within the zones."""
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.shapes.boxes import OrientedBox, boxes_overlap, triangles_touch
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import Workspace
+from planning.model.zones import Box
+
+from .existing import existing_cameras, existing_projectors
+from .scene import Scene
+from .standing import CLEARANCE_M, Device, collide, placed_box
+
+_D = TypeVar("_D", PlannedProjector, PlannedCamera)
+# Poses that are tried for each wanted, at most.
+_MOST_OFFERED = 20
+# Poses whose causes are told, about.
+_TOLD = 1000
+
+
+def lacks_room(scene: Scene, device: Device) -> str:
+    """Return what a device's body would touch or reach into; empty if nothing.
+
+    The object, the body of another device, a keep-out volume; below the floor; out of
+    the room. Floor and zones don't bind devices that stand already.
+    """
+    if device.body is None:
+        return ""
+    box = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
+    if _touches_object(scene, box):
+        return "the object"
+    if others := collide(device, scene.standing):
+        return f"the body of {others[0].name or 'another device'}"
+    return "" if device.existing else _zone_broken(scene.requirements.workspace, box)
+
+
+def with_room(scene: Scene, devices: Sequence[_D]) -> tuple[_D, ...]:
+    """Return the devices whose bodies have room among those that stand already."""
+    kept: list[_D] = []
+    for device in devices:
+        scene.pulse()
+        if not lacks_room(scene, device):
+            kept.append(device)
+    return tuple(kept)
+
+
+def offered_with_room(
+    scene: Scene, n: int, offer: Callable[[int], tuple[_D, ...]]
+) -> tuple[_D, ...]:
+    """Return at least n candidates that have room, if a finer lattice has as many.
+
+    Args:
+        scene: Surface and requirements.
+        n: Candidates wanted.
+        offer: Gives a number of candidates over the workspace.
+
+    Raises:
+        InfeasibleLimitsError: If no candidate's body has room.
+    """
+    offered, most = n, _MOST_OFFERED * n
+    while True:
+        candidates = offer(offered)
+        kept = with_room(scene, candidates)
+        if len(kept) >= min(n, len(candidates)) or offered >= most:
+            break
+        more = np.ceil(1.1 * offered * n / max(len(kept), 1))
+        offered = int(min(more, most))
+    if not kept:
+        raise InfeasibleLimitsError(_no_room(scene, candidates))
+    return kept
+
+
+def check_existing_room(
+    scene: Scene, projector: PlannedProjector, camera: PlannedCamera
+) -> None:
+    """Refuse existing devices whose bodies touch each other or the object.
+
+    Args:
+        scene: Surface and requirements.
+        projector: A projector of the rig.
+        camera: A camera of the rig.
+
+    Raises:
+        InfeasibleLimitsError: It names both and what to do.
+    """
+    required = scene.requirements
+    devices = (
+        *existing_projectors(required, projector, (0.0, 0.0)),
+        *existing_cameras(required, camera),
+    )
+    for device in devices:
+        if what := lacks_room(scene, device):
+            raise InfeasibleLimitsError(
+                f"existing {device.existing!r}: its body touches {what}, bodies must "
+                f"stand at least {1e3 * CLEARANCE_M:g} mm apart; correct its place or "
+                f"size_mm and centre_mm of its body"
+            )
+
+
+def _no_room(scene: Scene, candidates: Sequence[Device]) -> str:
+    causes: list[str] = []
+    for device in candidates[:: max(1, len(candidates) // _TOLD)]:
+        scene.pulse()
+        causes.append(lacks_room(scene, device))
+    kind = "projector" if isinstance(candidates[0], PlannedProjector) else "camera"
+    named = ", ".join(
+        f"{what} {100.0 * causes.count(what) / len(causes):.0f} %"
+        for what in sorted(set(causes), key=lambda what: (-causes.count(what), what))
+    )
+    return (
+        f"no {kind} of {len(candidates)} poses has room for its body, which would "
+        f"touch or reach into {named}; make the body smaller, {_remedy(set(causes))}"
+    )
+
+
+def _remedy(causes: set[str]) -> str:
+    if causes == {"the object"}:
+        return "or raise placement.standoff_mm"
+    if "the object" in causes:
+        return "move or widen the others, or change placement.standoff_mm"
+    return "or move or widen what is in its way"
+
+
+def _touches_object(scene: Scene, box: OrientedBox) -> bool:
+    mesh = scene.mesh
+    if np.linalg.norm(box.centre - mesh.centre) > box.radius + mesh.reach:
+        return False
+    return bool(triangles_touch(box, mesh.corners).any())
+
+
+def _zone_broken(workspace: Workspace, box: OrientedBox) -> str:
+    centre = np.array(workspace.centre)
+    corners = box.corners - centre
+    if workspace.floor_m is not None:
+        if not np.all(corners @ np.array(workspace.up) >= workspace.floor_m):
+            return "the floor"
+    if workspace.box is not None:
+        inside = np.abs(_of_zone(workspace.box, centre).local(box.corners))
+        if not np.all(inside <= np.array(workspace.box.half_m)):
+            return "the walls of the room"
+    for zone in workspace.keep_out:
+        if boxes_overlap(_of_zone(zone, centre), box):
+            return f"the keep-out volume {zone.name!r}"
+    return ""
+
+
+def _of_zone(zone: Box, centre: NDArray[np.float64]) -> OrientedBox:
+    return OrientedBox(
+        centre + np.array(zone.centre_m), np.array(zone.axes), np.array(zone.half_m)
+    )

@@ -1,0 +1,1 @@
+"""An object of which only a few points are known."""

@@ -1,0 +1,122 @@
+"""What both planning stages look at: the surface, its target, and how rays see it."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import ParallelModel, PinholeModel
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
+from geometry.rays.visibility import Visibility
+from geometry.repair.hollow import Shell, measure_shell
+from planning.model.requirements import Requirements, Workspace
+from planning.scene.workspace.view_tiles import Site
+
+from .lighting import Target
+from .standing import Device, Standing, bodies_of, existing_bodies
+
+Kind = Literal["projector", "camera"]
+
+# Positions are written to 0.01 mm; twice the half diagonal of that cube.
+_ROUNDING_M = 2e-5
+# Enough that no part of a field's size goes without.
+_SITE_SAMPLES = 2000
+_SITE_STREAM = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that doesn't depend on where devices stand.
+
+    Attributes:
+        mesh: The surface.
+        region: Dominant region of each face, -1 for none, shape (n_f,).
+        steep: Unit T1 of each face, zero where arbitrary or outside the target.
+        requirements: What is asked.
+        seed: Of every random draw.
+        threads: Worker threads; no result depends on it.
+        pulse: Called between pieces of work; raises when the run is to be cut.
+        placed: Bodies of devices that were chosen, beside those that stand already.
+    """
+
+    mesh: TriangleMesh
+    region: NDArray[np.int64]
+    steep: NDArray[np.float64]
+    requirements: Requirements
+    seed: int
+    threads: int
+    pulse: Callable[[], None] = lambda: None
+    placed: tuple[Standing, ...] = ()
+
+    @cached_property
+    def standing(self) -> tuple[Standing, ...]:
+        """Every body that stands in the way of light and views."""
+        return existing_bodies(self.requirements) + self.placed
+
+    def among(self, devices: Iterable[Device]) -> "Scene":
+        """Return the scene with the bodies of these devices, and no other planned."""
+        placed = bodies_of(device for device in devices if not device.existing)
+        if not (placed or self.placed):
+            return self
+        other = replace(self, placed=placed)
+        # What rays are cast against is the same mesh.
+        other.__dict__["visibility"] = self.visibility
+        return other
+
+    @cached_property
+    def safe_workspace(self) -> Workspace:
+        """The workspace less what rounding a position may cost."""
+        return self.requirements.workspace.inset(_ROUNDING_M)
+
+    @cached_property
+    def visibility(self) -> Visibility:
+        """Occlusion by the mesh."""
+        return Visibility(self.mesh, threads=self.threads)
+
+    @cached_property
+    def shell(self) -> Shell:
+        """Whether the mesh is hollow, and what of it lies inside."""
+        return measure_shell(self.visibility.caster)
+
+    @cached_property
+    def target_faces(self) -> NDArray[np.bool_]:
+        """Whether each face is in the target."""
+        if self.requirements.target == "surface":
+            return np.ones(len(self.mesh.faces), dtype=bool)
+        return self.region >= 0
+
+    def target_samples(self, n: int, stream: int) -> Target:
+        """Return n area-true samples of the target; each stream is a fresh draw."""
+        return self._samples(n, stream, self.target_faces)
+
+    def surface_samples(self, n: int, stream: int) -> Target:
+        """Return n area-true samples of the whole surface."""
+        return self._samples(n, stream, None)
+
+    def site(self, kind: Kind, device: PinholeModel | ParallelModel) -> Site | None:
+        """Return what devices stand over side by side; None where the object fits.
+
+        Args:
+            kind: Of the device.
+            device: Its optics.
+        """
+        required, space = self.requirements, self.requirements.workspace
+        radius, standoff, limits = (
+            (space.projector_radius_m, space.projector_standoff_m, required.projector)
+            if kind == "projector"
+            else (space.camera_radius_m, space.camera_standoff_m, required.camera)
+        )
+        if standoff is None:
+            return None
+        samples = self.target_samples(_SITE_SAMPLES, _SITE_STREAM).samples
+        return Site(device, space, radius, standoff, samples, limits.max_incidence)
+
+    def _samples(self, n: int, stream: int, within: NDArray[np.bool_] | None) -> Target:
+        # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.
+        seed = int(np.random.SeedSequence([self.seed, stream]).generate_state(1)[0])
+        samples = sample_surface(self.mesh, n, seed=seed, within=within)
+        return Target(samples, self.steep[samples.faces])

@@ -1,0 +1,166 @@
+"""What each camera sees of samples, apart from the light that falls on them.
+
+Sights don't depend on the projectors, so they are kept while ring axes turn.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.rays.visibility_matrix import visibility_matrix
+from planning.model.plan import PlannedCamera
+
+from . import measurability
+from .lighting import Target
+from .measurability import View
+from .scene import Scene
+from .standing import Standing, blocked_by
+
+# Of a cosine: what this decides roughly, `measurability.view` decides exactly.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What one camera sees.
+
+    Attributes:
+        rows: Samples seen, within every limit and with nothing in between, shape (k,).
+        view: How it sees them.
+    """
+
+    rows: NDArray[np.int64]
+    view: View
+
+
+def sights_of(
+    scene: Scene, cameras: Sequence[PlannedCamera], target: Target
+) -> tuple[Sight, ...]:
+    """Return what each camera sees of samples."""
+    offered: list[Sight] = []
+    wanted = np.zeros((len(cameras), len(target)), dtype=bool)
+    facing = _facing(cameras, target, scene.requirements.camera.max_incidence)
+    for row, camera in enumerate(cameras):
+        scene.pulse()
+        sight = _in_the_open(scene, camera, target, np.flatnonzero(facing[row]))
+        wanted[row, sight.rows] = True
+        offered.append(sight)
+    samples = target.samples
+    free = visibility_matrix(
+        scene.visibility,
+        np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
+        samples.points,
+        samples.normals,
+        candidates=wanted,
+    ).dense_transposed()
+    clear = (
+        _taken(sight, np.flatnonzero(free[sight.rows, column]))
+        for column, sight in enumerate(offered)
+    )
+    return tuple(
+        unblocked(sight, camera, samples.points, scene.standing)
+        for sight, camera in zip(clear, cameras, strict=True)
+    )
+
+
+def joined_sight(sights: Sequence[Sight]) -> Sight:
+    """Return the sights of several cameras, one after the other."""
+    views = [sight.view for sight in sights]
+    return Sight(
+        np.concatenate([sight.rows for sight in sights]),
+        View(
+            np.concatenate([view.stage for view in views]),
+            np.concatenate([view.rays for view in views]),
+            np.concatenate([view.distances for view in views]),
+            np.concatenate([view.facing for view in views]),
+            np.concatenate([view.jacobian for view in views]),
+        ),
+    )
+
+
+def unblocked(
+    sight: Sight,
+    camera: PlannedCamera,
+    points: NDArray[np.float64],
+    bodies: Sequence[Standing],
+) -> Sight:
+    """Return what is left of a sight of points (n, 3) with bodies in the way."""
+    if not bodies:
+        return sight
+    blocked = blocked_by(bodies, camera, points[sight.rows]).any(axis=1)
+    return _taken(sight, np.flatnonzero(~blocked))
+
+
+def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> View:
+    """Return how a camera sees samples, everything in between included."""
+    limits = scene.requirements.camera
+    return measurability.view(camera, target, limits, scene.visibility, scene.standing)
+
+
+class Sights:
+    """Sights of the same cameras on sets of samples, each looked at once.
+
+    Args:
+        scene: Surface and requirements.
+        cameras: Whose sights they are.
+    """
+
+    def __init__(self, scene: Scene, cameras: Sequence[PlannedCamera]) -> None:
+        self._scene, self.cameras = scene, tuple(cameras)
+        self._known: list[tuple[NDArray[np.float64], tuple[Sight, ...]]] = []
+        self._first: Sights | None = None
+
+    def joined(self, more: Sequence[PlannedCamera]) -> "Sights":
+        """Return the sights of these cameras, then of more; what is known is kept."""
+        both = Sights(self._scene, (*self.cameras, *more))
+        both._first = self
+        return both
+
+    def on(self, target: Target) -> tuple[Sight, ...]:
+        """Return what each camera sees of samples."""
+        points = target.samples.points
+        for known, found in self._known:
+            if np.array_equal(known, points):
+                return found
+        first = () if self._first is None else self._first.on(target)
+        rest = self.cameras[len(first) :]
+        found = first + (sights_of(self._scene, rest, target) if rest else ())
+        self._known.append((points, found))
+        return found
+
+
+def _in_the_open(
+    scene: Scene, camera: PlannedCamera, target: Target, some: NDArray[np.int64]
+) -> Sight:
+    """Return which of some samples a camera would see, were nothing in between."""
+    limits = scene.requirements.camera
+    seen = measurability.view(camera, target.take(some), limits, None)
+    return _taken(Sight(some, seen), np.flatnonzero(seen.stage == measurability.SEEN))
+
+
+def _taken(sight: Sight, chosen: NDArray[np.int64]) -> Sight:
+    return Sight(sight.rows[chosen], sight.view.take(chosen))
+
+
+def _facing(
+    cameras: Sequence[PlannedCamera], target: Target, max_incidence: float
+) -> NDArray[np.bool_]:
+    """Whether a camera may meet a sample within the incidence limit, rounding allowed.
+
+    Most of what a candidate can't see faces away from it. With O, P and N about one of
+    the samples, -(P - O).N = O.N - P.N and |P - O|^2 = |O|^2 - 2 O.P + |P|^2; shape
+    (n_cameras, n).
+    """
+    normals = target.samples.normals
+    middle = target.samples.points[:1].sum(axis=0)
+    points = target.samples.points - middle
+    centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras]) - middle
+    along = centres @ normals.T - np.einsum("ij,ij->i", points, normals)
+    squares = np.einsum("ij,ij->i", centres, centres)[:, None] - 2.0 * (
+        centres @ points.T
+    )
+    squares += np.einsum("ij,ij->i", points, points)
+    distances = np.sqrt(np.maximum(squares, 0.0))
+    return along >= (np.cos(max_incidence) - _ROUNDING) * distances

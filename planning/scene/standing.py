@@ -1,0 +1,126 @@
+"""Bodies of devices in the world: what they stand in the way of, and collide with.
+
+A body blocks the beams and the views of every device but its own. Light leaves a point,
+or in parallel light the plane of the panel, and ends at the sample.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.shapes.boxes import OrientedBox, boxes_overlap, lines_cross
+from planning.model.bodies import Body
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.requirements import Requirements
+
+Device = PlannedProjector | PlannedCamera
+
+# What is planned stays this far apart: positions are rounded to 0.01 mm afterwards.
+CLEARANCE_M = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A body in the world.
+
+    Attributes:
+        kind: `projector` or `camera`, whose it is.
+        world_from_device: Its device's pose, shape (4, 4) [m].
+        box: Where it is.
+        name: Of its device; empty until it has one.
+    """
+
+    kind: str
+    world_from_device: NDArray[np.float64]
+    box: OrientedBox
+    name: str = ""
+
+    def is_of(self, device: Device) -> bool:
+        """Return whether this is a device's own body."""
+        return self.kind == kind_of(device) and np.array_equal(
+            self.world_from_device, device.world_from_device
+        )
+
+
+def kind_of(device: Device) -> str:
+    """Return `projector` or `camera`."""
+    return "projector" if isinstance(device, PlannedProjector) else "camera"
+
+
+def placed_box(body: Body, world_from_device: NDArray[np.float64]) -> OrientedBox:
+    """Return a body in the world."""
+    turn, origin = world_from_device[:3, :3], world_from_device[:3, 3]
+    centre = origin + turn @ np.array(body.centre_m)
+    return OrientedBox(centre, turn.T, np.array(body.half_m))
+
+
+def bodies_of(devices: Iterable[Device]) -> tuple[Standing, ...]:
+    """Return the bodies of the devices that have one."""
+    return tuple(
+        Standing(
+            kind_of(device),
+            device.world_from_device,
+            placed_box(device.body, device.world_from_device),
+            device.id or device.existing,
+        )
+        for device in devices
+        if device.body is not None
+    )
+
+
+def moves_bodies(devices: Iterable[Device]) -> bool:
+    """Return whether any device that doesn't stand already has a body."""
+    return any(d.body is not None and not d.existing for d in devices)
+
+
+def existing_bodies(required: Requirements) -> tuple[Standing, ...]:
+    """Return the bodies of the devices that stand already."""
+    poses = [np.array(device.world_from_device) for device in required.existing]
+    return tuple(
+        Standing(device.kind, pose, placed_box(device.body, pose), device.name)
+        for device, pose in zip(required.existing, poses, strict=True)
+        if device.body is not None
+    )
+
+
+def blocked_by(
+    bodies: Sequence[Standing], device: Device, points: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return which bodies stand between a device and points; its own never does.
+
+    Args:
+        bodies: Bodies in the world.
+        device: Where light leaves, or views end.
+        points: Shape (n, 3) [m].
+
+    Returns:
+        Shape (n, n_bodies).
+    """
+    starts = _starts(device, points)
+    blocked = np.zeros((len(points), len(bodies)), dtype=bool)
+    for column, body in enumerate(bodies):
+        if not body.is_of(device):
+            blocked[:, column] = lines_cross(body.box, starts, points)
+    return blocked
+
+
+def collide(device: Device, bodies: Sequence[Standing]) -> list[Standing]:
+    """Return the bodies of other devices that a device's own comes too near to."""
+    if device.body is None:
+        return []
+    own = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
+    return [
+        body
+        for body in bodies
+        if not body.is_of(device) and boxes_overlap(own, body.box)
+    ]
+
+
+def _starts(device: Device, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    pose = device.world_from_device
+    if isinstance(device, PlannedProjector) and device.light == "parallel":
+        depth = (points - pose[:3, 3]) @ pose[:3, 2]
+        return points - depth[:, None] * pose[:3, 2]
+    return pose[:3, 3]

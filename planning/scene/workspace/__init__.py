@@ -1,0 +1,1 @@
+"""Where devices may stand: shell, zones, tiles, candidate viewpoints."""

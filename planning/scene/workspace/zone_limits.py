@@ -1,0 +1,108 @@
+"""Where zones let devices stand: depths, cells that lie outside, half-spaces.
+
+Positions are offsets x = Q - centre from the workspace's centre. The depth of x in a
+box is its distance from the nearest face, negative outside::
+
+    l = |A (x - c)| - h,   depth = -max(l) inside,   -|max(l, 0)| outside
+
+It changes by no more than x does, so what holds of the middle of a ball with its
+radius to spare holds of the whole ball.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.requirements import Workspace
+from planning.model.zones import Box
+
+_Array = NDArray[np.float64]
+_ROUNDING = 1e-9
+
+
+def depth(box: Box, offsets: _Array) -> _Array:
+    """Return how deep positions lie in a box, shape (n,) [m]; negative outside."""
+    beyond = np.abs((offsets - np.array(box.centre_m)) @ np.array(box.axes).T)
+    beyond = beyond - np.array(box.half_m)
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    return np.where(outside > 0.0, -outside, -beyond.max(axis=1))
+
+
+def stands(workspace: Workspace, offsets: _Array) -> NDArray[np.bool_]:
+    """Return whether zones let devices stand at positions (n, 3), shape (n,)."""
+    allowed = np.ones(len(offsets), dtype=bool)
+    if workspace.box is not None:
+        allowed &= depth(workspace.box, offsets) >= -_ROUNDING
+    if workspace.mounting:
+        on = [depth(plane, offsets) >= -_ROUNDING for plane in workspace.mounting]
+        allowed &= np.any(on, axis=0)
+    for zone in workspace.keep_out:
+        allowed &= depth(zone, offsets) <= _ROUNDING
+    return allowed
+
+
+def may_hold(
+    workspace: Workspace,
+    outwards: _Array,
+    angle: _Array | float,
+    low_m: _Array | float,
+    high_m: _Array | float,
+) -> NDArray[np.bool_]:
+    """Return which cells of the shell may hold a position that zones allow.
+
+    A cell has the directions within `angle` of `outwards` and the radii from `low_m` to
+    `high_m`. All of it lies in a ball about its middle, of radius ``(high - low) / 2 +
+    2 high sin(angle / 2)``. Cells are left out only if all of that ball is forbidden by
+    one limit.
+
+    Args:
+        workspace: Its zones alone count.
+        outwards: Unit directions, shape (n, 3).
+        angle: Angle about them [rad], shape (n,) or one number.
+        low_m: Least radius [m], shape (n,) or one number.
+        high_m: Largest radius [m], likewise.
+    """
+    middles = np.asarray(0.5 * (low_m + high_m))[..., None] * outwards
+    half_turn = np.minimum(0.5 * np.asarray(angle), 0.5 * np.pi)
+    reach = 0.5 * (high_m - low_m) + 2.0 * high_m * np.sin(half_turn) + _ROUNDING
+    allowed = np.ones(len(outwards), dtype=bool)
+    if workspace.box is not None:
+        allowed &= depth(workspace.box, middles) >= -reach
+    if workspace.mounting:
+        near = [depth(plane, middles) >= -reach for plane in workspace.mounting]
+        allowed &= np.any(near, axis=0)
+    for zone in workspace.keep_out:
+        allowed &= depth(zone, middles) <= reach
+    return allowed
+
+
+def half_spaces(workspace: Workspace, offset: _Array) -> tuple[_Array, _Array]:
+    """Return a convex part of what zones allow, about an admissible position.
+
+    x is in it iff ``normals @ x >= offsets``: the box of the workspace, the mounting
+    plane that holds the position, and for each keep-out volume the far side of the face
+    that the position is farthest beyond.
+
+    Args:
+        workspace: Its zones alone count.
+        offset: The position, shape (3,).
+
+    Returns:
+        Unit normals, shape (k, 3), and offsets in [m], shape (k,).
+    """
+    held = [] if workspace.box is None else [workspace.box]
+    if workspace.mounting:
+        depths = [depth(plane, offset[None])[0] for plane in workspace.mounting]
+        held.append(workspace.mounting[int(np.argmax(depths))])
+    normals: list[_Array] = [np.empty((0, 3))]
+    offsets: list[_Array] = [np.empty(0)]
+    for box in held:
+        sides = np.concatenate([np.array(box.axes), -np.array(box.axes)])
+        normals.append(sides)
+        offsets.append(sides @ np.array(box.centre_m) - np.tile(box.half_m, 2))
+    for zone in workspace.keep_out:
+        local = np.array(zone.axes) @ (offset - np.array(zone.centre_m))
+        face = int(np.argmax(np.abs(local) - np.array(zone.half_m)))
+        away = np.copysign(1.0, local[face]) * np.array(zone.axes[face])
+        normals.append(away[None])
+        offsets.append(np.array([away @ np.array(zone.centre_m) + zone.half_m[face]]))
+    return np.concatenate(normals), np.concatenate(offsets)

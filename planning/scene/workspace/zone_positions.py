@@ -1,0 +1,156 @@
+"""Positions in a shell that zones cut: along rays from the centre, or on planes.
+
+Along a ray x = r u every limit holds on intervals of r, so the admissible radius
+nearest to the middle of the shell is the middle itself or an end of an interval. Only
+those are tried.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.requirements import Workspace
+from planning.model.zones import Box
+
+from .zone_limits import stands
+
+_Array = NDArray[np.float64]
+
+# Radii are tried this far on either side of an end.
+_NUDGE_M = 1e-4
+# Positions offered for each wanted, at most, and how many are looked at in one go.
+_MOST_OFFERED = 200
+_BATCH = 20_000
+_LEVEL = 1e-12
+# Powers of the root of x^4 = x + 1: steps that fill a box evenly, whatever their number
+# (Roberts 2018, the golden ratio's successors).
+_STEPS: _Array = np.array([1.2207440846057596**-k for k in (1, 2, 3)])
+
+
+def is_zoned(workspace: Workspace) -> bool:
+    """Return whether a box, keep-out volumes or mounting planes cut the shell."""
+    return bool(workspace.box or workspace.keep_out or workspace.mounting)
+
+
+def admissible(
+    workspace: Workspace, radius_m: tuple[float, float], offsets: _Array
+) -> NDArray[np.bool_]:
+    """Return whether positions keep shell, cone, floor and zones, shape (n,)."""
+    distance = np.linalg.norm(offsets, axis=1)
+    low, high = radius_m
+    inside = (distance >= low - 1e-9) & (distance <= high + 1e-9)
+    if workspace.half_angle < np.pi:
+        along = offsets @ np.array(workspace.axis)
+        inside &= along >= distance * np.cos(workspace.half_angle)
+    if workspace.floor_m is not None:
+        inside &= offsets @ np.array(workspace.up) >= workspace.floor_m
+    inside[inside] = stands(workspace, offsets[inside])
+    return inside
+
+
+def along_rays(
+    workspace: Workspace, radius_m: tuple[float, float], directions: _Array
+) -> _Array:
+    """Return a position on each ray that has one, nearest to the middle of the shell.
+
+    Args:
+        workspace: Where devices may stand.
+        radius_m: Least and largest distance of this kind of device.
+        directions: Unit vectors, shape (n, 3).
+
+    Returns:
+        Offsets from the centre, shape (m, 3), m <= n, in the order of the rays.
+    """
+    parts = [
+        _on_rays(workspace, radius_m, directions[start : start + _BATCH])
+        for start in range(0, len(directions), _BATCH)
+    ]
+    return np.concatenate([np.empty((0, 3)), *parts])
+
+
+def filled(
+    workspace: Workspace,
+    radius_m: tuple[float, float],
+    n: int,
+    lattice: Callable[[int], _Array],
+) -> _Array:
+    """Return at least n positions if there are as many, shape (m, 3).
+
+    They lie on the mounting planes, if there are any, else along the rays of a lattice
+    of directions. Either is refined until n positions are left of it.
+
+    Args:
+        workspace: Where devices may stand.
+        radius_m: Least and largest distance of this kind of device.
+        n: Positions wanted.
+        lattice: Gives a number of unit vectors over the workspace's cone, (k, 3).
+    """
+    offered = n
+    while True:
+        if workspace.mounting:
+            laid = np.concatenate(_laid(workspace.mounting, offered))
+            kept = laid[admissible(workspace, radius_m, laid)]
+        else:
+            kept = along_rays(workspace, radius_m, lattice(offered))
+        if len(kept) >= n or offered >= _MOST_OFFERED * n:
+            return kept
+        wanted = np.ceil(1.1 * offered * n / max(len(kept), 1))
+        offered = int(min(wanted, _MOST_OFFERED * n))
+
+
+def _laid(planes: tuple[Box, ...], n: int) -> list[_Array]:
+    """About n places on all planes together, by area."""
+    areas = np.array([4.0 * plane.half_m[0] * plane.half_m[1] for plane in planes])
+    counts = np.ceil(n * areas / areas.sum()).astype(np.int64)
+    places: list[_Array] = []
+    for plane, count in zip(planes, counts, strict=True):
+        share = (0.5 + np.arange(count)[:, None] * _STEPS) % 1.0
+        local = (2.0 * share - 1.0) * np.array(plane.half_m)
+        places.append(np.array(plane.centre_m) + local @ np.array(plane.axes))
+    return places
+
+
+def _on_rays(
+    workspace: Workspace, radius_m: tuple[float, float], directions: _Array
+) -> _Array:
+    radii = _trials(workspace, radius_m, directions)
+    trials = radii[..., None] * directions[:, None]
+    good = admissible(workspace, radius_m, trials.reshape(-1, 3)).reshape(radii.shape)
+    off = np.where(good, np.abs(radii - 0.5 * (radius_m[0] + radius_m[1])), np.inf)
+    best = np.argmin(off, axis=1)
+    return trials[np.arange(len(best)), best][good.any(axis=1)]
+
+
+def _trials(
+    workspace: Workspace, radius_m: tuple[float, float], directions: _Array
+) -> _Array:
+    """Radii at which a limit begins or ends to hold on each ray, shape (n, k)."""
+    low, high = radius_m
+    n = len(directions)
+    ends = [np.full(n, r) for r in (0.5 * (low + high), low, high)]
+    if workspace.floor_m is not None:
+        rise = directions @ np.array(workspace.up)
+        level = workspace.floor_m / _off_zero(rise)
+        ends += [level - _NUDGE_M, level + _NUDGE_M]
+    held = workspace.mounting + (() if workspace.box is None else (workspace.box,))
+    for box in held + workspace.keep_out:
+        enter, leave = _interval(box, directions)
+        ends += [enter - _NUDGE_M, enter + _NUDGE_M, leave - _NUDGE_M]
+        ends += [leave + _NUDGE_M, 0.5 * (enter + leave)]
+    # A ray that misses a box has an end nowhere: the middle again.
+    radii = np.column_stack(ends)
+    return np.where((radii >= low) & (radii <= high), radii, 0.5 * (low + high))
+
+
+def _interval(box: Box, directions: _Array) -> tuple[_Array, _Array]:
+    """Radii at which rays from the centre enter and leave a box, each (n,)."""
+    axes, half = np.array(box.axes), np.array(box.half_m)
+    along = _off_zero(directions @ axes.T)
+    middle = axes @ np.array(box.centre_m)
+    a, b = (middle - half) / along, (middle + half) / along
+    return np.minimum(a, b).max(axis=1), np.maximum(a, b).min(axis=1)
+
+
+def _off_zero(values: _Array) -> _Array:
+    return np.where(np.abs(values) < _LEVEL, _LEVEL, values)

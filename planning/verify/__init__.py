@@ -1,0 +1,1 @@
+"""Checkers of plans; they share no code with the planner."""

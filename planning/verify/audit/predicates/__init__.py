@@ -1,0 +1,1 @@
+"""Lit, seen and measured, written again from `docs/semantics.md`."""

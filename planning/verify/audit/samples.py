@@ -1,0 +1,117 @@
+"""Samples of the audit: independent random draws, never the planner's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.errors import PlanFileError
+from planning.model.surface import Surface
+
+# Keeps the audit's draws apart from all others that start from the same seed.
+_STREAM = 20_141_203
+
+
+@dataclass(frozen=True, eq=False)
+class AuditSamples:
+    """Random points of a surface with what the predicates need to know of them.
+
+    Attributes:
+        points: Positions in [m], shape (n, 3).
+        normals: Unit normal of each sample's face, shape (n, 3).
+        faces: Face of each sample, shape (n,).
+        steep: T1 of each sample's face, zero where its limit doesn't bind, (n, 3).
+        region: Dominant region of each sample's face, -1 for none, shape (n,).
+        in_target: Whether each sample lies in the target, shape (n,).
+        weights: Area that each sample stands for, in [m²], shape (n,).
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    steep: NDArray[np.float64]
+    region: NDArray[np.int64]
+    in_target: NDArray[np.bool_]
+    weights: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "AuditSamples":
+        """Return some of the samples, each still standing for the same area."""
+        return AuditSamples(
+            self.points[chosen],
+            self.normals[chosen],
+            self.faces[chosen],
+            self.steep[chosen],
+            self.region[chosen],
+            self.in_target[chosen],
+            self.weights[chosen],
+        )
+
+
+def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSamples:
+    """Draw n points: half of them in the target, half outside, each part uniformly.
+
+    Within a part, faces are drawn with probability proportional to their area, and the
+    barycentric coordinates are uniform on the simplex. Where the target is the whole
+    surface all n fall in it.
+
+    Args:
+        surface: Surface of the plan.
+        target: `dominant` or `surface`.
+        n: Number of points.
+        seed: Of the random generator, at least 0.
+
+    Raises:
+        PlanFileError: If the target has no area.
+    """
+    rng = np.random.default_rng((_STREAM, seed))
+    inside = surface.target_faces(target)
+    areas = surface.mesh.face_areas
+    if not areas[inside].sum() > 0.0:
+        raise PlanFileError(
+            "surface.npz: the target has no area (no face with region >= 0); plan again"
+        )
+    whole = not areas[~inside].sum() > 0.0
+    parts = [(inside, n)] if whole else [(inside, (n + 1) // 2), (~inside, n // 2)]
+    drawn = [_draw(surface, mask, mask is inside, count, rng) for mask, count in parts]
+    return AuditSamples(
+        *(np.concatenate(columns) for columns in zip(*drawn, strict=True))
+    )
+
+
+def samples_at_centroids(surface: Surface, within: NDArray[np.bool_]) -> AuditSamples:
+    """Return one sample at the centroid of each chosen face, weighing its area."""
+    faces = np.flatnonzero(within & (surface.mesh.face_areas > 0.0))
+    return AuditSamples(
+        surface.mesh.face_centroids[faces],
+        surface.mesh.face_normals[faces],
+        faces,
+        np.asarray(surface.steep[faces], dtype=np.float64),
+        np.asarray(surface.region[faces], dtype=np.int64),
+        np.ones(len(faces), dtype=bool),
+        surface.mesh.face_areas[faces],
+    )
+
+
+def _draw(
+    surface: Surface,
+    within: NDArray[np.bool_],
+    in_target: bool,
+    n: int,
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.generic], ...]:
+    areas = np.where(within, surface.mesh.face_areas, 0.0)
+    total = float(areas.sum())
+    faces = rng.choice(len(areas), size=n, p=areas / total)
+    shares = rng.dirichlet((1.0, 1.0, 1.0), size=n)
+    return (
+        np.einsum("nk,nkd->nd", shares, surface.mesh.corners[faces]),
+        surface.mesh.face_normals[faces],
+        faces.astype(np.int64),
+        np.asarray(surface.steep[faces], dtype=np.float64),
+        np.asarray(surface.region[faces], dtype=np.int64),
+        np.full(n, in_target),
+        np.full(n, total / n),
+    )

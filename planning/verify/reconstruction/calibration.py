@@ -1,0 +1,253 @@
+"""What a scanner knows of its devices: optics and poses, and nothing of the object.
+
+The projection here is written apart from `geometry.devices`, which the planner uses, so
+that a mistake in one shows against the other. Pixels follow OpenCV: the centre of the
+top-left pixel is (0, 0).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import ParallelModel, PinholeModel
+from planning.model.plan import PlannedCamera, PlannedProjector
+
+_UNDISTORT_STEPS = 60
+_UNDISTORT_TOLERANCE = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class CameraCalibration:
+    """A camera: pinhole, Brown-Conrady lens, pose.
+
+    Attributes:
+        id: Name of the camera.
+        world_from_device: Pose [m], shape (4, 4).
+        matrix: K in [px], shape (3, 3).
+        distortion: k1, k2, p1, p2, k3.
+        resolution: Width and height in [px].
+    """
+
+    id: str
+    world_from_device: NDArray[np.float64]
+    matrix: NDArray[np.float64]
+    distortion: tuple[float, float, float, float, float]
+    resolution: tuple[int, int]
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Optical centre in the world in [m], shape (3,)."""
+        return self.world_from_device[:3, 3]
+
+    @property
+    def focal_px(self) -> float:
+        """Mean of the two focal lengths in [px]."""
+        return 0.5 * float(self.matrix[0, 0] + self.matrix[1, 1])
+
+    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return pixels (n, 2) of world points (n, 3); NaN behind the camera."""
+        turn = self.world_from_device[:3, :3]
+        x, y, z = ((points - self.centre) @ turn).T
+        z = np.where(z > 0.0, z, np.nan)
+        x, y = self._bend(x / z, y / z)
+        matrix = self.matrix
+        return np.column_stack(
+            [matrix[0, 0] * x + matrix[0, 2], matrix[1, 1] * y + matrix[1, 2]]
+        )
+
+    def rays(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return unit viewing directions (n, 3) in the world of pixels (n, 2).
+
+        The lens is inverted by the fixed point ``p = (q - tangential(p)) / radial(p)``;
+        NaN where that doesn't settle: no point of the scene is imaged there.
+        """
+        matrix = self.matrix
+        x = (pixels[:, 0] - matrix[0, 2]) / matrix[0, 0]
+        y = (pixels[:, 1] - matrix[1, 2]) / matrix[1, 1]
+        if any(self.distortion):
+            x, y = self._unbend(x, y)
+        scale = 1.0 / np.sqrt(x * x + y * y + 1.0)
+        local = np.column_stack([x * scale, y * scale, scale])
+        return local @ self.world_from_device[:3, :3].T
+
+    def _terms(
+        self, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Radial factor and the two tangential shifts of the lens."""
+        k1, k2, p1, p2, k3 = self.distortion
+        xx, xy, yy = x * x, x * y, y * y
+        s = xx + yy
+        radial = 1.0 + k1 * s + k2 * s**2 + k3 * s**3
+        return (
+            radial,
+            2.0 * p1 * xy + p2 * (s + 2.0 * xx),
+            p1 * (s + 2.0 * yy) + (2.0 * p2 * xy),
+        )
+
+    def _bend(
+        self, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        radial, shift_x, shift_y = self._terms(x, y)
+        return x * radial + shift_x, y * radial + shift_y
+
+    def _unbend(
+        self, qx: NDArray[np.float64], qy: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        x, y = qx, qy
+        change = np.full_like(qx, np.inf)
+        with np.errstate(all="ignore"):
+            for _ in range(_UNDISTORT_STEPS):
+                radial, shift_x, shift_y = self._terms(x, y)
+                new_x, new_y = (qx - shift_x) / radial, (qy - shift_y) / radial
+                change = np.abs(new_x - x) + np.abs(new_y - y)
+                x, y = new_x, new_y
+                if np.all(change < _UNDISTORT_TOLERANCE):
+                    break
+        settled = change < 1e3 * _UNDISTORT_TOLERANCE
+        return np.where(settled, x, np.nan), np.where(settled, y, np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectorCalibration:
+    """A projector: optics, pose and the frame of its rings.
+
+    Attributes:
+        id: Name of the projector.
+        light: `diverging` (pinhole) or `parallel` (beam along +z from the plane z = 0).
+        world_from_device: Pose [m], shape (4, 4).
+        world_from_ring: Pose of the ring frame [m], shape (4, 4).
+        matrix: From panel coordinates to pixels, shape (3, 3): K for diverging light,
+            where panel coordinates are (x/z, y/z); for parallel light, where they are
+            (x, y) in [m], 1 / pixel pitch on the diagonal.
+        resolution: Width and height in [px].
+        beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
+    """
+
+    id: str
+    light: Literal["diverging", "parallel"]
+    world_from_device: NDArray[np.float64]
+    world_from_ring: NDArray[np.float64]
+    matrix: NDArray[np.float64]
+    resolution: tuple[int, int]
+    beam_radius: float | None
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Optical centre, or centre of the panel, in the world in [m], shape (3,)."""
+        return self.world_from_device[:3, 3]
+
+    @property
+    def axis(self) -> NDArray[np.float64]:
+        """Direction of the optical axis in the world, shape (3,)."""
+        return self.world_from_device[:3, 2]
+
+    def beams(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return unit directions of the light at world points, (n, 3) both."""
+        if self.light == "parallel":
+            return np.broadcast_to(self.axis, points.shape)
+        beams = points - self.centre
+        return beams / np.linalg.norm(beams, axis=1, keepdims=True)
+
+    @property
+    def ring_from_device(self) -> NDArray[np.float64]:
+        """Pose of the device in the ring frame, shape (4, 4)."""
+        turn = self.world_from_ring[:3, :3].T
+        pose = np.eye(4)
+        pose[:3, :3] = turn @ self.world_from_device[:3, :3]
+        pose[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
+        return pose
+
+    def to_ring(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return world points (n, 3) in the ring frame."""
+        return (points - self.world_from_ring[:3, 3]) @ self.world_from_ring[:3, :3]
+
+    def panel(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return pixels (n, 2) that light world points (n, 3), and depths z (n,).
+
+        Pixels are NaN behind the device.
+        """
+        local = (points - self.centre) @ self.world_from_device[:3, :3]
+        z = local[:, 2]
+        flat = local[:, :2]
+        front = np.where(z > 0.0, 1.0, np.nan)
+        flat = (
+            flat
+            * (front / np.where(z > 0.0, z, 1.0) if self._diverging else front)[:, None]
+        )
+        return flat * np.diag(self.matrix)[:2] + self.matrix[:2, 2], z
+
+    def in_panel(
+        self, pixels: NDArray[np.float64], margin_px: float = 0.0
+    ) -> NDArray[np.bool_]:
+        """Return whether pixels (n, 2) are drawn: in the image and in the beam."""
+        u, v = pixels.T
+        width, height = self.resolution
+        edge = 0.5 + margin_px
+        inside = (u >= -edge) & (u <= width - 1 + edge)
+        inside &= (v >= -edge) & (v <= height - 1 + edge)
+        if self.beam_radius is not None:
+            flat = self.panel_coordinates(pixels)
+            reach = self.beam_radius + margin_px / float(self.matrix[0, 0])
+            inside &= np.hypot(flat[:, 0], flat[:, 1]) <= reach
+        return inside
+
+    def panel_coordinates(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return panel coordinates (n, 2) of pixels (n, 2)."""
+        return (pixels - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
+
+    @property
+    def _diverging(self) -> bool:
+        return self.light == "diverging"
+
+
+@dataclass(frozen=True)
+class PairCalibration:
+    """One projector and one camera."""
+
+    projector: ProjectorCalibration
+    camera: CameraCalibration
+
+
+def calibrate_camera(camera: PlannedCamera) -> CameraCalibration:
+    """Return what a plan says of a camera."""
+    device = camera.device
+    return CameraCalibration(
+        camera.id,
+        camera.world_from_device,
+        device.camera_matrix,
+        device.distortion,
+        device.resolution,
+    )
+
+
+def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
+    """Return what a plan says of a projector."""
+    device = projector.device
+    beam_radius = device.beam_radius if isinstance(device, ParallelModel) else None
+    return ProjectorCalibration(
+        projector.id,
+        projector.light,
+        projector.world_from_device,
+        projector.world_from_ring,
+        _panel_matrix(device),
+        device.resolution,
+        beam_radius,
+    )
+
+
+def _panel_matrix(device: PinholeModel | ParallelModel) -> NDArray[np.float64]:
+    if isinstance(device, PinholeModel):
+        return device.camera_matrix
+    width, height = device.resolution
+    scale = 1.0 / device.pixel_pitch_m
+    return np.array(
+        [
+            [scale, 0.0, 0.5 * (width - 1)],
+            [0.0, scale, 0.5 * (height - 1)],
+            [0.0, 0.0, 1.0],
+        ]
+    )

@@ -1,0 +1,220 @@
+"""A calibration file: what was measured of devices after they were mounted.
+
+JSON; metres and pixels, as in `plan.json`. Devices and values that it lacks stay as in
+the plan.
+"""
+
+import copy
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError, model_validator
+
+from planning.model.errors import CalibrationError
+from planning.model.plan import RigPlan
+from planning.model.table_types import Name, Table
+
+_Three = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Four = Annotated[list[float], Field(min_length=4, max_length=4)]
+_Matrix = Annotated[list[_Three], Field(min_length=3, max_length=3)]
+_Pose = Annotated[list[_Four], Field(min_length=4, max_length=4)]
+_Lens = Annotated[list[float], Field(min_length=5, max_length=5)]
+# How far a written rotation may be from one.
+_ROTATION = 1e-4
+# Patterns and root discs are drawn for the planned poses; farther off another unit or
+# another device is meant: share of the distance to the object's centre, and radians.
+_FARTHEST = 0.3
+_MOST_TURNED = np.deg2rad(30.0)
+# Of a projector's optics, beyond which its rings aren't circles any more [px].
+_SAME_PX = 0.01
+
+
+class _Device(Table):
+    id: Name
+    world_from_device: _Pose | None = None
+    K: _Matrix | None = None
+    distortion: _Lens | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.world_from_device is not None:
+            _check_pose(np.array(self.world_from_device))
+        if self.K is not None:
+            _check_matrix(np.array(self.K))
+        if self.world_from_device is None and self.K is None and not self.distortion:
+            raise ValueError(
+                f"{self.id} has no measured value; write world_from_device, K or "
+                f"distortion, or leave the device out"
+            )
+        return self
+
+
+class _File(Table):
+    format: Literal["ringrig-calibration"]
+    version: Literal[1]
+    devices: Annotated[list[_Device], Field(min_length=1)]
+
+
+def _check_pose(pose: NDArray[np.float64]) -> None:
+    turn = pose[:3, :3]
+    off = float(np.abs(turn @ turn.T - np.eye(3)).max())
+    if not (off <= _ROTATION and np.linalg.det(turn) > 0.0):
+        raise ValueError(
+            f"world_from_device: its first three columns must be a rotation (R R^T "
+            f"differs from the identity by {off:.2g}); write more digits"
+        )
+    if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+        raise ValueError(
+            f"world_from_device: its last row {pose[3].tolist()} must be 0 0 0 1"
+        )
+
+
+def _check_matrix(matrix: NDArray[np.float64]) -> None:
+    plain = matrix.copy()
+    plain[[0, 1, 0, 1], [0, 1, 2, 2]] = 0.0
+    if plain.tolist() != [[0.0] * 3, [0.0] * 3, [0.0, 0.0, 1.0]]:
+        raise ValueError(
+            f"K = {matrix.tolist()} must be [fx, 0, cx], [0, fy, cy], [0, 0, 1] in px"
+        )
+    if not np.all(np.diag(matrix) > 0.0):
+        raise ValueError(f"K: focal lengths {np.diag(matrix)[:2]} px must be positive")
+
+
+def calibrated_plan(plan: RigPlan, path: Path) -> RigPlan:
+    """Return a plan with its devices as a calibration file says they are.
+
+    The rings of a projector move with it: ``world_from_ring`` keeps its place in the
+    device.
+
+    Args:
+        plan: For which the patterns were drawn.
+        path: Of the calibration file.
+
+    Raises:
+        CalibrationError: If the file can't be read, or doesn't fit the plan.
+    """
+    file = _read(path)
+    document = copy.deepcopy(plan.document)
+    cameras = {entry["id"]: entry for entry in document["cameras"]}
+    projectors = {entry["id"]: entry for entry in document["projectors"]}
+    seen: set[str] = set()
+    for device in file.devices:
+        entry = cameras.get(device.id) or projectors.get(device.id)
+        if entry is None:
+            known = ", ".join((*projectors, *cameras))
+            raise CalibrationError(
+                f"{path}: device {device.id!r} isn't in the plan, which has {known}"
+            )
+        if device.id in seen:
+            raise CalibrationError(f"{path}: device {device.id!r} twice; keep one")
+        seen.add(device.id)
+        try:
+            if device.id in projectors:
+                _require_same_optics(device, entry)
+            _move(device, entry, plan)
+        except ValueError as error:
+            raise CalibrationError(f"{path}: {device.id}: {error}") from None
+        for key in ("K", "distortion") if device.id in cameras else ():
+            if getattr(device, key) is not None:
+                entry[key] = getattr(device, key)
+    found = RigPlan(document, plan.surface)
+    try:
+        _ = found.cameras, found.projectors
+    except ValueError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+    return found
+
+
+def _move(device: _Device, entry: dict[str, Any], plan: RigPlan) -> None:
+    """Put a device where it was measured, and its rings with it.
+
+    Raises:
+        ValueError: If that is too far from the plan to be meant.
+    """
+    if device.world_from_device is None:
+        return
+    measured = np.array(device.world_from_device)
+    # The rotation next to what was written.
+    u, _, vt = np.linalg.svd(measured[:3, :3])
+    measured[:3, :3] = u @ vt
+    planned = np.array(entry["world_from_device"])
+    away = float(np.linalg.norm(measured[:3, 3] - planned[:3, 3]))
+    reach = float(np.linalg.norm(planned[:3, 3] - plan.surface.mesh.centre))
+    if not away <= _FARTHEST * reach:
+        raise ValueError(
+            f"stands {away:.3g} m from its place in the plan, at most "
+            f"{_FARTHEST * reach:.3g} m; write metres in the axes of the mesh, or plan "
+            f"with the device as it stands"
+        )
+    turn = measured[:3, :3].T @ planned[:3, :3]
+    angle = float(np.arccos(np.clip(0.5 * (np.trace(turn) - 1.0), -1.0, 1.0)))
+    if not angle <= _MOST_TURNED:
+        raise ValueError(
+            f"is turned by {np.degrees(angle):.1f} degrees from the plan, at most "
+            f"{np.degrees(_MOST_TURNED):.0f}; +x is right, +y down, +z along the axis"
+        )
+    if "world_from_ring" in entry:
+        ring = np.linalg.inv(planned) @ np.array(entry["world_from_ring"])
+        entry["world_from_ring"] = (measured @ ring).tolist()
+    entry["world_from_device"] = measured.tolist()
+
+
+def _require_same_optics(device: _Device, entry: dict[str, Any]) -> None:
+    """Refuse other optics of a projector than those that its patterns are drawn for.
+
+    Raises:
+        ValueError: If they differ.
+    """
+    drawn = entry["K"]
+    if device.K is not None and (
+        drawn is None
+        or not np.allclose(device.K, np.array(drawn), rtol=0.0, atol=_SAME_PX)
+    ):
+        raise ValueError(
+            f"K = {device.K} isn't the one that its patterns are drawn for ({drawn}); "
+            f"put the measured optics into the rig file, plan, and project those"
+        )
+    if device.distortion is not None and any(device.distortion):
+        raise ValueError(
+            f"distortion = {device.distortion} of a projector isn't known to the "
+            f"decoder; correct the images that it shows for its lens"
+        )
+
+
+def _read(path: Path) -> _File:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        return _File.model_validate(values)
+    except FileNotFoundError:
+        raise CalibrationError(f"{path}: no such file") from None
+    except OSError as error:
+        raise CalibrationError(
+            f"{path}: can't be read ({error.strerror}); check the path and its rights"
+        ) from None
+    except ValidationError as error:
+        raise CalibrationError(f"{path}: {_fault(error)}") from None
+    except (ValueError, RecursionError) as error:
+        raise CalibrationError(
+            f"{path}: not JSON ({error}); correct that place"
+        ) from None
+
+
+def _fault(error: ValidationError) -> str:
+    """Return the first fault: where, what was written, the rule, what to do."""
+    first = error.errors(include_url=False)[0]
+    where = "".join(
+        f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]
+    ).removeprefix(".")
+    if first["type"] == "missing":
+        return f"`{where}` is missing; write it"
+    if first["type"] == "extra_forbidden":
+        return f"`{where}` is not a known key; see docs/captures.md"
+    rule = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    if first["type"] == "value_error":
+        return f"[{where}] {rule}"
+    value = repr(first["input"])
+    value = value if len(value) <= 60 else f"{value[:57]}..."
+    return f"`{where or 'the file'}` = {value}: {rule}; write such a value"

@@ -1,0 +1,1 @@
+"""Clouds merged and held against the mesh."""

@@ -1,0 +1,169 @@
+"""Measured points against the mesh, judged by the limits that the plan states."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
+from geometry.rays.proximity import closest_points
+from planning.model.requirements import CheckLimits
+from planning.verify.reconstruction.cloud import Cloud
+
+_MM = 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """Signed distances of points from the mesh along its normals, outside positive.
+
+    Attributes:
+        distances: In [m], shape (n,).
+        faces: Nearest face of each point, shape (n,).
+    """
+
+    distances: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square in [m]."""
+        return float(np.sqrt(np.mean(self.distances**2)))
+
+    @property
+    def p95_m(self) -> float:
+        """95th percentile of the absolute distance in [m]."""
+        return float(np.percentile(np.abs(self.distances), 95.0))
+
+    @property
+    def bias_m(self) -> float:
+        """Mean in [m]."""
+        return float(np.mean(self.distances))
+
+    @property
+    def max_m(self) -> float:
+        """Largest absolute distance in [m]."""
+        return float(np.abs(self.distances).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Completeness:
+    """Shares of surface samples with a measured point nearby.
+
+    Attributes:
+        thresholds_m: Half, one and two tau [m].
+        fractions: Of the target predicted measured, after redundancy was removed.
+        predicted_missing: Share of it with no point within tau in the whole cloud;
+            None without a prediction.
+        missing: Samples predicted measured that have no such point, shape (n,).
+    """
+
+    thresholds_m: tuple[float, float, float]
+    fractions: tuple[float, float, float]
+    predicted_missing: float | None
+    missing: NDArray[np.bool_]
+
+
+def measure_accuracy(cloud: Cloud, mesh: TriangleMesh, *, threads: int) -> Accuracy:
+    """Return the distances of a cloud from the full mesh."""
+    nearest = closest_points(mesh, cloud.points, threads=threads)
+    return Accuracy(nearest.distances, nearest.faces)
+
+
+def nearest_distance(
+    cloud: Cloud, samples: SurfaceSamples, reach_m: float
+) -> NDArray[np.float64]:
+    """Return the distance from each sample to a point measured from its own side.
+
+    A point counts if its viewing ray r meets the sample's normal with r.N < 0: on a
+    thin shell points of the other side are near, too. Each camera's nearest point is
+    tried.
+
+    Args:
+        cloud: Measured points.
+        samples: Of the surface.
+        reach_m: Points farther away aren't looked for [m].
+
+    Returns:
+        In [m], inf where there is no such point within reach, shape (n_samples,).
+    """
+    best = np.full(len(samples), np.inf)
+    for camera in np.unique(cloud.camera):
+        own = cloud.camera == camera
+        distance, nearest = KDTree(cloud.points[own]).query(
+            samples.points, distance_upper_bound=reach_m
+        )
+        # Where nothing is in reach the index is one past the last point.
+        rays = np.concatenate([cloud.rays[own], np.zeros((1, 3))])[nearest]
+        facing = np.einsum("ij,ij->i", rays, samples.normals) < 0.0
+        best = np.where(facing, np.minimum(best, distance), best)
+    return best
+
+
+def measure_completeness(
+    everything: Cloud,
+    merged: Cloud,
+    samples: SurfaceSamples,
+    predicted: NDArray[np.bool_] | None,
+    tau_m: float,
+) -> Completeness:
+    """Return how much of the samples was measured, and what should have been.
+
+    Args:
+        everything: All points.
+        merged: Those that stay after redundancy is removed.
+        samples: Of the target.
+        predicted: Samples that the plan claims measured; None: all, without a claim.
+        tau_m: One ring gap [m].
+    """
+    claimed = np.ones(len(samples), dtype=bool) if predicted is None else predicted
+    thresholds = (0.5 * tau_m, tau_m, 2.0 * tau_m)
+    reach = 2.01 * tau_m
+    kept = nearest_distance(merged, samples.take(claimed), reach)
+    fractions = [_share(kept <= threshold) for threshold in thresholds]
+    missing = claimed & ~(nearest_distance(everything, samples, reach) <= tau_m)
+    return Completeness(
+        thresholds,
+        (fractions[0], fractions[1], fractions[2]),
+        None if predicted is None else _share(missing[claimed]),
+        missing,
+    )
+
+
+def judge(
+    accuracy: Accuracy,
+    completeness: Completeness,
+    limits: CheckLimits,
+) -> tuple[str, ...]:
+    """Return a clause for each limit that isn't kept: what, value, limit."""
+    lengths = (
+        ("rms distance of the points from the mesh", accuracy.rms_m, limits.max_rms_m),
+        ("95th percentile of the distance", accuracy.p95_m, limits.max_p95_m),
+        ("mean signed distance", accuracy.bias_m, limits.max_bias_m),
+    )
+    failures = [
+        f"{name} is {_MM * value:.3f} mm, limit {_MM * limit:.3f} mm"
+        for name, value, limit in lengths
+        if not abs(value) <= limit
+    ]
+    missing = completeness.predicted_missing
+    if missing is None:
+        return tuple(failures)
+    share, tau = completeness.fractions[1], _MM * completeness.thresholds_m[1]
+    if not share >= limits.min_completeness:
+        failures.append(
+            f"completeness is {share:.3f} of the target predicted measured at "
+            f"{tau:.2f} mm, limit {limits.min_completeness:.3f}"
+        )
+    if not missing <= limits.max_predicted_missing:
+        failures.append(
+            f"{100 * missing:.2f} % of the samples predicted measured have no point "
+            f"within {tau:.2f} mm, limit {100 * limits.max_predicted_missing:.2f} %"
+        )
+    return tuple(failures)
+
+
+def _share(values: NDArray[np.bool_]) -> float:
+    return float(np.mean(values)) if len(values) else 0.0

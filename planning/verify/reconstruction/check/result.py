@@ -1,0 +1,105 @@
+"""What the check from pixels found."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.render.photometry import Photometry
+
+from .accuracy import Accuracy, Completeness
+from .comparison import Comparison
+from .merge import Merged
+
+
+@dataclass(frozen=True)
+class PairCount:
+    """What one pair of devices gave.
+
+    Attributes:
+        projector: Id of the projector.
+        camera: Id of the camera.
+        lit_pixels: Pixels with enough contrast.
+        n_edges: Ring edges found.
+        n_points: Points triangulated.
+        rejected: Edges without a point, by cause.
+    """
+
+    projector: str
+    camera: str
+    lit_pixels: int
+    n_edges: int
+    n_points: int
+    rejected: dict[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What the rig measured of the object, judged against the plan's limits.
+
+    Attributes:
+        everything: All points, before redundancy was removed.
+        merged: The cloud that stays, with normals and standard deviations.
+        accuracy: Of the merged cloud; None if it is empty.
+        completeness: Of the target.
+        pairs: What each pair gave.
+        photometry: The simulated light and sensor; None: the images were taken.
+        failures: One sentence for each limit that isn't kept.
+        seconds: Processor time of `render`, `decode` and `merge` over all pairs [s].
+        comparison: With a plan's prediction; None if none was given.
+    """
+
+    everything: Cloud
+    merged: Merged
+    accuracy: Accuracy | None
+    completeness: Completeness
+    pairs: tuple[PairCount, ...]
+    photometry: Photometry | None
+    failures: tuple[str, ...]
+    seconds: dict[str, float]
+    comparison: Comparison | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.failures
+
+    @property
+    def n_points(self) -> int:
+        """Points before redundancy was removed."""
+        return len(self.everything)
+
+    @property
+    def n_merged(self) -> int:
+        """Points that stay."""
+        return len(self.merged.cloud)
+
+    @property
+    def redundant_fraction(self) -> float:
+        """Share of the points that was removed as redundant."""
+        return 1.0 - self.n_merged / self.n_points if self.n_points else 0.0
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the `reconstruction` object of `plan.json`."""
+        accuracy, complete = self.accuracy, self.completeness
+        light = self.photometry
+        return {
+            "n_points": self.n_points,
+            "n_merged": self.n_merged,
+            "redundant_fraction": self.redundant_fraction,
+            "accuracy_rms_m": accuracy and accuracy.rms_m,
+            "accuracy_p95_m": accuracy and accuracy.p95_m,
+            "accuracy_bias_m": accuracy and accuracy.bias_m,
+            "accuracy_max_m": accuracy and accuracy.max_m,
+            "completeness": [
+                {"threshold_m": threshold, "fraction": fraction}
+                for threshold, fraction in zip(
+                    complete.thresholds_m, complete.fractions, strict=True
+                )
+            ],
+            "predicted_missing": complete.predicted_missing,
+            "pixel_noise": light and light.pixel_noise,
+            "ambient": light and light.ambient,
+            **({} if self.comparison is None else self.comparison.to_document()),
+            "passed": self.passed,
+            "failures": list(self.failures),
+        }

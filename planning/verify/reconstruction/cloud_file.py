@@ -1,0 +1,125 @@
+"""`cloud.ply`: the merged cloud, coloured by the uncertainty of each point.
+
+Positions are in the unit and axes of the mesh file, so that both lie on each other in
+any viewer; the header's comments say so and give the scale to metres.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.files import write_atomically
+from planning.verify.reconstruction.check.merge import Merged
+
+from .colour_scale import colour_range, colours, legend
+
+_GENERATOR = "comment ringrig cloud"
+_FIELDS = (
+    *((name, "<f8") for name in ("x", "y", "z")),
+    *((name, "<f4") for name in ("nx", "ny", "nz", "sigma")),
+    *((name, "u1") for name in ("red", "green", "blue")),
+)
+_ROW = np.dtype(list(_FIELDS))
+_PLY_TYPES = {"<f8": "double", "<f4": "float", "u1": "uchar"}
+
+
+@dataclass(frozen=True)
+class LengthUnit:
+    """The unit that lengths of a file are in.
+
+    Attributes:
+        name: What it is called.
+        in_m: How many metres it is.
+    """
+
+    name: str
+    in_m: float
+
+    @classmethod
+    def of(cls, meshes: list[dict[str, Any]]) -> "LengthUnit":
+        """Return the unit of a plan's first mesh; of a scaled one, a file unit."""
+        unit, scale = meshes[0]["unit"], float(meshes[0]["scale_to_m"])
+        return cls("file units" if unit == "size_mm" else str(unit), scale)
+
+
+@dataclass(frozen=True, eq=False)
+class CloudFile:
+    """What `cloud.ply` holds.
+
+    Attributes:
+        rows: Points, normals, sigma and colours, one a row.
+        unit: Of positions and sigma.
+        limits: Sigma at both ends of the colour scale, in that unit.
+    """
+
+    rows: NDArray[np.void]
+    unit: LengthUnit
+    limits: tuple[float, float]
+
+    @classmethod
+    def of(cls, merged: Merged, unit: LengthUnit) -> "CloudFile":
+        """Lay out a merged cloud.
+
+        Where the normal isn't known it is 0 0 0, and sigma is the largest that any
+        normal could give: the length of the point's move with its edge, times the
+        edge's noise.
+        """
+        cloud = merged.cloud
+        known = np.isfinite(merged.normals[:, 0])
+        largest = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
+        sigma = np.where(known, merged.sigma, largest) / unit.in_m
+        limits = colour_range(sigma)
+        rows = np.empty(len(cloud), dtype=_ROW)
+        normals = np.where(known[:, None], merged.normals, 0.0)
+        for axis, name in enumerate("xyz"):
+            rows[name] = cloud.points[:, axis] / unit.in_m
+            rows[f"n{name}"] = normals[:, axis]
+        rows["sigma"] = sigma
+        shades = colours(sigma, limits)
+        for channel, name in enumerate(("red", "green", "blue")):
+            rows[name] = shades[:, channel]
+        return cls(rows, unit, limits)
+
+    @property
+    def legend(self) -> str:
+        """What the colours mean, in one line."""
+        return legend(self.limits, self.unit.name)
+
+    def save(self, path: Path) -> None:
+        """Write the file; its old content stays whole until the new one is complete.
+
+        Raises:
+            OSError: If it can't be written.
+        """
+        write_atomically(path, self._write)
+
+    def _write(self, file: BinaryIO) -> None:
+        low, high = self.limits
+        header = [
+            "ply",
+            "format binary_little_endian 1.0",
+            _GENERATOR,
+            f"comment unit {self.unit.name}, {self.unit.in_m!r} m; axes of the mesh",
+            "comment sigma: standard deviation along the normal, same unit",
+            f"comment colour viridis by sigma, {low:.6g} to {high:.6g}: {self.legend}",
+            f"element vertex {len(self.rows)}",
+            *(f"property {_PLY_TYPES[kind]} {name}" for name, kind in _FIELDS),
+            "end_header",
+        ]
+        file.write("".join(f"{line}\n" for line in header).encode("ascii"))
+        file.write(self.rows.tobytes())
+
+
+def remove_cloud(path: Path) -> bool:
+    """Remove a cloud that was written here before, and nothing else; say if it was."""
+    try:
+        with path.open("rb") as file:
+            ours = file.read(512).split(b"\n")[2:3] == [_GENERATOR.encode()]
+    except OSError:
+        return False
+    if ours:
+        path.unlink()
+    return ours

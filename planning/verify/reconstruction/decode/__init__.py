@@ -1,0 +1,1 @@
+"""From images to edges, rings and points."""

@@ -1,0 +1,179 @@
+"""Light adds up: every frame and its inverse together are white and black.
+
+``I + I_inv = W + K`` holds in every pixel, with the light that surfaces pass on to each
+other too. Frames that were exchanged, exposed otherwise, cut, moved or disturbed break
+the rule.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.errors import CapturesError
+from planning.verify.reconstruction.patterns.ring_patterns import Images
+
+_FEWEST_BRIGHT = 100
+# A pixel is surely bright in a frame that exceeds its inverse by this share of white.
+_SURELY = 0.5
+_HALF_BRIGHT = 0.3
+_MOST_BENT = 0.05
+# A frame brighter or darker than the rest by this share shifts edges by half of it,
+# about a fiftieth of a pixel.
+_MOST_DRIFT = 0.03
+# A pixel breaks the rule if its rest exceeds this share of its contrast and this many
+# standard deviations; a frame does if more than that share of its pixels do.
+_REST_SHARE = 0.1
+_REST_SIGMAS = 8.0
+_MOST_BROKEN = 0.2
+# A frame that moved by d leaves a rest of -d . grad I; edges move by half of d [px].
+_MOST_MOVED_PX = 0.1
+_MOVED_SIGMAS = 8.0
+
+
+def broken_pixels(
+    stack: Images, good: NDArray[np.bool_], names: Sequence[str]
+) -> NDArray[np.bool_]:
+    """Pixels of which a frame and its inverse don't add up to white and black.
+
+    Raises:
+        CapturesError: If that is so in much of the image, or a frame is brighter or
+            darker than the rest as a whole.
+    """
+    rows, columns = np.nonzero(good)
+    pixels = stack[:, rows, columns].astype(np.float32)
+    white, black, pairs = pixels[0], pixels[1], pixels[2:].reshape(-1, 2, len(rows))
+    sums = pairs.sum(axis=1)
+    by_bits = np.median(sums, axis=0) - 2.0 * black
+    contrast = np.maximum(np.maximum(white - black, by_bits), 1.0)
+    rests = sums - (white + black)
+    _require_linear(pairs, rests, contrast)
+    spreads = [float(np.median(np.abs(rest))) for rest in rests]
+    spread = max(1.0, 1.4826 * float(np.median(spreads)))
+    wrong = np.abs(rests) > _REST_SHARE * contrast + _REST_SIGMAS * spread
+    shares = wrong.mean(axis=1) if len(rows) else np.zeros(len(rests))
+    if np.any(shares > _MOST_BROKEN):
+        raise CapturesError(_which_broke(shares, names))
+    _require_one_exposure(pairs, rests, white - black, names)
+    broken = np.zeros(good.shape, dtype=bool)
+    broken[rows, columns] = wrong.any(axis=0)
+    _require_still(stack, good & ~broken, rests[:, ~broken[rows, columns]], names)
+    return broken
+
+
+def _require_linear(
+    pairs: NDArray[np.float32],
+    rests: NDArray[np.float32],
+    contrast: NDArray[np.float32],
+) -> None:
+    """Refuse grey levels that aren't in proportion to light, by half-bright pixels.
+
+    There a frame and its inverse together exceed white if dark tones were lifted, as
+    by a display's gamma; in most of the frames, unlike what befell a single one.
+    """
+    clear = contrast >= 0.5 * float(np.median(contrast))
+    level = (pairs[:, 0, clear] - pairs[:, 1, clear]) / contrast[clear]
+    share = rests[:, clear] / contrast[clear]
+    half = np.abs(level) <= _HALF_BRIGHT
+    excesses = [
+        float(np.median(rest[mid]) - np.median(rest[~mid]))
+        for rest, mid in zip(share, half, strict=True)
+        if min(np.count_nonzero(mid), np.count_nonzero(~mid)) >= _FEWEST_BRIGHT
+    ]
+    excess = float(np.median(excesses)) if excesses else 0.0
+    if not abs(excess) <= _MOST_BENT:
+        raise CapturesError(
+            f"where a frame and its inverse are half bright they add up to "
+            f"{1.0 + excess:.0%} of white: grey levels must be in proportion to light; "
+            f"switch gamma, tone curve and automatic contrast off"
+        )
+
+
+def _which_broke(shares: NDArray[np.float64], names: Sequence[str]) -> str:
+    bad = np.flatnonzero(shares > _MOST_BROKEN)
+    share = float(shares.max())
+    if len(bad) > 0.5 * len(shares) and len(shares) > 2:
+        which = f"{names[0]} or {names[1]}"
+        rule = "is no frame of this sequence, or was exposed otherwise: no frame and "
+        rule += "its inverse add up to them"
+    else:
+        which = ", ".join(
+            f"{names[2 + 2 * b]} and {names[3 + 2 * b]}" for b in bad.tolist()
+        )
+        rule = "don't add up to white and black: exchanged, cut, moved or exposed "
+        rule += "otherwise"
+    return f"{which} {rule} (in {share:.0%} of the lit pixels)"
+
+
+def _require_one_exposure(
+    pairs: NDArray[np.float32],
+    rests: NDArray[np.float32],
+    contrast: NDArray[np.float32],
+    names: Sequence[str],
+) -> None:
+    """Refuse frames brighter or darker than the rest, by the pixels that they light."""
+    drift = np.zeros(pairs.shape[:2])
+    typical = 0.5 * float(np.median(contrast))
+    for b, (frame, inverse) in enumerate(pairs):
+        surely = _SURELY * contrast
+        for side, bright in enumerate((frame - inverse, inverse - frame)):
+            bright = (bright >= surely) & (contrast >= typical)
+            if np.count_nonzero(bright) >= _FEWEST_BRIGHT:
+                rest = float(np.median(rests[b][bright]))
+                drift[b, side] = rest / float(np.median(contrast[bright]))
+    off = np.abs(drift) > _MOST_DRIFT
+    if not off.any():
+        return
+    b, side = np.unravel_index(np.argmax(np.abs(drift)), drift.shape)
+    if np.count_nonzero(off) > 0.5 * off.size and off.size > 2:
+        value, which = -float(np.median(drift)), f"{names[0]} or {names[1]}"
+    else:
+        value, which = float(drift[b, side]), names[2 + 2 * int(b) + int(side)]
+    raise CapturesError(
+        f"{which} is {abs(value):.0%} {'brighter' if value > 0 else 'darker'} than the "
+        f"other frames, at most {_MOST_DRIFT:.0%}: one exposure and gain for all"
+    )
+
+
+def _require_still(
+    stack: Images,
+    good: NDArray[np.bool_],
+    rests: NDArray[np.float32],
+    names: Sequence[str],
+) -> None:
+    """Refuse frames that moved against the others, by least squares over the image.
+
+    The rest is fitted by ``-a . grad I - b . grad W``: a frame that moved by d has
+    a = d, b = 0, its inverse a = -d, b = d, both together b = d, white b = -d.
+    """
+    white = _gradient(stack[0], good)
+    for b, rest in enumerate(rests):
+        terms = np.concatenate([_gradient(stack[2 + 2 * b], good), white])
+        moved, sigma = _least_squares(terms, np.asarray(rest))
+        off = np.maximum(np.hypot(*moved[:2]), np.hypot(*moved[2:]))
+        surely = np.abs(moved) > np.maximum(_MOST_MOVED_PX, _MOVED_SIGMAS * sigma)
+        if surely.any():
+            raise CapturesError(
+                f"{names[2 + 2 * b]}, its inverse or {names[0]} moved by {off:.2g} px "
+                f"against the others, at most {_MOST_MOVED_PX} px: object and devices "
+                f"must stand still"
+            )
+
+
+def _gradient(
+    image: NDArray[np.uint8 | np.float32], good: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Grey levels a pixel along u and v at the good pixels, shape (2, n)."""
+    down, across = map(np.asarray, np.gradient(image.astype(np.float32)))
+    return np.stack([across[good], down[good]]).astype(np.float64)
+
+
+def _least_squares(
+    terms: NDArray[np.float64], rest: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the factors of ``rest = -factors . terms``, and their deviations."""
+    normal = np.linalg.pinv(terms @ terms.T, hermitian=True)
+    factors = -normal @ (terms @ rest)
+    left = rest + factors @ terms
+    variance = float(left @ left) / max(1, len(rest) - len(terms))
+    return factors, np.sqrt(variance * np.maximum(np.diag(normal), 0.0))

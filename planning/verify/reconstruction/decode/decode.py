@@ -1,0 +1,302 @@
+"""Images to measured points, with no knowledge of the object."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from planning.verify.reconstruction.calibration import PairCalibration
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingPatterns
+
+from .edges import SATURATED, Edges, find_edges
+from .triangulate import RingHits, intersect_rings
+
+# Neighbours along a ring edge are looked for this far away in the image [px].
+_NEAR_PX = 2.6
+# Edges in a row that make a piece of surface. Single ones are often false, three hardly
+# more often than a dozen, and ribs are but a few pixels wide.
+_MIN_CHAIN = 3
+# Share of the changes of one bit alone that must name a ring. Rings, however fine and
+# dim, reach 0.95 in every bit, steps of depth included; in the frame that stands in
+# another's place hardly any do. Between the two is an image disordered in part.
+_MIN_NAMED = 1.0 / 3.0
+# A bit is judged by more changes without a name than this share of all, and this many:
+# where few rings flip it, steps of depth may outnumber them.
+_UNNAMED_SHARE = 0.02
+_UNNAMED_LEAST = 10
+# The next ring is looked for this far away [px].
+_NEXT_RING_PX = 100.0
+# Keeps rings apart when neighbours are looked for.
+_RING_APART_PX = 1000.0
+# tan(65 degrees) along a ring, tan(75 degrees) from ring to ring, where a gap is wide
+# enough to mix surface with step.
+_MAX_SLANT = 2.14
+_STEPS_STEEPER = 1.74
+# Saturated pixels that are kept as evidence, about.
+_SATURATED_KEPT = 500
+# Why an edge may give no point, in the order in which it is asked; `fates` counts so.
+CAUSES = (
+    "labels",
+    "no_intersection",
+    "root",
+    "conditioning",
+    "outside_panel",
+    "isolated",
+    "depth_step",
+    "unconfirmed",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Decoded:
+    """What one camera measured under one projector.
+
+    Attributes:
+        cloud: The points, with camera and projector index 0.
+        lit_pixels: Pixels with enough contrast between white and black.
+        n_edges: Edges found, whether a point came of them or not.
+        rejected: Edges that gave no point, by cause.
+        edges: All edges, for the search for causes.
+        fates: Index in `CAUSES` of why each edge gave no point, -1 if it gave one,
+            shape (n_edges,).
+        n_saturated: Pixels that the white frame saturates.
+        saturated: Some of them, (u, v) in the camera's image, shape (k, 2).
+    """
+
+    cloud: Cloud
+    lit_pixels: int
+    n_edges: int
+    rejected: dict[str, int]
+    edges: Edges
+    fates: NDArray[np.int8]
+    n_saturated: int
+    saturated: NDArray[np.float64]
+
+    @classmethod
+    def nothing(cls) -> "Decoded":
+        """Return what a device that is off gives."""
+        fates = np.zeros(0, dtype=np.int8)
+        nowhere = np.zeros((0, 2))
+        return cls(Cloud.empty(), 0, 0, {}, Edges.nothing(), fates, 0, nowhere)
+
+
+def decode(
+    frames: Frames,
+    patterns: RingPatterns,
+    calibration: PairCalibration,
+    *,
+    min_conditioning: float = 0.1,
+    max_slant: float = _MAX_SLANT,
+) -> Decoded:
+    """Measure points from images, pattern definitions and calibration alone.
+
+    Args:
+        frames: Images of one camera under one projector.
+        patterns: What the projector drew.
+        calibration: Of both devices.
+        min_conditioning: Least |r.m|; below it a point is left out.
+        max_slant: Most that a ring may run along the viewing ray on one surface, as the
+            tangent of the incidence at the camera. Where one surface hides another,
+            false edges hang in the step between them; this finds them.
+
+    Raises:
+        ValueError: If the frames aren't as many as the patterns ask for.
+    """
+    if len(frames.stack) != patterns.n_frames:
+        raise ValueError(
+            f"{len(frames.stack)} frames, but {len(patterns.radii)} rings are coded in "
+            f"{patterns.n_frames}: white, black, {patterns.n_bits} bits and the root "
+            f"disc, each with its inverse"
+        )
+    edges, lit_pixels = find_edges(frames, patterns)
+    saturated = np.argwhere(frames.stack[0] >= SATURATED)[:, ::-1] + np.array(
+        frames.corner, dtype=np.float64
+    )
+    # Out of order, what labels are left are chance.
+    return measure_edges(
+        edges,
+        patterns,
+        calibration,
+        lit_pixels,
+        saturated,
+        min_conditioning=min_conditioning,
+        max_slant=max_slant,
+        believed=not _out_of_order(edges),
+    )
+
+
+def measure_edges(
+    edges: Edges,
+    patterns: RingPatterns,
+    calibration: PairCalibration,
+    lit_pixels: int,
+    saturated: NDArray[np.float64],
+    *,
+    min_conditioning: float,
+    max_slant: float = _MAX_SLANT,
+    believed: bool = True,
+) -> Decoded:
+    """Measure the points of labelled edges, wherever the labels come from.
+
+    Args:
+        edges: With a ring and a root each.
+        patterns: Whose rings were drawn.
+        calibration: Of both devices.
+        lit_pixels: Pixels that the projector lights.
+        saturated: Pixels (u, v) that it saturates, shape (k, 2).
+        min_conditioning: As in `decode`.
+        max_slant: As in `decode`.
+        believed: Whether the labels can be; otherwise all are left out.
+    """
+    camera, projector = calibration.camera, calibration.projector
+    rays = camera.rays(edges.pixels)
+    radii = patterns.radii[edges.rings]
+    hits = intersect_rings(camera.centre, rays, radii, edges.roots, projector)
+    length, across = _chains(edges, hits, camera.focal_px, max_slant)
+    causes = {
+        "no_intersection": ~np.isfinite(hits.distances),
+        "root": _doubtful_root(edges, rays, patterns, calibration),
+        "conditioning": ~(np.abs(hits.conditioning) >= min_conditioning),
+        "outside_panel": ~projector.in_panel(projector.panel(hits.points)[0], 1.0),
+        "isolated": length < _MIN_CHAIN,
+        "depth_step": across > _STEPS_STEEPER * max_slant,
+    }
+    kept = np.ones(len(edges), dtype=bool)
+    fates = np.full(len(edges), -1, dtype=np.int8)
+    rejected: dict[str, int] = {}
+    if not believed:
+        causes = {"labels": kept.copy()}
+    for cause, fails in causes.items():
+        rejected[cause] = int(np.count_nonzero(kept & fails))
+        fates[kept & fails] = CAUSES.index(cause)
+        kept &= ~fails
+    return Decoded(
+        _cloud(edges, rays, hits, calibration).take(kept),
+        lit_pixels,
+        len(edges),
+        rejected,
+        edges,
+        fates,
+        len(saturated),
+        saturated[:: max(1, len(saturated) // _SATURATED_KEPT)],
+    )
+
+
+def _doubtful_root(
+    edges: Edges,
+    rays: NDArray[np.float64],
+    patterns: RingPatterns,
+    calibration: PairCalibration,
+) -> NDArray[np.bool_]:
+    """Edges of which both roots, or neither, lie on the side that the disc told.
+
+    The disc was drawn for the planned place of the camera. Where that isn't its
+    measured place, the sign of r.m and the side of the disc differ near its border.
+    """
+    camera, projector = calibration.camera, calibration.projector
+    place = projector.to_ring(camera.centre[None])[0]
+    if np.allclose(place, patterns.camera_in_ring, rtol=0.0, atol=1e-9):
+        return np.zeros(len(edges), dtype=bool)
+
+    def fits(roots: NDArray[np.int8]) -> NDArray[np.bool_]:
+        radii = patterns.radii[edges.rings]
+        points = intersect_rings(camera.centre, rays, radii, roots, projector).points
+        local = projector.to_ring(points)
+        flat = local[:, :2]
+        if patterns.light == "diverging":
+            flat = flat / local[:, 2:]
+        inside = projector.in_panel(projector.panel(points)[0], 1.0)
+        return (np.sign(patterns.root_side(flat)) == edges.roots) & inside
+
+    return fits(edges.roots) == fits(-edges.roots)
+
+
+def _out_of_order(edges: Edges) -> bool:
+    """Whether some frame isn't the bit that it is taken for.
+
+    In a Gray code any change of one bit alone between neighbouring annuli is a ring;
+    with bits exchanged, those of some frames lead to annuli far apart, or to none.
+    """
+    unnamed = edges.flips - edges.named
+    least = max(_UNNAMED_LEAST, _UNNAMED_SHARE * int(edges.flips.sum()))
+    contradicted = (unnamed > least) & (edges.named < _MIN_NAMED * edges.flips)
+    return bool(np.any(contradicted))
+
+
+def _chains(
+    edges: Edges, hits: RingHits, focal_px: float, max_slant: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """How far edges go on as a surface, along their rings and from ring to ring.
+
+    Slant is the change of distance between edges in units of a pixel's width there:
+    the tangent of the incidence in one direction.
+
+    Returns:
+        Edges in the unbroken chain of each, links steeper than `max_slant` left out;
+        and the slant towards the next rings, the lesser of both sides, NaN where
+        neither is near. Both (n,).
+    """
+    length = np.zeros(len(edges), dtype=np.int64)
+    across = np.full(len(edges), np.nan)
+    rows = np.flatnonzero(np.isfinite(hits.distances))
+    if len(rows) == 0:
+        return length, across
+    t = hits.distances[rows]
+    place = np.column_stack([edges.pixels[rows], _RING_APART_PX * edges.rings[rows]])
+    tree = KDTree(place)
+    one, other = tree.query_pairs(_NEAR_PX, output_type="ndarray").T
+    run = np.linalg.norm(place[one] - place[other], axis=1) * (t[one] / focal_px)
+    linked = np.abs(t[one] - t[other]) <= max_slant * run
+    ends = one[linked], other[linked]
+    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(rows), len(rows)))
+    _, chain = connected_components(links, directed=False)
+    length[rows] = np.bincount(chain)[chain]
+
+    def towards(ring: int) -> NDArray[np.float64]:
+        near = place + np.array([0.0, 0.0, ring * _RING_APART_PX])
+        apart, nearest = tree.query(near, distance_upper_bound=_NEXT_RING_PX)
+        found = (nearest < len(rows)) & (apart > 0.5)
+        steps = np.abs(t[np.where(found, nearest, 0)] - t)
+        return np.where(
+            found, steps * focal_px / (np.where(found, apart, 1.0) * t), np.nan
+        )
+
+    across[rows] = np.fmin(towards(1), towards(-1))
+    return length, across
+
+
+def _cloud(
+    edges: Edges,
+    rays: NDArray[np.float64],
+    hits: RingHits,
+    calibration: PairCalibration,
+) -> Cloud:
+    return Cloud(
+        points=hits.points,
+        rays=rays,
+        beams=calibration.projector.beams(hits.points),
+        pixels=edges.pixels,
+        camera=np.zeros(len(edges), dtype=np.int16),
+        projector=np.zeros(len(edges), dtype=np.int16),
+        ring=edges.rings.astype(np.int16),
+        conditioning=hits.conditioning,
+        shift=_shift(edges, rays, hits, calibration),
+        noise_px=edges.noise_px,
+    )
+
+
+def _shift(
+    edges: Edges,
+    rays: NDArray[np.float64],
+    hits: RingHits,
+    calibration: PairCalibration,
+) -> NDArray[np.float64]:
+    """Move of a point on its ring surface with its edge: t dr - r (m.t dr)/(r.m)."""
+    beside = calibration.camera.rays(edges.pixels + 0.5 * edges.across)
+    moved = 2.0 * hits.distances[:, None] * (beside - rays)
+    slide = np.einsum("ij,ij->i", moved, hits.normals)
+    return moved - (slide / hits.conditioning)[:, None] * rays

@@ -1,0 +1,243 @@
+"""Images to labelled ring edges, with no knowledge of the object.
+
+An edge is where the decoded annulus index changes by exactly one between neighbouring
+pixels; which bit flipped says which frame holds the edge, and the zero level of that
+frame's normalised difference between the two pixels is the sub-pixel position.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erfinv
+
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    Frames,
+    Images,
+    RingPatterns,
+)
+
+_MIN_CONTRAST = 10.0
+SATURATED = 254.5
+# Least |I - I_inv| / (W - K) of every bit beside an edge, and of the root bit on it:
+# the level 1.5 px off an edge that is blurred by 6.6 px.
+_MIN_CERTAINTY = 0.18
+# Least contrast of a pixel, as a share of the largest beside it: less is the rim of an
+# object or shadow, whose mixed pixels shift edges.
+_MIN_EVENNESS = 0.6
+# Beyond this an edge is saturated, and its probit says nothing.
+_MAX_LEVEL = 0.98
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Ring edges in one camera's image.
+
+    Attributes:
+        pixels: Sub-pixel positions (u, v) in the camera's image, shape (n, 2).
+        rings: Ring edge of each, shape (n,).
+        roots: Sign of r.m, from the root disc, shape (n,).
+        across: Unit direction in the image across the edge, shape (n, 2).
+        noise_px: Standard deviation of the position along `across` [px], shape (n,).
+        flips: Changes of one bit alone between lit pixels, by bit, shape (n_bits,).
+        named: Those of them that name a ring, shape (n_bits,).
+    """
+
+    pixels: NDArray[np.float64]
+    rings: NDArray[np.int64]
+    roots: NDArray[np.int8]
+    across: NDArray[np.float64]
+    noise_px: NDArray[np.float64]
+    flips: NDArray[np.int64]
+    named: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+    @classmethod
+    def nothing(cls) -> "Edges":
+        """Return no edges."""
+        none, places = np.zeros(0), np.zeros((0, 2))
+        count = np.zeros(0, dtype=np.int64)
+        return cls(
+            places, count, np.zeros(0, np.int8), places, none, count, count.copy()
+        )
+
+
+def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[Edges, int]:
+    """Return the labelled ring edges of a stack of images, and its lit pixels."""
+    reader = _Reader(frames.stack, patterns)
+    noise = reader.grey_noise()
+    along_rows = _crossings(reader, noise)
+    along_columns = _crossings(reader.transposed(), noise)
+    swapped = along_columns.pixels[:, ::-1], along_columns.across[:, ::-1]
+    # A crossing is kept in the one direction that runs more squarely into the edge.
+    a = np.abs(along_rows.across[:, 0]) >= np.abs(along_rows.across[:, 1])
+    b = np.abs(swapped[1][:, 1]) > np.abs(swapped[1][:, 0])
+    edges = Edges(
+        np.concatenate([along_rows.pixels[a], swapped[0][b]]) + np.array(frames.corner),
+        np.concatenate([along_rows.rings[a], along_columns.rings[b]]),
+        np.concatenate([along_rows.roots[a], along_columns.roots[b]]),
+        np.concatenate([along_rows.across[a], swapped[1][b]]),
+        np.concatenate([along_rows.noise_px[a], along_columns.noise_px[b]]),
+        along_rows.flips + along_columns.flips,
+        along_rows.named + along_columns.named,
+    )
+    return edges, int(np.count_nonzero(reader.valid))
+
+
+class _Reader:
+    """Bits, annulus indices and normalised differences of a stack of images.
+
+    Attributes:
+        contrast: White - black, at least 1, shape (h, w).
+        valid: Pixels bright enough under the white frame and not saturated.
+        code: Bits of each pixel.
+        index: Annulus of each pixel, -1 where there is none.
+        sure: Pixels whose every bit stands out.
+        even: Pixels about which the contrast is nearly the same.
+    """
+
+    def __init__(self, stack: Images, patterns: RingPatterns) -> None:
+        self._stack = stack
+        self.patterns = patterns
+        white, black = stack[0].astype(np.float32), stack[1].astype(np.float32)
+        contrast = white - black
+        self.valid = (contrast >= _MIN_CONTRAST) & (white < SATURATED)
+        self.contrast = np.maximum(contrast, np.float32(1.0))
+        code = np.zeros(contrast.shape, dtype=np.int16)
+        least = np.full(contrast.shape, np.inf, dtype=np.float32)
+        for bit in range(patterns.n_bits):
+            difference = self._difference(2 + 2 * bit)
+            code |= (difference > 0.0).astype(np.int16) << bit
+            np.minimum(least, np.abs(difference), out=least)
+        self.code = code
+        self.index = np.where(self.valid, patterns.index_of_code[code], np.int16(-1))
+        self.sure = self.valid & (least >= _MIN_CERTAINTY * self.contrast)
+        self.even = _even(contrast, self.grey_noise())
+
+    def transposed(self) -> "_Reader":
+        """Return the same reader with rows and columns exchanged."""
+        other = object.__new__(_Reader)
+        other._stack = self._stack.transpose(0, 2, 1)
+        other.patterns = self.patterns
+        for name in ("contrast", "valid", "code", "index", "sure", "even"):
+            setattr(other, name, getattr(self, name).T)
+        return other
+
+    def level(
+        self, frame: NDArray[np.int64] | int, i: NDArray[np.int64], j: NDArray[np.int64]
+    ) -> NDArray[np.float32]:
+        """Return (I - I_inv) / (W - K) of a frame at pixels: -1 dark to 1 bright."""
+        stack = self._stack
+        bright = stack[frame, i, j].astype(np.float32)
+        return (bright - stack[frame + 1, i, j]) / self.contrast[i, j]
+
+    def grey_noise(self) -> float:
+        """Return the standard deviation of one frame, from I + I_inv = W + K."""
+        i, j = np.nonzero(self.sure)
+        if len(i) < 100:
+            return 1.0
+        i, j = i[:: max(1, len(i) // 20_000)], j[:: max(1, len(j) // 20_000)]
+        frames = self._stack[:4, i, j].astype(np.float32)
+        rest = frames[2] + frames[3] - frames[0] - frames[1]
+        # Mean absolute values: a median of whole grey levels would be a whole one.
+        return max(0.5 * np.sqrt(0.5 * np.pi) * float(np.mean(np.abs(rest))), 1e-3)
+
+    def _difference(self, frame: int) -> NDArray[np.float32]:
+        return np.subtract(self._stack[frame], self._stack[frame + 1], dtype=np.float32)
+
+
+def _even(contrast: NDArray[np.float32], noise: float) -> NDArray[np.bool_]:
+    """Pixels whose 3 x 3 neighbours' contrast differs by little, noise allowed for."""
+    low, high = np.pad(contrast, 1, mode="edge"), np.pad(contrast, 1, mode="edge")
+    low = np.minimum(np.minimum(low[:-2], low[1:-1]), low[2:])
+    low = np.minimum(np.minimum(low[:, :-2], low[:, 1:-1]), low[:, 2:])
+    high = np.maximum(np.maximum(high[:-2], high[1:-1]), high[2:])
+    high = np.maximum(np.maximum(high[:, :-2], high[:, 1:-1]), high[:, 2:])
+    return low >= np.float32(_MIN_EVENNESS) * high - np.float32(4.0 * noise)
+
+
+def _crossings(reader: _Reader, noise: float) -> Edges:
+    """Edges between pixels of one row, in pixels (column, row) of the reader."""
+    index, sure = reader.index, reader.sure
+    before, after = index[:, 1:-2], index[:, 2:-1]
+    code, usable = reader.code, reader.valid & reader.even
+    found = (code[:, 1:-2] != code[:, 2:-1]) & sure[:, :-3] & sure[:, 3:]
+    found &= usable[:, 1:-2] & usable[:, 2:-1]
+    found[:1] = found[-1:] = False
+    flipped = code[:, 1:-2] ^ code[:, 2:-1]
+    flips = _count_single(flipped[found], reader.patterns.n_bits)
+    found &= (np.abs(after - before) == 1) & (before >= 0) & (after >= 0)
+    named = _count_single(flipped[found], reader.patterns.n_bits)
+    found &= (index[:, :-3] == before) & (index[:, 3:] == after)
+    i, j = np.nonzero(found)
+    j = j + 1
+    rings = np.minimum(index[i, j], index[i, j + 1]).astype(np.int64)
+    frame = 2 + 2 * reader.patterns.flipping_bit[rings]
+    left, right = reader.level(frame, i, j), reader.level(frame, i, j + 1)
+    along = right - left
+    cross = _row_slope(reader, frame, i, j)
+    root_frame = 2 + 2 * reader.patterns.n_bits
+    root = 0.5 * (reader.level(root_frame, i, j) + reader.level(root_frame, i, j + 1))
+    good = ((left > 0.0) != (right > 0.0)) & (np.abs(root) >= _MIN_CERTAINTY)
+    i, j, left, right = i[good], j[good], left[good], right[good]
+    part, spread = _zero_between(left, right)
+    along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
+    slope = np.hypot(along, cross)
+    contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
+    return Edges(
+        np.column_stack([j + part, i.astype(np.float64)]),
+        rings[good],
+        np.where(root[good] > 0.0, 1, -1).astype(np.int8),
+        np.column_stack([along, cross]) / slope[:, None],
+        np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope,
+        flips,
+        named,
+    )
+
+
+def _count_single(flipped: NDArray[np.int16], n_bits: int) -> NDArray[np.int64]:
+    """Count the changes of one bit alone, by bit; between rings there are no others."""
+    count = np.bincount(flipped, minlength=1 << n_bits)
+    return count[1 << np.arange(n_bits)].astype(np.int64)
+
+
+def _zero_between(
+    left: NDArray[np.float32], right: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where between two pixels a blurred step crosses zero, and how surely.
+
+    A blurred step is an error function, whose inverse makes it a straight line: with
+    a, b = erfinv(left), erfinv(right) the crossing is at a / (a - b).
+
+    Args:
+        left: Level at 0, of the other sign than `right`, shape (n,).
+        right: Level at 1, shape (n,).
+
+    Returns:
+        Position in [0, 1], and its standard deviation for levels that have one of 1.
+    """
+    a, b = (
+        erfinv(np.clip(level, -_MAX_LEVEL, _MAX_LEVEL).astype(np.float64))
+        for level in (left, right)
+    )
+    rise = np.square(a - b)
+    spread = np.hypot(b * np.exp(a * a), a * np.exp(b * b)) / rise
+    return a / (a - b), 0.5 * np.sqrt(np.pi) * spread
+
+
+def _row_slope(
+    reader: _Reader,
+    frame: NDArray[np.int64],
+    i: NDArray[np.int64],
+    j: NDArray[np.int64],
+) -> NDArray[np.float32]:
+    """Change of the level from row to row at an edge; 0 beside unlit pixels."""
+    below, above = (
+        reader.level(frame, i + side, j) + reader.level(frame, i + side, j + 1)
+        for side in (1, -1)
+    )
+    valid = reader.valid
+    lit = valid[i + 1, j] & valid[i + 1, j + 1] & valid[i - 1, j] & valid[i - 1, j + 1]
+    return np.where(lit, np.float32(0.25) * (below - above), np.float32(0.0))

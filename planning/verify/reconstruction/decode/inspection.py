@@ -1,0 +1,206 @@
+"""Whether images can be what they are taken for, from their pixels alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_opening
+
+from planning.model.errors import CapturesError
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    Frames,
+    Images,
+    RingPatterns,
+)
+
+from .adding_up import broken_pixels
+
+# A pixel is lit if white exceeds black by this many levels of 255, as in the decoder.
+_LIT = 10.0
+_LIT_BY_BITS = 20.0
+_FEWEST_LIT = 100
+# From this level of 255 on, or where levels pile up, a sensor is taken to be clipped.
+_CLIPPED = 250.0
+_PILED = 50
+_PILE = 4.0
+_MOST_CLIPPED = 0.5
+# Pixels left out, and codes that no annulus has, are worth a word from these shares on.
+_WORTH_A_WORD = 0.01
+_MOST_STRANGE = 0.02
+_SURE = 0.25
+# Pixels beyond the lit ones that the decoder needs about them.
+_MARGIN_PX = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Inspected:
+    """Images that may be decoded.
+
+    Attributes:
+        frames: The lit part; pixels that can't be trusted are made dark.
+        notes: A clause for each reason for which pixels were left out.
+    """
+
+    frames: Frames
+    notes: tuple[str, ...]
+
+
+class DarkError(CapturesError):
+    """White is no brighter than black; whether light should be there, others know."""
+
+
+def inspect(stack: Images, patterns: RingPatterns, names: Sequence[str]) -> Inspected:
+    """Hold the images of a camera under a projector against each other.
+
+    Args:
+        stack: White, black, bits and root disc with their inverses, (n_frames, h, w),
+            levels 0 to 255, of the camera's whole image.
+        patterns: What the projector drew.
+        names: Of the frames.
+
+    Raises:
+        CapturesError: If the images contradict each other or the patterns.
+        DarkError: If there is no light.
+    """
+    part, corner = _lit_part(stack)
+    lit = _lit(part)
+    clipped = _clipped(part, lit, names)
+    notes: list[str] = []
+    share = _share(clipped, lit)
+    if share > _WORTH_A_WORD:
+        notes.append(f"{share:.1%} of the lit pixels are clipped and left out")
+    _require_different(part, names)
+    good = lit & ~clipped
+    broken = broken_pixels(part, good, names)
+    _require_codes(part, good & ~broken, patterns)
+    share = _share(broken, good)
+    if share > _WORTH_A_WORD:
+        notes.append(
+            f"{share:.1%} of the lit pixels are left out: frames and inverses there "
+            f"don't add up to white and black"
+        )
+    frames = part.copy()
+    # Without contrast nothing is decoded; what is clipped stays so for all to see.
+    frames[:, broken] = 0
+    frames[:, clipped] = 255
+    return Inspected(Frames(frames, corner), tuple(notes))
+
+
+def _lit(stack: Images) -> NDArray[np.bool_]:
+    """Pixels that get light: in white, or in the first bits and their inverses.
+
+    Two of them, so that a single damaged frame lights nothing; what is isolated is
+    noise.
+    """
+    black = stack[1].astype(np.float32)
+    sums = [np.add(stack[k], stack[k + 1], dtype=np.float32) for k in (2, 4)]
+    by_bits = np.minimum(*sums) - 2.0 * black >= _LIT_BY_BITS
+    opened = np.asarray(binary_opening(by_bits, np.ones((3, 3))), dtype=bool)
+    return (_contrast(stack) >= _LIT) | opened
+
+
+def _contrast(stack: Images) -> NDArray[np.float32]:
+    return np.subtract(stack[0], stack[1], dtype=np.float32)
+
+
+def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+    return float(np.count_nonzero(part & whole) / max(1, np.count_nonzero(whole)))
+
+
+def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
+    """Return the part of the images that holds all lit pixels, and its corner (u, v).
+
+    Raises:
+        CapturesError: If white is darker than black.
+        DarkError: If there is no light.
+    """
+    contrast, lit = _contrast(stack), _lit(stack)
+    n_lit = int(np.count_nonzero(contrast >= _LIT))
+    n_below = int(np.count_nonzero(contrast <= -_LIT))
+    if n_below > max(n_lit, _FEWEST_LIT):
+        raise CapturesError(
+            f"white is darker than black in {n_below} pixels, brighter in {n_lit}: "
+            f"the two were exchanged, or are frames of something else"
+        )
+    if n_lit < _FEWEST_LIT:
+        levels = [float(np.median(image)) for image in stack[:2]]
+        raise DarkError(
+            f"no light: white exceeds black by {_LIT:.0f} of 255 in {n_lit} pixels "
+            f"(median levels {levels[0]:.0f} and {levels[1]:.0f}); light the object, "
+            f"or expose longer; shorter if both are near 255"
+        )
+    rows, columns = (np.flatnonzero(lit.any(axis=axis)) for axis in (1, 0))
+    top, left = (max(0, int(place[0]) - _MARGIN_PX) for place in (rows, columns))
+    bottom, right = (int(place[-1]) + 1 + _MARGIN_PX for place in (rows, columns))
+    return stack[:, top:bottom, left:right], (left, top)
+
+
+def _clipped(
+    stack: Images, lit: NDArray[np.bool_], names: Sequence[str]
+) -> NDArray[np.bool_]:
+    """Pixels in which any frame reaches what the sensor can tell apart at most.
+
+    Raises:
+        CapturesError: If most of the lit ones are.
+    """
+    level = min(_CLIPPED, _piled_level(stack[0]))
+    clipped = stack.max(axis=0) >= level
+    share = _share(clipped, lit)
+    if share <= _MOST_CLIPPED:
+        return clipped
+    by_frame = [_share(image >= level, lit) for image in stack]
+    worst = int(np.argmax(by_frame))
+    if by_frame[worst] > 2.0 * by_frame[0]:
+        raise CapturesError(
+            f"{names[worst]} is clipped in {by_frame[worst]:.0%} of the lit pixels, "
+            f"{names[0]} in {by_frame[0]:.0%}: it isn't of the same exposure"
+        )
+    raise CapturesError(
+        f"over-exposed: {share:.0%} of the lit pixels are clipped; shorten the "
+        f"exposure until {names[0]} keeps below {_CLIPPED:.0f} of 255"
+    )
+
+
+def _piled_level(white: NDArray[np.uint8 | np.float32]) -> float:
+    """Return the brightest level if pixels pile up there, inf if they don't.
+
+    A sensor may be full before its numbers are.
+    """
+    levels, counts = np.unique(white, return_counts=True)
+    if len(levels) < 2 or counts[-1] < _PILED or counts[-1] < _PILE * counts[-2]:
+        return float("inf")
+    return float(levels[-1])
+
+
+def _require_different(stack: Images, names: Sequence[str]) -> None:
+    """Refuse two frames of the same pixels: noise makes any two differ."""
+    seen: dict[int, int] = {}
+    for k, image in enumerate(stack):
+        before = seen.setdefault(hash(image.tobytes()), k)
+        if before != k and np.array_equal(image, stack[before]):
+            raise CapturesError(
+                f"{names[before]} and {names[k]} are the same image; take it again"
+            )
+
+
+def _require_codes(
+    stack: Images, good: NDArray[np.bool_], patterns: RingPatterns
+) -> None:
+    """Refuse images whose pixels hold codes that the projector never drew."""
+    rows, columns = np.nonzero(good & (_contrast(stack) >= _LIT))
+    contrast = _contrast(stack)[rows, columns]
+    code = np.zeros(len(rows), dtype=np.int64)
+    sure = np.ones(len(rows), dtype=bool)
+    for bit in range(patterns.n_bits):
+        pair = stack[2 + 2 * bit : 4 + 2 * bit, rows, columns].astype(np.float32)
+        level = pair[0] - pair[1]
+        code |= (level > 0.0).astype(np.int64) << bit
+        sure &= np.abs(level) >= _SURE * contrast
+    strange = patterns.index_of_code[code[sure]] < 0
+    share = float(strange.mean()) if len(strange) else 0.0
+    if share > _MOST_STRANGE:
+        raise CapturesError(
+            f"{share:.0%} of the lit pixels hold codes of no ring: a bit exchanged "
+            f"with another or its inverse, or frames of another projector"
+        )

@@ -1,0 +1,108 @@
+"""Ray meets ring surface: a cylinder in parallel light, a cone in diverging light."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.verify.reconstruction.calibration import ProjectorCalibration
+
+
+@dataclass(frozen=True, eq=False)
+class RingHits:
+    """Where rays meet the ring surfaces that they were labelled with.
+
+    Attributes:
+        points: In the world [m], shape (n, 3); NaN where there is no intersection.
+        distances: Along the rays [m], shape (n,).
+        normals: Unit normals m of the ring surfaces in the world, shape (n, 3).
+        conditioning: r.m, shape (n,).
+    """
+
+    points: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    conditioning: NDArray[np.float64]
+
+
+def intersect_rings(
+    origin: NDArray[np.float64],
+    rays: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    roots: NDArray[np.int8],
+    projector: ProjectorCalibration,
+) -> RingHits:
+    """Intersect viewing rays with ring surfaces, taking the root that the disc told.
+
+    In ring coordinates, o the origin and q the direction, b = sign(r.m) the root bit::
+
+        A = qx^2 + qy^2 - k qz^2,  B = ox qx + oy qy - k oz qz
+        C = ox^2 + oy^2 - k oz^2 - c,   t = (-B + b sqrt(B^2 - A C)) / A
+
+    with k = 0, c = R^2 for the cylinder and k = R^2, c = 0 for the cone. Of the two
+    forms of t the one that doesn't subtract nearly equal numbers is used.
+
+    Args:
+        origin: Optical centre in the world [m], shape (3,).
+        rays: Unit directions in the world, shape (n, 3).
+        radii: R of each ray's ring: [m], or a tangent in diverging light, shape (n,).
+        roots: Sign of r.m for each ray, shape (n,).
+        projector: Calibration that holds the ring frame.
+
+    Returns:
+        Points and conditioning; NaN where a ray misses, where the point lies behind
+        the camera or, for a cone, behind the projector.
+    """
+    o = projector.to_ring(origin[None])[0]
+    q = rays @ projector.world_from_ring[:3, :3]
+    t = _distance(o, q, radii, roots.astype(np.float64), projector.light)
+    with np.errstate(invalid="ignore"):
+        bad = ~(t > 0.0)
+        if projector.light == "diverging":
+            bad |= ~(o[2] + t * q[:, 2] > 0.0)
+    t = np.where(bad, np.nan, t)
+    local = o + t[:, None] * q
+    normals = _ring_normals(local, radii, projector.light)
+    return RingHits(
+        points=origin + t[:, None] * rays,
+        distances=t,
+        normals=normals @ projector.world_from_ring[:3, :3].T,
+        conditioning=np.einsum("ij,ij->i", q, normals),
+    )
+
+
+def _distance(
+    o: NDArray[np.float64],
+    q: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    root: NDArray[np.float64],
+    light: Literal["diverging", "parallel"],
+) -> NDArray[np.float64]:
+    square = radii * radii
+    k, c = (square, 0.0) if light == "diverging" else (0.0, square)
+    qx, qy, qz = q.T
+    a = qx * qx + qy * qy - k * qz * qz
+    b = o[0] * qx + o[1] * qy - k * o[2] * qz
+    constant = o[0] ** 2 + o[1] ** 2 - k * o[2] ** 2 - c
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = np.sqrt(b * b - a * constant)
+        sign = np.where(b < 0.0, -1.0, 1.0)
+        e = -(b + sign * spread)
+        return np.where(root == sign, constant / e, e / a)
+
+
+def _ring_normals(
+    local: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    light: Literal["diverging", "parallel"],
+) -> NDArray[np.float64]:
+    x, y = local[:, 0], local[:, 1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        across = np.hypot(x, y)
+        if light == "parallel":
+            return np.column_stack([x / across, y / across, np.zeros_like(across)])
+        return (
+            np.column_stack([x / across, y / across, -radii])
+            / np.sqrt(1.0 + radii * radii)[:, None]
+        )

@@ -1,0 +1,169 @@
+"""A diagnosis in a sentence, with sizes and an "as if"."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.calibration import (
+    ProjectorCalibration,
+    calibrate_projector,
+)
+
+from .corrections import Device
+from .diagnosis import Cause, Explanation
+from .supposed import GRAZING, incidence_cosine
+
+_MM = 1e3
+# Turns below this aren't worth a word [rad].
+_NO_TURN = np.deg2rad(0.005)
+# An axis that passes the object by more than this share of its distance isn't aimed.
+_MOST_ASIDE = 0.5
+
+
+def in_words(cause: Cause, plan: RigPlan) -> str:
+    """Return what a cause looks like, and how far the edges were off their rings.
+
+    Args:
+        cause: The equally good explanations.
+        plan: Whose devices it names.
+    """
+    looks = [_looks(explanation, plan) for explanation in cause.explanations]
+    left = cause.explanations[0].left_m
+    return (
+        f"{' or '.join(looks)} (that takes the edges' mean distance from their rings "
+        f"from {_MM * cause.before_m:.3f} to {_MM * left:.3f} mm)"
+    )
+
+
+def _looks(explanation: Explanation, plan: RigPlan) -> str:
+    correction = explanation.correction
+    if correction.role is None:
+        return _object_looks(explanation)
+    devices = plan.cameras if correction.role == "cameras" else plan.projectors
+    names = [devices[index].id for index in correction.devices]
+    if correction.kind == "swap":
+        return f"{' and '.join(names)} look swapped"
+    index = correction.devices[0]
+    before: Device = getattr(explanation.before, correction.role)[index]
+    after: Device = getattr(explanation.after, correction.role)[index]
+    if correction.kind == "focal":
+        return f"{names[0]} looks as if {_focal(before, after)}"
+    away = float(np.linalg.norm(explanation.before.body.centre - before.centre))
+    looks = f"{names[0]} looks as if it {_displaced(before, after, away)}"
+    if isinstance(before, ProjectorCalibration):
+        assert isinstance(after, ProjectorCalibration)
+        looks += _grazing(before, after, plan)
+    if correction.role == "cameras":
+        looks += _too_wide(names[0], after, plan)
+    return looks
+
+
+def _object_looks(explanation: Explanation) -> str:
+    before, after = explanation.before.body, explanation.after.body
+    change = after.scale / before.scale - 1.0
+    turn = _angle(after.turn @ before.turn.T)
+    shift = float(np.linalg.norm(after.shift - before.shift))
+    words: list[str] = []
+    if explanation.correction.kind != "moved":
+        words.append(f"{_per_cent(change)} {'larger' if change > 0 else 'smaller'}")
+    if explanation.correction.kind != "scale":
+        words.append(f"moved by {_two_digits(_MM * shift)} mm")
+        if turn > _NO_TURN:
+            words.append(f"turned by {_two_digits(np.rad2deg(turn))} degrees")
+    return f"the object looks {', '.join(words)} against the mesh"
+
+
+def _focal(before: Device, after: Device) -> str:
+    change = float(after.matrix[0, 0] / before.matrix[0, 0]) - 1.0
+    longer = "longer" if change > 0.0 else "shorter"
+    return f"its focal length were {_per_cent(change)} {longer}"
+
+
+def _displaced(before: Device, after: Device, away: float) -> str:
+    moved = float(np.linalg.norm(after.centre - before.centre))
+    turns = after.world_from_device[:3, :3], before.world_from_device[:3, :3]
+    angle = _angle(turns[0] @ turns[1].T)
+    words: list[str] = []
+    if angle > _NO_TURN:
+        axes = (after.world_from_device[:3, 2], before.world_from_device[:3, 2])
+        aside = away * _aside(*axes)
+        least = "at least " * isinstance(before, ProjectorCalibration)
+        turned = f"were turned by {least}{_two_digits(np.rad2deg(angle))} degrees"
+        if aside < _MOST_ASIDE * away:
+            turned += f" (aimed {_millimetres(aside)} off at the object)"
+        words.append(turned)
+    if moved > 0.0:
+        words.append(f"stood {_millimetres(moved)} from its place")
+    return " and ".join(words) or "were not moved"
+
+
+def _grazing(
+    before: ProjectorCalibration, after: ProjectorCalibration, plan: RigPlan
+) -> str:
+    """Say at what angle the target is lit that the projector should serve.
+
+    That is what it would meet more squarely than any other projector of the plan.
+    """
+    mesh = plan.surface.mesh
+    target = plan.surface.target_faces(plan.requirements.target)
+    middles, normals = mesh.face_centroids[target], mesh.face_normals[target]
+    areas = mesh.face_areas[target]
+    each = [
+        incidence_cosine(calibrate_projector(p), middles, normals)
+        for p in plan.projectors
+    ]
+    planned = incidence_cosine(before, middles, normals)
+    limit = np.cos(plan.requirements.projector.max_incidence)
+    own = (planned >= limit) & (planned >= np.max(each, axis=0))
+    if not own.any():
+        return ""
+    lit = incidence_cosine(after, middles[own], normals[own])
+    order = np.argsort(lit)
+    half = np.searchsorted(np.cumsum(areas[own][order]), 0.5 * areas[own].sum())
+    angle = float(np.arccos(np.clip(lit[order[half]], -1.0, 1.0)))
+    if angle < GRAZING:
+        return ""
+    return (
+        f", so that it meets the surface that it should serve at "
+        f"{np.rad2deg(angle):.0f} degrees (median): grazing"
+    )
+
+
+def _millimetres(length: float) -> str:
+    """Return a length in [m] in words."""
+    return f"{_two_digits(_MM * length)} mm"
+
+
+def _two_digits(value: float) -> str:
+    """Return a number in words: two digits, whole from 10 on, never an exponent."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+
+
+def _too_wide(name: str, after: Device, plan: RigPlan) -> str:
+    """Name a baseline of the plan that exceeds its limit with the camera so placed."""
+    centres = {c.id: c.world_from_device[:3, 3] for c in plan.cameras}
+    for row in plan.document.get("baselines") or ():
+        if name not in row["cameras"] or row["d_max"] is None:
+            continue
+        (other,) = (one for one in row["cameras"] if one != name)
+        d = float(np.linalg.norm(after.centre - centres[other]))
+        if row["d"] < row["d_max"] < d:
+            return (
+                f", which makes its baseline to {other} {_MM * d:.1f} mm: too wide, "
+                f"eq. (10) allows {_MM * row['d_max']:.1f} mm"
+            )
+    return ""
+
+
+def _angle(turn: NDArray[np.float64]) -> float:
+    return float(Rotation.from_matrix(turn).magnitude())
+
+
+def _aside(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Tangent of the angle between two unit vectors."""
+    return float(np.linalg.norm(np.cross(one, other)) / max(float(one @ other), 1e-3))
+
+
+def _per_cent(change: float) -> str:
+    return f"{_two_digits(100.0 * abs(change))} %"

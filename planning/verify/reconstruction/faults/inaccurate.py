@@ -1,0 +1,127 @@
+"""What points that are off the mesh have in common, no device being displaced."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.rays.proximity import closest_points
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.cloud import Cloud
+
+from .supposed import GRAZING
+
+_MM = 1e3
+# Points of each pair that are looked at.
+_POINTS_A_PAIR = 1000
+# A projector counts if so many of the points that are off are its own.
+_MUCH = 0.25
+
+
+def where_inaccurate(plan: RigPlan, cloud: Cloud) -> str:
+    """Say what the points that are off have in common, nothing being displaced."""
+    limit = plan.requirements.check.max_rms_m
+    few = cloud.take(_some_of_each_pair(cloud))
+    mesh = plan.surface.mesh
+    nearest = closest_points(mesh, few.points)
+    error = np.abs(nearest.distances)
+    far = error > limit
+    cosine = -np.einsum("ij,ij->i", few.beams, mesh.face_normals[nearest.faces])
+    grazing = _grazing(plan, few.projector[far], cosine[far])
+    if grazing:
+        return (
+            f"the points that are off were lit at grazing incidence, where edges "
+            f"smear: {', '.join(grazing)} (median)"
+        )
+    medians = _pair_medians(few, error, len(plan.projectors), len(plan.cameras))
+    off = medians > limit
+    if not off.any():
+        return (
+            "most points of every pair are accurate: the rest, or the surface that is "
+            "missing, lies where few rings reach"
+        )
+    known = np.isfinite(medians)
+    if np.all(off[known]):
+        return (
+            f"every pair of devices is off (median error "
+            f"{_MM * np.nanmin(medians):.3f} to {_MM * np.nanmax(medians):.3f} mm), "
+            f"and no change of one device, nor of the object's place or size, explains "
+            f"it: the object isn't the mesh of the plan, or several devices differ"
+        )
+    ids = tuple(p.id for p in plan.projectors), tuple(c.id for c in plan.cameras)
+    return _name_devices(off, known, medians, *ids)
+
+
+def _grazing(
+    plan: RigPlan, projector: NDArray[np.int16], cosine: NDArray[np.float64]
+) -> list[str]:
+    """Name projectors whose points among those that are off are lit at grazing light.
+
+    Args:
+        plan: Of the rig.
+        projector: Of each point that is off, shape (n,).
+        cosine: Of the incidence of its light, shape (n,).
+    """
+    names: list[str] = []
+    for p, device in enumerate(plan.projectors):
+        own = projector == p
+        if len(own) and np.mean(own) > _MUCH:
+            lit = float(np.median(cosine[own]))
+            if lit < np.cos(GRAZING):
+                angle = np.rad2deg(np.arccos(np.clip(lit, -1.0, 1.0)))
+                names.append(f"{device.id} at {angle:.0f} degrees")
+    return names
+
+
+def _some_of_each_pair(cloud: Cloud) -> NDArray[np.int64]:
+    chosen: list[NDArray[np.int64]] = []
+    pair = cloud.projector.astype(np.int64) << 16 | cloud.camera
+    for key in np.unique(pair):
+        rows = np.flatnonzero(pair == key)
+        chosen.append(rows[:: -(-len(rows) // _POINTS_A_PAIR)])
+    return np.concatenate(chosen)
+
+
+def _pair_medians(
+    cloud: Cloud, error: NDArray[np.float64], n_projectors: int, n_cameras: int
+) -> NDArray[np.float64]:
+    """Median error of each pair [m], NaN where it has no point."""
+    medians = np.full((n_projectors, n_cameras), np.nan)
+    for p in range(n_projectors):
+        for c in range(n_cameras):
+            own = (cloud.projector == p) & (cloud.camera == c)
+            if own.any():
+                medians[p, c] = np.median(error[own])
+    return medians
+
+
+def _name_devices(
+    off: NDArray[np.bool_],
+    known: NDArray[np.bool_],
+    medians: NDArray[np.float64],
+    projectors: tuple[str, ...],
+    cameras: tuple[str, ...],
+) -> str:
+    """Name the devices whose every pair is off, if they account for all that is."""
+    bad_cameras = np.all(off | ~known, axis=0)
+    bad_projectors = np.all(off | ~known, axis=1)
+    cameras_off = [name for name, bad in zip(cameras, bad_cameras, strict=True) if bad]
+    projectors_off = [
+        name for name, bad in zip(projectors, bad_projectors, strict=True) if bad
+    ]
+    by_camera = np.tile(bad_cameras, (len(projectors), 1))
+    by_projector = np.tile(bad_projectors[:, None], len(cameras))
+    explanations: tuple[tuple[list[str], NDArray[np.bool_]], ...] = (
+        (projectors_off, by_projector),
+        (cameras_off, by_camera),
+        (projectors_off + cameras_off, by_camera | by_projector),
+    )
+    for names, blamed in explanations:
+        if names and not np.any(off & ~blamed):
+            rest = known & ~blamed
+            verb = "differs" if len(names) == 1 else "differ"
+            return (
+                f"{' and '.join(names)} {verb} from the plan in pose or optics: median "
+                f"error {_MM * np.median(medians[off]):.3f} mm, of the other pairs "
+                f"{_MM * np.median(medians[rest]):.3f} mm"
+            )
+    pairs = ", ".join(f"{projectors[p]} with {cameras[c]}" for p, c in np.argwhere(off))
+    return f"some pairs of devices are off and others aren't: {pairs}"

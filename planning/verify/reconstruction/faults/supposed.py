@@ -1,0 +1,260 @@
+"""Ring edges against the mesh, were the devices and the object placed otherwise.
+
+A decoded edge says: at this pixel of this camera lies ring k of this projector.
+Wherever the devices are supposed to stand, the pixel's ray meets the mesh in a point,
+and the projector draws something there: how far that is from ring k is the mismatch. It
+needs no root of a cone and no nearest point, and so stays smooth far from the truth.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from planning.model.plan import RigPlan
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.decode.decode import Decoded
+from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
+
+Role = Literal["cameras", "projectors"]
+# Edges of each pair of devices that are looked at.
+EDGES_A_PAIR = 240
+# Incidence of light beyond which edges smear: formulation.md section 2 [rad].
+GRAZING = np.deg2rad(70.0)
+# Pairs with fewer edges say nothing.
+_LEAST_EDGES = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """The mesh, and where and how large the object is supposed to be against it.
+
+    A vertex v of the mesh is at ``centre + scale turn (v - centre) + shift``.
+
+    Attributes:
+        mesh: Of the plan.
+        caster: Casts rays against it.
+        centre: Fixed point of turn and scale in the world [m], shape (3,).
+        turn: Rotation, shape (3, 3).
+        scale: Size over that of the mesh.
+        shift: In [m], shape (3,).
+    """
+
+    mesh: TriangleMesh
+    caster: RayCaster
+    centre: NDArray[np.float64]
+    turn: NDArray[np.float64]
+    scale: float
+    shift: NDArray[np.float64]
+
+    def hits(
+        self, origin: NDArray[np.float64], rays: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return where rays (n, 3) meet it, NaN where they don't, and the faces."""
+        back = self.turn / self.scale
+        start = self.centre + (origin - self.centre - self.shift) @ back
+        faces, distances = self.caster.first_hits(start, rays @ self.turn)
+        reach = np.where(faces >= 0, self.scale * distances, np.nan)
+        return origin + reach[:, None] * rays, faces
+
+    def normals(self, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return unit normals of faces in the world, shape (n, 3)."""
+        return self.mesh.face_normals[faces] @ self.turn.T
+
+
+@dataclass(frozen=True, eq=False)
+class Supposed:
+    """How everything is supposed to stand; devices in the order of the plan."""
+
+    cameras: tuple[CameraCalibration, ...]
+    projectors: tuple[ProjectorCalibration, ...]
+    body: Object
+
+    @classmethod
+    def of(cls, plan: RigPlan) -> "Supposed":
+        """Return what the plan says."""
+        mesh = plan.surface.mesh
+        return cls(
+            tuple(calibrate_camera(camera) for camera in plan.cameras),
+            cls.designs(plan),
+            Object(
+                mesh,
+                RayCaster(mesh, threads=1),
+                mesh.centre,
+                np.eye(3),
+                1.0,
+                np.zeros(3),
+            ),
+        )
+
+    @staticmethod
+    def designs(plan: RigPlan) -> tuple[ProjectorCalibration, ...]:
+        """Return the projectors as their patterns were drawn for them."""
+        return tuple(calibrate_projector(projector) for projector in plan.projectors)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Some labelled edges of every pair of devices.
+
+    Attributes:
+        pixels: Sub-pixel positions (u, v), shape (n, 2).
+        radii: Ring that each edge is said to lie on, as in the plan, shape (n,).
+        camera: Index of the camera, shape (n,).
+        projector: Index of the projector, shape (n,).
+        noise_px: Standard deviation of the edge's position across itself [px], (n,).
+        designs: Projectors as the patterns were drawn for them.
+    """
+
+    pixels: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    camera: NDArray[np.int64]
+    projector: NDArray[np.int64]
+    noise_px: NDArray[np.float64]
+    designs: tuple[ProjectorCalibration, ...]
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+    def index(self, role: Role) -> NDArray[np.int64]:
+        """Return which device of a role each edge is of, shape (n,)."""
+        return self.camera if role == "cameras" else self.projector
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Return the pairs of projector and camera that there are edges of."""
+        both = zip(self.projector.tolist(), self.camera.tolist(), strict=True)
+        return sorted(set(both))
+
+    def take(self, chosen: NDArray[np.int64]) -> "Evidence":
+        """Return some of the edges."""
+        return Evidence(
+            self.pixels[chosen],
+            self.radii[chosen],
+            self.camera[chosen],
+            self.projector[chosen],
+            self.noise_px[chosen],
+            self.designs,
+        )
+
+    @classmethod
+    def at(
+        cls, plan: RigPlan, pixels: NDArray[np.float64], p: int, c: int
+    ) -> "Evidence":
+        """Return pixels (n, 2) of one pair that are on no ring in particular."""
+        n = len(pixels)
+        index = np.full(n, c), np.full(n, p)
+        return cls(pixels, np.zeros(n), *index, np.zeros(n), Supposed.designs(plan))
+
+    @classmethod
+    def of(
+        cls, plan: RigPlan, decoded: list[tuple[tuple[int, int], Decoded]]
+    ) -> "Evidence":
+        """Take as many edges of each pair, evenly; none with disordered labels."""
+        parts = [cls.at(plan, np.zeros((0, 2)), 0, 0)]
+        for (p, c), pair in decoded:
+            edges = pair.edges
+            if len(edges) < _LEAST_EDGES or pair.rejected.get("labels", 0):
+                continue
+            rows = np.linspace(0, len(edges) - 1, min(EDGES_A_PAIR, len(edges)))
+            rows = rows.astype(np.int64)
+            radii = plan.projectors[p].ring_radii[edges.rings[rows]]
+            part = cls.at(plan, edges.pixels[rows], p, c)
+            noise = edges.noise_px[rows]
+            parts.append(replace(part, radii=radii, noise_px=noise))
+        return cls(
+            np.concatenate([part.pixels for part in parts]),
+            np.concatenate([part.radii for part in parts]),
+            np.concatenate([part.camera for part in parts]),
+            np.concatenate([part.projector for part in parts]),
+            np.concatenate([part.noise_px for part in parts]),
+            parts[0].designs,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where the rays of edges meet the object, shape (n, 3), NaN where they don't.
+
+    Attributes:
+        points: In the world [m].
+        normals: Unit normals there.
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+
+
+def places(evidence: Evidence, supposed: Supposed) -> Places:
+    """Return where edges lie on the object; the projectors don't matter."""
+    n = len(evidence)
+    points, normals = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    for c in np.unique(evidence.camera):
+        own = np.flatnonzero(evidence.camera == c)
+        camera = supposed.cameras[c]
+        rays = camera.rays(evidence.pixels[own])
+        whole = np.isfinite(rays[:, 0])
+        hits, faces = supposed.body.hits(camera.centre, rays[whole])
+        points[own[whole]] = hits
+        normals[own[whole]] = supposed.body.normals(faces)
+    return Places(points, normals)
+
+
+def mismatches(
+    evidence: Evidence, supposed: Supposed, at: Places
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far edges are off their rings, and how squarely they are lit.
+
+    With X where the edge lies, z its depth before the projector, and rho the ring
+    coordinate of the projector's pixel that lights X (as the patterns were drawn), the
+    mismatch is ``(rho - R) z / sqrt(1 + R^2)``, in parallel light ``rho - R``.
+
+    Args:
+        evidence: The edges.
+        supposed: How everything is supposed to stand.
+        at: Where the edges lie.
+
+    Returns:
+        Mismatch in [m], NaN where the object is missed or faces away from the light,
+        and the cosine of the incidence of the light, shape (n,).
+    """
+    mismatch, cosine = np.full((2, len(evidence)), np.nan)
+    for p in np.unique(evidence.projector):
+        own = np.flatnonzero(evidence.projector == p)
+        projector, design = supposed.projectors[p], evidence.designs[p]
+        points, radii = at.points[own], evidence.radii[own]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            pixels, depth = projector.panel(points)
+            plane = ring_plane(design, pixels)
+            off = np.hypot(plane[:, 0], plane[:, 1]) - radii
+            if design.light == "diverging":
+                off = off * depth / np.sqrt(1.0 + radii * radii)
+            cosine[own] = incidence_cosine(projector, points, at.normals[own])
+        mismatch[own] = off
+    return np.where(cosine > 0.0, mismatch, np.nan), cosine
+
+
+def incidence_cosine(
+    projector: ProjectorCalibration,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the cosine of the incidence of a projector's light, shadows left aside.
+
+    Args:
+        projector: As it is supposed to stand.
+        points: Of the surface [m], shape (n, 3).
+        normals: Unit normals there, shape (n, 3).
+    """
+    if projector.light == "parallel":
+        return -(normals @ projector.axis)
+    beams = points - projector.centre
+    beams = beams / np.linalg.norm(beams, axis=1, keepdims=True)
+    return -np.einsum("ij,ij->i", beams, normals)

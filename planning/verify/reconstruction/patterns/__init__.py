@@ -1,0 +1,1 @@
+"""What each projector shows: ring patterns, frames, files."""

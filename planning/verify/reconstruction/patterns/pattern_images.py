@@ -1,0 +1,128 @@
+"""Pattern frames as grey images of a projector's own resolution.
+
+Edges are anti-aliased: a pixel that a ring edge crosses gets the share of it that is
+bright, (rho - R) / |grad rho| + 1/2 held within [0, 1], with rho the ring coordinate of
+its centre. Half way between, frame and inverse are equally bright, whatever the
+projector's gamma.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .pattern_frames import Frame, PatternSequence
+from .ring_patterns import RingPatterns, ring_plane
+
+_WHITE = 255.0
+_NEIGHBOURS = (slice(None, -1), slice(1, None))
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """Where a projector's pixels lie among the rings, shape (h, w) each.
+
+    Attributes:
+        sequence: What is shown.
+        x: Of pixel centres in the plane of the rings.
+        y: Likewise.
+        edge: Ring edge that is nearest in the ring coordinate.
+        within: Grey level of the part of the pixel that lies inside that edge.
+        beyond: Of the part outside it; both together are the pixel in white.
+    """
+
+    sequence: PatternSequence
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    edge: NDArray[np.intp]
+    within: NDArray[np.uint8]
+    beyond: NDArray[np.uint8]
+
+    def image(self, frame: Frame) -> NDArray[np.uint8]:
+        """Return a frame's grey levels, 0 to 255, shape (h, w)."""
+        if frame.kind == "root":
+            assert frame.camera is not None
+            outside = self._outside[frame.camera]
+            return self.within + self.beyond - outside if frame.inverse else outside
+        bright = self.sequence.annulus_levels(frame).astype(np.uint8)
+        inside = self.within * bright[:-1].take(self.edge)
+        return inside + self.beyond * bright[1:].take(self.edge)
+
+    @cached_property
+    def _outside(self) -> dict[str, NDArray[np.uint8]]:
+        """Where r.m > 0, by camera: outside its root disc."""
+        white = self.within + self.beyond
+        found: dict[str, NDArray[np.uint8]] = {}
+        for camera, patterns in self.sequence.patterns.items():
+            share = _share_at_once(_root_level(patterns, self.x, self.y))
+            found[camera] = np.rint(white * share).astype(np.uint8)
+        return found
+
+
+def canvas(sequence: PatternSequence) -> Canvas:
+    """Return where a projector's pixels lie among its rings."""
+    patterns, projector = sequence.rings, sequence.projector
+    width, height = projector.resolution
+    v, u = np.indices((height, width), dtype=np.float64)
+    pixels = np.column_stack([u.ravel(), v.ravel()])
+    x, y = (part.reshape(height, width) for part in ring_plane(projector, pixels).T)
+    rho = np.hypot(x, y)
+    slope = _slope(rho)
+    radii = patterns.radii
+    edge = np.searchsorted(0.5 * (radii[1:] + radii[:-1]), rho)
+    drawn = _share(patterns.outer_radius - rho, slope)
+    if projector.beam_radius is not None:
+        flat = projector.panel_coordinates(pixels)
+        away = np.hypot(flat[:, 0], flat[:, 1]).reshape(height, width)
+        drawn = drawn * _share(projector.beam_radius - away, _slope(away))
+    white = np.rint(_WHITE * drawn).astype(np.uint8)
+    beyond = np.rint(white * _share(rho - radii[edge], slope)).astype(np.uint8)
+    return Canvas(sequence, x, y, edge, white - beyond, beyond)
+
+
+def _root_level(
+    patterns: RingPatterns, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return what is zero on the border of a root disc, with the sign of r.m.
+
+    |p|^2 o_z - o_x p_x - o_y p_y, with o_z = 1 in parallel light.
+    """
+    across, down, away = patterns.camera_in_ring
+    depth = away if patterns.light == "diverging" else 1.0
+    return x * (depth * x - across) + y * (depth * y - down)
+
+
+def _share_at_once(level: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return `_share` of a quantity with a single border: slopes matter there alone."""
+    positive = level > 0.0
+    border = np.zeros_like(positive)
+    for axis in (0, 1):
+        one, other = (positive.swapaxes(0, axis)[part] for part in _NEIGHBOURS)
+        marked = border.swapaxes(0, axis)
+        for part in _NEIGHBOURS:
+            marked[part] |= one != other
+    share = positive.astype(np.float32)
+    v, u = np.nonzero(border)
+    height, width = level.shape
+    down, up = np.minimum(v + 1, height - 1), np.maximum(v - 1, 0)
+    right, left = np.minimum(u + 1, width - 1), np.maximum(u - 1, 0)
+    steep = np.hypot(
+        (level[v, right] - level[v, left]) / (right - left),
+        (level[down, u] - level[up, u]) / (down - up),
+    )
+    share[v, u] = _share(level[v, u], np.maximum(steep, np.finfo(float).tiny))
+    return share
+
+
+def _slope(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return |grad| in units a pixel, never 0."""
+    down, across = np.gradient(values)
+    return np.maximum(np.hypot(across, down), np.finfo(float).tiny)
+
+
+def _share(
+    signed: NDArray[np.float64], slope: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the share of a pixel beyond the border where a quantity is zero."""
+    return np.clip(signed / slope + 0.5, 0.0, 1.0)

@@ -1,0 +1,144 @@
+"""What a projector draws: Gray-coded annuli about the ring axis, and the root discs.
+
+A sequence is white, black, each bit of the annulus index with its inverse, and for each
+camera the disc that tells the two roots of its rays apart, with its inverse: in all
+``2 ceil(log2 N) + 2 + 2 n_cameras`` frames for N annuli, one more than rings.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+
+Images = NDArray[np.uint8 | np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class RingPatterns:
+    """The patterns of one projector, as seen by one camera's decoder.
+
+    Attributes:
+        light: `diverging` or `parallel`.
+        radii: Ring edges, rising: tangents R = x/z (diverging) or radii in [m], (n,).
+        camera_in_ring: The camera's optical centre in the ring frame [m], shape (3,).
+    """
+
+    light: Literal["diverging", "parallel"]
+    radii: NDArray[np.float64]
+    camera_in_ring: NDArray[np.float64]
+
+    @property
+    def n_annuli(self) -> int:
+        """Areas that the rings part the panel into."""
+        return len(self.radii) + 1
+
+    @property
+    def n_bits(self) -> int:
+        """Bits of the annulus index."""
+        return max(1, (self.n_annuli - 1).bit_length())
+
+    @property
+    def n_frames(self) -> int:
+        """Frames that one camera's decoder reads."""
+        return 2 * self.n_bits + 4
+
+    @property
+    def outer_radius(self) -> float:
+        """Where the outermost annulus ends: one more gap beyond the last ring."""
+        return float(2.0 * self.radii[-1] - self.radii[-2])
+
+    @cached_property
+    def codes(self) -> NDArray[np.int64]:
+        """Gray code of each annulus, shape (n_annuli,)."""
+        index = np.arange(self.n_annuli)
+        return index ^ (index >> 1)
+
+    @cached_property
+    def index_of_code(self) -> NDArray[np.int16]:
+        """Annulus of each code, -1 for codes that aren't drawn, (2**n_bits,)."""
+        table = np.full(1 << self.n_bits, -1, dtype=np.int16)
+        table[self.codes] = np.arange(self.n_annuli)
+        return table
+
+    @cached_property
+    def flipping_bit(self) -> NDArray[np.int64]:
+        """Bit that changes across each ring edge, shape (n_rings,)."""
+        changed = self.codes[1:] ^ self.codes[:-1]
+        return np.log2(changed).astype(np.int64)
+
+    def bit(self, bit: int) -> NDArray[np.float32]:
+        """Return whether each annulus is bright in the frame of a bit, (n_annuli,)."""
+        return ((self.codes >> bit) & 1).astype(np.float32)
+
+    def root_side(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the signed distance of ring-plane points from the border of the disc.
+
+        With o the camera in ring coordinates, the sign is that of r.m::
+
+            diverging  |p|^2 o_z - o_x p_x - o_y p_y        parallel  p.(p - o)
+
+        to first order in units of p, positive outside the disc.
+
+        Args:
+            p: Normalised (x/z, y/z) or, in parallel light, (x, y) in [m], shape (n, 2).
+
+        Returns:
+            Shape (n,).
+        """
+        square = self.camera_in_ring[2] if self.light == "diverging" else 1.0
+        flat = self.camera_in_ring[:2]
+        level = square * np.sum(p * p, axis=1) - p @ flat
+        slope = np.linalg.norm(2.0 * square * p - flat, axis=1)
+        return level / np.maximum(slope, 1e-12)
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Images of one camera under the patterns of one projector.
+
+    Attributes:
+        stack: white, black, then each bit and its inverse, then the root disc and its
+            inverse; shape (n_frames, h, w), grey levels 0 to 255.
+        corner: Pixel (u, v) of the stack's top-left pixel in the camera's image.
+    """
+
+    stack: Images
+    corner: tuple[int, int]
+
+
+def ring_patterns(
+    projector: ProjectorCalibration,
+    radii: NDArray[np.float64],
+    camera: CameraCalibration,
+) -> RingPatterns:
+    """Return the patterns of a projector with the root disc of one camera."""
+    return RingPatterns(
+        projector.light, radii, projector.to_ring(camera.centre[None])[0]
+    )
+
+
+def ring_plane(
+    projector: ProjectorCalibration, pixels: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return where projector pixels (n, 2) lie in the plane that rings are drawn in.
+
+    Args:
+        projector: As the patterns were drawn for it.
+        pixels: Projector pixels, shape (n, 2).
+
+    Returns:
+        (x/z, y/z) in diverging light, (x, y) in [m] in parallel light, shape (n, 2).
+    """
+    flat = projector.panel_coordinates(pixels)
+    pose = projector.ring_from_device
+    if projector.light == "parallel":
+        return flat @ pose[:2, :2].T + pose[:2, 3]
+    x, y, z = pose[:3, :2] @ flat.T + pose[:3, 2:3]
+    return np.column_stack([x / z, y / z])

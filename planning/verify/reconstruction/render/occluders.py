@@ -1,0 +1,89 @@
+"""Bodies of the devices that really stand there, as meshes that rays are cast against.
+
+A body is dark: light that meets it is lost, and a camera that looks at it sees nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+
+# Six quads of a box whose corner i has the signs of the bits of i.
+_QUADS = np.array(
+    [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ]
+)
+
+
+class Occluder(Protocol):
+    """Whatever answers, as `RayCaster` does, whether rays are blocked."""
+
+    def occluded(
+        self,
+        origins: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        distances: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Return whether each ray is blocked within its distance, shape (n,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Both:
+    """The object and what stands before it."""
+
+    surface: Occluder
+    obstacles: Occluder
+
+    def occluded(
+        self,
+        origins: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        distances: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Return whether either blocks each ray within its distance, shape (n,)."""
+        ray = origins, directions, distances
+        return self.surface.occluded(*ray) | self.obstacles.occluded(*ray)
+
+
+def obstacles_of(plan: RigPlan, name: str) -> RayCaster | None:
+    """Return the bodies of all devices but one; None where there are none.
+
+    Args:
+        plan: What really stands there.
+        name: Id of the device whose light or view they are in the way of.
+    """
+    every: Sequence[PlannedProjector | PlannedCamera] = (
+        *plan.projectors,
+        *plan.cameras,
+    )
+    corners = [
+        _corners(device) for device in every if device.id != name and device.body
+    ]
+    if not corners:
+        return None
+    faces = np.concatenate([_QUADS[:, [0, 1, 2]], _QUADS[:, [0, 2, 3]]])
+    parts = [faces + 8 * number for number in range(len(corners))]
+    mesh = TriangleMesh(np.concatenate(corners), np.concatenate(parts))
+    return RayCaster(mesh, threads=1)
+
+
+def _corners(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
+    """Corners of a device's body in the world, shape (8, 3); it has one."""
+    assert device.body is not None
+    signs = np.array([[2 * (i >> k & 1) - 1 for k in range(3)] for i in range(8)])
+    local = np.array(device.body.centre_m) + signs * np.array(device.body.half_m)
+    pose = device.world_from_device
+    return local @ pose[:3, :3].T + pose[:3, 3]

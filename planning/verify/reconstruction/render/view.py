@@ -1,0 +1,170 @@
+"""What a camera sees of the mesh that really stands there, by ray casting."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import CHUNK, RayCaster, equal_parts
+from planning.verify.reconstruction.calibration import CameraCalibration
+
+from .photometry import Photometry
+
+_MARGIN_PX = 6
+# Drawn edges blurred by less than this in the image are sampled twice a pixel, and so
+# is the blur of the lens: else they lie askew, and no later blur mends it [px].
+_SHARP_PX = 0.7
+_SUB = np.array([[-0.25, -0.25], [-0.25, 0.25], [0.25, -0.25], [0.25, 0.25]])
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What a camera sees: samples of the surface, one a cell and 4 at steps of depth.
+
+    A cell is a pixel, or a quarter of one where drawn edges are sharper than that.
+
+    Attributes:
+        camera: The camera that looks.
+        corner: Pixel (u, v) of the window's top-left pixel.
+        shape: Rows and columns of the window, in pixels.
+        fold: Cells along a pixel, 1 or 2.
+        cells: Flat index in the window's cells of each sample, shape (n,).
+        weights: Share of the cell that each sample stands for, shape (n,).
+        points: Surface points in the world [m], shape (n, 3).
+        normals: Face normals there, shape (n, 3).
+        rays: Viewing directions, shape (n, 3).
+        distances: From the camera [m], shape (n,).
+        albedo: Shape (n,).
+    """
+
+    camera: CameraCalibration
+    corner: tuple[int, int]
+    shape: tuple[int, int]
+    fold: int
+    cells: NDArray[np.int64]
+    weights: NDArray[np.float32]
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    rays: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    albedo: NDArray[np.float32]
+
+
+def view(
+    camera: CameraCalibration,
+    mesh: TriangleMesh,
+    caster: RayCaster,
+    photometry: Photometry,
+    obstacles: RayCaster | None = None,
+) -> View | None:
+    """Cast a camera's pixels against the mesh; None if it sees nothing of it.
+
+    Args:
+        camera: The camera that looks.
+        mesh: What it looks at.
+        caster: Casts rays against the mesh.
+        photometry: Albedo of the mesh.
+        obstacles: Casts rays against what stands before it.
+    """
+    window = _window(camera, mesh)
+    if window is None:
+        return None
+    (left, top), shape = window
+    away = float(np.linalg.norm(mesh.centre - camera.centre))
+    sharp = photometry.projector_blur_m * camera.focal_px < _SHARP_PX * away
+    fold = 2 if sharp else 1
+    rows, columns = fold * shape[0], fold * shape[1]
+    first = 0.5 / fold - 0.5
+    grid = np.empty((rows, columns, 2))
+    grid[:, :, 0] = left + first + np.arange(columns) / fold
+    grid[:, :, 1] = (top + first + np.arange(rows) / fold)[:, None]
+    grid = grid.reshape(-1, 2)
+    rays, faces, distances = _cast(camera, caster, grid, obstacles)
+    if not np.any(faces >= 0):
+        return None
+    steps = _depth_steps(faces, distances, (rows, columns), fold * camera.focal_px)
+    whole = np.flatnonzero((faces >= 0) & ~steps)
+    split = np.flatnonzero(steps)
+    fine = (grid[split][:, None] + _SUB / fold).reshape(-1, 2)
+    fine_rays, fine_faces, fine_distances = _cast(camera, caster, fine, obstacles)
+    hit = fine_faces >= 0
+    cells = np.concatenate([whole, np.repeat(split, len(_SUB))[hit]])
+    all_rays = np.concatenate([rays[whole], fine_rays[hit]])
+    all_faces = np.concatenate([faces[whole], fine_faces[hit]])
+    reach = np.concatenate([distances[whole], fine_distances[hit]])
+    weights = np.ones(len(cells), dtype=np.float32)
+    weights[len(whole) :] = 1.0 / len(_SUB)
+    points = camera.centre + reach[:, None] * all_rays
+    return View(
+        camera,
+        (left, top),
+        shape,
+        fold,
+        cells,
+        weights,
+        points,
+        mesh.face_normals[all_faces],
+        all_rays,
+        reach,
+        photometry.albedo(points),
+    )
+
+
+def _window(
+    camera: CameraCalibration, mesh: TriangleMesh
+) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Corner (u, v) and shape (rows, columns) of the image part that holds the mesh."""
+    pixels = camera.project(mesh.corners.reshape(-1, 3))
+    low, high = np.array([0, 0]), np.array(camera.resolution) - 1
+    if np.all(np.isfinite(pixels)):
+        low = np.maximum(low, np.floor(pixels.min(axis=0)).astype(int) - _MARGIN_PX)
+        high = np.minimum(high, np.ceil(pixels.max(axis=0)).astype(int) + _MARGIN_PX)
+    elif not np.any(np.isfinite(pixels)):
+        return None
+    columns, rows = (int(side) for side in high - low + 1)
+    if columns < 1 or rows < 1:
+        return None
+    return (int(low[0]), int(low[1])), (rows, columns)
+
+
+def _cast(
+    camera: CameraCalibration,
+    caster: RayCaster,
+    pixels: NDArray[np.float64],
+    obstacles: RayCaster | None,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    n = len(pixels)
+    rays, faces, distances = np.empty((n, 3)), np.empty(n, dtype=np.int64), np.empty(n)
+    for part in equal_parts(n, CHUNK):
+        along = camera.rays(pixels[part])
+        blind = ~np.isfinite(along[:, 0])
+        if blind.any():
+            along[blind] = -camera.world_from_device[:3, 2]
+        faces[part], distances[part] = caster.first_hits(camera.centre, along)
+        faces[part][blind] = -1
+        rays[part] = along
+    if obstacles is not None:
+        hit = np.flatnonzero(faces >= 0)
+        hidden = obstacles.occluded(camera.centre, rays[hit], distances[hit])
+        faces[hit[hidden]] = -1
+    return rays, faces, distances
+
+
+def _depth_steps(
+    faces: NDArray[np.int64],
+    distances: NDArray[np.float64],
+    shape: tuple[int, int],
+    focal_px: float,
+) -> NDArray[np.bool_]:
+    """Pixels whose neighbour is the background or lies many pixels' width apart."""
+    depth = np.where(faces >= 0, distances, 1e9).astype(np.float32).reshape(shape)
+    steps = np.zeros(shape, dtype=bool)
+    for one, other, near, far in (
+        (depth[1:], depth[:-1], steps[1:], steps[:-1]),
+        (depth[:, 1:], depth[:, :-1], steps[:, 1:], steps[:, :-1]),
+    ):
+        jump = np.abs(one - other) > np.minimum(one, other) * (20.0 / focal_px)
+        near |= jump
+        far |= jump
+    return steps.ravel()

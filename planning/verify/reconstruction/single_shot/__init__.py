@@ -1,0 +1,1 @@
+"""One image a camera, rings told apart by a prior mesh."""

@@ -1,0 +1,178 @@
+"""Labels for one image of rings, from a mesh that the object is known to lie near."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.proximity import closest_points
+from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.calibration import PairCalibration
+from planning.verify.reconstruction.decode.triangulate import intersect_rings
+
+# Places on a ray at which its depth in the prior is looked at.
+_STEPS = 12
+_ROOTS = (1, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class PriorLabels:
+    """What each point of a line is taken for.
+
+    Attributes:
+        rings: Ring, -1 where none is sure, shape (n,).
+        roots: Sign of r.m, 0 where none is sure, shape (n,).
+        rejected: Points without a label, by cause: `off_prior`, no ring meets the ray
+            near the prior; `ambiguous`, several do.
+    """
+
+    rings: NDArray[np.int64]
+    roots: NDArray[np.int8]
+    rejected: dict[str, int]
+
+
+def label_by_prior(
+    pixels: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    pair: PairCalibration,
+    prior: TriangleMesh,
+    *,
+    tolerance_m: float,
+) -> PriorLabels:
+    """Return the ring and root of points on lines, where the prior leaves one choice.
+
+    Each ray meets every ring surface in up to two points. A point is labelled if
+    exactly one of them lies within the tolerance of the prior, where the object itself
+    can't hide it from either device. So no label of a ring is wrong while the surfaces
+    of object and prior lie within the tolerance of each other;
+    neighbouring candidates are dR / |r.m| apart along the ray, which bounds how far off
+    a prior may be: a depth range dZ <= dR / |r.m|.
+
+    Args:
+        pixels: Points of lines in the camera's image, shape (n, 2).
+        radii: Of the rings, rising, shape (n_rings,).
+        pair: Calibration of both devices.
+        prior: What the object is known to lie near.
+        tolerance_m: How near [m].
+
+    Raises:
+        ValueError: If the tolerance isn't positive.
+    """
+    if not (tolerance_m > 0.0 and np.isfinite(tolerance_m)):
+        raise ValueError(f"tolerance_m must be positive, got {tolerance_m} m")
+    rays = pair.camera.rays(pixels)
+    met = _candidates(rays, radii, pair, prior, tolerance_m)
+    near = _possible(met, rays, pair, prior, tolerance_m)
+    count = np.bincount(near.rows, minlength=len(pixels))
+    rings = np.full(len(pixels), -1, dtype=np.int64)
+    roots = np.zeros(len(pixels), dtype=np.int8)
+    one = count[near.rows] == 1
+    rings[near.rows[one]] = near.rings[one]
+    roots[near.rows[one]] = near.roots[one]
+    return PriorLabels(
+        rings,
+        roots,
+        {
+            "off_prior": int(np.count_nonzero(count == 0)),
+            "ambiguous": int(np.count_nonzero(count > 1)),
+        },
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """Where rays meet ring surfaces: ray, ring, root and point of each."""
+
+    rows: NDArray[np.int64]
+    rings: NDArray[np.int64]
+    roots: NDArray[np.int8]
+    points: NDArray[np.float64]
+
+    def take(self, chosen: NDArray[np.bool_]) -> "_Candidates":
+        return _Candidates(
+            self.rows[chosen],
+            self.rings[chosen],
+            self.roots[chosen],
+            self.points[chosen],
+        )
+
+
+def _candidates(
+    rays: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    pair: PairCalibration,
+    prior: TriangleMesh,
+    tolerance_m: float,
+) -> _Candidates:
+    """Intersections of every ray with every ring in the prior's box."""
+    low, high = prior.bounds[0] - tolerance_m, prior.bounds[1] + tolerance_m
+    parts: list[_Candidates] = []
+    for ring, radius in enumerate(radii):
+        for root in _ROOTS:
+            every, side = np.full(len(rays), radius), np.full(len(rays), root, np.int8)
+            hits = intersect_rings(
+                pair.camera.centre, rays, every, side, pair.projector
+            )
+            # NaN, where a ray misses the ring, is in no box.
+            inside = np.all((hits.points >= low) & (hits.points <= high), axis=1)
+            rows = np.flatnonzero(inside)
+            number = np.full(len(rows), ring, dtype=np.int64)
+            parts.append(_Candidates(rows, number, side[rows], hits.points[rows]))
+    return _Candidates(
+        np.concatenate([part.rows for part in parts]),
+        np.concatenate([part.rings for part in parts]),
+        np.concatenate([part.roots for part in parts]),
+        np.concatenate([part.points for part in parts]),
+    )
+
+
+def _possible(
+    met: _Candidates,
+    rays: NDArray[np.float64],
+    pair: PairCalibration,
+    prior: TriangleMesh,
+    tolerance_m: float,
+) -> _Candidates:
+    """Those near the prior, in the panel, that the object leaves seen and lit."""
+    if len(met.rows) == 0:
+        return met
+    projector = pair.projector
+    near = np.abs(closest_points(prior, met.points).distances) <= tolerance_m
+    pixels, depth = projector.panel(met.points)
+    met = met.take(near & projector.in_panel(pixels))
+    depth = depth[near & projector.in_panel(pixels)]
+    caster = RayCaster(prior, threads=1)
+    reach = np.linalg.norm(met.points - pair.camera.centre, axis=1)
+    hidden = _behind_prior(met.points, rays[met.rows], reach, caster, tolerance_m)
+    if projector.light == "diverging":
+        depth = np.linalg.norm(met.points - projector.centre, axis=1)
+    beams = projector.beams(met.points)
+    hidden |= _behind_prior(met.points, beams, depth, caster, tolerance_m)
+    return met.take(~hidden)
+
+
+def _behind_prior(
+    points: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    away: NDArray[np.float64],
+    caster: RayCaster,
+    tolerance_m: float,
+) -> NDArray[np.bool_]:
+    """Whether rays that end at points ran deeper in the prior than it may be off, (n,).
+
+    Then the object itself stands in the way. Whether the prior's own surface does, or
+    is turned away, says nothing so surely.
+    """
+    faces, first = caster.first_hits(points - away[:, None] * towards, towards)
+    rows = np.flatnonzero((faces >= 0) & (away > first + 2.0 * tolerance_m))
+    blocked = np.zeros(len(points), dtype=bool)
+    for share in (np.arange(_STEPS) + 0.5) / _STEPS:
+        left = rows[~blocked[rows]]
+        if len(left) == 0:
+            break
+        along = first[left] + share * (away[left] - first[left])
+        inner = points[left] + (along - away[left])[:, None] * towards[left]
+        depth = closest_points(caster.mesh, inner).distances
+        blocked[left] = depth < -tolerance_m
+    return blocked

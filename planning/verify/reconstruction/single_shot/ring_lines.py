@@ -1,0 +1,150 @@
+"""One image of bright rings: how it is drawn, and where its lines run to sub-pixel.
+
+Lines are found after Steger, "An unbiased detector of curvilinear structures", IEEE
+PAMI 20(2), 1998: where the image, smoothed at the scale of the line, has a ridge.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve, gaussian_filter1d, map_coordinates
+
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingPatterns
+
+# Least brightness of a line above what lies beside it, in grey levels and in noises.
+_MIN_CONTRAST = 10.0
+_MIN_NOISES = 6.0
+# A bar of width w smoothed at w / (2 sqrt 3) has this much times height / scale^2 for
+# its second derivative.
+_BAR = 2.0 * np.sqrt(3.0) / np.sqrt(2.0 * np.pi) * np.exp(-1.5)
+_MIN_SCALE_PX = 1.0
+# Share of a line's brightness that it must fall by on both sides.
+_MIN_FALL = 0.4
+# Second differences in both directions: blind to everything but noise.
+_NOISE_MASK = np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class RingLines:
+    """Points on the middles of bright lines in one camera's image.
+
+    Attributes:
+        pixels: Sub-pixel positions (u, v) in the camera's image, shape (n, 2).
+        across: Unit direction in the image across the line, shape (n, 2).
+        noise_px: Standard deviation of the position along `across` [px], shape (n,).
+    """
+
+    pixels: NDArray[np.float64]
+    across: NDArray[np.float64]
+    noise_px: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+
+def line_patterns(patterns: RingPatterns, width: float) -> RingPatterns:
+    """Return patterns whose odd annuli are bright lines on the rings.
+
+    Args:
+        patterns: Whose rings are the middles of the lines.
+        width: Of a line, in the unit of the radii.
+
+    Raises:
+        ValueError: If lines would touch each other or the centre.
+    """
+    half = 0.5 * width
+    radii = (patterns.radii[:, None] + np.array([-half, half])).ravel()
+    if not (width > 0.0 and np.all(np.diff(radii, prepend=0.0) > 0.0)):
+        gap = float(np.diff(patterns.radii, prepend=0.0).min())
+        raise ValueError(
+            f"lines of width {width:.4g} must be positive and narrower than the least "
+            f"gap between rings, {gap:.4g}, in the unit of the radii"
+        )
+    return RingPatterns(patterns.light, radii, patterns.camera_in_ring)
+
+
+def find_lines(frames: Frames, width_px: float) -> RingLines:
+    """Return the points of bright lines in an image.
+
+    With I smoothed by a Gaussian of sigma = w / (2 sqrt 3) and n the direction of its
+    most negative second derivative, the ridge is at ``-(n.grad I) / (n.H n)`` from the
+    pixel's centre along n; a point belongs to the pixel that it lies in.
+
+    Args:
+        frames: One image, shape (1, h, w).
+        width_px: Width w of a line in the image [px].
+    """
+    image = frames.stack[0].astype(np.float64)
+    scale = max(_MIN_SCALE_PX, width_px / (2.0 * np.sqrt(3.0)))
+    along_v, along_u, vv, uv, uu = (
+        _derivative(image, scale, order)
+        for order in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    )
+    # The eigenvalue of the Hessian that is most negative across a bright line.
+    bend = 0.5 * (uu + vv) - np.hypot(0.5 * (uu - vv), uv)
+    noise = _grey_noise(image, bend, scale)
+    contrast = -bend * (scale * scale / _BAR)
+    bright = contrast >= max(_MIN_CONTRAST, _MIN_NOISES * noise)
+    i, j = np.nonzero(bright)
+    curve = bend[i, j]
+    across = _direction(uu[i, j] - curve, vv[i, j] - curve, uv[i, j])
+    slope = across[:, 0] * along_u[i, j] + across[:, 1] * along_v[i, j]
+    step = (-slope / curve)[:, None] * across
+    inside = np.all(np.abs(step) <= 0.5, axis=1)
+    places = np.column_stack([j, i]) + step
+    reach = np.sqrt(12.0) * scale * across
+    smooth = _derivative(image, scale, (0, 0))
+    inside &= _falls(smooth, places, reach, _MIN_FALL * contrast[i, j])
+    # A derivative of white noise, smoothed, varies by 1 / (8 pi scale^4).
+    spread = noise / (np.sqrt(8.0 * np.pi) * scale * scale * np.abs(curve[inside]))
+    pixels = places[inside] + np.array(frames.corner)
+    return RingLines(pixels, across[inside], spread)
+
+
+def _falls(
+    smooth: NDArray[np.float64],
+    places: NDArray[np.float64],
+    reach: NDArray[np.float64],
+    least: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Whether it is darker on both sides, a width away; beside an edge it isn't."""
+    here, before, after = (
+        map_coordinates(
+            smooth, (places + side * reach).T[::-1], order=1, mode="nearest"
+        )
+        for side in (0.0, -1.0, 1.0)
+    )
+    return (here - before >= least) & (here - after >= least)
+
+
+def _derivative(
+    image: NDArray[np.float64], scale: float, order: tuple[int, int]
+) -> NDArray[np.float64]:
+    """Derivative of a smoothed image, of some order down and across."""
+    smooth = np.empty_like(image)
+    gaussian_filter1d(image, scale, axis=0, order=order[0], output=smooth)
+    gaussian_filter1d(smooth, scale, axis=1, order=order[1], output=smooth)
+    return smooth
+
+
+def _direction(
+    a: NDArray[np.float64], c: NDArray[np.float64], b: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Eigenvectors across a line, (n, 2), of matrices less that eigenvalue."""
+    # [[a, b], [b, c]] is singular; its null vector is orthogonal to its larger row.
+    first = np.abs(a) >= np.abs(c)
+    x, y = np.where(first, -b, -c), np.where(first, a, b)
+    length = np.maximum(np.hypot(x, y), 1e-30)
+    return np.column_stack([x / length, y / length])
+
+
+def _grey_noise(
+    image: NDArray[np.float64], bend: NDArray[np.float64], scale: float
+) -> float:
+    """Standard deviation of a pixel on the lines, in grey levels."""
+    lines = -bend * (scale * scale / _BAR) >= _MIN_CONTRAST
+    if np.count_nonzero(lines) < 100:
+        return 1.0
+    rough = np.abs(convolve(image, _NOISE_MASK))[lines]
+    return max(float(np.sqrt(0.5 * np.pi) * np.mean(rough) / 6.0), 1e-3)

@@ -1,0 +1,292 @@
+"""`plan verify`: the audit of every claim, then the check from pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geometry.mesh.mesh import TriangleMesh
+from planning.verify.audit.audit import Audit, audit_plan
+from planning.model.plan import RigPlan
+from planning.verify.audit.figure_claims import compare_figures, contradictions
+
+if TYPE_CHECKING:
+    from geometry.mesh.sampling import SurfaceSamples
+    from planning.verify.audit.samples import AuditSamples
+    from planning.verify.reconstruction.check.check import Reconstruction
+    from planning.verify.reconstruction.check.comparison import Prediction
+
+_MM = 1e3
+_MESH_SAMPLES = 2000
+# A mesh that is larger or smaller by more than this is another file or unit.
+_MOST_RESIZED = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """Whether a plan's claims hold.
+
+    Attributes:
+        failures: One sentence for each false claim, and for each limit of the check
+            that isn't kept and that the plan doesn't own up to.
+        audit: The geometric audit.
+        reconstruction: The check from pixels; None if it wasn't asked for.
+        missed: Limits of the check that aren't kept, as the plan records itself.
+    """
+
+    failures: tuple[str, ...]
+    audit: Audit
+    reconstruction: Reconstruction | None
+    missed: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every claim holds; a plan may claim that it misses something."""
+        return not self.failures
+
+    @property
+    def unmet(self) -> tuple[str, ...]:
+        """Requirements and limits that the plan misses and says so: nothing false."""
+        return self.audit.unmet + self.missed
+
+    @property
+    def coverage(self) -> dict[str, dict[str, float]]:
+        """Recomputed areas of `surface` and `target`, keys as in the plan [m²]."""
+        return self.audit.areas
+
+    def to_document(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        found = self.reconstruction
+        return {
+            "passed": self.passed,
+            "failures": list(self.failures),
+            "unmet": list(self.unmet),
+            "coverage": self.coverage,
+            "samples": len(self.audit.samples),
+            "reconstruction": None if found is None else found.to_document(),
+        }
+
+    def summary(self) -> str:
+        """Return the verdict for a person, in a few lines."""
+        lines = [
+            _areas_line(name, self.coverage[name]) for name in ("target", "surface")
+        ]
+        lines.append(_pixels_line(self.reconstruction))
+        lines += [f"not met: {sentence}" for sentence in self.unmet]
+        lines += [f"FALSE: {sentence}" for sentence in self.failures]
+        count = len(self.failures)
+        found = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
+        lines.append(
+            f"verified: every claim holds ({found})"
+            if self.passed
+            else f"NOT verified: {count} failure{'s' * (count > 1)}"
+        )
+        return "\n".join(lines)
+
+
+def verify_plan(
+    plan: RigPlan,
+    mesh: TriangleMesh | None = None,
+    *,
+    check_pixels: bool = True,
+    truth: RigPlan | None = None,
+    seed: int | None = None,
+    threads: int = 2,
+    progress: Callable[[str], None] | None = None,
+) -> Verification:
+    """Recompute every claim of a plan, then measure its object through pixels.
+
+    Args:
+        plan: The plan, as written.
+        mesh: If given, it must be the surface that the plan speaks of. If it isn't, it
+            is also what is rendered, so that the pixels say how it differs; unless its
+            size is so different that the file is another one, or in another unit.
+        check_pixels: Whether the reconstruction is run.
+        truth: What really stands there; the plan by default. With it, or with another
+            mesh, every limit of the check that isn't kept is a failure.
+        seed: Of the audit's samples and the pixel noise; the plan's own by default.
+        threads: Worker threads; the result doesn't depend on them.
+        progress: Receives a line when a stage begins.
+
+    Raises:
+        PlanFileError: If the plan is broken, so that its claims have no meaning.
+    """
+    say = progress or _silent
+    seed = int(plan.document["seed"]) if seed is None else seed
+    say("audit: recomputing every claim on fresh samples")
+    audit = audit_plan(plan, seed=seed, threads=threads)
+    failures = list(audit.failures)
+    if mesh is not None:
+        differs = compare_meshes(mesh, plan.surface.mesh, threads=threads)
+        failures += differs
+        if differs and _comparable(mesh, plan.surface.mesh):
+            truth = _with_mesh(truth or plan, mesh)
+    recorded = plan.document["reconstruction"]
+    failures += contradictions(recorded)
+    if not check_pixels:
+        return Verification(tuple(failures), audit, None)
+    found = _reconstruct(plan, audit, truth, seed, threads, say)
+    if truth is not None:
+        # What is recorded is of the rig as planned.
+        return Verification((*failures, *found.failures), audit, found)
+    false = compare_figures(recorded, found.to_document())
+    owned_up = recorded is not None and recorded.get("passed") is False
+    if owned_up and not false:
+        return Verification(tuple(failures), audit, found, found.failures)
+    return Verification((*failures, *found.failures, *false), audit, found)
+
+
+def compare_meshes(
+    mesh: TriangleMesh, surface: TriangleMesh, *, threads: int = 2
+) -> list[str]:
+    """Return why a mesh isn't the surface of a plan; nothing if it is.
+
+    Equal vertices and faces settle it. Otherwise random points of either must lie on
+    the other within 1e-4 of its radius, and the areas agree to 1e-3: the same shape,
+    differently repaired or triangulated.
+    """
+    slack = 1e-4 * surface.radius
+    if mesh.faces.shape == surface.faces.shape and np.array_equal(
+        mesh.faces, surface.faces
+    ):
+        same = mesh.vertices.shape == surface.vertices.shape
+        if same and np.abs(mesh.vertices - surface.vertices).max() <= 1e-9:
+            return []
+    if not np.allclose(mesh.bounds, surface.bounds, rtol=0.0, atol=slack):
+        sizes = [np.round(_MM * np.ptp(m.bounds, axis=0), 2) for m in (mesh, surface)]
+        return [
+            f"mesh: its bounding box ({sizes[0].tolist()} mm) isn't that of "
+            f"surface.npz ({sizes[1].tolist()} mm); check file, unit and axes"
+        ]
+    apart = max(_apart(mesh, surface, threads), _apart(surface, mesh, threads))
+    if not apart <= slack:
+        return [
+            f"mesh: lies up to {_MM * apart:.3g} mm off surface.npz "
+            f"(tolerance {_MM * slack:.2g} mm): another shape"
+        ]
+    if not abs(mesh.area - surface.area) <= 1e-3 * surface.area:
+        return [
+            f"mesh: area {mesh.area:.6g} m², of surface.npz {surface.area:.6g} m², "
+            f"tolerance 0.1 %"
+        ]
+    return []
+
+
+def _comparable(mesh: TriangleMesh, surface: TriangleMesh) -> bool:
+    """Whether a mesh may be the plan's object, changed: near it and of its size."""
+    low, high = 1.0 / _MOST_RESIZED, _MOST_RESIZED
+    apart = float(np.linalg.norm(mesh.centre - surface.centre))
+    return low <= mesh.radius / surface.radius <= high and apart <= surface.radius
+
+
+def _with_mesh(plan: RigPlan, mesh: TriangleMesh) -> RigPlan:
+    """Return the devices of a plan about another object."""
+    n = len(mesh.faces)
+    surface = replace(
+        plan.surface,
+        mesh=mesh,
+        member=np.zeros(n, dtype=np.int64),
+        region=np.full(n, -1, dtype=np.int64),
+        steep=np.zeros((n, 3)),
+    )
+    return RigPlan(plan.document, surface)
+
+
+def _silent(line: str) -> None:
+    """Report to nobody."""
+
+
+def _reconstruct(
+    plan: RigPlan,
+    audit: Audit,
+    truth: RigPlan | None,
+    seed: int,
+    threads: int,
+    say: Callable[[str], None],
+) -> Reconstruction:
+    """Run the check from pixels on the audit's own samples."""
+    from planning.verify.reconstruction.check.check import reconstruct_plan
+    from planning.verify.reconstruction.check.comparison import compare
+
+    inside, predicted = audit.in_target()
+    found = reconstruct_plan(
+        plan,
+        seed=seed,
+        threads=threads,
+        truth=truth,
+        samples=_bare(inside),
+        predicted=predicted,
+        progress=lambda done, total: say(f"pixels: pair {done} of {total}"),
+    )
+    comparison = compare(
+        _prediction(plan, audit, threads),
+        found.everything,
+        found.accuracy,
+        plan.surface.region,
+        plan.requirements.check.tau_m,
+    )
+    return replace(found, comparison=comparison)
+
+
+def _prediction(plan: RigPlan, audit: Audit, threads: int) -> Prediction:
+    """What the audit recomputed, by the plan's limits and at the physical floors."""
+    from planning.verify.audit.coverage.floors import possible_at_floors
+    from planning.verify.reconstruction.check.comparison import Prediction
+
+    samples = audit.samples
+    return Prediction(
+        _bare(samples),
+        samples.weights,
+        samples.in_target,
+        samples.region,
+        np.array([camera.world_from_device[:3, 3] for camera in plan.cameras]),
+        audit.predicted_by,
+        possible_at_floors(plan, samples, threads=threads),
+    )
+
+
+def _bare(samples: AuditSamples) -> SurfaceSamples:
+    from geometry.mesh.sampling import SurfaceSamples
+
+    weight = float(samples.weights[0]) if len(samples) else 0.0
+    return SurfaceSamples(samples.points, samples.normals, samples.faces, weight)
+
+
+def _apart(mesh: TriangleMesh, other: TriangleMesh, threads: int) -> float:
+    """Largest distance of random points of one mesh from the other in [m]."""
+    from geometry.rays.proximity import closest_points
+
+    rng = np.random.default_rng(0)
+    areas = mesh.face_areas
+    faces = rng.choice(len(areas), size=_MESH_SAMPLES, p=areas / areas.sum())
+    shares = rng.dirichlet((1.0, 1.0, 1.0), size=_MESH_SAMPLES)
+    points = np.einsum("nk,nkd->nd", shares, mesh.corners[faces])
+    return float(np.abs(closest_points(other, points, threads=threads).distances).max())
+
+
+def _areas_line(name: str, areas: Mapping[str, float]) -> str:
+    return (
+        f"{name} {1e4 * areas['area_m2']:.2f} cm², recomputed: "
+        f"{1e4 * areas['reachable_by_projectors_m2']:.2f} reachable by projectors, "
+        f"{1e4 * areas['lit_m2']:.2f} lit, "
+        f"{1e4 * areas['reachable_by_cameras_m2']:.2f} of it reachable by cameras, "
+        f"{1e4 * areas['measured_m2']:.2f} measured"
+    )
+
+
+def _pixels_line(found: Reconstruction | None) -> str:
+    if found is None:
+        return "pixels: NOT CHECKED"
+    figures = found.to_document()
+    if figures["accuracy_rms_m"] is None:
+        return "pixels: no point was measured"
+    return (
+        f"pixels: {figures['n_merged']} points, rms "
+        f"{_MM * figures['accuracy_rms_m']:.3f} mm, p95 "
+        f"{_MM * figures['accuracy_p95_m']:.3f} mm, bias "
+        f"{_MM * figures['accuracy_bias_m']:.3f} mm, predicted but missing "
+        f"{100 * figures['predicted_missing']:.2f} %"
+    )

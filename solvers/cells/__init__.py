@@ -1,0 +1,1 @@
+"""Lower bounds on counts over cells of poses."""

@@ -1,0 +1,252 @@
+"""How many poses are needed at least, wherever in their cells they stand.
+
+First multipliers (``cell_multipliers``), one count after the other from below; then the
+search over multisets of cells (``cell_tuples``) for the counts that multipliers don't
+refute. Each spends counted work; cut short, the bound is lower but true.
+"""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from solvers.bit_rows import BitSum, pack_rows
+from solvers.given_numbers import whole_number
+from solvers.one_thread import on_one_thread
+from solvers.status import WorkBudget
+
+from .cell_multipliers import MultiplierSearch
+from .cell_problem import CellProblem, WholeRows, whole_rows
+from .cell_store import CellStore
+from .cell_tree import CellTree
+from .cell_tuples import Enough, refute_tuples
+
+DEFAULT_BUDGET = 2e10
+_MULTIPLIERS_SHARE = 0.5
+
+
+class CellStatus(enum.Enum):
+    """What the search over cells found out about a count."""
+
+    PROVED = "fewer poses than the count can't be enough"
+    SURVIVED = "fewer poses may be enough: cells that can't be split don't refute it"
+    CUT = "stopped at a limit before a proof"
+    INFEASIBLE = "no number of poses is enough"
+
+
+@dataclass(frozen=True, eq=False)
+class CellBound:
+    """Answer of :func:`bound_count`.
+
+    Attributes:
+        problem: The problem this answers.
+        tree: The cells over which it holds.
+        count: The count that was to be proved.
+        status: What was found out.
+        lower_bound: Poses needed at least, at most ``count``; inf if infeasible.
+        proof: What proves the bound, and what cut the proof short if anything did.
+        survivor: Cells, by the tree's names and with repetition, in which
+            ``lower_bound`` poses may be enough: where a better cover may be. Else None.
+        multipliers: Of the rows, integers, shape (n_rows,).
+        dearest: No pose serves rows of more than this price by the multipliers.
+        by_multipliers: The part of the bound that multipliers prove.
+        most_weight: Weight that ``count`` - 1 poses can serve at most, by the
+            multipliers, in the problem's unit.
+        cells_used: Cells that the tree was asked for.
+        finest_level: Splits between a root and the finest of them.
+        tuples_met: Multisets of cells that were weighed.
+    """
+
+    problem: CellProblem
+    tree: CellTree
+    count: int
+    status: CellStatus
+    lower_bound: float
+    proof: str
+    survivor: NDArray[np.int64] | None
+    multipliers: NDArray[np.int64]
+    dearest: int
+    by_multipliers: float
+    most_weight: float
+    cells_used: int
+    finest_level: int
+    tuples_met: int
+
+    def rederived(self) -> tuple[float, float]:
+        """Return ``by_multipliers`` and ``most_weight``, from problem and tree again.
+
+        Walks the tree from its roots and splits what costs more than ``dearest``;
+        nothing else of the answer enters.
+        """
+        return multiplier_bound(
+            self.problem,
+            self.tree,
+            self.multipliers,
+            n_poses=self.count - 1,
+            dearest=self.dearest,
+        )
+
+
+def multiplier_bound(
+    problem: CellProblem,
+    tree: CellTree,
+    multipliers: ArrayLike,
+    *,
+    n_poses: int,
+    dearest: int = 0,
+) -> tuple[float, float]:
+    """Return what multipliers prove, whatever made them.
+
+    Args:
+        problem: What must be served.
+        tree: Cells that hold every pose.
+        multipliers: Any numbers, shape (n_rows,); what isn't positive counts as 0.
+        n_poses: K of the weight.
+        dearest: Cells are split while they cost more; 0 goes down to the leaves.
+
+    Returns:
+        The number of poses that is needed at least, inf if no cell serves anything that
+        counts; and the weight that K poses serve at most, in the problem's unit.
+
+    Raises:
+        ValueError: If K isn't a whole number of at least 0.
+    """
+    n_poses = whole_number("n_poses", n_poses, least=0)
+    whole = whole_rows(problem)
+    given = whole.multipliers(multipliers)
+    price = BitSum(given)
+    top, batch = 0, tree.roots()
+    while batch.cells.size:
+        prices = price(batch.rows)
+        dear = prices > dearest
+        top = max(top, int(prices[~dear].max(initial=0)))
+        cells, prices = batch.cells[dear], prices[dear]
+        batch = tree.children(cells)
+        whole_cells = np.bincount(batch.parents, minlength=cells.size) == 0
+        top = max(top, int(prices[whole_cells].max(initial=0)))
+    most = whole.in_unit(whole.most(given, n_poses * top))
+    return whole.count_bound(given, top), min(most, float(problem.weights.sum()))
+
+
+@on_one_thread
+def bound_count(
+    problem: CellProblem,
+    tree: CellTree,
+    count: int,
+    *,
+    budget: float = DEFAULT_BUDGET,
+    time_limit: float = float("inf"),
+) -> CellBound:
+    """Prove that fewer than ``count`` poses can't be enough, or as much as holds.
+
+    Args:
+        problem: What must be served.
+        tree: Cells that hold every pose of the workspace.
+        count: Poses that are known to be enough.
+        budget: Counted work, about 1e9 a second.
+        time_limit: Wall time that cuts the work, in [s]; the proof then says so.
+
+    Raises:
+        ValueError: If the count isn't a whole number of at least 1, the tree has other
+            rows than the problem, or a cell serves rows that its parent misses.
+    """
+    count = whole_number("count", count, least=1)
+    if tree.n_rows != problem.weights.size:
+        raise ValueError(
+            f"the tree's cells have {tree.n_rows} rows, the problem has "
+            f"{problem.weights.size}"
+        )
+    return _Proof(problem, tree, count, WorkBudget(budget, time_limit=time_limit)).run()
+
+
+class _Proof:
+    """One run; gathers what the answer says."""
+
+    def __init__(
+        self, problem: CellProblem, tree: CellTree, count: int, budget: WorkBudget
+    ) -> None:
+        self.problem, self.tree, self.count, self.budget = problem, tree, count, budget
+        self.whole = whole_rows(problem)
+        self.store = CellStore(tree, budget)
+        share = budget.part(_MULTIPLIERS_SHARE * budget.units)
+        self.search = MultiplierSearch(self.whole, self.store, share)
+        self.lower, self.proof = 0, "nothing is required of poses"
+        self.survivor: NDArray[np.int64] | None = None
+        self.met = 0
+
+    def run(self) -> CellBound:
+        """Raise the bound by one until nothing refutes the next count."""
+        if not _reachable(self.whole, self.store):
+            proof = "all cells together serve less than is required"
+            return self._answer(CellStatus.INFEASIBLE, float("inf"), proof)
+        while self.lower < self.count and self._refute(self.lower):
+            pass
+        if self.lower >= self.count:
+            return self._answer(CellStatus.PROVED, float(self.count), self.proof)
+        if self.survivor is not None:
+            proof = f"{self.proof}; cells that can't be split don't refute {self.lower}"
+            return self._answer(CellStatus.SURVIVED, float(self.lower), proof)
+        cut = "memory limit" if self.store.full else self.budget.reason
+        proof = f"{self.proof}; search cut by the {cut}"
+        return self._answer(CellStatus.CUT, float(self.lower), proof)
+
+    def _refute(self, n_poses: int) -> bool:
+        if n_poses == 0:
+            return self._refute_none()
+        if self.search.refute(n_poses):
+            self.lower = int(min(self.search.bound, self.count))
+            self.proof = "multipliers of the rows"
+            return True
+        found = refute_tuples(
+            self.whole, self.store, n_poses, self.search.multipliers, self.budget
+        )
+        self.met += found.met
+        if found.refuted:
+            self.lower = n_poses + 1
+            self.proof = f"multisets of {n_poses} cells by exhaustion"
+        elif found.survivor is not None:
+            self.survivor = self.store.names[found.survivor]
+        return found.refuted
+
+    def _refute_none(self) -> bool:
+        none = np.zeros((1, 0, self.store.rows.shape[1]), dtype=np.uint64)
+        enough = bool(Enough(self.whole, 0)(none)[0][0])
+        if enough:
+            self.survivor = np.empty(0, dtype=np.int64)
+        else:
+            self.lower, self.proof = 1, "what is required needs a pose"
+        return not enough
+
+    def _answer(self, status: CellStatus, lower: float, proof: str) -> CellBound:
+        search, total = self.search, float(self.problem.weights.sum())
+        most = self.whole.most(search.multipliers, (self.count - 1) * search.dearest)
+        multipliers = search.multipliers.copy()
+        multipliers.flags.writeable = False
+        return CellBound(
+            problem=self.problem,
+            tree=self.tree,
+            count=self.count,
+            status=status,
+            lower_bound=lower,
+            proof=proof,
+            survivor=self.survivor,
+            multipliers=multipliers,
+            dearest=search.dearest,
+            by_multipliers=search.bound,
+            most_weight=min(self.whole.in_unit(most), total),
+            cells_used=self.store.size,
+            finest_level=int(self.store.levels.max(initial=0)),
+            tuples_met=self.met,
+        )
+
+
+def _reachable(whole: WholeRows, store: CellStore) -> bool:
+    """Whether poses without number, anywhere, serve enough."""
+    served = np.bitwise_or.reduce(store.rows[: store.n_roots], axis=0)
+    served |= pack_rows((whole.needs == 0)[None])[0]
+    weights = [
+        int(BitSum(np.where(whole.row_sets == g, whole.weights, 0))(served[None])[0])
+        for g in range(len(whole.needed))
+    ]
+    return all(w >= n for w, n in zip(weights, whole.needed, strict=True))

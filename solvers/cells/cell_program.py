@@ -1,0 +1,143 @@
+"""The linear program that proposes multipliers, by rows added where they are broken.
+
+The least upper bound on what K poses serve, over multipliers lambda_i = w_i u_i / r_i::
+
+    minimise    K theta + sum_g t_g (w(g) - W_g) - sum_i w_i u_i
+    subject to  sum_{i in S} (w_i / r_i) u_i <= theta   for the cells S in hand
+                0 <= u_i <= t_g,  sum_g t_g = 1
+
+A negative value refutes K: its multipliers satisfy need(lambda) > K M. Rows are cells,
+a few hundred; their dual values are the poses that a fractional cover would use. What
+comes back is a proposal, evaluated again in integers by who uses it.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.highs import run_highs
+from solvers.status import WorkBudget
+
+from .cell_problem import WholeRows
+
+# Work of one simplex iteration for each row and cell in hand.
+_UNITS_PER_ENTRY = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Multipliers of one linear program.
+
+    Attributes:
+        multipliers: Shape (n_rows,), at least 0.
+        value: The program's optimum over the cells in hand.
+        used: Cells in hand that the fractional cover uses.
+    """
+
+    multipliers: NDArray[np.float64]
+    value: float
+    used: NDArray[np.int64]
+
+
+class MultiplierProgram:
+    """A program that keeps its basis while cells come and go."""
+
+    def __init__(self, whole: WholeRows, budget: WorkBudget) -> None:
+        import highspy
+
+        self._highs = highspy
+        self._budget = budget
+        self._whole = whole
+        self._live = np.flatnonzero((whole.weights > 0) & (whole.needs > 0))
+        scale = self._live.size / max(1, int(whole.weights[self._live].sum()))
+        self._gains = whole.weights[self._live] * scale
+        self._costs = self._gains / whole.needs[self._live]
+        self._sets = whole.row_sets[self._live]
+        # A set that its free rows meet alone needs nothing.
+        self._slack = np.array(
+            [
+                (int(whole.weights[whole.row_sets == g].sum()) - needed) * scale
+                for g, needed in enumerate(whole.needed)
+            ]
+        )
+        self.cells = np.empty(0, dtype=np.int64)
+        self._solver = self._model()
+
+    def set_count(self, n_poses: float) -> None:
+        """Ask about this number of poses from now on."""
+        self._solver.changeColCost(self._live.size, float(n_poses))
+
+    def add(self, cells: NDArray[np.int64], serves: NDArray[np.bool_]) -> None:
+        """Take cells in hand, with their rows as a matrix (n, n_rows)."""
+        infinity = self._highs.kHighsInf
+        for row in serves[:, self._live]:
+            places = np.append(np.flatnonzero(row), self._live.size).astype(np.int32)
+            values = np.append(self._costs[row], -1.0)
+            self._solver.addRow(-infinity, 0.0, places.size, places, values)
+        self.cells = np.concatenate([self.cells, cells])
+
+    def drop(self, cells: NDArray[np.int64]) -> None:
+        """Let cells in hand go, because their children take their place."""
+        gone = np.flatnonzero(np.isin(self.cells, cells))
+        if gone.size:
+            first = self._solver.getNumRow() - self.cells.size
+            places = (first + gone).astype(np.int32)
+            self._solver.deleteRows(places.size, places)
+            self.cells = np.delete(self.cells, gone)
+
+    def solve(self) -> Proposal | None:
+        """Return the program's multipliers, or None if it wasn't solved."""
+        cost = _UNITS_PER_ENTRY * self._live.size * (self.cells.size + 12)
+        steps = int(min(self._budget.remaining / cost, 1e7))
+        if steps < 1 or self._budget.exhausted:
+            return None
+        self._solver.setOptionValue("simplex_iteration_limit", steps)
+        self._solver.setOptionValue("time_limit", self._clock())
+        run_highs(self._solver)
+        taken = self._solver.getInfo().simplex_iteration_count
+        self._budget.spend(max(0, int(taken)) * cost + 1e5)
+        solution = self._solver.getSolution()
+        values = np.asarray(solution.col_value, dtype=np.float64)
+        duals = np.asarray(solution.row_dual, dtype=np.float64)
+        n = self._live.size
+        if values.size <= n or not np.all(np.isfinite(values)):
+            return None
+        multipliers = np.zeros(self._whole.weights.size)
+        multipliers[self._live] = self._costs * np.clip(values[:n], 0.0, None)
+        used = np.abs(duals[duals.size - self.cells.size :]) > 1e-9
+        value = float(self._solver.getInfo().objective_function_value)
+        return Proposal(multipliers, value, self.cells[used])
+
+    def _clock(self) -> float:
+        """Return HiGHS' time limit, which counts from when the model was made."""
+        left = max(0.01, min(self._budget.time_left, 1e7))
+        return float(self._solver.getRunTime()) + left
+
+    def _model(self) -> Any:  # noqa: ANN401
+        n, n_sets = self._live.size, self._slack.size
+        solver: Any = self._highs.Highs()
+        for name, value in (
+            ("output_flag", False),
+            ("threads", 1),
+            ("parallel", "off"),
+            ("random_seed", 0),
+            ("solver", "simplex"),
+        ):
+            solver.setOptionValue(name, value)
+        infinity = self._highs.kHighsInf
+        lower = np.zeros(n + 1 + n_sets)
+        upper = np.concatenate([np.ones(n), [infinity], np.ones(n_sets)])
+        solver.addVars(lower.size, lower, upper)
+        costs = np.concatenate([-self._gains, [1.0], self._slack])
+        every = np.arange(lower.size, dtype=np.int32)
+        solver.changeColsCost(every.size, every, costs)
+        places = (n + 1 + np.arange(n_sets)).astype(np.int32)
+        solver.addRow(1.0, 1.0, n_sets, places, np.ones(n_sets))
+        if n_sets > 1:
+            # With one set its share is 1, and the bound of u says the same.
+            for i, g in enumerate(self._sets):
+                pair = np.array([i, n + 1 + int(g)], dtype=np.int32)
+                solver.addRow(-infinity, 0.0, 2, pair, np.array([1.0, -1.0]))
+        return solver

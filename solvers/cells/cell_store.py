@@ -1,0 +1,149 @@
+"""The cells that a bound has asked a tree for so far, checked as they come in."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.bit_rows import (
+    BitSum,
+    GrowingArray,
+    check_padding,
+    exceeds,
+    parts,
+    words_for,
+)
+from solvers.status import WorkBudget
+
+from .cell_tree import MAX_BYTES, CellBatch, CellTree, check_size
+
+_UNASKED = -1
+# Cells asked about at once, so that the limit is met before much is made.
+_ASKED = 1024
+
+
+class CellStore:
+    """Cells in the order in which they came; children come after their parents.
+
+    Attributes:
+        tree: Where they come from.
+        full: Whether a split was refused, because of ``MAX_BYTES``.
+    """
+
+    def __init__(self, tree: CellTree, budget: WorkBudget) -> None:
+        self.tree = tree
+        self.full = False
+        self._budget = budget
+        self._words = words_for(tree.n_rows)
+        roots = tree.roots()
+        check_size(roots.cells.size, tree.n_rows)
+        none = np.empty(0, dtype=np.int64)
+        self._name, self._level = GrowingArray(none), GrowingArray(none)
+        self._first, self._number = GrowingArray(none), GrowingArray(none)
+        self._row = GrowingArray(np.empty((0, self._words), dtype=np.uint64))
+        self._append(roots, np.zeros(roots.cells.size, dtype=np.int64))
+        self.n_roots = self.size
+
+    @property
+    def size(self) -> int:
+        """Number of cells so far."""
+        return self._name.size
+
+    @property
+    def names(self) -> NDArray[np.int64]:
+        """The tree's name of each cell."""
+        return self._name.values
+
+    @property
+    def levels(self) -> NDArray[np.int64]:
+        """Splits between a root and each cell."""
+        return self._level.values
+
+    @property
+    def rows(self) -> NDArray[np.uint64]:
+        """Bit rows, shape (size, n_words)."""
+        return self._row.values
+
+    @property
+    def frontier(self) -> NDArray[np.int64]:
+        """Cells that aren't split yet, which hold every pose together."""
+        return np.flatnonzero(self._number.values <= 0)
+
+    def is_split(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which cells have children here."""
+        return self._number.values[cells] > 0
+
+    def may_split(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which cells the tree hasn't been asked about."""
+        return self._number.values[cells] == _UNASKED
+
+    def children(self, cell: int) -> NDArray[np.int64]:
+        """Return the children that a cell has here."""
+        first = self._first.values[cell]
+        return np.arange(first, first + max(0, self._number.values[cell]))
+
+    def split(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Ask the tree for the children of cells; return those that came.
+
+        Nothing comes of cells that can't be split, that were asked about before, or
+        that there is no room for.
+
+        Raises:
+            ValueError: If a child serves a row that its parent misses.
+        """
+        before = self.size
+        asked = cells[self.may_split(cells)]
+        for part in parts(asked.size, _ASKED):
+            self._ask(asked[part])
+        return np.arange(before, self.size)
+
+    def _ask(self, asked: NDArray[np.int64]) -> None:
+        if self.full:
+            return
+        batch = self.tree.children(self.names[asked])
+        if not self._room(batch.cells.size):
+            self.full = True
+            return
+        self._check(asked, batch)
+        number = np.bincount(batch.parents, minlength=asked.size)
+        self._number.values[asked] = number
+        self._first.values[asked] = self.size + np.cumsum(number) - number
+        self._append(batch, self.levels[asked[batch.parents]] + 1)
+
+    def prices(
+        self, cells: NDArray[np.int64], multipliers: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Return lambda(S) of each cell, exactly."""
+        price = BitSum(multipliers)
+        self._budget.spend(cells.size * self._words * price.units + 3e5)
+        found = np.empty(cells.size, dtype=np.int64)
+        for part in parts(cells.size):
+            found[part] = price(self.rows[cells[part]])
+        return found
+
+    def _room(self, n: int) -> bool:
+        return (self.size + n) * self._words * 8 <= MAX_BYTES
+
+    def _check(self, asked: NDArray[np.int64], batch: CellBatch) -> None:
+        if not np.all(np.diff(batch.parents) >= 0):
+            raise ValueError("children must come in the order of the cells asked for")
+        bad = exceeds(batch.rows, self.rows, asked[batch.parents])
+        if bad >= 0:
+            parent = self.names[asked[batch.parents[bad]]]
+            raise ValueError(
+                f"cell {batch.cells[bad]} serves rows that its parent {parent} misses: "
+                f"a parent must hold the union of its children"
+            )
+
+    def _append(self, batch: CellBatch, levels: NDArray[np.int64]) -> None:
+        n = batch.cells.size
+        if batch.rows.shape != (n, self._words) or batch.rows.dtype != np.uint64:
+            raise ValueError(
+                f"bit rows must be uint64 of shape {(n, self._words)}, got "
+                f"{batch.rows.dtype} {batch.rows.shape}"
+            )
+        check_padding(batch.rows, self.tree.n_rows)
+        self._name.append(batch.cells)
+        self._level.append(levels)
+        self._first.append(np.zeros(n, dtype=np.int64))
+        self._number.append(np.full(n, _UNASKED))
+        self._row.append(batch.rows)
+        self._budget.spend(2.0 * n * self._words)

@@ -1,0 +1,179 @@
+"""Search over multisets of K cells: may K poses serve enough, and where?
+
+Start from K times the whole tree. A multiset goes if its cells' rows together don't
+reach the requirement, or cost less than need(lambda). Else its coarsest cell is split.
+Two poses may stand in the same cell, so a cell used m times becomes (m, 0), (m - 1, 1),
+... (0, m) uses of its halves: every multiset of parts once, (a, a) among them. Which
+cell is split depends on the multiset alone, so none is met twice. A multiset of cells
+that can't be split and still reaches the requirement is handed back.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.bit_rows import BitSum, pack_rows, parts
+from solvers.status import WorkBudget
+
+from .cell_problem import WholeRows
+from .cell_store import CellStore
+from .cell_twigs import VOID, Twigs
+
+_BATCH = 2048
+# Words that a batch's rows may take.
+_WORDS = 2_000_000
+_UNITS_PER_NODE = 300.0
+_NEVER = np.iinfo(np.int64).max
+
+
+@dataclass(frozen=True, eq=False)
+class TupleAnswer:
+    """Answer of :func:`refute_tuples`.
+
+    Attributes:
+        refuted: Whether no K poses reach the requirement.
+        survivor: K cells of the store, with repetition, that may and can't be split;
+            None if none was found.
+        met: Multisets that were weighed.
+    """
+
+    refuted: bool
+    survivor: NDArray[np.int64] | None
+    met: int
+
+
+def refute_tuples(
+    whole: WholeRows,
+    store: CellStore,
+    n_poses: int,
+    multipliers: NDArray[np.int64],
+    budget: WorkBudget,
+) -> TupleAnswer:
+    """Search all multisets of K cells, as far as the budget reaches.
+
+    Args:
+        whole: What must be served.
+        store: The cells known so far; more are asked for where needed.
+        n_poses: K, at least 1.
+        multipliers: Any non-negative integers of the store's rows; good ones prune.
+        budget: Counted work.
+    """
+    twigs = Twigs(whole, store, n_poses, multipliers)
+    if twigs.root == VOID:
+        return TupleAnswer(refuted=True, survivor=None, met=0)
+    enough = Enough(whole, n_poses)
+    start, _ = _weigh(np.full((1, n_poses), twigs.root), twigs, enough)
+    stack = [start] if len(start) else []
+    met = 0
+    while stack:
+        nodes, ended = _split(stack.pop(), twigs)
+        # With the store full, what could be split looks as if it couldn't.
+        if budget.exhausted or store.full:
+            return TupleAnswer(refuted=False, survivor=None, met=met)
+        if ended is not None:
+            cells = np.array(sorted(twigs.cell(int(t)) for t in ended))
+            return TupleAnswer(refuted=False, survivor=cells, met=met)
+        met += len(nodes)
+        budget.spend(len(nodes) * (enough.units + _UNITS_PER_NODE) + 1e5)
+        nodes, weights = _weigh(nodes, twigs, enough)
+        # The heaviest last, so that what may survive comes first.
+        nodes = nodes[np.argsort(weights, kind="stable")]
+        stack += [nodes[part] for part in parts(len(nodes), _BATCH)]
+    return TupleAnswer(refuted=True, survivor=None, met=met)
+
+
+class Enough:
+    """Weighs what K bit rows serve together, each row as often as it needs."""
+
+    def __init__(self, whole: WholeRows, n_poses: int) -> None:
+        needs = np.minimum(whole.needs, n_poses + 1)
+        self._planes = int(min(needs.max(initial=0), n_poses))
+        self._exactly = pack_rows(needs == np.arange(self._planes + 1)[:, None])
+        self._simple = bool(np.all(needs == 1))
+        self._needed = whole.needed
+        self._sums = [
+            BitSum(np.where(whole.row_sets == g, whole.weights, 0))
+            for g in range(len(whole.needed))
+        ]
+        words = self._exactly.shape[1]
+        per_word = 2.0 * n_poses * max(1, self._planes)
+        self.units = words * (per_word + sum(s.units for s in self._sums))
+        self.batch = max(1, _WORDS // (words * (1 + n_poses + self._planes)))
+
+    def served(self, rows: NDArray[np.uint64]) -> NDArray[np.uint64]:
+        """Return the rows that enough of K cells serve; shape (n, K, n_words) given."""
+        if self._simple:
+            return np.bitwise_or.reduce(rows, axis=1)
+        n, n_poses, words = rows.shape
+        # Plane j: what more than j of the cells so far serve.
+        planes = np.zeros((self._planes, n, words), dtype=np.uint64)
+        for k in range(n_poses):
+            for j in range(self._planes - 1, 0, -1):
+                planes[j] |= planes[j - 1] & rows[:, k]
+            if self._planes:
+                planes[0] |= rows[:, k]
+        found = np.broadcast_to(self._exactly[0], (n, words)).copy()
+        for plane, mask in zip(planes, self._exactly[1:], strict=True):
+            found |= plane & mask
+        return found
+
+    def __call__(
+        self, rows: NDArray[np.uint64]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """Return whether each K rows meet every set, and what they serve in all."""
+        found = self.served(rows)
+        each = np.stack([weigh(found) for weigh in self._sums])
+        meets = [w >= needed for w, needed in zip(each, self._needed, strict=True)]
+        return np.all(meets, axis=0), each.sum(axis=0)
+
+
+def _weigh(
+    nodes: NDArray[np.int64], twigs: Twigs, enough: Enough
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the multisets that remain, and what they serve at most."""
+    nodes = nodes[np.all(nodes != VOID, axis=1)]
+    nodes = nodes[twigs.costs[nodes].sum(axis=1) >= twigs.floor]
+    weights = np.zeros(len(nodes), dtype=np.int64)
+    meets = np.zeros(len(nodes), dtype=bool)
+    for part in parts(len(nodes), enough.batch):
+        meets[part], weights[part] = enough(twigs.rows[nodes[part]])
+    return nodes[meets], weights[meets]
+
+
+def _split(
+    nodes: NDArray[np.int64], twigs: Twigs
+) -> tuple[NDArray[np.int64], NDArray[np.int64] | None]:
+    """Split each multiset's coarsest twig; or return one that can't be split."""
+    final = np.zeros(nodes.shape, dtype=bool)
+    settled: list[NDArray[np.int64]] = []
+    while len(nodes):
+        ranks = np.where(final, _NEVER, twigs.coarseness[nodes])
+        which = np.argmin(ranks, axis=1)
+        if np.any(np.take_along_axis(final, which[:, None], axis=1)):
+            ended = np.take_along_axis(final, which[:, None], axis=1).ravel()
+            return nodes[:0], nodes[int(np.argmax(ended))]
+        chosen = np.take_along_axis(nodes, which[:, None], axis=1).ravel()
+        halves = twigs.halves(chosen)
+        leaf = halves[:, 0] == chosen
+        settled += _uses(nodes[~leaf], chosen[~leaf], halves[~leaf])
+        final = (final | (nodes == chosen[:, None]))[leaf]
+        nodes = nodes[leaf]
+    return np.concatenate(settled) if settled else nodes, None
+
+
+def _uses(
+    nodes: NDArray[np.int64], chosen: NDArray[np.int64], halves: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    """Replace m uses of a twig by (m, 0), (m - 1, 1), ... (0, m) uses of its halves."""
+    found: list[NDArray[np.int64]] = []
+    at = nodes == chosen[:, None]
+    uses = at.sum(axis=1)
+    for m in np.unique(uses):
+        rows, places, two = nodes[uses == m], at[uses == m], halves[uses == m]
+        for second in range(m + 1):
+            parts_of = np.repeat(two, [m - second, second], axis=1)
+            new = rows.copy()
+            new[places] = parts_of.ravel()
+            found.append(np.sort(new, axis=1))
+    return found

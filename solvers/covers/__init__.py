@@ -1,0 +1,1 @@
+"""Set covers: fewest, cheapest, most weight; with bounds."""

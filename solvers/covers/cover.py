@@ -1,0 +1,259 @@
+"""Fewest or cheapest sets that cover enough weight, with a bound and its proof.
+
+The program is stated in ``cover_problem``. Counts (unit costs) are solved by greedy and
+large-neighbourhood search from above, Lagrangian bound and exact search over tuples
+from below; among the covers of the fewest sets the one of most weight is sought.
+Costs go to the linear program and HiGHS' branch and bound.
+
+References:
+    Tarbox and Gottschlich, "Planning for complete sensor coverage in inspection",
+    Computer Vision and Image Understanding 61(1), 1995.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from solvers.covers.multi.multicover import fewest_multicover, heaviest_of
+from solvers.given_numbers import set_names, whole_number
+from solvers.one_thread import on_one_thread
+from solvers.status import SolveStatus, WorkBudget
+
+from .answers import NONE, CountAnswer
+from .cheapest import cheapest_sets
+from .counts import fewest_sets, most_weight
+from .cover_problem import CoverProblem
+from .neighbourhood import greedy, prune
+from .reductions import ReducedCover, forgiven, reduce_problem
+
+DEFAULT_BUDGET = 2e9
+
+
+@dataclass(frozen=True, eq=False)
+class CoverSolution:
+    """Answer to a :class:`CoverProblem`.
+
+    Attributes:
+        problem: The problem this answers.
+        status: How the solve ended.
+        selected: Chosen sets in increasing order, shape (k,); if the status is
+            ``INFEASIBLE``, few sets that cover all that can be covered, or of as
+            many as are allowed those that cover most.
+        lower_bound: Proven lower bound on the cost of any cover; inf if infeasible.
+            Where HiGHS' bound comes within 1e-5 of the cost, it is the cost.
+        proof: What proves the bound, and what cut the proof short if anything did.
+    """
+
+    problem: CoverProblem
+    status: SolveStatus
+    selected: NDArray[np.int64]
+    lower_bound: float
+    proof: str
+
+    @property
+    def cost(self) -> float:
+        """Cost of the selection."""
+        return float(self.problem.costs[self.selected].sum())
+
+    @property
+    def covered_weight(self) -> float:
+        """Weight that the selection covers, recomputed from the problem."""
+        return self.problem.covered_weight(self.selected)
+
+    @property
+    def covered_weights(self) -> NDArray[np.float64]:
+        """The same in each row set, shape (n_g,)."""
+        return self.problem.covered_weights(self.selected)
+
+    def shortfall(self) -> float:
+        """Return the missing share of a row set's weight, recomputed; 0 if met.
+
+        Of several row sets it is the largest.
+        """
+        required, totals = self.problem.required_weight, self.problem.total_weights
+        missing = required - self.covered_weights
+        missing[missing <= forgiven(self.problem)] = 0.0
+        shares = missing / np.where(totals > 0, totals, np.maximum(missing, 1e-300))
+        return float(shares.max())
+
+
+@dataclass(frozen=True, eq=False)
+class MaxCoverageSolution:
+    """Answer of :func:`solve_max_coverage`.
+
+    Attributes:
+        problem: The problem this answers; its requirement plays no part.
+        n_sets: Number of sets allowed.
+        status: ``OPTIMAL`` if no such selection covers more, else ``FEASIBLE``.
+        selected: Chosen sets in increasing order, at most ``n_sets``.
+        upper_bound: Weight that no ``n_sets`` sets exceed.
+        proof: What proves the bound, and what cut the proof short if anything did.
+    """
+
+    problem: CoverProblem
+    n_sets: int
+    status: SolveStatus
+    selected: NDArray[np.int64]
+    upper_bound: float
+    proof: str
+
+    @property
+    def covered_weight(self) -> float:
+        """Weight that the selection covers, recomputed from the problem."""
+        return self.problem.covered_weight(self.selected)
+
+
+@on_one_thread
+def solve_cover(
+    problem: CoverProblem,
+    *,
+    max_sets: int | None = None,
+    time_limit: float = 60.0,
+    seed: int = 0,
+    budget: float = DEFAULT_BUDGET,
+    heaviest: bool = True,
+    reduced: ReducedCover | None = None,
+) -> CoverSolution:
+    """Find the fewest (or cheapest) sets that reach the required weight.
+
+    Args:
+        problem: The cover to solve.
+        max_sets: Sets allowed. If more are proved necessary, the status is
+            ``INFEASIBLE`` and the selection covers the most with that many; if no
+            cover this small is found but none is excluded, it is ``UNKNOWN``.
+        time_limit: Wall time that cuts the work, in [s]; the proof then says so.
+        seed: Seed of the neighbourhood search.
+        budget: Counted work, in matrix entries touched; about 1e9 a second.
+        heaviest: Whether to look for the one of most weight among the covers of the
+            fewest sets; no for who asks `solve_max_coverage` next.
+        reduced: This problem's `reduced_problem`, where it is at hand.
+
+    Returns:
+        The solution. An infeasible problem is an answer, not an error: its selection
+        covers all the weight that can be covered (or the most with ``max_sets``).
+    """
+    fixed = problem.fixed
+    if max_sets is not None:
+        max_sets = whole_number("max_sets", max_sets, least=1)
+        if not max_sets >= fixed.size:
+            raise ValueError(f"max_sets is {max_sets}, but {fixed.size} sets are fixed")
+    seed = whole_number("seed", seed, least=0)
+    work = WorkBudget(budget, time_limit=time_limit)
+    cover = _or_reduce(problem, reduced)
+    work.spend(cover.entries)
+    free = None if max_sets is None else max_sets - fixed.size
+    if not np.any(cover.quotas > 0):
+        nothing = "no weight is required"
+        proof = "the fixed sets suffice" if fixed.size else nothing
+        answer = CountAnswer(SolveStatus.OPTIMAL, NONE, 0.0, proof)
+    elif not cover.reachable:
+        answer = _unreachable(cover, work, seed, free)
+    elif problem.unit_costs:
+        search = fewest_sets if cover.simple else fewest_multicover
+        answer = search(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
+        unit = float(problem.costs[0])
+        answer = replace(answer, lower_bound=answer.lower_bound * unit)
+    else:
+        answer = cheapest_sets(cover, work, seed=seed, max_sets=free)
+    selected = np.union1d(fixed, cover.kept[answer.selected])
+    lower = answer.lower_bound + float(problem.costs[fixed].sum())
+    cost = float(problem.costs[selected].sum())
+    # Both are sums of costs, in another order.
+    lower = cost if cost < lower <= cost * (1.0 + 1e-12) else lower
+    return CoverSolution(problem, answer.status, selected, lower, answer.proof)
+
+
+@on_one_thread
+def solve_max_coverage(
+    problem: CoverProblem,
+    n_sets: int,
+    *,
+    warm_start: ArrayLike | None = None,
+    time_limit: float = 60.0,
+    seed: int = 0,
+    budget: float = DEFAULT_BUDGET,
+    reduced: ReducedCover | None = None,
+) -> MaxCoverageSolution:
+    """Find the largest weight that at most ``n_sets`` sets cover; costs play no part.
+
+    Args:
+        problem: The cover; its required weight plays no part.
+        n_sets: Sets allowed, at least 0.
+        warm_start: A selection to start from; the answer is never worse.
+        time_limit: Wall time that cuts the work, in [s]; the proof then says so.
+        seed: Seed of the neighbourhood search.
+        budget: Counted work, in matrix entries touched.
+        reduced: This problem's `reduced_problem`, where it is at hand.
+    """
+    fixed = problem.fixed
+    n_sets = whole_number("n_sets", n_sets, least=0)
+    if not n_sets >= fixed.size:
+        raise ValueError(f"n_sets is {n_sets}, but {fixed.size} sets are fixed")
+    given = () if warm_start is None else warm_start
+    start = set_names("warm_start", given, problem.costs.size)
+    if start.size > n_sets:
+        raise ValueError(f"warm_start must name at most {n_sets} sets of the problem")
+    free = n_sets - fixed.size
+    seed = whole_number("seed", seed, least=0)
+    work = WorkBudget(budget, time_limit=time_limit)
+    cover = _or_reduce(problem, reduced, costs=np.ones(problem.costs.size))
+    work.spend(cover.entries)
+    known = cover.stand_in[np.setdiff1d(start, fixed)]
+    known = np.unique(known[known >= 0])[:free]
+    search = most_weight if cover.simple else heaviest_of
+    answer = search(cover, free, work, seed=seed, start=known)
+    selected = np.union1d(fixed, cover.kept[answer.selected])
+    warm = np.union1d(fixed, start)
+    better = problem.covered_weight(warm) > problem.covered_weight(selected)
+    if better and warm.size <= n_sets:
+        # Only where sets that stand in for others coincide.
+        selected = warm
+    covered = problem.covered_weight(selected)
+    optimal = answer.status is SolveStatus.OPTIMAL
+    upper = (cover.settled + answer.upper_bound) * cover.unit
+    return MaxCoverageSolution(
+        problem,
+        n_sets,
+        answer.status,
+        selected,
+        covered if optimal else max(covered, upper),
+        answer.proof,
+    )
+
+
+def reduced_problem(problem: CoverProblem) -> ReducedCover:
+    """Return what both solvers search, to be made once for several questions.
+
+    Raises:
+        ValueError: If costs differ: where they don't count, more sets may be dropped.
+    """
+    if not problem.unit_costs:
+        raise ValueError("costs differ: solve each question from the problem itself")
+    return reduce_problem(problem)
+
+
+def _or_reduce(
+    problem: CoverProblem,
+    given: ReducedCover | None,
+    *,
+    costs: NDArray[np.float64] | None = None,
+) -> ReducedCover:
+    if given is None:
+        return reduce_problem(problem, costs=costs)
+    if given.problem is not problem:
+        raise ValueError("reduced must be made from this problem")
+    return given
+
+
+def _unreachable(
+    cover: ReducedCover, work: WorkBudget, seed: int, max_sets: int | None
+) -> CountAnswer:
+    """Answer a problem whose requirement exceeds the weight of all sets together."""
+    everything = replace(cover, quotas=cover.totals)
+    few = prune(everything, greedy(everything, NONE, work))
+    if max_sets is not None and few.size > max_sets:
+        search = most_weight if cover.simple else heaviest_of
+        few = search(cover, max_sets, work, seed=seed).selected
+    proof = "all sets together cover less than is required"
+    return CountAnswer(SolveStatus.INFEASIBLE, few, float("inf"), proof)

@@ -1,0 +1,193 @@
+"""Upper bounds on many parts of a cover's selections at once, exact in any order.
+
+A part holds the selections of K sets that take no closed set, and at least one set of
+each of some groups that have none in common. For any lambda in [0, w] they cover at
+most::
+
+    sum_e (w_e - lambda_e) + the dearest such selection, a set's price being lambda(a_j)
+
+which is the dearest of each group and the dearest others. Multipliers are kept as whole
+steps of a grid so coarse that sums of all of them are exact in single precision: bounds
+are exact, and the same whatever the BLAS and its threads. The volume algorithm
+(``relaxation``) lowers the bounds of many parts by one matrix product a step.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.covers.reductions import ReducedCover
+from solvers.status import WorkBudget
+
+# Sums of whole numbers up to this are exact in single precision.
+_EXACT = float(1 << 23)
+# Running means are kept in steps of this size, so that their sums are exact too.
+_STEP = 2.0**-12
+# A dense multiply-add in single precision costs this share of a unit of work.
+_DENSE_UNIT = 1.0 / 16.0
+# Work of choosing the dearest, for each part and set.
+_CHOOSE = 6.0
+_MEMORY = 0.9
+# After so many steps, parts that were refuted take no further part.
+_ROUND = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Selections of K sets, bounded.
+
+    Attributes:
+        closed: Sets that aren't taken, shape (n_s,).
+        groups: Indices of sets of which at least one is taken, each; none is closed.
+        shares: lambda / w, shape (n_e,).
+        primal: Running mean of the dearest selections, shape (n_s,).
+        dearest: The last dearest selection, at most K sets.
+        pace: Of the volume algorithm: the length of its steps, and how many in a row
+            lowered nothing.
+        bound: Integer-valued weight that no selection of the part exceeds.
+    """
+
+    closed: NDArray[np.bool_]
+    groups: tuple[NDArray[np.int64], ...]
+    shares: NDArray[np.float32]
+    primal: NDArray[np.float32]
+    dearest: NDArray[np.int64]
+    bound: float
+    pace: tuple[float, int] = (1.0, 0)
+
+
+class PartBounds:
+    """Bounds parts of the selections of K sets.
+
+    Args:
+        cover: A simple cover: one row set, each row needed once.
+        n_sets: K.
+        target: Weight below which a part needs no lower bound.
+        budget: Work.
+
+    Attributes:
+        covers: Whether set s covers row e, as 0 and 1, shape (n_s, n_e).
+        n_sets: K.
+    """
+
+    def __init__(
+        self, cover: ReducedCover, n_sets: int, target: float, budget: WorkBudget
+    ) -> None:
+        self.covers = cover.by_set.astype(np.float32).toarray()
+        self.n_sets = n_sets
+        self._weights, self._total = cover.weights, cover.total
+        self._target, self._budget = target, budget
+        self._grid = 2.0 ** max(0.0, np.ceil(np.log2(self._total / _EXACT)))
+
+    def whole(self, shares: NDArray[np.float64]) -> Part:
+        """Return the part of all selections, not bounded yet."""
+        n = len(self.covers)
+        return Part(
+            np.zeros(n, dtype=bool),
+            (),
+            shares.astype(np.float32),
+            np.zeros(n, dtype=np.float32),
+            np.empty(0, dtype=np.int64),
+            np.inf,
+        )
+
+    def lowered(self, parts: list[Part], steps: int) -> list[Part]:
+        """Return the parts with bounds as low as so many steps bring them.
+
+        Bounds below the target are as good as any: the steps end there.
+        """
+        bounded: list[Part] = []
+        live = parts
+        for _ in range(0, steps, _ROUND):
+            if not live or self._budget.exhausted:
+                break
+            live = self._stepped(live)
+            bounded += [part for part in live if part.bound < self._target]
+            live = [part for part in live if part.bound >= self._target]
+        return bounded + live
+
+    def weight_of(self, chosen: NDArray[np.int64]) -> float:
+        """Return the weight that sets cover."""
+        return float(self._weights[self.covers[chosen].any(axis=0)].sum())
+
+    def _stepped(self, parts: list[Part]) -> list[Part]:
+        """Some steps of the volume algorithm on all parts."""
+        weights, aim = self._weights, 0.998 * self._target
+        shares = np.stack([part.shares for part in parts]).astype(np.float64)
+        best, (bounds, chosen) = shares, self._bounds(parts, shares)
+        taken = self._indicator(chosen)
+        primal = np.stack([part.primal for part in parts]).astype(np.float64)
+        fresh = np.array([not part.dearest.size for part in parts])
+        primal = np.where(fresh[:, None], taken, primal)
+        step = np.array([part.pace[0] for part in parts])
+        stale = np.array([part.pace[1] for part in parts])
+        for _ in range(_ROUND):
+            primal = np.round(primal / _STEP) * _STEP
+            reached = primal.astype(np.float32) @ self.covers
+            excess = 1.0 - reached.astype(np.float64)
+            moving = np.where(excess > 0, best < 1.0, best > 0.0)
+            length = np.maximum((excess * excess * moving) @ weights, 1e-9)
+            far = np.maximum(bounds - aim, 1e-4 * self._total)
+            shares = np.clip(best + (step * far / length)[:, None] * excess, 0.0, 1.0)
+            found, chosen = self._bounds(parts, shares)
+            primal = _MEMORY * primal + (1.0 - _MEMORY) * self._indicator(chosen)
+            lower = found < bounds
+            best = np.where(lower[:, None], shares, best)
+            bounds = np.minimum(bounds, found)
+            stale = np.where(lower, 0, stale + 1)
+            step = np.where(lower, np.minimum(1.1 * step, 4.0), step)
+            step = np.where(~lower & (stale % 5 == 0), 0.6 * step, step)
+            if np.all(bounds < self._target):
+                break
+        return [
+            replace(
+                part,
+                shares=best[i].astype(np.float32),
+                primal=primal[i].astype(np.float32),
+                dearest=chosen[i],
+                bound=min(part.bound, float(bounds[i])),
+                pace=(float(step[i]), int(stale[i])),
+            )
+            for i, part in enumerate(parts)
+        ]
+
+    def _bounds(
+        self, parts: list[Part], shares: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
+        """Return the bound of each part by its multipliers, and what is dearest."""
+        steps = np.floor(shares * (self._weights / self._grid))
+        prices = steps.astype(np.float32) @ self.covers.T
+        self._budget.spend(
+            2.0 * len(parts) * self.covers.size * _DENSE_UNIT
+            + _CHOOSE * prices.size
+            + 1e5
+        )
+        chosen = [
+            self._dearest(part, own) for part, own in zip(parts, prices, strict=True)
+        ]
+        paid = np.array(
+            [
+                own[sets].sum(dtype=np.float64)
+                for own, sets in zip(prices, chosen, strict=True)
+            ]
+        )
+        return self._total + self._grid * (paid - steps.sum(axis=1)), chosen
+
+    def _dearest(self, part: Part, prices: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Return the dearest selection of a part."""
+        picks = [int(group[np.argmax(prices[group])]) for group in part.groups]
+        left = self.n_sets - len(picks)
+        if left == 0:
+            return np.array(picks, dtype=np.int64)
+        others = np.where(part.closed, np.float32(-1.0), prices)
+        others[picks] = -1.0
+        top = np.argpartition(-others, min(left, others.size) - 1)[:left]
+        top = top[others[top] > 0.0]
+        return np.concatenate([np.array(picks, dtype=np.int64), top])
+
+    def _indicator(self, chosen: list[NDArray[np.int64]]) -> NDArray[np.float64]:
+        found = np.zeros((len(chosen), len(self.covers)))
+        for row, sets in zip(found, chosen, strict=True):
+            row[sets] = 1.0
+        return found

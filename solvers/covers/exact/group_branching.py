@@ -1,0 +1,219 @@
+"""Branch and bound on groups of alike sets, for partial covers.
+
+In a cover by visibility each place is offered many times over: columns beside each
+other differ in few rows, so a fractional solution spreads over all of them, and closing
+one set, or taking one, changes next to nothing. A node is split by a *group*, the sets
+that are alike to one of them (by the Jaccard index of their rows): either none of it is
+taken, or at least one. Groups split further until the bound of what is left falls
+below the target. Nodes are bounded many at a time (``group_bounds``), best bound first.
+
+References:
+    Ryan and Foster, "An integer programming approach to scheduling", 1981, for
+    branching on what several columns have in common.
+"""
+
+import heapq
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.covers.answers import NONE
+from solvers.covers.reductions import ReducedCover
+from solvers.status import WorkBudget
+
+from .group_bounds import Part, PartBounds
+from .incumbent import Incumbent
+
+# Larger covers aren't searched: the dense copy takes four bytes an entry, the table
+# of what is alike four for each pair of sets.
+_MAX_DENSE = 60_000_000
+_MAX_SETS = 4_000
+# Share of the work that may go into that table.
+_PREPARED = 0.25
+# Parts bounded together, and bytes of parts kept open.
+_BATCH = 48
+_MAX_OPEN = 600_000_000
+# Steps for the whole, and for a part that starts from its parent's multipliers.
+_FIRST_STEPS, _STEPS = 200, 40
+# Sets about which a group is tried, and the least likeness of its members.
+_CENTRES = 6
+_LIKENESS = (0.6, 0.3)
+
+
+@dataclass(frozen=True, eq=False)
+class GroupSearch:
+    """Answer of :func:`best_by_groups`.
+
+    Attributes:
+        selected: Best selection found that reaches the target, or None.
+        weight: Integer-valued weight that it covers, 0 without one.
+        upper_bound: No K sets cover more than this.
+        complete: Whether nothing is left open.
+    """
+
+    selected: NDArray[np.int64] | None
+    weight: float
+    upper_bound: float
+    complete: bool
+
+
+def best_by_groups(
+    cover: ReducedCover,
+    n_sets: int,
+    *,
+    target: float,
+    multipliers: NDArray[np.float64],
+    budget: WorkBudget,
+    first: bool = False,
+) -> GroupSearch:
+    """Find K sets that cover at least a target, the most if all of the budget lasts.
+
+    Args:
+        cover: A simple cover.
+        n_sets: K, at least 1.
+        target: Integer-valued weight below which nothing is of interest.
+        multipliers: Row multipliers in [0, w] to start from, shape (n_e,).
+        budget: Work; when it ends, the bound of what is left open is returned.
+        first: Whether any selection that reaches the target will do.
+    """
+    size = cover.n_sets * cover.weights.size
+    too_large = size > _MAX_DENSE or cover.n_sets > _MAX_SETS
+    # A table of what is alike that leaves no work to use it is made for nothing.
+    too_dear = _table_units(cover) > _PREPARED * budget.remaining
+    if too_large or too_dear or n_sets >= cover.n_sets:
+        return GroupSearch(None, 0.0, cover.total, complete=False)
+    budget.spend(_table_units(cover))
+    return _Tree(cover, n_sets, target, budget, first=first).run(multipliers)
+
+
+class _Tree(Incumbent[NDArray[np.int64]]):
+    """Search over groups; see `best_by_groups`. It is its own incumbent."""
+
+    def __init__(
+        self,
+        cover: ReducedCover,
+        n_sets: int,
+        target: float,
+        budget: WorkBudget,
+        *,
+        first: bool,
+    ) -> None:
+        super().__init__(cover, target, first=first)
+        self.cover, self.n_sets, self.budget = cover, n_sets, budget
+        self._names = count()
+        self._open: list[tuple[float, int, Part]] = []
+        self.bounds = PartBounds(cover, n_sets, target, budget)
+        self._alike = _likeness(self.bounds.covers, cover.weights)
+
+    def run(self, multipliers: NDArray[np.float64]) -> GroupSearch:
+        whole = self.bounds.whole(multipliers / self.cover.weights)
+        self._take([whole], _FIRST_STEPS)
+        most = _MAX_OPEN // (4 * self.cover.weights.size + 5 * self.cover.n_sets)
+        while self._promising:
+            if self.done or self.budget.exhausted or len(self._open) > most:
+                # What the clock cut before it was bounded may cover everything.
+                left = min(-self._open[0][0], self.cover.total)
+                upper = max(self.weight, left // self.cover.grain * self.cover.grain)
+                return GroupSearch(self.selected, self.weight, upper, complete=False)
+            split: list[Part] = []
+            while self._promising and len(split) < _BATCH:
+                split += self._children(heapq.heappop(self._open)[2])
+            self._take(split, _STEPS)
+        return GroupSearch(self.selected, self.weight, self.refuted, complete=True)
+
+    @property
+    def _promising(self) -> bool:
+        """Whether a part is open that may reach the target."""
+        return bool(self._open) and -self._open[0][0] >= self.target
+
+    def _take(self, parts: list[Part], steps: int) -> None:
+        """Bound parts, look at what they would take, and keep those still open."""
+        still: list[Part] = []
+        for part in self.bounds.lowered(parts, steps):
+            only = self._only(part)
+            if only is not None:
+                self.offer(np.sort(only), self.bounds.weight_of(only))
+                continue
+            if part.dearest.size:
+                dearest = np.sort(part.dearest)
+                self.offer(dearest, self.bounds.weight_of(dearest))
+            still.append(part)
+        for part in still:
+            if part.bound >= self.target:
+                heapq.heappush(self._open, (-part.bound, next(self._names), part))
+
+    def _only(self, part: Part) -> NDArray[np.int64] | None:
+        """Return the selection that covers all that a part's can, if it is one."""
+        if any(group.size > 1 for group in part.groups):
+            return None
+        taken = np.concatenate([NONE, *part.groups])
+        if taken.size == self.n_sets:
+            return taken
+        others = np.setdiff1d(np.flatnonzero(~part.closed), taken)
+        left = self.n_sets - taken.size
+        return np.concatenate([taken, others]) if others.size <= left else None
+
+    def _children(self, part: Part) -> list[Part]:
+        """Return the part without a group, and with at least one of it."""
+        home, group = self._group(part)
+        closed = part.closed.copy()
+        closed[group] = True
+        kept = tuple(own for i, own in enumerate(part.groups) if i != home)
+        without = kept
+        if home >= 0:
+            without += (np.setdiff1d(part.groups[home], group),)
+        part = replace(part, pace=(1.0, 0), dearest=NONE)
+        fewer = replace(part, closed=closed, groups=without)
+        return [replace(part, groups=(*kept, group)), fewer]
+
+    def _group(self, part: Part) -> tuple[int, NDArray[np.int64]]:
+        """Return sets to branch on, and the group of the part that holds them, or -1.
+
+        Half of a set, by the running mean, splits evenly.
+        """
+        home = np.full(part.closed.size, -1)
+        for i, group in enumerate(part.groups):
+            home[group] = i if group.size > 1 else -2
+        if len(part.groups) == self.n_sets:
+            home[home == -1] = -2
+        free = ~part.closed & (home != -2)
+        mean = np.where(free, part.primal, -1.0)
+        best, chosen = -np.inf, (-1, np.empty(0, dtype=np.int64))
+        for centre in np.argsort(-mean, kind="stable")[:_CENTRES]:
+            if not free[centre]:
+                break
+            near = free & (home == home[centre])
+            for least in _LIKENESS:
+                group = np.flatnonzero(near & (self._alike[centre] >= least))
+                if home[centre] >= 0 and group.size == part.groups[home[centre]].size:
+                    break
+                share = float(part.primal[group].sum())
+                worth = min(share, 1.0 - share)
+                if worth > best:
+                    best, chosen = worth, (int(home[centre]), group)
+        return chosen if chosen[1].size else self._halves(part)
+
+    def _halves(self, part: Part) -> tuple[int, NDArray[np.int64]]:
+        """Half of the largest group, where no set of it is alike to some only."""
+        i = int(np.argmax([group.size for group in part.groups]))
+        return i, part.groups[i][: part.groups[i].size // 2]
+
+
+def _table_units(cover: ReducedCover) -> float:
+    """Work of `_likeness`."""
+    return cover.n_sets * cover.n_sets * cover.weights.size / 16.0
+
+
+def _likeness(
+    covers: NDArray[np.float32], weights: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Return the weighted Jaccard index of each pair of sets, shape (n_s, n_s)."""
+    # Whole numbers below 2^12 for rows: sums are exact, so ties fall alike everywhere.
+    scale = max(1.0, float(weights.sum()) / float(1 << 23))
+    whole = np.maximum(np.floor(weights / scale), 1.0).astype(np.float32)
+    both = (covers * whole) @ covers.T
+    own = both.diagonal()
+    either = own[:, None] + own[None, :] - both
+    return np.asarray(both / either, dtype=np.float32)

@@ -1,0 +1,56 @@
+"""The best selection of an exact search, and what is still of interest.
+
+Improvements below the rounding of a sum of all weights are no weight: the next one has
+to be better by more than that, and by a grain at least.
+"""
+
+import math
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from solvers.covers.reductions import ReducedCover
+from solvers.covers.relaxation import rounding
+
+_C = TypeVar("_C")
+
+
+class Incumbent(Generic[_C]):
+    """What a search for the most weight of K sets has found.
+
+    Args:
+        cover: The cover.
+        target: Integer-valued weight below which nothing is of interest.
+        first: Whether any selection that reaches the target will do.
+
+    Attributes:
+        target: Raised beyond each selection that is kept.
+        selected: The best selection that reached the target, or None.
+        weight: Integer-valued weight that it covers, 0 without one.
+    """
+
+    def __init__(self, cover: ReducedCover, target: float, *, first: bool) -> None:
+        self.target = target
+        self.selected: _C | None = None
+        self.weight = 0.0
+        self._first = first
+        self._grain = cover.grain
+        least = np.floor(cover.total * rounding(cover.weights.size))
+        self._least = max(cover.grain, float(least))
+
+    def offer(self, chosen: _C, weight: float) -> None:
+        """Keep a selection that reaches the target, and ask for more from then on."""
+        if weight >= self.target:
+            self.selected, self.weight = chosen, weight
+            self.target = weight + self._least
+
+    @property
+    def refuted(self) -> float:
+        """Most weight that a sum may have below the target, where all is pruned."""
+        grain = int(self._grain)
+        return float((math.ceil(self.target) - 1) // grain * grain)
+
+    @property
+    def done(self) -> bool:
+        """Whether any selection will do, and one is there."""
+        return self._first and self.selected is not None

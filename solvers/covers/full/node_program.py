@@ -1,0 +1,160 @@
+"""Linear programs of the nodes of ``branching``, one HiGHS instance for all.
+
+Each starts from the optimal basis of its parent. What a node may claim is evaluated
+here from its multipliers, whatever HiGHS says of them.
+"""
+
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.highs import run_highs
+from solvers.status import WorkBudget
+
+from .row_generation import needed_sets, program
+
+_UNITS_PER_ITERATION = 4.0
+# A call, and each row and column that its basis is handed over for.
+_CALL_UNITS = 3e5
+_BASIS_UNITS = 1e3
+
+Basis = tuple[list[Any], list[Any], list[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the covers.
+
+    Attributes:
+        allowed: Sets that may be taken, shape (n_s,).
+        taken: Those of them that are, shape (n_s,).
+        added: Further rows, of shape (n_s,): some set of each is taken.
+        symmetric: Whether symmetries of what is left are worth looking for.
+    """
+
+    allowed: NDArray[np.bool_]
+    taken: NDArray[np.bool_]
+    added: tuple[NDArray[np.bool_], ...] = ()
+    symmetric: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A part of the covers with its bound and what its program left."""
+
+    part: Part
+    bound: float
+    basis: Basis
+    primal: NDArray[np.float64]
+    reduced: NDArray[np.float64]
+    dual: NDArray[np.float64]
+
+
+class NodeProgram:
+    """Linear program of a node, from the optimal basis of its parent.
+
+    Attributes:
+        rows: Rows of the cover that are in every node's program, shape (m, n_s).
+    """
+
+    def __init__(
+        self, rows: NDArray[np.bool_], enough: float, budget: WorkBudget
+    ) -> None:
+        import highspy
+
+        self.rows = rows
+        self.budget = budget
+        self._solver = program(rows, budget)
+        self._solver.setOptionValue("presolve", "off")
+        self._solver.setOptionValue("objective_bound", enough)
+        whole = np.ones(rows.shape[1], dtype=bool)
+        self._whole = self._part = Part(whole, ~whole)
+        self._basic = highspy.HighsBasisStatus.kBasic
+        self._basis = highspy.HighsBasis()
+        self._measure()
+
+    def root(self) -> Node | None:
+        """Return the whole bounded, or None where the budget ended before."""
+        return self.solve(self._whole, None)
+
+    def take_in(self, rows: NDArray[np.bool_]) -> None:
+        """Add rows to every node's program."""
+        self._change(dataclasses.replace(self._part, added=()))
+        self._add(rows)
+        self.rows = np.concatenate([self.rows, rows])
+        self._measure()
+
+    def solve(self, part: Part, basis: Basis | None) -> Node | None:
+        """Return a part bounded, or None where the budget ended before."""
+        if self.budget.exhausted:
+            return None
+        self._change(part)
+        added = part.added
+        n_base = len(self.rows)
+        if basis is not None:
+            columns, base, local = basis
+            new = [self._basic] * (n_base - len(base))
+            last = [self._basic] * (len(added) - len(local))
+            self._basis.col_status = columns
+            self._basis.row_status = [*base, *new, *local, *last][: n_base + len(added)]
+            self._basis.valid = True
+            self._solver.setBasis(self._basis)
+        run_highs(self._solver)
+        steps = float(self._solver.getInfo().simplex_iteration_count)
+        self.budget.spend(_UNITS_PER_ITERATION * self._entries * steps + _CALL_UNITS)
+        self.budget.spend(_BASIS_UNITS * (n_base + part.allowed.size))
+        solution = self._solver.getSolution()
+        dual = np.clip(np.nan_to_num(np.asarray(solution.row_dual)), 0.0, None)
+        primal = np.asarray(solution.col_value, dtype=np.float64)
+        if dual.size != n_base + len(added) or primal.size != part.taken.size:
+            dual, primal = np.zeros(n_base + len(added)), np.zeros(part.taken.size)
+        reduced = 1.0 - dual[:n_base] @ self._values
+        for y, row in zip(dual[n_base:], added, strict=True):
+            reduced[row] -= y
+        bound = needed_sets(dual, reduced[part.allowed & ~part.taken])
+        bound += float(reduced[part.taken].sum())
+        if not self._served(part):
+            bound = np.inf
+        kept = self._solver.getBasis()
+        status = list(kept.row_status)
+        basis = list(kept.col_status), status[:n_base], status[n_base:]
+        return Node(part, bound, basis, primal, reduced, dual)
+
+    def _measure(self) -> None:
+        self._values = self.rows.astype(np.float64)
+        self._entries = float(np.count_nonzero(self.rows) + sum(self.rows.shape))
+
+    def _served(self, part: Part) -> bool:
+        """Whether the sets allowed cover every row at all."""
+        if not np.all(self._values @ part.allowed.astype(np.float64) > 0):
+            return False
+        return all(bool(np.any(row & part.allowed)) for row in part.added)
+
+    def _change(self, part: Part) -> None:
+        """Bring the program from the part solved last to another."""
+        old, self._part = self._part, part
+        other = (part.allowed != old.allowed) | (part.taken != old.taken)
+        moved = np.flatnonzero(other).astype(np.int32)
+        if moved.size:
+            lower = part.taken[moved].astype(np.float64)
+            upper = part.allowed[moved].astype(np.float64)
+            self._solver.changeColsBounds(moved.size, moved, lower, upper)
+        common = 0
+        for before, now in zip(old.added, part.added, strict=False):
+            if before is not now:
+                break
+            common += 1
+        first, stop = len(self.rows) + common, len(self.rows) + len(old.added)
+        if stop > first:
+            stale = np.arange(first, stop, dtype=np.int32)
+            self._solver.deleteRows(stale.size, stale)
+        self._add(part.added[common:])
+
+    def _add(self, rows: Iterable[NDArray[np.bool_]]) -> None:
+        for row in rows:
+            sets = np.flatnonzero(row).astype(np.int32)
+            self._solver.addRow(1.0, np.inf, sets.size, sets, np.ones(sets.size))

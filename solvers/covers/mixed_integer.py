@@ -1,0 +1,262 @@
+"""Covers as linear and mixed-integer programs for HiGHS, over plain arrays.
+
+    minimise c x   subject to   A x >= r y,  w_g y >= W_g for each row set g,
+                                1 x <= K,  0 <= y <= 1,  x binary
+
+or with the largest w y as the aim. One thread and limits on iterations and nodes, so
+that the answer doesn't depend on the machine. What comes back is a proposal: selections
+and linear bounds are evaluated again by the caller. Only the bound of branch and bound
+is HiGHS' own word.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from solvers.highs import run_highs
+from solvers.status import WorkBudget
+
+from .reductions import ReducedCover
+
+# Units of work per nonzero that a simplex iteration, the root with its cuts (of a
+# partial and of a full cover) and any other node cost.
+_UNITS_PER_ITERATION = 2.0
+_UNITS_PER_ROOT = 100_000.0
+_UNITS_PER_FULL_ROOT = 20_000.0
+_UNITS_PER_NODE = 3_000.0
+_MAX_ENTRIES = 60_000
+# HiGHS' own tolerance, relative to the bound.
+TOLERANCE = 1e-6
+# Weights, in their mean, that it isn't told of.
+_LIGHT = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class IntegerAnswer:
+    """What branch and bound left.
+
+    Attributes:
+        selected: The best selection, to be checked, or None.
+        bound: HiGHS' bound on the cost from below, or on the weight from above, with
+            its tolerance; None if it has none.
+    """
+
+    selected: NDArray[np.int64] | None
+    bound: float | None
+
+
+def linear_multipliers(
+    cover: ReducedCover, budget: WorkBudget
+) -> NDArray[np.float64] | None:
+    """Return row multipliers of the linear relaxation, or None if it wasn't solved.
+
+    Shape (n_e,), in cost; safe to use in ``relaxation.cost_bound`` whatever they are.
+    """
+    steps = int(budget.remaining / (_UNITS_PER_ITERATION * cover.entries))
+    if steps < 1:
+        return None
+    solver = _model(cover, budget)
+    solver.setOptionValue("simplex_iteration_limit", min(steps, 10_000_000))
+    run_highs(solver)
+    budget.spend(
+        float(solver.getInfo().simplex_iteration_count)
+        * _UNITS_PER_ITERATION
+        * cover.entries
+    )
+    dual = np.asarray(solver.getSolution().row_dual, dtype=np.float64)
+    if dual.size < cover.weights.size:
+        return None
+    return _cost_unit(cover) * np.clip(
+        np.nan_to_num(dual[: cover.weights.size]), 0.0, None
+    )
+
+
+def fits(cover: ReducedCover) -> bool:
+    """Whether the program is small enough for branch and bound to be of use."""
+    return cover.entries <= _MAX_ENTRIES
+
+
+def solve_integer(
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    *,
+    max_sets: int | None = None,
+) -> IntegerAnswer:
+    """Look for the cheapest cover by branch and bound, up to a number of nodes.
+
+    Args:
+        cover: The cover.
+        start: A selection to start from.
+        budget: Counted work.
+        max_sets: Sets allowed.
+    """
+    return _branch(cover, start, budget, max_sets=max_sets, heaviest=False)
+
+
+def heaviest_integer(
+    cover: ReducedCover, start: NDArray[np.int64], budget: WorkBudget, *, n_sets: int
+) -> IntegerAnswer:
+    """Look for the most weight of K sets that meet the requirements."""
+    return _branch(cover, start, budget, max_sets=n_sets, heaviest=True)
+
+
+def _branch(
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    *,
+    max_sets: int | None,
+    heaviest: bool,
+) -> IntegerAnswer:
+    light = cover.full and not heaviest
+    root = _UNITS_PER_FULL_ROOT if light else _UNITS_PER_ROOT
+    spare = budget.remaining / cover.entries - root
+    if not spare > 0 or budget.exhausted:
+        return IntegerAnswer(None, None)
+    solver = _model(cover, budget, integer=True, max_sets=max_sets, heaviest=heaviest)
+    solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
+    _warm_start(solver, cover, start)
+    run_highs(solver)
+    return _answer(solver, cover, root, budget, heaviest=heaviest)
+
+
+def _answer(
+    solver: Any,  # noqa: ANN401
+    cover: ReducedCover,
+    root: float,
+    budget: WorkBudget,
+    *,
+    heaviest: bool,
+) -> IntegerAnswer:
+    import highspy
+
+    info = solver.getInfo()
+    nodes = _UNITS_PER_NODE * max(0, int(info.mip_node_count))
+    budget.spend((root + nodes) * cover.entries)
+    if solver.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
+        return IntegerAnswer(None, None)
+    values = np.asarray(solver.getSolution().col_value, dtype=np.float64)
+    n = cover.n_sets
+    found = bool(solver.getSolution().value_valid) and values.size >= n
+    selected = np.flatnonzero(values[:n] > 0.5) if found else None
+    bound = float(info.mip_dual_bound)
+    if not np.isfinite(bound):
+        return IntegerAnswer(selected, None)
+    tolerance = TOLERANCE * max(1.0, abs(bound))
+    if heaviest:
+        light = float(_weights(cover)[1].sum())
+        weight = float(cover.weights.mean()) * (light + tolerance - bound)
+        return IntegerAnswer(selected, weight)
+    cost = _cost_unit(cover) * max(0.0, bound - tolerance)
+    return IntegerAnswer(selected, cost)
+
+
+def _cost_unit(cover: ReducedCover) -> float:
+    """Return what costs are divided by: 1 unless small, or far above it."""
+    mean = float(cover.costs.mean()) if cover.n_sets else 1.0
+    # A power of two, so that whole costs stay whole in some unit.
+    return 1.0 if 1.0 <= mean < 1e5 else float(2.0 ** np.round(np.log2(mean)))
+
+
+def _model(
+    cover: ReducedCover,
+    budget: WorkBudget,
+    *,
+    integer: bool = False,
+    max_sets: int | None = None,
+    heaviest: bool = False,
+) -> Any:  # noqa: ANN401
+    """Return a HiGHS instance that holds the program."""
+    import highspy
+
+    n_e, n_s = cover.weights.size, cover.n_sets
+    # Weights of mean 1, so that the solver's tolerance is a small share of a row.
+    weights, dropped = _weights(cover)
+    needed = np.maximum(0.0, cover.quotas / cover.weights.mean() - dropped)
+    with_rows = heaviest or not cover.full
+    link: sparse.csr_array = cover.by_row
+    lower = cover.needs.astype(np.float64)
+    cost = cover.costs / _cost_unit(cover)
+    if with_rows:
+        own = sparse.dia_array((-lower[None], [0]), shape=(n_e, n_e))
+        groups = sparse.csr_array(
+            (weights, (cover.row_sets, np.arange(n_e))), shape=(needed.size, n_e)
+        )
+        link = _stack([[link, own], [None, groups]])
+        lower = np.concatenate([np.zeros(n_e), needed])
+        cost = np.concatenate(
+            [np.zeros(n_s), -weights] if heaviest else [cost, np.zeros(n_e)]
+        )
+    upper = np.full(lower.size, highspy.kHighsInf)
+    if max_sets is not None:
+        ones = np.zeros((1, cost.size))
+        ones[0, :n_s] = 1.0
+        link = _stack([[link], [sparse.csr_array(ones)]])
+        lower, upper = np.append(lower, 0.0), np.append(upper, float(max_sets))
+    lp: Any = highspy.HighsLp()
+    lp.num_col_, lp.num_row_ = cost.size, lower.size
+    lp.col_cost_ = cost
+    lp.col_lower_, lp.col_upper_ = np.zeros(cost.size), np.ones(cost.size)
+    lp.row_lower_, lp.row_upper_ = lower, upper
+    lp.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
+    lp.a_matrix_.start_ = link.indptr.astype(np.int32)
+    lp.a_matrix_.index_ = link.indices.astype(np.int32)
+    lp.a_matrix_.value_ = link.data.astype(np.float64)
+    if integer:
+        whole, free = highspy.HighsVarType.kInteger, highspy.HighsVarType.kContinuous
+        kinds = [whole] * n_s
+        if with_rows:
+            # Half of the service is no half of a row.
+            kinds += [whole if need > 1 else free for need in cover.needs]
+        lp.integrality_ = kinds
+    solver = highspy.Highs()
+    for name, value in (
+        ("output_flag", False),
+        ("threads", 1),
+        ("parallel", "off"),
+        ("random_seed", 0),
+        ("mip_rel_gap", 0.0),
+        ("mip_abs_gap", 1e-9),
+        ("time_limit", max(0.01, budget.time_left)),
+    ):
+        solver.setOptionValue(name, value)
+    solver.passModel(lp)
+    return solver
+
+
+def _weights(
+    cover: ReducedCover,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return weights in their mean, and what was left out of each row set.
+
+    HiGHS ignores coefficients below 1e-9; such rows count as covered, so that its bound
+    is still one.
+    """
+    weights = cover.weights / cover.weights.mean()
+    light = weights < _LIGHT
+    dropped = cover.by_row_set(np.where(light, weights, 0.0))
+    return np.where(light, 0.0, weights), dropped
+
+
+def _stack(blocks: list[list[sparse.sparray | None]]) -> sparse.csr_array:
+    return sparse.csr_array(sparse.block_array(blocks))
+
+
+def _warm_start(
+    solver: Any,  # noqa: ANN401
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+) -> None:
+    import highspy
+
+    values = np.zeros(solver.getNumCol())
+    values[start] = 1.0
+    if values.size > cover.n_sets:
+        values[cover.n_sets :] = cover.served(start) >= cover.needs
+    known = highspy.HighsSolution()
+    known.col_value = values.tolist()
+    solver.setSolution(known)

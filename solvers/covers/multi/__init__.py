@@ -1,0 +1,1 @@
+"""Covers with several needs or row sets."""

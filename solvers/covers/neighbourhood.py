@@ -1,0 +1,163 @@
+"""Good covers fast: greedy choice, tabu search, and a large-neighbourhood search.
+
+Every sum is of integer-valued weights, hence exact, and every tie goes to the lowest
+index: the same seed and budget give the same answer on any machine.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.status import WorkBudget
+
+from .reductions import ReducedCover
+from .swaps import Swaps
+
+# Moves for which a set that went may not come back: from the first to below the second.
+_AWAY = (6, 16)
+# What came may not go for a move, and one more for each of so many sets selected.
+_SETTLING = 4
+
+
+def greedy(
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    *,
+    n_sets: int | None = None,
+) -> NDArray[np.int64]:
+    """Extend a selection by the set of most new weight a unit of cost.
+
+    A row that more than one set must serve gives its weight in equal parts. Stops when
+    every row set has what it requires or, if ``n_sets`` is given, at that many sets.
+
+    Returns:
+        Selected sets in the order of choice.
+    """
+    chosen = [int(s) for s in start]
+    counts = cover.served(np.array(chosen, dtype=np.int64))
+    parts = cover.weights / cover.needs
+    while n_sets is None or len(chosen) < n_sets:
+        open_rows = counts < cover.needs
+        if n_sets is None:
+            covered = cover.by_row_set(np.where(open_rows, 0.0, cover.weights))
+            lacking = covered < cover.quotas
+            if not np.any(lacking):
+                break
+            open_rows &= lacking[cover.row_sets]
+        gains = cover.by_set @ np.where(open_rows, parts, 0.0)
+        gains[chosen] = 0.0
+        budget.spend(cover.entries)
+        best = int(np.argmax(gains / cover.costs if n_sets is None else gains))
+        if not gains[best] > 0:
+            break
+        chosen.append(best)
+        counts[cover.members(best)] += 1
+    return np.array(chosen, dtype=np.int64)
+
+
+def most_coverage(
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    *,
+    target: float,
+    seed: int,
+    max_moves: int,
+) -> NDArray[np.int64]:
+    """Raise the weight that a selection covers without more sets, by tabu search.
+
+    Makes the best swap even where it loses weight; for some moves, drawn at random,
+    what went may not come back and what came may not go, unless that beats the best.
+
+    Returns:
+        The best selection found, increasing.
+
+    References:
+        Glover, "Tabu search - part I", ORSA Journal on Computing 1(3), 1989.
+    """
+    rng = np.random.default_rng(seed)
+    swaps = Swaps(cover, (int(s) for s in start), budget)
+    best, most = list(swaps.chosen), swaps.covered
+    enters = np.zeros(cover.n_sets, dtype=np.int64)
+    leaves = np.zeros(cover.n_sets, dtype=np.int64)
+    for move in range(max_moves):
+        if most >= target or budget.exhausted or not best:
+            break
+        barred = enters > move
+        barred[swaps.chosen] = True
+        change, out, into = swaps.best_swap(
+            stay=leaves[swaps.chosen] > move, barred=barred, beyond=most - swaps.covered
+        )
+        if not np.isfinite(change):
+            continue
+        gone = swaps.chosen[out]
+        swaps.drop(out)
+        swaps.add(into)
+        enters[gone] = move + int(rng.integers(*_AWAY))
+        leaves[into] = move + 1 + int(rng.integers(1, 2 + len(best) // _SETTLING))
+        if swaps.covered > most:
+            best, most = list(swaps.chosen), swaps.covered
+    return np.array(sorted(best), dtype=np.int64)
+
+
+def prune(cover: ReducedCover, selected: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Drop sets, dearest first, while what is required is still reached."""
+    chosen = [int(s) for s in selected]
+    counts = cover.served(selected)
+    covered = cover.by_row_set(np.where(counts >= cover.needs, cover.weights, 0.0))
+    for s in sorted(chosen, key=lambda s: (-cover.costs[s], -s)):
+        rows = cover.members(s)
+        lost = rows[counts[rows] == cover.needs[rows]]
+        loss = np.bincount(
+            cover.row_sets[lost],
+            weights=cover.weights[lost],
+            minlength=cover.quotas.size,
+        )
+        if np.all(covered - loss >= cover.quotas):
+            chosen.remove(s)
+            counts[rows] -= 1
+            covered -= loss
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def cheapest(
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    *,
+    seed: int,
+    max_kicks: int,
+    max_sets: int | None = None,
+) -> NDArray[np.int64]:
+    """Lower the cost of a selection that reaches what is required.
+
+    Drops some sets at random, lets greedy repair the cover, keeps what is cheaper, or
+    smaller while more sets are selected than allowed.
+
+    Returns:
+        The cheapest selection found, increasing.
+    """
+    rng = np.random.default_rng(seed)
+    best = prune(cover, start)
+    worth = _worth(cover, best, max_sets)
+    for _ in range(max_kicks):
+        if budget.exhausted or best.size == 0:
+            break
+        n_kept = best.size - int(rng.integers(1, max(2, best.size // 2 + 1)))
+        kept = np.sort(rng.choice(best, size=n_kept, replace=False))
+        fresh = int(rng.integers(cover.n_sets))
+        trial = prune(cover, greedy(cover, np.union1d(kept, [fresh]), budget))
+        other = _worth(cover, trial, max_sets)
+        if other[0] < worth[0] or (
+            other[0] == worth[0] and other[1] < worth[1] * (1.0 - 1e-12)
+        ):
+            best, worth = trial, other
+    return best
+
+
+def _worth(
+    cover: ReducedCover, selected: NDArray[np.int64], max_sets: int | None
+) -> tuple[int, float]:
+    """Return the sets above the number allowed, then the cost."""
+    excess = 0 if max_sets is None else max(0, selected.size - max_sets)
+    return excess, float(cover.costs[selected].sum())

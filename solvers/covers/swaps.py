@@ -1,0 +1,148 @@
+"""A selection that changes a set at a time, with the worth of every swap kept current.
+
+With n_e sets of the selection S over row e, the weight that set j adds, and what it
+wins back of that which set i of S covers alone::
+
+    gain_j = sum_{e: n_e = 0} w_e a_ej
+    regain_ij = sum_{e: n_e = 1, a_ei = 1} w_e a_ej
+
+so i makes room for j at the change gain_j + regain_ij - regain_ii. A set that comes or
+goes changes them only by the rows whose n_e goes between 0, 1 and 2. The weights are
+integers, so what was added and taken away again leaves no trace of rounding.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.status import WorkBudget
+
+from .reductions import ReducedCover
+
+# Entries that are widened from one byte to eight at a time.
+_BLOCK = 2**18
+# What a change costs however few rows it touches.
+_CALL_UNITS = 3e4
+# What a multiply-add of a product of matrices costs.
+_PRODUCT_UNIT = 0.3
+# Owner of rows that no chosen set covers.
+_NOBODY = -1
+
+
+class Swaps:
+    """A selection under change.
+
+    Attributes:
+        chosen: Selected sets, in the order in which they came.
+        covered: Weight that they cover.
+        gain: Weight that each set would add, shape (n_s,).
+        regain: Weight that each set would win back of what one chosen set covers
+            alone, shape (k, n_s).
+    """
+
+    def __init__(
+        self, cover: ReducedCover, chosen: Iterable[int], budget: WorkBudget
+    ) -> None:
+        self.chosen: list[int] = []
+        self.covered = 0.0
+        self.gain: NDArray[np.float64] = cover.by_set @ cover.weights
+        self.regain: NDArray[np.float64] = np.zeros((0, cover.n_sets))
+        self._cover = cover
+        self._budget = budget
+        self._unit = _exact_unit(cover.weights)
+        exact = np.float64 if self._unit is None else np.float32
+        self._weights = (cover.weights / (self._unit or 1.0)).astype(exact)
+        self._serves = cover.by_row.astype(bool).toarray()
+        self._counts = np.zeros(cover.weights.size, dtype=np.int64)
+        # Sum of 1 + s over the sets that cover a row: its owner, where there's but one.
+        self._owners = np.zeros(cover.weights.size, dtype=np.int64)
+        budget.spend(float(self._serves.size))
+        for s in chosen:
+            self.add(s)
+
+    def add(self, s: int) -> None:
+        """Select one set more."""
+        rows = self._members(s)
+        touched = rows[self._counts[rows] <= 1]
+        # What was open is its own now; what one set covered alone isn't any more.
+        sums = self._sums_by_owner([*self.chosen, _NOBODY], touched)
+        self.covered += float(self.gain[s])
+        self.gain -= sums[-1]
+        self.regain -= sums[:-1]
+        self.regain = np.concatenate([self.regain, sums[-1:]])
+        self.chosen.append(s)
+        self._counts[rows] += 1
+        self._owners[rows] += s + 1
+
+    def drop(self, position: int) -> None:
+        """Give up the set at a position of the selection."""
+        s = self.chosen.pop(position)
+        lost = self.regain[position]
+        self.gain += lost
+        self.covered -= float(lost[s])
+        self.regain = np.delete(self.regain, position, axis=0)
+        rows = self._members(s)
+        self._counts[rows] -= 1
+        self._owners[rows] -= s + 1
+        self.regain += self._sums_by_owner(self.chosen, rows[self._counts[rows] == 1])
+
+    def best_swap(
+        self,
+        *,
+        stay: NDArray[np.bool_] | None = None,
+        barred: NDArray[np.bool_] | None = None,
+        beyond: float = np.inf,
+    ) -> tuple[float, int, int]:
+        """Return the largest change in weight, the position that goes, what comes.
+
+        Args:
+            stay: Positions that may not go, shape (k,); default none.
+            barred: Sets that may not come, shape (n_s,); default none.
+            beyond: Change above which neither counts.
+        """
+        losses = self.regain[np.arange(len(self.chosen)), self.chosen]
+        change = self.regain + self.gain - losses[:, None]
+        self._budget.spend(float(change.size))
+        if stay is not None and barred is not None:
+            tabu = stay[:, None] | barred
+            change[tabu & (change <= beyond)] = -np.inf
+        out, into = np.unravel_index(int(np.argmax(change)), change.shape)
+        return float(change[out, into]), int(out), int(into)
+
+    def _members(self, s: int) -> NDArray[np.signedinteger]:
+        by_set = self._cover.by_set
+        return by_set.indices[by_set.indptr[s] : by_set.indptr[s + 1]]
+
+    def _sums_by_owner(
+        self, owners: list[int], rows: NDArray[np.signedinteger]
+    ) -> NDArray[np.float64]:
+        """Return w(rows of owner o that set j covers), shape (n_owners, n_s)."""
+        n_sets = self._cover.n_sets
+        place = np.zeros(n_sets + 1, dtype=np.int64)
+        place[np.array(owners, dtype=np.int64) + 1] = np.arange(len(owners))
+        owner = place[self._owners[rows]]
+        # Sorted by owner, so that a block of rows has few of them.
+        order = np.argsort(owner, kind="stable")
+        rows, owner = rows[order], owner[order]
+        total = np.zeros((len(owners), n_sets))
+        step = max(1, _BLOCK // max(1, n_sets))
+        for start in range(0, rows.size, step):
+            part = slice(start, start + step)
+            few = np.arange(owner[part][0], owner[part][-1] + 1)
+            factors = (few[:, None] == owner[part]) * self._weights[rows[part]]
+            serves = self._serves.take(rows[part], axis=0).astype(factors.dtype)
+            total[few] += factors @ serves
+            self._budget.spend(serves.size * (1.0 + _PRODUCT_UNIT * few.size))
+        self._budget.spend(total.size + _CALL_UNITS)
+        return total if self._unit is None else total * self._unit
+
+
+def _exact_unit(weights: NDArray[np.float64]) -> float | None:
+    """Return a power of two in which sums of weights are exact in single precision.
+
+    None where there is none: weights are integers, but may be as large as 2^52.
+    """
+    unit = float(np.gcd.reduce(weights.astype(np.int64), initial=0)) or 1.0
+    unit = float(np.gcd(int(unit), 1 << 62))
+    return unit if float(weights.sum()) / unit < 2.0**24 else None

@@ -1,0 +1,1 @@
+"""Smooth programs over poses: margins, ring axes, baselines."""

@@ -1,0 +1,281 @@
+"""The ring axis of a projector: where its cameras measure most, and most exactly.
+
+In the frame in which the axis moves the rings' centre is the origin and X a point; an
+axis is two numbers a. With u = X/|X| and z(a) the unit vector a along the axis::
+
+    parallel:   the axis runs along +z through (a_x, a_y, 0),   d = (X_x, X_y, 0) - a
+    diverging:  z(a) = (2 a_x, 2 a_y, 1 - a.a)/(1 + a.a),       d = (u.z) u - z
+
+so m = d/|d| is the ring normal at X and |a| = tan(half the tilt) in diverging light.
+For a camera with viewing ray r and g = G m (`formulation.md`, section 3, G = J_r^T
+(N r^T - (N.r) I)) the three limits on a measurable pair, each as a share of its limit,
+make a smooth count of what is measured::
+
+    c = (r.d)^2/(d.d + gap^2),   k = |G d|^2/(d.d + gap^2)
+    e = (c_0^2 + (s_R^2 + s^2 k)/s_max^2) / c + (p_0^2 k / (f h)^2)^4
+    maximise  sum over samples of max over cameras of 1/(1 + e)
+    subject to  every held point inside the largest ring
+
+The gap damps what is inside the innermost ring, where m turns through all directions.
+The max over cameras is that of the best at the current axis, which touches the true
+sum from below: no round makes it less. ``axis_nlp`` states a round in CasADi; this
+module assigns cameras and checks answers in numpy, with its own formulas.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.status import SolveStatus
+
+Light = Literal["diverging", "parallel"]
+
+# The largest ring is kept by this share, well above IPOPT's tolerance.
+INSET = 1e-6
+# Pitch limits count little until they are near: error shares to this power of k.
+PITCH_POWER = 4
+_ROUNDS = 10
+# Of a round, in units of the largest ring.
+_REACH = 0.5
+_SHRINK = 0.3
+_DIRECTIONS = 32
+_SETTLED = 1e-5
+_AZIMUTHS = 12
+# Of the largest ring, the axis' distance from the middle.
+_REACHES = (0.15, 0.3, 0.45, 0.6)
+
+
+@dataclass(frozen=True, eq=False)
+class AxisProgram:
+    """One projector's samples, and how k cameras see them.
+
+    Attributes:
+        light: Kind of light.
+        points: X in [m], shape (n, 3).
+        rays: Unit viewing rays r, shape (n, k, 3).
+        slopes: G in [1/px], shape (n, k, 2, 3).
+        seen: Which camera sees which sample, shape (n, k).
+        noise: s, edge noise x distance in [px m], shape (n, k).
+        placement_m: s_R |N.r| in [m], shape (n, k).
+        facing: f = |N.r| / distance in [1/m], shape (n, k).
+        others: What other projectors make of a sample, 1/(1 + e), shape (n,).
+        held: Lit points X in [m] that stay inside the largest ring, shape (h, 3).
+        start: a to start from, shape (2,).
+        ring_radius: Largest ring, a tangent (diverging) or in [m] (parallel).
+        gap: Of the rings, likewise.
+        min_conditioning: c_0, over 0.
+        max_sigma_m: s_max in [m]; inf doesn't bind.
+        min_pitch_px: p_0 in [px]; 0 doesn't bind.
+
+    Raises:
+        ValueError: If an array has the wrong shape or isn't finite, or a limit isn't
+            positive.
+    """
+
+    light: Light
+    points: NDArray[np.float64]
+    rays: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+    noise: NDArray[np.float64]
+    placement_m: NDArray[np.float64]
+    facing: NDArray[np.float64]
+    others: NDArray[np.float64]
+    held: NDArray[np.float64]
+    start: NDArray[np.float64]
+    ring_radius: float
+    gap: float
+    min_conditioning: float
+    max_sigma_m: float = np.inf
+    min_pitch_px: float = 0.0
+
+    def __post_init__(self) -> None:
+        n, k = self.seen.shape
+        shapes = {"points": (n, 3), "rays": (n, k, 3), "slopes": (n, k, 2, 3)}
+        shapes |= {name: (n, k) for name in ("noise", "placement_m", "facing")}
+        shapes |= {"others": (n,), "held": (len(self.held), 3), "start": (2,)}
+        for name, shape in shapes.items():
+            value = np.asarray(getattr(self, name), dtype=np.float64)
+            if value.shape != shape or not np.all(np.isfinite(value)):
+                raise ValueError(f"{name} must be finite and {shape}")
+        if self.light not in ("diverging", "parallel"):
+            raise ValueError(f"light is {self.light!r}, not diverging or parallel")
+        for name in ("ring_radius", "gap", "min_conditioning"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}, must be positive")
+        if not self.max_sigma_m > 0.0:
+            raise ValueError(f"max_sigma_m is {self.max_sigma_m}, must be positive")
+        if not 0.0 <= self.min_pitch_px < np.inf:
+            raise ValueError(f"min_pitch_px is {self.min_pitch_px}, must be 0 or more")
+
+
+@dataclass(frozen=True, eq=False)
+class AxisSolution:
+    """Answer of :func:`solve_axis`; figures are recomputed in numpy over all samples.
+
+    Attributes:
+        program: The program this answers.
+        status: ``LOCALLY_OPTIMAL`` if at IPOPT's answer the cameras that it was given
+            are the best, ``FEASIBLE`` if the rounds ended before, ``UNKNOWN`` if no
+            axis held every point inside the largest ring.
+        axis: a, shape (2,); the start unless a better was found.
+        value: Mean of :func:`axis_scores`.
+        slack: Least of :func:`axis_slack`.
+    """
+
+    program: AxisProgram
+    status: SolveStatus
+    axis: NDArray[np.float64]
+    value: float
+    slack: float
+
+    @property
+    def moved(self) -> bool:
+        """Whether the axis differs from the start."""
+        return not np.array_equal(self.axis, self.program.start)
+
+
+def axis_direction(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return z(a) of diverging light, unit, shape (3,)."""
+    square = float(axis @ axis)
+    return np.array([2.0 * axis[0], 2.0 * axis[1], 1.0 - square]) / (1.0 + square)
+
+
+def pair_scores(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return 1/(1 + e) of every sample and camera, shape (n, k); 0 where not seen."""
+    points = program.points
+    if program.light == "parallel":
+        d = np.column_stack([points[:, :2] - axis, np.zeros(len(points))])
+        spacing = np.full(len(points), program.gap)
+    else:
+        z, distance = axis_direction(axis), np.linalg.norm(points, axis=1)
+        u = points / distance[:, None]
+        cosine = u @ z
+        d = cosine[:, None] * u - z
+        spacing = distance * program.gap * cosine**2
+    damped = (np.einsum("ij,ij->i", d, d) + program.gap**2)[:, None]
+    c = np.einsum("ikj,ij->ik", program.rays, d) ** 2 / damped
+    k = np.sum(np.einsum("ikaj,ij->ika", program.slopes, d) ** 2, axis=2) / damped
+    variance = (program.placement_m**2 + program.noise**2 * k) / program.max_sigma_m**2
+    reach = program.facing * spacing[:, None]
+    crowding = program.min_pitch_px**2 * k / np.maximum(reach, 1e-300) ** 2
+    score = c / (
+        c * (1.0 + crowding**PITCH_POWER) + program.min_conditioning**2 + variance
+    )
+    return np.where(program.seen, score, 0.0)
+
+
+def axis_scores(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return each sample's best 1/(1 + e), over cameras and projectors, (n,)."""
+    own = pair_scores(program, axis).max(axis=1, initial=0.0)
+    return np.maximum(own, program.others)
+
+
+def axis_slack(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return by how much each held point is inside the largest ring, shape (h,).
+
+    1 - (distance to the axis / largest ring)^2 (parallel), or
+    (cos(angle to the axis) / cos(atan(largest ring)) - 1) / (largest ring)^2.
+    """
+    held, radius = program.held, program.ring_radius
+    if program.light == "parallel":
+        return 1.0 - np.sum((held[:, :2] - axis) ** 2, axis=1) / radius**2
+    u = held / np.linalg.norm(held, axis=1, keepdims=True)
+    return (u @ axis_direction(axis) * np.hypot(1.0, radius) - 1.0) / radius**2
+
+
+def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSolution:
+    """Move an axis to where cameras measure most, near its start.
+
+    Args:
+        program: Samples, cameras and where to start.
+        max_iterations: Limit of each IPOPT run.
+
+    Returns:
+        An axis that is never worse than the start; the status says which it is.
+    """
+    from .axis_nlp import run_ipopt
+
+    best = np.array(program.start, dtype=np.float64)
+    best_value, best_slack = _figures(program, best)
+    binding, reach, settled = _outermost(program), _REACH, False
+    for _ in range(_ROUNDS):
+        pairs = _assigned(program, best)
+        if pairs.size == 0:
+            break
+        outcome = run_ipopt(program, pairs, binding, best, reach, max_iterations)
+        axis = outcome.axis
+        if not np.all(np.isfinite(axis)):
+            break
+        broken = np.flatnonzero(axis_slack(program, axis) < 0.0)
+        if broken.size:
+            binding = np.union1d(binding, broken[:_DIRECTIONS])
+            continue
+        value, slack = _figures(program, axis)
+        gain = value - best_value
+        if best_slack >= 0.0 and gain < -_SETTLED:
+            # IPOPT may leap over a peak into a lower valley: no farther than this.
+            reach *= _SHRINK
+            continue
+        inside = np.max(np.abs(axis - best)) < 0.99 * reach * program.ring_radius
+        if gain > 0.0 or not best_slack >= 0.0:
+            best, best_value, best_slack = axis, value, slack
+        settled = outcome.success and bool(inside)
+        settled &= np.array_equal(pairs, _assigned(program, axis))
+        if settled or (inside and gain < _SETTLED):
+            break
+    if not best_slack >= 0.0:
+        status = SolveStatus.UNKNOWN
+    elif settled:
+        status = SolveStatus.LOCALLY_OPTIMAL
+    else:
+        status = SolveStatus.FEASIBLE
+    return AxisSolution(program, status, best, best_value, best_slack)
+
+
+def best_start(program: AxisProgram) -> NDArray[np.float64]:
+    """Return the best of a polar grid of axes about the middle, shape (2,).
+
+    Blind curves make the program many-peaked, and its two variables cheap to look
+    through. It is the program's own start where no axis of the grid is better.
+    """
+    best = program.start
+    value, slack = _figures(program, best)
+    angle = 2.0 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
+    for reach in _REACHES:
+        size = reach * program.ring_radius
+        for axis in size * np.column_stack([np.cos(angle), np.sin(angle)]):
+            found, room = _figures(program, axis)
+            if room >= 0.0 and (found > value or not slack >= 0.0):
+                best, value, slack = axis, found, room
+    return best
+
+
+def _figures(program: AxisProgram, axis: NDArray[np.float64]) -> tuple[float, float]:
+    return (
+        float(np.mean(axis_scores(program, axis))),
+        float(np.min(axis_slack(program, axis), initial=np.inf)),
+    )
+
+
+def _assigned(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Rows (sample, camera): the best camera of each sample that this projector has."""
+    own = pair_scores(program, axis)
+    camera = np.argmax(own, axis=1) if own.shape[1] else np.zeros(len(own), dtype=int)
+    seen = program.seen.any(axis=1)
+    best = own.max(axis=1, initial=0.0)
+    rows = np.flatnonzero(seen & (best >= program.others))
+    return np.column_stack([rows, camera[rows]]).astype(np.int64)
+
+
+def _outermost(program: AxisProgram) -> NDArray[np.int64]:
+    """Held points that reach farthest in each of some directions across the axis."""
+    held = program.held
+    if not len(held):
+        return np.zeros(0, dtype=np.int64)
+    flat = held[:, :2] if program.light == "parallel" else held[:, :2] / held[:, 2:]
+    angle = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    ways = np.stack([np.cos(angle), np.sin(angle)])
+    return np.unique(np.argmax(flat @ ways, axis=0))

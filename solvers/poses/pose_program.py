@@ -1,0 +1,328 @@
+"""The projector pose of largest margin, eqs. (1)-(2) of the paper with limits.
+
+For a device at Q with rotation R (columns are its axes) and served samples (P, N, T),
+X = R^T (P - Q), light L = (P - Q)/|P - Q| (diverging) or R e_z (parallel)::
+
+    maximise    t
+    subject to  -N.L >= cos(max_incidence - t)
+                |T.L| <= cos(min_tangent_angle + t)        where T != 0
+                X in the frustum or the panel, inside the last ring, in range
+                lo <= |Q - centre| <= hi,  axis.(Q - centre) >= |Q - centre| cos(half)
+                up.Q >= floor,  n.Q >= d for each half-space (n, d)
+
+over Q, R and t: smooth and not convex, so an optimum is local. ``pose_nlp`` states it
+in CasADi; this module solves it over an active set and checks the answer in numpy, with
+its own formulas. Occlusion isn't part of it: rays decide after every move.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.status import SolveStatus
+
+Light = Literal["diverging", "parallel"]
+
+# Hard limits are kept by this share of the size, well above IPOPT's tolerance.
+INSET = 1e-6
+_ROUNDS = 8
+_SETTLED_RAD = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class PoseProgram:
+    """One projector and the samples that it must serve.
+
+    Attributes:
+        points: Samples P in [m], shape (n, 3).
+        normals: Outward unit normals N, shape (n, 3).
+        steep: Unit steep directions T, zero where there is none, shape (n, 3).
+        light: Kind of light.
+        world_from_device: Pose to start from, shape (4, 4).
+        max_incidence: Largest angle of -L to N in [rad].
+        min_tangent_angle: Least angle of L to the line of T in [rad].
+        range_m: Limits of |P - Q| (diverging) or X_z (parallel) in [m].
+        shell_m: Limits of |Q - centre| in [m].
+        centre: Centre of the workspace in [m], shape (3,).
+        axis: Axis of the workspace cone, unit, shape (3,).
+        half_angle: Opening of that cone in [rad]; pi doesn't bind.
+        camera_matrix: K in [px], shape (3, 3); diverging light only.
+        resolution: Width and height in [px]; diverging light only.
+        half_panel_m: Half width and height in [m]; parallel light only.
+        pixel_margin: Pixels that stay free at the image border; diverging light only.
+        beam_radius_m: Largest distance from the optical axis; parallel light only.
+        ring_radius: Largest ring, a tangent (diverging) or in [m] (parallel).
+        ring_from_device: Ring frame, fixed to the device, shape (4, 4).
+        up: Unit vector away from the floor, shape (3,).
+        floor: Least up.Q in [m].
+        max_move_m: Largest change of each coordinate of Q in [m].
+        half_spaces: Rows (n, d), unit n and d in [m], of half-spaces n.Q >= d that hold
+            Q, shape (k, 4); None: none.
+
+    Raises:
+        ValueError: If an array has the wrong shape, a number isn't finite, or a limit
+            is empty.
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    steep: NDArray[np.float64]
+    light: Light
+    world_from_device: NDArray[np.float64]
+    max_incidence: float
+    min_tangent_angle: float
+    range_m: tuple[float, float]
+    shell_m: tuple[float, float]
+    centre: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    half_angle: float = np.pi
+    camera_matrix: NDArray[np.float64] | None = None
+    resolution: tuple[int, int] | None = None
+    half_panel_m: tuple[float, float] | None = None
+    pixel_margin: float = 0.5
+    beam_radius_m: float = np.inf
+    ring_radius: float = np.inf
+    ring_from_device: NDArray[np.float64] | None = None
+    up: NDArray[np.float64] | None = None
+    floor: float = -np.inf
+    max_move_m: float = np.inf
+    half_spaces: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.points)
+        if n == 0:
+            raise ValueError("points is empty: a pose needs a sample to serve")
+        shapes = {"points": (n, 3), "normals": (n, 3), "steep": (n, 3)}
+        shapes |= {"world_from_device": (4, 4), "centre": (3,), "axis": (3,)}
+        for name, shape in shapes.items():
+            value = np.asarray(getattr(self, name), dtype=np.float64)
+            if value.shape != shape or not np.all(np.isfinite(value)):
+                raise ValueError(f"{name} must be finite and {shape}")
+        if self.light not in ("diverging", "parallel"):
+            raise ValueError(f"light is {self.light!r}, not diverging or parallel")
+        for name in ("range_m", "shell_m"):
+            low, high = getattr(self, name)
+            if not 0.0 <= low <= high < np.inf:
+                raise ValueError(f"{name} is {low} to {high}: empty or not finite")
+        for name in ("max_incidence", "min_tangent_angle"):
+            if not 0.0 <= getattr(self, name) <= np.pi / 2:
+                raise ValueError(f"{name} must lie within 0 and pi/2")
+        if self.light == "diverging":
+            if self.camera_matrix is None or self.resolution is None:
+                raise ValueError("diverging light needs camera_matrix and resolution")
+        elif self.half_panel_m is None:
+            raise ValueError("parallel light needs half_panel_m")
+        planes = self.planes
+        if planes.ndim != 2 or planes.shape[1] != 4 or not np.all(np.isfinite(planes)):
+            raise ValueError(f"half_spaces must be finite, (k, 4), is {planes.shape}")
+
+    @property
+    def planes(self) -> NDArray[np.float64]:
+        """Rows (n, d) of the half-spaces, shape (k, 4); k = 0 without any."""
+        given = np.empty((0, 4)) if self.half_spaces is None else self.half_spaces
+        return np.asarray(given, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSolution:
+    """Answer of :func:`solve_pose`; figures are recomputed in numpy over all samples.
+
+    Attributes:
+        program: The program this answers.
+        status: ``LOCALLY_OPTIMAL`` from IPOPT, ``FEASIBLE`` if it stopped early or the
+            start couldn't be improved, ``UNKNOWN`` if no pose held every limit.
+        world_from_device: The pose, shape (4, 4); the start unless a better was found.
+        margin_rad: Least margin of any sample, see :func:`pose_margins`.
+        slack: Least slack of the other limits, see :func:`pose_slack`.
+        n_active: Samples that IPOPT saw in the last round.
+    """
+
+    program: PoseProgram
+    status: SolveStatus
+    world_from_device: NDArray[np.float64]
+    margin_rad: float
+    slack: float
+    n_active: int
+
+    @property
+    def moved(self) -> bool:
+        """Whether the pose differs from the start."""
+        return not np.array_equal(
+            self.world_from_device, self.program.world_from_device
+        )
+
+
+def light_directions(
+    program: PoseProgram, world_from_device: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return L at every sample, unit, shape (n, 3)."""
+    if program.light == "parallel":
+        return np.broadcast_to(world_from_device[:3, 2], program.points.shape)
+    away = program.points - world_from_device[:3, 3]
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+def pose_margins(
+    program: PoseProgram, world_from_device: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the margin of every sample in [rad], shape (n,).
+
+    min(max_incidence - incidence, tangent angle - min_tangent_angle), the second only
+    where there is a steep direction.
+    """
+    light = light_directions(program, world_from_device)
+    facing = -np.sum(program.normals * light, axis=1)
+    along = np.abs(np.sum(program.steep * light, axis=1))
+    margin = program.max_incidence - np.arccos(np.clip(facing, -1.0, 1.0))
+    tangent = np.arccos(np.clip(along, 0.0, 1.0)) - program.min_tangent_angle
+    steep = np.any(program.steep != 0.0, axis=1)
+    return np.where(steep, np.minimum(margin, tangent), margin)
+
+
+def pose_slack(
+    program: PoseProgram, world_from_device: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the least slack of each sample's other limits, and the device's last.
+
+    Lengths count in [m], image coordinates as tangents, angles in [rad]; at least 0
+    where every limit holds.
+
+    Returns:
+        Shape (n + 1,).
+    """
+    rotation, position = world_from_device[:3, :3], world_from_device[:3, 3]
+    local = (program.points - position) @ rotation
+    frame = program.ring_from_device
+    ring = local if frame is None else local @ frame[:3, :3].T + frame[:3, 3]
+    beyond = np.hypot(ring[:, 0], ring[:, 1])
+    if program.light == "parallel":
+        assert program.half_panel_m is not None
+        span = local[:, 2]
+        inside = np.min(np.array(program.half_panel_m) - np.abs(local[:, :2]), axis=1)
+        axial = program.beam_radius_m - np.hypot(local[:, 0], local[:, 1])
+        inside = np.minimum(inside, np.minimum(axial, program.ring_radius - beyond))
+    else:
+        span = np.linalg.norm(local, axis=1)
+        inside = _image_slack(program, local)
+        if np.isfinite(program.ring_radius):
+            front = ring[:, 2] > 0
+            tangent = np.where(front, beyond / np.where(front, ring[:, 2], 1), np.inf)
+            inside = np.minimum(inside, program.ring_radius - tangent)
+    low, high = program.range_m
+    samples = np.min([inside, span - low, high - span], axis=0)
+    return np.append(samples, _workspace_slack(program, position))
+
+
+def _image_slack(
+    program: PoseProgram, local: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance to the image border, less the margin, over the focal length."""
+    assert program.camera_matrix is not None
+    assert program.resolution is not None
+    k = program.camera_matrix
+    focal = np.array([k[0, 0], k[1, 1]])
+    front = local[:, 2] > 0
+    depth = np.where(front, local[:, 2], 1.0)[:, None]
+    pixels = local[:, :2] / depth * focal + k[:2, 2]
+    low = -0.5 + program.pixel_margin
+    high = np.array(program.resolution) - 0.5 - program.pixel_margin
+    room = np.minimum(pixels - low, high - pixels) / focal
+    return np.where(front, np.min(room, axis=1), -np.inf)
+
+
+def _workspace_slack(program: PoseProgram, position: NDArray[np.float64]) -> float:
+    offset = position - program.centre
+    radius = float(np.linalg.norm(offset))
+    low, high = program.shell_m
+    slack = min(radius - low, high - radius)
+    if program.half_angle < np.pi:
+        across = float(np.linalg.norm(np.cross(program.axis, offset)))
+        angle = np.arctan2(across, float(program.axis @ offset))
+        slack = min(slack, program.half_angle - float(angle))
+    if program.up is not None and np.isfinite(program.floor):
+        slack = min(slack, float(program.up @ position) - program.floor)
+    planes = program.planes
+    if len(planes):
+        slack = min(slack, float(np.min(planes[:, :3] @ position - planes[:, 3])))
+    return slack
+
+
+def solve_pose(
+    program: PoseProgram, *, max_points: int = 60, max_iterations: int = 200
+) -> PoseSolution:
+    """Move a projector to the largest margin near its start.
+
+    Args:
+        program: What to serve, from where to start.
+        max_points: Tightest samples that IPOPT starts with; violated ones join.
+        max_iterations: Limit of each IPOPT run.
+
+    Returns:
+        A pose that is never worse than the start; the status says which it is.
+    """
+    from .pose_nlp import run_ipopt
+
+    start = np.array(program.world_from_device, dtype=np.float64)
+    best, best_margin, best_slack = start, *_figures(program, start)
+    active = _tightest(program, start, max_points)
+    settled, pose, margin, slack = False, start, best_margin, best_slack
+    for _ in range(_ROUNDS):
+        outcome = run_ipopt(program, active, pose, max_iterations=max_iterations)
+        if not np.all(np.isfinite(outcome.world_from_device)):
+            break
+        pose = outcome.world_from_device
+        margin, slack = _figures(program, pose)
+        if _improves(margin, slack, best_margin, best_slack):
+            best, best_margin, best_slack = pose, margin, slack
+        violated = _violated(program, pose, outcome.margin_rad)
+        fresh = np.setdiff1d(violated, active)[:max_points]
+        if fresh.size == 0:
+            settled = outcome.success
+            break
+        active = np.union1d(active, fresh)
+    if not best_slack >= 0.0:
+        status = SolveStatus.UNKNOWN
+    elif settled and slack >= 0.0 and margin >= best_margin - _SETTLED_RAD:
+        status = SolveStatus.LOCALLY_OPTIMAL
+    else:
+        status = SolveStatus.FEASIBLE
+    return PoseSolution(program, status, best, best_margin, best_slack, active.size)
+
+
+def _figures(program: PoseProgram, pose: NDArray[np.float64]) -> tuple[float, float]:
+    return (
+        float(np.min(pose_margins(program, pose))),
+        float(np.min(pose_slack(program, pose))),
+    )
+
+
+def _improves(margin: float, slack: float, than: float, than_slack: float) -> bool:
+    """Whether limits hold and the margin is larger, or the limits hold at last."""
+    if not slack >= 0.0:
+        return False
+    return margin > than or not than_slack >= 0.0
+
+
+def _tightest(
+    program: PoseProgram, pose: NDArray[np.float64], n: int
+) -> NDArray[np.int64]:
+    """Samples of least margin, and of least slack, half of each."""
+    margins, slack = pose_margins(program, pose), pose_slack(program, pose)[:-1]
+    half = max(1, n // 2)
+    return np.union1d(
+        np.argsort(margins, kind="stable")[:half],
+        np.argsort(slack, kind="stable")[:half],
+    ).astype(np.int64)
+
+
+def _violated(
+    program: PoseProgram, pose: NDArray[np.float64], margin: float
+) -> NDArray[np.int64]:
+    """Samples that break a limit or the margin that IPOPT claims, worst first."""
+    short = margin - _SETTLED_RAD - pose_margins(program, pose)
+    broken = -pose_slack(program, pose)[:-1]
+    worst = np.argsort(-np.maximum(short, broken), kind="stable")
+    worst = worst[(short[worst] > 0) | (broken[worst] > 0)]
+    return worst.astype(np.int64)
