@@ -28,7 +28,6 @@ from pathlib import Path
 
 import numpy as np
 from from_tests import load
-from planning.verify.audit.audit import audit_plan
 
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
@@ -46,6 +45,7 @@ from planning.projectors.projector_stage import ProjectorStage
 from planning.report.assemble import write_plan
 from planning.report.draft import Draft, Order
 from planning.scene.scene import Scene
+from planning.verify.audit.audit import audit_plan
 
 ROOT = Path(__file__).resolve().parents[1]
 _PROJECTORS = 3

@@ -21,9 +21,9 @@ from pathlib import Path
 
 import numpy as np
 from from_tests import load
-from planning.verify.audit.audit import audit_plan
 
 from planning import RigPlan
+from planning.verify.audit.audit import audit_plan
 
 ROOT = Path(__file__).resolve().parents[1]
 RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from planning.verify.audit.audit import audit_plan
 from scipy.spatial.transform import Rotation
 from seam_gap import GAP, predicted_limit, seam_samples, wall_rig
 
@@ -29,6 +28,7 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.shapes.sample_head.sample_head import write_sample
 from planning import load_mesh, load_rig, plan_rig
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit import audit_plan
 from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.verification import verify_plan
 

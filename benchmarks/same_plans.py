@@ -146,7 +146,9 @@ def _ranges() -> str:
 
 
 def _planned(python: str, arguments: list[str], out: Path) -> dict[str, Any]:
-    code = "import sys; sys.path[:0] = ['.']; from planning.cli.main import main; main()"
+    code = (
+        "import sys; sys.path[:0] = ['.']; from planning.cli.main import main; main()"
+    )
     words = [*arguments, "--max-projectors", "3", "--no-check", "--no-patterns"]
     begin = time.perf_counter()
     done = subprocess.run(

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
-    "CurvatureField": "curvature",
-    "RayCaster": "rays",
-    "Region": "regions",
-    "TriangleMesh": "mesh",
-    "dominant_regions": "regions",
-    "from_trimesh": "interchange",
-    "load_mesh": "readers",
-    "principal_curvatures": "curvature",
-    "regions_of_faces": "selected_regions",
-    "to_trimesh": "interchange",
+    "CurvatureField": "curvature.curvature",
+    "RayCaster": "rays.rays",
+    "Region": "regions.regions",
+    "TriangleMesh": "mesh.mesh",
+    "dominant_regions": "regions.regions",
+    "from_trimesh": "files.interchange",
+    "load_mesh": "files.readers",
+    "principal_curvatures": "curvature.curvature",
+    "regions_of_faces": "regions.selected_regions",
+    "to_trimesh": "files.interchange",
 }
 __all__ = [
     "CurvatureField",

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
-    "ArrayTree": "cells",
-    "CellProblem": "cell_problem",
-    "CoverProblem": "cover_problem",
-    "CoverSolution": "cover",
+    "ArrayTree": "cells.cell_tree",
+    "CellProblem": "cells.cell_problem",
+    "CoverProblem": "covers.cover_problem",
+    "CoverSolution": "covers.cover",
     "SolveStatus": "status",
-    "bound_count": "cell_bound",
-    "solve_cover": "cover",
-    "solve_max_coverage": "cover",
+    "bound_count": "cells.cell_bound",
+    "solve_cover": "covers.cover",
+    "solve_max_coverage": "covers.cover",
 }
 __all__ = [
     "ArrayTree",

@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import importlib
 import importlib.util
 import sys
 from collections.abc import Callable, Generator
@@ -122,7 +123,7 @@ def benchmark_module() -> Callable[[str], ModuleType]:
 
 
 def _load(name: str) -> ModuleType:
-    return _executed(f"ringrig_tests_{name}", Path(__file__).with_name(f"{name}.py"))
+    return importlib.import_module(f"support.{name}")
 
 
 def _executed(name: str, path: Path) -> ModuleType:

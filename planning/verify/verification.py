@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.verify.audit.audit import Audit, audit_plan
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit import Audit, audit_plan
 from planning.verify.audit.figure_claims import compare_figures, contradictions
 
 if TYPE_CHECKING:

@@ -1,0 +1,348 @@
+"""Which route's cameras stand, what the certificate says of both, and who believes it.
+
+A ball that three projectors light: three cameras measure what is lit, if they stand at
+the right places. Sixteen candidates don't, so a cover of them takes four or five.
+"""
+
+import copy
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.shapes.primitives import box, sphere
+from planning import RigPlan
+from planning.cameras.baselines.camera_spread import CameraSpread
+from planning.cameras.camera_cover import (
+    camera_stage,
+    lit_samples,
+    measured_by,
+    offered_cameras,
+)
+from planning.cameras.camera_routes import (
+    _clearly_wider,
+    better_route,
+    cover_by_cover,
+    slide_routes,
+)
+from planning.cameras.camera_slides import reached_by_candidates, rows_to_slide_on
+from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
+from planning.cameras.routes import Routes
+from planning.model.bodies import Body
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.projectors.projector_stage import plan_projectors
+from planning.proofs.projector_bound import Effort
+from planning.proofs.selection import required_rows
+from planning.report.summary.summary import _routes
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import uniform_radii
+from planning.scene.scene import Scene
+from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.counts.route_claims import audit_routes
+from planning.verify.audit.ledger import Ledger
+
+RADIUS = 0.1
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_rows():
+    """Fewer samples than a plan rests on: the questions here aren't of exactness."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("planning.cameras.camera_cover._ROWS", 800)
+        patch.setattr("planning.cameras.camera_cover._CHECK_ROWS", 1500)
+        yield
+
+
+@pytest.fixture(scope="module")
+def ball():
+    mesh, rig = sphere(RADIUS, subdivisions=4), load_rig("default")
+    required = rig.requirements(
+        mesh.centre,
+        mesh.radius,
+        max_projectors=6,
+        target="surface",
+        tau_m=0.004,
+        dominant_coverage=0.6,
+    )
+    n, eye = len(mesh.faces), np.eye(4)
+    scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
+    lens, radii = rig.projector_device(), uniform_radii(0.3, 0.0035)
+    template = PlannedProjector("", rig.light, eye, eye, lens, radii)
+    offset = (rig.ring_tilt_rad, -np.pi / 2)
+    stage = plan_projectors(scene, template, 120, ring_offset=offset, rounds=1)
+    camera = PlannedCamera("", eye, rig.camera_device())
+    return scene, stage.projectors, camera
+
+
+@pytest.fixture(scope="module")
+def coarse(ball):
+    """A cover of sixteen candidates, and what the default makes of it."""
+    scene, projectors, camera = ball
+    offered = offered_cameras(scene, camera, 16)
+    cover = cover_by_cover(scene, projectors, offered)
+    return cover, *better_route(scene, projectors, cover, "both")
+
+
+@pytest.fixture(scope="module")
+def fine(ball):
+    """The same of 160 candidates, which hold as small a cover."""
+    scene, projectors, camera = ball
+    cover = cover_by_cover(scene, projectors, offered_cameras(scene, camera, 160))
+    return cover, *better_route(scene, projectors, cover, "both")
+
+
+def test_fewer_by_the_paper_join_the_candidates_and_the_proof(ball, coarse):
+    scene, projectors, _ = ball
+    cover, better, routes = coarse
+    assert cover.selection.needed == cover.selection.lower_bound > 3
+    assert (routes.cover, routes.paper, routes.taken) == (
+        cover.selection.needed,
+        3,
+        "paper",
+    )
+    proof = camera_stage(scene, better).certificate
+    assert proof["count"] == proof["needed"]["count"] == 3
+    assert proof["candidates"]["lower_bound"] <= 3
+    assert proof["candidates"]["n_candidates"] == len(better.offered.cameras) > 16
+    # The three are among what was proved over, and measure what is asked of all of it.
+    rows = lit_samples(scene, projectors, scene.target_samples(6000, 901))
+    held = measured_by(scene, better.offered.cameras, rows)
+    share = held[:, better.selection.chosen].any(axis=1).sum() / held.any(axis=1).sum()
+    assert share >= 0.94
+    ids = {id(camera) for camera in better.offered.cameras}
+    assert all(id(camera) in ids for camera in better.cameras)
+
+
+def test_a_cover_that_is_as_small_stays_as_it_was(fine):
+    cover, better, routes = fine
+    assert better is cover
+    assert (routes.cover, routes.paper, routes.taken) == (3, 3, "cover")
+    assert len(routes.rival) == 3
+
+
+def test_the_route_is_the_same_on_every_run_and_with_two_threads(ball, coarse):
+    scene, projectors, _ = ball
+    cover = coarse[0]
+    found = [
+        route_among(one, projectors, cover.offered, cover.rows, cover.measured)
+        for one in (scene, replace(scene, threads=2))
+    ]
+    poses = [
+        np.stack([c.world_from_device for c in one.offered.cameras]) for one in found
+    ]
+    np.testing.assert_array_equal(*poses)
+
+
+def test_the_route_alone_is_bounded_over_candidates_and_itself(ball):
+    scene, projectors, camera = ball
+    offered = offered_cameras(scene, camera, 40)
+    cover = cover_by_paper(scene, projectors, offered)
+    found = cover.selection
+    assert found.needed == 3
+    assert found.lower_bound <= 3
+    assert found.best_rows <= found.best_rows_bound
+    assert found.best_rows >= found.required
+    assert found.required == required_rows(cover.measured.any(axis=1), 0.95)
+    assert np.all(found.chosen >= 40)
+    stage = camera_stage(scene, cover)
+    assert stage.cameras == stage.by_count[3]
+    for entry in stage.certificate["by_count"]:
+        assert entry["value_m2"] <= entry["upper_bound_m2"] * (1 + 1e-9)
+    fewer = stage.certificate["one_fewer"]["upper_bound_m2"]
+    assert fewer > 0.0
+
+
+def test_too_few_allowed_are_the_best_of_the_route_and_say_what_is_needed(ball):
+    scene, projectors, camera = ball
+    few = replace(scene, requirements=replace(scene.requirements, max_cameras=2))
+    cover = cover_by_paper(few, projectors, offered_cameras(few, camera, 40))
+    assert cover.selection.status == "infeasible"
+    assert (len(cover.cameras), cover.selection.needed) == (2, 3)
+    _, routes = better_route(few, projectors, cover, "paper")
+    assert (routes.paper, routes.taken) == (3, "paper")
+
+
+def test_bodies_of_the_routes_cameras_keep_off_each_other(ball):
+    """Bodies so deep that cameras less than 1 m apart collide before the ball."""
+    scene, projectors, camera = ball
+    bulky = replace(camera, body=Body((0.0, 0.0, -0.2), (0.2, 0.2, 0.2)))
+    cover = cover_by_paper(scene, projectors, offered_cameras(scene, bulky, 40))
+    assert cover.crowd is not None
+    chosen = cover.selection.chosen.tolist()
+    assert cover.crowd.stand_together(chosen)
+    rows = cover.crowd.covers(chosen, chosen).any(axis=1).sum()
+    assert rows >= cover.selection.required
+    assert "bounds_leave_out" in camera_stage(scene, cover).certificate
+
+
+def test_what_no_camera_sees_is_refused(ball):
+    scene, projectors, camera = ball
+    blind = replace(camera.device, range_m=(5.0, 6.0))
+    far = replace(camera, device=blind)
+    with pytest.raises(InfeasibleLimitsError, match="no camera of 40 poses"):
+        cover_by_paper(scene, projectors, offered_cameras(scene, far, 40))
+
+
+def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
+    ball, fine, monkeypatch
+):
+    monkeypatch.setattr("planning.cameras.camera_slides._ROWS", 600)
+    scene, projectors, _ = ball
+    cover, _, routes = fine
+    stage = camera_stage(scene, cover)
+    # As if they stood already: they can't slide back.
+    fixed = tuple(replace(c, existing="old") for c in _beside(stage.cameras))
+    close = replace(stage, cameras=fixed)
+    rivals = replace(close, routes=replace(routes, rival=stage.cameras))
+    taken, slid = slide_routes(scene, projectors, rivals)
+    assert taken.routes.taken == "paper"
+    assert "instead of" in taken.routes.why
+    assert slid.cameras is taken.cameras
+    assert [c.world_from_device.tolist() for c in taken.cameras] == [
+        c.world_from_device.tolist() for c in stage.cameras
+    ]
+    # Other numbers than the cover's are no rivals.
+    fewer = replace(rivals, routes=replace(routes, rival=stage.cameras[:2]))
+    assert slide_routes(scene, projectors, fewer)[0] is fewer
+
+
+def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
+    """Twelve candidates with 30 mm of depth of field; proofs speak of what they reach.
+
+    Cameras that slid to where more is measured would owe 95 % of that, too.
+    """
+    monkeypatch.setattr("planning.cameras.camera_slides._ROWS", 1500)
+    scene, projectors, camera = ball
+    short = replace(camera, device=replace(camera.device, range_m=(1.0, 1.03)))
+    cover = cover_by_cover(scene, projectors, offered_cameras(scene, short, 12))
+    stage = camera_stage(scene, cover)
+    rows = rows_to_slide_on(scene.among(projectors), projectors)
+    reached = reached_by_candidates(scene.among(projectors), stage, rows)
+    assert reached.mean() < 0.95 * rows.lit.any(axis=1).mean()
+    _, slid = slide_routes(scene, projectors, stage)
+    beyond = slid.measured_by.any(axis=1) & ~reached
+    assert beyond.sum() <= 0.002 * reached.sum()
+    assert slid.n_evaluations > 1
+
+
+def _beside(cameras):
+    """The same cameras, the second by the first, where it is of no use."""
+    near = cameras[0].world_from_device.copy()
+    c, s = np.cos(0.05), np.sin(0.05)
+    near[:3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ near[:3]
+    return (cameras[0], replace(cameras[1], world_from_device=near), *cameras[2:])
+
+
+def _slid(apart_m, parts):
+    """Two cameras of which each measures those of ten samples that are named."""
+    measured = np.zeros((10, 2), dtype=bool)
+    for column, part in enumerate(parts):
+        measured[list(part), column] = True
+    return CameraSpread((), measured, apart_m, apart_m, 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("rival", "better"),
+    [
+        (_slid(1.10, (range(6), range(5, 10))), True),
+        (_slid(1.09, (range(6), range(5, 10))), False),
+        (_slid(1.5, (range(6), range(5, 9))), False),
+        (_slid(1.5, (range(5), range(5, 10))), False),
+        (_slid(None, (range(6), range(5, 10))), False),
+    ],
+)
+def test_clearly_farther_apart_is_a_tenth_and_loses_neither_area_nor_overlap(
+    rival, better
+):
+    assert _clearly_wider(rival, _slid(1.0, (range(6), range(5, 10)))) == better
+
+
+@pytest.fixture(scope="module")
+def planned(small_job, tmp_path_factory, with_few_samples):
+    """A plan of a block by the paper's route, from the command line."""
+    folder, block = (
+        tmp_path_factory.mktemp("paper"),
+        box((100.0, 60.0, 30.0), divisions=4),
+    )
+    lines = [f"v {x} {y} {z}" for x, y, z in block.vertices]
+    lines += [f"f {a} {b} {c}" for a, b, c in block.faces + 1]
+    (folder / "block.obj").write_text("\n".join(lines))
+    words = ["--cameras-by", "paper", "--max-projectors", "2", "--target", "surface"]
+    words += ["--dominant-coverage", "0.6"]
+    with pytest.MonkeyPatch.context() as patch, with_few_samples():
+        # What is proved of the projectors isn't the question.
+        weak = Effort(finest=3, budget=1e6, shadows=0.0, most_samples=200)
+        patch.setattr("planning.pipeline.DEFAULT", weak)
+        ended = small_job.run(folder / "block.obj", folder, words)
+    assert ended.code == 0, ended.message
+    return ended.plan, RigPlan.load(folder / "plan" / "plan.json")
+
+
+def test_a_plan_by_the_papers_route_alone_bears_the_audit(planned):
+    document, plan = planned
+    routes = document["certificates"]["cameras"]["routes"]
+    assert (routes["asked"], routes["taken"]) == ("paper", "paper")
+    assert routes["cover"] is None
+    assert audit_plan(plan).failures == ()
+    proof = document["certificates"]["cameras"]
+    assert routes["paper"] == proof["needed"]["count"] == len(plan.cameras)
+    areas = plan.coverage["target"]
+    assert areas["measured_m2"] >= 0.95 * areas["reachable_by_cameras_m2"]
+
+
+def test_the_summary_tells_both_counts_and_why():
+    told = Routes("both", 3, 4, "cover", "fewer; so").entry()
+    (line,) = _routes({"routes": told})
+    assert re.search(
+        r"3 by the cover, 4 by the paper.*taken the cover.*fewer; so", line
+    )
+    (alone,) = _routes({"routes": Routes("paper", None, 4, "paper", "").entry()})
+    assert alone.endswith("4 by the paper's largest baselines")
+    assert _routes({}) == []
+
+
+def _failures(routes, **proof):
+    needed = {"count": 3, "lower_bound": 3}
+    table = {"status": "optimal", "needed": needed, "routes": routes, **proof}
+    ledger = Ledger({"certificates": {"cameras": table}})
+    audit_routes(ledger)
+    return ledger.failures
+
+
+TRUE = {"asked": "both", "cover": 3, "paper": 4, "taken": "cover", "why": "fewer"}
+
+
+def test_true_claims_of_the_routes_pass():
+    assert _failures(TRUE) == ()
+    assert _failures(TRUE | {"paper": None}) == ()
+    assert _failures(TRUE | {"cover": 4, "paper": 3, "taken": "paper"}) == ()
+    alone = TRUE | {"asked": "paper", "cover": None, "paper": 3, "taken": "paper"}
+    assert _failures(alone) == ()
+    # Fresh samples may ask for one more than the route needs.
+    more = {"status": "feasible", "needed": {"count": 4, "lower_bound": 3}}
+    assert _failures(TRUE, **more) == ()
+    ledger = Ledger({"certificates": {"cameras": {"status": "optimal"}}})
+    audit_routes(ledger)
+    assert ledger.failures == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "proof", "said"),
+    [
+        ({"paper": 2}, {}, "a route needs 2 cameras, but at least 3"),
+        ({"taken": "paper"}, {}, "4 cameras are taken instead of 3"),
+        ({"cover": 4}, {}, "needs 4, the certificate says 3"),
+        ({"cover": 2.5}, {}, "must be a number of cameras"),
+        ({"paper": float("nan")}, {}, "must be a number of cameras"),
+        ({"asked": "cover"}, {}, "null where 'cover' was asked"),
+        ({"asked": "paper"}, {}, "must be one of"),
+        ({"taken": "luck"}, {}, "must be one of"),
+        ({"cover": None}, {}, "has no count"),
+        ({}, {"needed": {"count": 4, "lower_bound": 3}}, "needs 3, the certificate"),
+    ],
+)
+def test_a_false_claim_of_the_routes_is_found(change, proof, said):
+    routes = copy.deepcopy(TRUE) | change
+    assert said in " ".join(_failures(routes, **proof))

@@ -1,0 +1,340 @@
+"""The command line as scripts see it: files, streams, exit codes, one-line errors."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import planning
+from geometry.shapes.sample_head.sample_head import write_sample
+from planning.cli.main import main
+from planning.verify.verification import verify_plan
+
+ROOT = Path(__file__).resolve().parents[2]
+SHARED = ROOT.parent / "shared" / "data"
+VOLATILE = ("created", "command", "timings_s", "cost")
+
+
+# A quarter of the samples behind claims: no test of this file is about their number.
+FEW = "import planning.claims as a, planning.overlaps as b\n"
+FEW += "a.N_SAMPLES = b.N_SAMPLES = 3000\n"
+
+
+def run(*words, cwd, threads=None, before=""):
+    """Run `plan` as a process of its own, on the package under test."""
+    home = str(Path(planning.__file__).resolve().parents[1])
+    environment = os.environ | {"PYTHONPATH": home, "PYTHONWARNINGS": "ignore"}
+    if threads is not None:
+        environment["OMP_NUM_THREADS"] = str(threads)
+        environment["OPENBLAS_NUM_THREADS"] = str(threads)
+    code = before + "from planning.cli.main import main; main()"
+    command = [sys.executable, "-c", code, *words]
+    return subprocess.run(
+        command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300
+    )
+
+
+def in_process(monkeypatch, capsys, *words):
+    """Run `plan` in this process; return exit code, stdout, stderr."""
+    monkeypatch.setattr(sys, "argv", ["plan", *map(str, words)])
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(name, "1")
+    with pytest.raises(SystemExit) as caught:
+        main()
+    return caught.value.code or 0, *capsys.readouterr()
+
+
+@pytest.fixture(scope="module")
+def face(tmp_path_factory):
+    path = tmp_path_factory.mktemp("mesh") / "face.obj"
+    write_sample(path, n_faces=8000)
+    return path
+
+
+# A head is seen from the front alone: two or so of each device do.
+RIG = """
+base = "default"
+name = "front"
+[workspace]
+shape = "cone"
+axis = [0.0, -1.0, 0.0]
+half_angle_deg = 40.0
+[requirements]
+dominant_coverage = 0.85
+coverage = 0.9
+min_reachable = 0.5
+"""
+
+
+@pytest.fixture(scope="module")
+def runs(face):
+    """One job with 1 and with 2 threads, the second with --json.
+
+    The check's own determinism over threads is tested with the check.
+    """
+    folder = face.parent
+    (folder / "front.toml").write_text(RIG)
+    found = []
+    for threads in (1, 2):
+        words = ["--mesh", "face.obj", "--max-projectors", "3", "-o", f"plan{threads}"]
+        words += ["--rig", "front.toml"]
+        words += ["--threads", str(threads)]
+        words += ["--json", "--no-check"] * (threads == 2)
+        found.append(run(*words, cwd=folder, threads=threads, before=FEW))
+    return folder, found
+
+
+def test_the_main_job_ends_with_0_and_says_what_a_designer_needs(runs):
+    _, (first, _) = runs
+    assert first.returncode == 0, first.stderr
+    for words in (
+        "2 projectors",
+        "COVERAGE",
+        "MARGINAL",
+        "CHECK    passed",
+        "plan.json",
+        "RINGS    P1",
+        "patterns",
+    ):
+        assert words in first.stdout
+    offered = re.findall(r"(\d+) candidate poses", first.stdout.replace(",", ""))
+    assert 640 <= int(offered[0]) <= 1000
+    assert int(offered[1]) == 480
+    assert "plan: " not in first.stdout
+    assert "cameras: candidates" in first.stderr
+
+
+def test_the_same_command_gives_the_same_files_whatever_the_threads(runs):
+    folder, _ = runs
+    drawn = sorted(
+        path.relative_to(folder / "plan1").as_posix()
+        for path in (folder / "plan1" / "patterns").rglob("*.*")
+    )
+    assert len([name for name in drawn if name.endswith(".png")]) >= 40
+    for name in ("surface.npz", "rig.png", *drawn):
+        one, two = ((folder / f"plan{n}" / name).read_bytes() for n in (1, 2))
+        assert one == two, name
+    texts = []
+    for n in (1, 2):
+        document = json.loads((folder / f"plan{n}" / "plan.json").read_text())
+        for key in VOLATILE:
+            assert document.pop(key)
+        assert (document.pop("reconstruction") is None) == (n == 2)
+        del document["members"][0]["reconstruction"]
+        texts.append(json.dumps(document))
+    assert texts[0] == texts[1]
+
+
+def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(
+    runs, tmp_path, monkeypatch, capsys
+):
+    folder, _ = runs
+    good = run("verify", "plan1/plan.json", "--mesh", "face.obj", "--json", cwd=folder)
+    assert good.returncode == 0, good.stderr
+    assert json.loads(good.stdout)["passed"] is True
+    spoiled = tmp_path / "plan.json"
+    document = json.loads((folder / "plan1" / "plan.json").read_text())
+    document["coverage"]["target"]["measured_m2"] *= 0.9
+    spoiled.write_text(json.dumps(document))
+    (tmp_path / "surface.npz").write_bytes(
+        (folder / "plan1" / "surface.npz").read_bytes()
+    )
+    # What is false shows without the pixels, which the good plan was held against.
+    audit_alone = partial(verify_plan, check_pixels=False)
+    monkeypatch.setattr("planning.cli.commands.verify_plan", audit_alone)
+    code, out, err = in_process(monkeypatch, capsys, "verify", spoiled, "--quiet")
+    assert (code, err) == (1, "")
+    assert "measured_m2" in out
+
+
+def test_json_is_one_object_and_nothing_else(runs):
+    folder, (_, second) = runs
+    assert second.returncode == 0, second.stderr
+    document = json.loads(second.stdout)
+    assert document["format"] == "ringrig-plan"
+    assert document["reconstruction"] is None
+    assert document.pop("missed") == []
+    written = json.loads((folder / "plan2" / "plan.json").read_text())
+    assert written.items() <= document.items()
+
+
+def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path):
+    code = (
+        "import planning.commands as c, sys\n"
+        "def stop(*a, **k): raise KeyboardInterrupt\n"
+        "c.plan_rig = stop\n"
+        f"sys.argv = ['plan', '--mesh', {str(face)!r}, '--max-projectors', '3']\n"
+        "from planning.cli.main import main; main()"
+    )
+    home = str(Path(planning.__file__).resolve().parents[1])
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": home},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 130
+    assert not (tmp_path / "face-plan" / "plan.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--mesh", "no.obj", "--max-projectors", 3], 3, "no such file"),
+        (["--mesh", "FACE", "--unit", "m", "--max-projectors", 3], 3, "--unit mm"),
+        (["--mesh", "FACE", "--max-projectors", 0], 2, "not in the range"),
+        (["--mesh", "FACE"], 2, "--max-projectors"),
+        (["--mesh", "FACE", "--max-projectors", 3, "--nope"], 2, "--nope"),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "--pattern", "dense"],
+            2,
+            "isn't built yet",
+        ),
+        (
+            ["--mesh", "FACE", "--mesh", "FACE", "--max-projectors", 3],
+            2,
+            "isn't built yet|aren't built yet",
+        ),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "--unit", "mm", "--size-mm", 3],
+            2,
+            "not both",
+        ),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "--coverage", "nan"],
+            2,
+            "coverage",
+        ),
+        (["--mesh", "FACE", "--max-projectors", 3, "--rig", "x.toml"], 3, "x.toml"),
+        (["--max-projectors", 3], 2, "give --mesh FILE, or --ranges"),
+        (["--mesh", "", "--max-projectors", 3], 2, "names no file"),
+        (["--ranges", "", "--max-projectors", 3], 2, "names no file"),
+        (
+            ["--mesh", "FACE", "--ranges", "o.csv", "--max-projectors", 3],
+            2,
+            "not both: a mesh says where",
+        ),
+        (["--ranges", "o.csv", "--max-projectors", 3], 3, "o.csv: no such file"),
+        (["--ranges", "FACE", "--max-projectors", 3], 3, "line 4: the header lacks"),
+        (
+            ["--ranges", "o.csv", "--max-projectors", 3, "--unit", "mm"],
+            2,
+            "--unit with --ranges: the file is in millimetres",
+        ),
+        (
+            ["--ranges", "o.csv", "--max-projectors", 3, "--select", "f.txt"],
+            2,
+            "no faces to select",
+        ),
+        (
+            ["--ranges", "o.csv", "--max-projectors", 3, "--target", "dominant"],
+            2,
+            "no dominant region",
+        ),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "-o", "FACE/x"],
+            2,
+            "can't write",
+        ),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "--time-limit", "0.001"],
+            5,
+            "time limit",
+        ),
+        (["verify", "no.json"], 3, "no such file"),
+        (["vrify"], 2, "verify"),
+        (["export", "plan.json", "--to", "ros"], 2, "isn't built yet"),
+        (["report", "plan.json"], 2, "isn't built yet"),
+        (["reconstruct", "no.json"], 3, "no such file"),
+    ],
+)
+def test_errors_are_one_line_with_the_documented_code(
+    words, code, message, face, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    words = [str(w).replace("FACE", str(face)) for w in words]
+    if words[0] not in ("verify", "vrify", "export", "report", "reconstruct"):
+        words += ["--quiet"]
+    found, out, err = in_process(monkeypatch, capsys, *words)
+    assert found == code
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert re.search(message, err)
+
+
+def test_an_empty_mesh_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    (tmp_path / "empty.obj").write_text("# nothing\n")
+    words = ["--mesh", tmp_path / "empty.obj", "--max-projectors", 3, "--quiet"]
+    code, out, err = in_process(monkeypatch, capsys, *words)
+    assert (code, out) == (3, "")
+    assert len(err.splitlines()) == 1
+    assert "empty.obj" in err
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys\nfrom planning.cli import commands\n"
+        "try:\n    commands.main(['--help'], prog_name='plan')\n"
+        "except SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'scipy', 'trimesh', 'igl', 'cvxpy', 'casadi', 'PIL'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
+    )
+    home = str(Path(planning.__file__).resolve().parents[1])
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": home},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "--max-projectors" in done.stdout
+
+
+def test_rigs_lists_every_number_with_its_source(monkeypatch, capsys):
+    code, out, _ = in_process(monkeypatch, capsys, "rigs")
+    assert code == 0
+    assert "default:" in out
+    assert "assumed" in out
+    assert "read:" in out
+
+
+def test_sample_writes_the_file_at_the_root(tmp_path, monkeypatch, capsys):
+    path = tmp_path / "mine.obj"
+    code, out, _ = in_process(
+        monkeypatch, capsys, "sample", "-o", path, "--faces", 2000
+    )
+    assert code == 0
+    assert "mine.obj" in out
+    assert path.read_text().startswith("# Sample head")
+
+
+def test_the_real_face_scan_is_planned(tmp_path):
+    """In parallel light too: benchmarks/main_job.py."""
+    mesh = SHARED / "meshes" / "face_scan_james.obj"
+    if not mesh.exists():
+        pytest.skip("../shared/data isn't there")
+    words = ["--mesh", str(mesh), "--max-projectors", "3"]
+    done = run(*words, "-o", str(tmp_path), "--quiet", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "CHECK    passed" in done.stdout
+
+
+def test_a_hollow_bust_exits_1_and_says_how_much_why_and_what_helps(tmp_path):
+    mesh = SHARED / "meshes" / "snowden_bust_lo.obj"
+    if not mesh.exists():
+        pytest.skip("../shared/data isn't there")
+    words = ["--mesh", str(mesh), "--unit", "in", "--max-projectors", "3"]
+    done = run(*words, "-o", str(tmp_path), "--quiet", cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "can be lit from anywhere" in done.stdout
+    assert "shadowed" in done.stdout
+    assert "What would help" in done.stdout
+    assert (tmp_path / "plan.json").exists()

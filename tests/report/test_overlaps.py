@@ -1,0 +1,274 @@
+"""Light of two projectors on one surface: areas of closed form, and who fires when."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.devices import ParallelModel
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.primitives import box, grid, joined, sphere
+from planning.model.plan import PlannedProjector, RigPlan
+from planning.report.entries.firing import schedule_line
+from planning.report.entries.overlaps import overlap_entries, shared_areas
+from planning.rig.rig import load_rig
+from planning.rings.ring_radii import ring_frame
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import aimed_poses
+from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.counts.overlap_claims import audit_overlaps, light_falls
+from planning.verify.audit.counts.schedule_claims import audit_schedule
+from planning.verify.audit.estimates import Estimator
+from planning.verify.audit.ledger import Ledger
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import Lamp
+from planning.verify.audit.samples import AuditSamples, draw_samples
+
+# A panel of 0.4 m a side.
+WIDE = ParallelModel((2000, 2000), 2e-4, (0.8, 1.2))
+
+
+def scene_of(mesh, light="parallel"):
+    rig = load_rig("default", light=light)
+    required = rig.requirements(
+        mesh.centre, mesh.radius, max_projectors=9, target="surface", tau_m=0.004
+    )
+    n = len(mesh.faces)
+    return Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+
+
+def beams(*positions, device=WIDE, aims=None, light="parallel"):
+    """Projectors at positions, aimed at the origin, their rings about the axis."""
+    made = []
+    for k, at in enumerate(positions):
+        aim = np.zeros(3) if aims is None else np.array(aims[k], dtype=float)
+        up = np.array([0.0, 1.0, 0.0]) if abs(at[1]) < 0.5 else np.array([0, 0, 1.0])
+        pose = aimed_poses(np.array([at], dtype=float), aim, up, device)[0]
+        radii = np.array([0.1, 0.3])
+        ring = ring_frame(pose, device, 0.0, 0.0)
+        made.append(PlannedProjector(f"P{k + 1}", light, pose, ring, device, radii))
+    return made
+
+
+def groups(scene, projectors):
+    return overlap_entries(scene, projectors)["firing_schedule"]["groups"]
+
+
+@pytest.mark.parametrize("light", ["parallel", "diverging"])
+def test_plates_back_to_back_are_lit_together(light):
+    front = grid(0.1, 0.1, divisions=(4, 4))
+    back = TriangleMesh(front.vertices - [0, 0, 0.01], front.faces[:, ::-1])
+    device = load_rig("default", light=light).projector_device()
+    scene = scene_of(joined(front, back), light)
+    projectors = beams((0.1, 0, 1), (0.1, 0, -1), device=device, light=light)
+    found = overlap_entries(scene, projectors)
+    (pair,) = found["overlaps"]
+    assert (pair["target_m2"], pair["surface_m2"]) == (0.0, 0.0)
+    schedule = found["firing_schedule"]
+    assert schedule["groups"] == [["P1", "P2"]]
+    assert (schedule["n_groups"], schedule["proof"]) == (1, "clique")
+    # Each does put light on its own side.
+    areas = shared_areas(scene, projectors, scene.surface_samples(2000, 1))
+    assert np.diag(areas) == pytest.approx([0.01, 0.01], rel=0.03)
+
+
+def test_opposite_sides_of_a_ball_share_nothing_and_three_around_it_a_lune_each():
+    """Light from two directions 120 degrees apart: lunes of 60 degrees, a sixth."""
+    scene = scene_of(sphere(0.1, subdivisions=4))
+    assert groups(scene, beams((1, 0, 0), (-1, 0, 0))) == [["P1", "P2"]]
+    around = [(np.cos(a), 0.0, np.sin(a)) for a in np.radians([0, 120, 240])]
+    found = overlap_entries(scene, beams(*around))
+    assert found["firing_schedule"]["groups"] == [["P1"], ["P2"], ["P3"]]
+    assert found["firing_schedule"]["clique"] == ["P1", "P2", "P3"]
+    for pair in found["overlaps"]:
+        for part in ("target_m2", "surface_m2"):
+            share = pair[part] / scene.mesh.area
+            # Light over 89 degrees is left out: 2 degrees of the lune's 60.
+            assert share == pytest.approx(58 / 360, abs=0.008)
+
+
+def test_three_on_one_plate_fire_one_after_the_other_however_poor_their_light():
+    """At 80 degrees, or out of range, nothing is lit, and codes are spoilt."""
+    scene = scene_of(grid(0.1, 0.1, divisions=(4, 4)))
+    grazing = (np.sin(np.radians(80)), 0.0, np.cos(np.radians(80)))
+    projectors = beams((0, 0, 1), grazing, (0, 0, 3))
+    found = overlap_entries(scene, projectors)
+    assert found["firing_schedule"]["n_groups"] == 3
+    for pair in found["overlaps"]:
+        assert pair["target_m2"] == pytest.approx(0.01, rel=1e-9)
+    # Even steep sides: the light runs along them.
+    steep = replace(scene, steep=np.tile([1.0, 0.0, 0.0], (len(scene.mesh.faces), 1)))
+    assert overlap_entries(steep, projectors)["overlaps"] == found["overlaps"]
+
+
+def test_narrow_beams_share_a_lens_and_the_outer_two_of_three_fire_together():
+    """Circles of radius r, d apart: 2 r^2 acos(d / 2r) - d / 2 sqrt(4 r^2 - d^2)."""
+    scene = scene_of(grid(0.16, 0.16, divisions=(4, 4)))
+    r, d = 0.03, 0.04
+    at = [(k * d, 0.0, 1.0) for k in (-1, 0, 1)]
+    aims = [(k * d, 0.0, 0.0) for k in (-1, 0, 1)]
+    found = overlap_entries(
+        scene, beams(*at, aims=aims, device=replace(WIDE, beam_radius=r))
+    )
+    lens = 2 * r**2 * np.arccos(d / (2 * r)) - d / 2 * np.sqrt(4 * r**2 - d**2)
+    areas = {tuple(p["projectors"]): p["surface_m2"] for p in found["overlaps"]}
+    assert areas["P1", "P2"] == pytest.approx(lens, rel=0.1)
+    assert areas["P2", "P3"] == pytest.approx(lens, rel=0.1)
+    assert areas["P1", "P3"] == 0.0
+    assert found["firing_schedule"]["groups"] == [["P1", "P3"], ["P2"]]
+    assert found["firing_schedule"]["clique"] == ["P2", "P3"]
+
+
+def test_what_is_drawn_beyond_the_last_ring_spoils_codes_too():
+    """Last rings of 20 mm, a gap of 10: light falls within 30 mm; axes are 50 apart."""
+    scene = scene_of(grid(0.16, 0.16, divisions=(4, 4)))
+    r, d = 0.03, 0.05
+    at = [(k * d, 0.0, 1.0) for k in (0, 1)]
+    aims = [(k * d, 0.0, 0.0) for k in (0, 1)]
+    rings = np.array([0.01, 0.02])
+    pair = [replace(p, ring_radii=rings) for p in beams(*at, aims=aims)]
+    (entry,) = overlap_entries(scene, pair)["overlaps"]
+    lens = 2 * r**2 * np.arccos(d / (2 * r)) - d / 2 * np.sqrt(4 * r**2 - d**2)
+    assert entry["surface_m2"] == pytest.approx(lens, rel=0.15)
+    # The audit's own predicate says the same.
+    own = scene.surface_samples(20_000, 3).samples
+    n = len(own.points)
+    steep, ones = np.zeros((n, 3)), np.ones(n)
+    samples = AuditSamples(
+        own.points, own.normals, own.faces, steep, ones.astype(int), ones > 0, ones
+    )
+    lamps = [
+        Lamp(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
+        for p in pair
+    ]
+    shadow = Shadow(scene.mesh, threads=2)
+    both = [light_falls(lamp, samples, shadow) for lamp in lamps]
+    found = scene.mesh.area * float(np.all(both, axis=0).mean())
+    assert found == pytest.approx(lens, rel=0.15)
+
+
+def test_shadow_is_no_light():
+    """From above, a box hides as much of the plate as its top catches."""
+    lifted = box((0.05, 0.04, 0.03))
+    lifted = TriangleMesh(lifted.vertices + [0, 0, 0.05], lifted.faces)
+    plate = grid(0.2, 0.2, divisions=(3, 3))
+    scene = scene_of(joined(plate, lifted))
+    (above,) = beams((0, 0, 1))
+    samples = scene.surface_samples(12_000, 1)
+    assert shared_areas(scene, [above], samples)[0, 0] == pytest.approx(0.04, rel=0.01)
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def plan(request, handmade) -> RigPlan:
+    return handmade.build_plan(request.param)
+
+
+@pytest.fixture(scope="module")
+def failures(plan):
+    """What the audit of these two claims says of a document."""
+    shadow = Shadow(plan.surface.mesh, threads=2)
+    samples = draw_samples(plan.surface, "dominant", 20_000, 0)
+    areas = (plan.coverage[part]["area_m2"] for part in ("surface", "target"))
+    estimator = Estimator(samples, plan.coverage["samples"], *areas)
+
+    def failures_of(document):
+        ledger = Ledger(document)
+        audit_overlaps(replace(plan, document=document), shadow, estimator, ledger)
+        audit_schedule(replace(plan, document=document), ledger)
+        return ledger.failures
+
+    return failures_of
+
+
+def test_the_whole_audit_looks_at_both_claims(plan):
+    document = copy.deepcopy(plan.document)
+    _area(document)
+    document["firing_schedule"]["n_groups"] = 3
+    found = audit_plan(replace(plan, document=document)).failures
+    keys = [failure.split(":")[0] for failure in found]
+    assert keys == ["overlaps.P1 + P2.target_m2", "firing_schedule.n_groups"]
+
+
+def _area(document):
+    document["overlaps"][0]["target_m2"] *= 0.8
+
+
+def _surface_area(document):
+    document["overlaps"][0]["surface_m2"] *= 1.25
+
+
+def _together(document):
+    document["firing_schedule"] |= {"groups": [["P1", "P2"]], "n_groups": 1}
+    document["firing_schedule"] |= {"lower_bound": 1, "clique": ["P1"]}
+
+
+def _together_and_nothing_shared(document):
+    _together(document)
+    document["overlaps"][0] |= {"target_m2": 0.0, "surface_m2": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (_area, "overlaps.P1 + P2.target_m2: claimed"),
+        (_surface_area, "overlaps.P1 + P2.surface_m2: claimed"),
+        (_together, "by the plan's own overlaps they light a surface in common"),
+        (_together_and_nothing_shared, "fire together, but light of both falls on"),
+        (lambda d: d.pop("overlaps"), "must name each of the 1 pairs of P1, P2"),
+        (
+            lambda d: d["overlaps"].append(d["overlaps"][0]),
+            "must name each of the 1 pairs",
+        ),
+        (lambda d: d.pop("firing_schedule"), "None must name each of P1, P2 exactly"),
+        (
+            lambda d: d["firing_schedule"].update(groups=[["P1"], []]),
+            "must name each of P1, P2 exactly once",
+        ),
+        (
+            lambda d: d["firing_schedule"].update(n_groups=3),
+            "n_groups: 3 is claimed for 2 groups",
+        ),
+        (
+            lambda d: d["firing_schedule"].update(clique=["P1"]),
+            "proof: 'clique' doesn't prove that 2.0 groups are needed",
+        ),
+        (
+            lambda d: d["firing_schedule"].update(clique=["P1", "P7"]),
+            "must be projectors that overlap pairwise",
+        ),
+        (
+            lambda d: d["firing_schedule"].update(lower_bound=3),
+            "lower_bound: 3 for 2 groups",
+        ),
+    ],
+)
+def test_each_false_claim_alone_turns_the_audit_red(plan, failures, change, sentence):
+    document = copy.deepcopy(plan.document)
+    assert failures(document) == ()
+    change(document)
+    found = failures(document)
+    assert any(sentence in failure for failure in found), found
+    assert len(found) <= 3
+
+
+def test_exhaustion_is_tried_again_by_the_audit(plan, failures):
+    """One group is enough for two that share nothing, whatever was tried."""
+    document = copy.deepcopy(plan.document)
+    document["firing_schedule"] |= {"proof": "exhaustion"}
+    assert failures(document) == ()
+    document["overlaps"][0] |= {"target_m2": 0.0, "surface_m2": 0.0}
+    found = failures(document)
+    assert any("'exhaustion' doesn't prove that 2" in failure for failure in found)
+
+
+def test_the_line_says_who_fires_when_and_why_not_in_fewer(plan):
+    line = schedule_line(plan.document)
+    assert line.startswith("FIRING   P1, then P2: 2 groups, fewer won't do: any two of")
+    share = plan.document["overlaps"][0]["target_m2"]
+    share /= plan.document["coverage"]["target"]["area_m2"]
+    assert f"most shared: P1 and P2, {100 * share:.1f} % of the target" in line
+    document = copy.deepcopy(plan.document)
+    document["firing_schedule"] |= {"groups": [["P1", "P2"]], "n_groups": 1}
+    assert "all projectors together" in schedule_line(document)
+    assert schedule_line(document | {"overlaps": []}) == ""

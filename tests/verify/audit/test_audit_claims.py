@@ -1,0 +1,718 @@
+"""Each false claim alone turns the audit red, with the sentence that names it."""
+
+import copy
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from geometry.mesh.mesh import TriangleMesh
+from planning.model.errors import PlanFileError
+from planning.model.plan import RigPlan
+from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.baselines.baseline_claims import distance_to_surface
+from planning.verify.audit.coverage.group_claims import audit_groups
+from planning.verify.audit.ledger import Ledger
+
+
+def failures(plan: RigPlan, **options) -> tuple[str, ...]:
+    return audit_plan(plan, **options).failures
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def plan(request, handmade) -> RigPlan:
+    return handmade.build_plan(request.param)
+
+
+@pytest.mark.parametrize(
+    ("light", "target"),
+    [("diverging", "dominant"), ("diverging", "surface"), ("parallel", "dominant")],
+)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_true_claims_pass(handmade, light, target, seed):
+    audit = audit_plan(handmade.build_plan(light, target), seed=seed)
+    assert audit.failures == ()
+    assert audit.passed
+
+
+def test_the_result_depends_on_the_seed_alone(plan):
+    one, two, other = (
+        audit_plan(plan, seed=s, n_samples=3000, threads=t)
+        for s, t in ((5, 1), (5, 2), (6, 2))
+    )
+    assert one.areas == two.areas != other.areas
+    assert np.array_equal(one.predicted, two.predicted)
+
+
+def test_prediction_and_areas_speak_of_the_same_samples(plan):
+    audit = audit_plan(plan, n_samples=3000)
+    samples, predicted = audit.in_target()
+    measured = audit.areas["target"]["measured_m2"]
+    assert samples.weights[predicted].sum() == pytest.approx(measured)
+    assert np.ptp(samples.weights) == 0.0
+    assert not np.any(predicted & ~audit.lit[audit.samples.in_target])
+
+
+@pytest.mark.parametrize("points", [4.5, -4.5])
+def test_an_area_off_by_more_than_sampling_explains_is_found_in_both_directions(
+    plan, handmade, points
+):
+    """Each claim has a recomputed figure of its own, so all may be false at once."""
+    names = (
+        "reachable_by_projectors_m2",
+        "lit_m2",
+        "reachable_by_cameras_m2",
+        "measured_m2",
+    )
+
+    def change(document):
+        for part in ("surface", "target"):
+            areas = document["coverage"][part]
+            for name in names:
+                areas[name] += 0.01 * points * areas["area_m2"]
+
+    found = failures(handmade.tampered(plan, change))
+    for key in (f"{part}.{name}" for part in ("surface", "target") for name in names):
+        start = f"coverage.{key}: claimed"
+        assert any(sentence.startswith(start) for sentence in found), key
+
+
+def _entry(kind, index, name, value):
+    def change(document):
+        document[kind][index][name] = value(document[kind][index].get(name))
+
+    return change
+
+
+def _at(*path):
+    *parents, last, value = path
+
+    def change(document):
+        table = document
+        for step in parents:
+            table = table[step]
+        table[last] = value(table[last]) if callable(value) else value
+
+    return change
+
+
+def _shift(pose, axis, by):
+    pose = copy.deepcopy(pose)
+    pose[axis][3] += by
+    return pose
+
+
+def _farther(pose):
+    pose = np.array(pose)
+    pose[:3, 3] *= 1.4
+    return pose.tolist()
+
+
+def _swapped(split):
+    """The same areas under another cause."""
+    return {"sigma": sum(split.values())}
+
+
+FALSE = {
+    "area_m2": (_at("coverage", "target", "area_m2", lambda x: x * 1.001), "area_m2: "),
+    "order": (
+        _at("coverage", "target", "reachable_by_cameras_m2", lambda x: x * 2),
+        "must lie between 0 and lit_m2",
+    ),
+    "samples": (_at("coverage", "samples", 0), "coverage.samples: 0 must"),
+    "missing": (_at("coverage", "surface", {}), "coverage.surface.lit_m2: None"),
+    "nan": (
+        _at("coverage", "target", "lit_m2", math.nan),
+        "coverage.target.lit_m2: nan",
+    ),
+    "cause": (
+        _at("coverage", "uncovered_by_cause", "projector_incidence", lambda x: x * 1.7),
+        "uncovered_by_cause.projector_incidence: claimed",
+    ),
+    "cause sum": (
+        _at(
+            "coverage", "uncovered_by_cause", "projector_incidence", lambda x: x * 1.02
+        ),
+        "uncovered_by_cause (sum): claimed",
+    ),
+    "unknown cause": (
+        _at("coverage", "uncovered_by_cause", lambda x: x | {"gremlins": 0.0}),
+        "causes that there are not: gremlins",
+    ),
+    "unreachable": (
+        _at("coverage", "unreachable_by_cause", lambda x: x | {"tangent_angle": 1e-3}),
+        "unreachable_by_cause.tangent_angle: claimed",
+    ),
+    "unmeasurable": (
+        _at("coverage", "unmeasurable_by_cause", _swapped),
+        "unmeasurable_by_cause.sigma: claimed",
+    ),
+    "unmeasurable sum": (
+        _at("coverage", "unmeasurable_by_cause", {}),
+        "unmeasurable_by_cause (sum): claimed",
+    ),
+    "lit area": (
+        _entry("projectors", 0, "lit_area_m2", lambda x: x * 1.2),
+        "P1.lit_area",
+    ),
+    "seen area": (
+        _entry("cameras", 1, "seen_area_m2", lambda x: x * 1.3),
+        "C2.seen_area",
+    ),
+    "sole area": (
+        _entry("cameras", 0, "sole_area_m2", lambda x: x * 1.5),
+        "C1.sole_area",
+    ),
+    "margin high": (
+        _entry("projectors", 0, "min_margin_rad", lambda x: x + 0.1),
+        "P1.min_margin_rad: claimed",
+    ),
+    "margin low": (
+        _entry("projectors", 0, "min_margin_rad", lambda x: x - 0.1),
+        "a lit sample's is 0 or more",
+    ),
+    "lit_by": (_entry("regions", 0, "lit_by", lambda x: ["P1"]), "P2 isn't named"),
+    "lit_by unknown": (
+        _entry("regions", 0, "lit_by", lambda x: ["P9"]),
+        "must list ids",
+    ),
+    "lit_fraction": (
+        _entry("regions", 1, "lit_fraction", lambda x: x - 0.12),
+        "regions.1.lit_fraction",
+    ),
+    "region area": (
+        _entry("regions", 1, "area_m2", lambda x: x * 1.01),
+        "regions.1.area_m2",
+    ),
+    "region faces": (
+        _entry("regions", 1, "n_faces", lambda x: x + 1),
+        "regions.1.n_faces",
+    ),
+    "region ids": (_entry("regions", 1, "id", lambda x: 7), "regions: ids [0, 7]"),
+    "ring frame": (
+        _entry("projectors", 1, "world_from_ring", lambda x: _shift(x, 2, 1e-3)),
+        "P2.world_from_ring: its origin is",
+    ),
+    "rig camera": (_at("rig", "camera", "K", 0, 0, 15000.0), "C1.K: claimed"),
+    "rig distortion": (_at("rig", "camera", "distortion", 0, 0.0), "C2.distortion: "),
+    "rig range": (_at("rig", "projector", "range_m", 1, 2.0), "P1.range_m: claimed"),
+    "rig resolution": (_at("rig", "projector", "resolution", 0, 7), "P1.resolution: "),
+    "no rig": (_at("rig", "camera", None), "rig.camera: is missing"),
+    "outside": (
+        _entry("cameras", 0, "world_from_device", _farther),
+        "mm outside requirements.workspace",
+    ),
+    "floor": (_at("requirements", "workspace", "floor_m", 0.2), "mm outside requ"),
+    "cone": (
+        _at("requirements", "workspace", "half_angle", 0.4),
+        "surface.npz reference_projectors: ",
+    ),
+    "centre": (
+        _at("requirements", "workspace", "centre", 0, 0.01),
+        "workspace.centre: ",
+    ),
+    "size": (
+        _at("requirements", "workspace", "object_radius_m", 0.06),
+        "object_radius_m: ",
+    ),
+    "references": (
+        _at("requirements", "workspace", "n_reference_cameras", 400),
+        "400 reference poses are claimed, surface.npz holds 4",
+    ),
+    "too many": (_at("requirements", "max_projectors", 1), "max_projectors allows 1"),
+    "same id": (_entry("cameras", 1, "id", lambda x: "C1"), "cameras: ids repeat"),
+    "count": (_at("certificates", "cameras", "count", 1), "cameras.count: claimed 1"),
+    "bound": (
+        _at("certificates", "projectors", "candidates", "lower_bound", 3),
+        "lower_bound: 3 exceeds the count of 2",
+    ),
+    "continuous": (
+        _at("certificates", "cameras", "continuous", {"lower_bound": 4}),
+        "cameras.continuous.lower_bound: 4 exceeds",
+    ),
+    "continuous beyond candidates": (
+        _at("certificates", "projectors", "continuous", {"lower_bound": 2}),
+        "2 is claimed over all poses, but only 1 over the candidates",
+    ),
+    "continuous of cameras beyond candidates": (
+        _at("certificates", "cameras", "continuous", {"lower_bound": 2}),
+        "cameras.continuous.lower_bound: 2 is claimed over all poses, but only 1 over",
+    ),
+    "continuous area": (
+        _at(
+            "certificates",
+            "cameras",
+            lambda claims: (
+                claims
+                | {
+                    "continuous": {"lower_bound": 1, "one_fewer_upper_bound_m2": 0.001},
+                    "by_count": [
+                        {"count": 1, "value_m2": 0.002, "upper_bound_m2": 0.003},
+                        {"count": 2, "value_m2": 0.004, "upper_bound_m2": 0.005},
+                    ],
+                }
+            ),
+        ),
+        "10.00 cm² is claimed over all poses, but 1 of the candidates cover 20.00 cm²",
+    ),
+    "optimal": (
+        _at("certificates", "projectors", "status", "optimal"),
+        "2 devices stand against a bound of 1",
+    ),
+    "status": (
+        _at("certificates", "cameras", "status", "great"),
+        "'great' isn't one of",
+    ),
+    "required": (
+        _at("certificates", "cameras", "required_m2", lambda x: x * 0.5),
+        "cameras.required_m2: claimed",
+    ),
+    "best area": (
+        _at("certificates", "cameras", "best_area", "upper_bound_m2", 1e-6),
+        "exceeds upper_bound_m2",
+    ),
+    "marginal": (
+        _at("marginal", "projectors", 1, "lit_target_m2", lambda x: x * 1.1),
+        "marginal.projectors.2.lit_target_m2: claimed",
+    ),
+    "marginal falls": (
+        _at("marginal", "cameras", 0, "measured_target_m2", 0.009),
+        "measured_target_m2 falls from 90.00 cm² with 1 camera to ",
+    ),
+    "marginal too large": (
+        _at("marginal", "projectors", 0, "lit_surface_m2", 1.0),
+        "marginal.projectors.1.lit_surface_m2: 1.0 is claimed, must be an area",
+    ),
+    "phi": (_at("baselines", 0, "phi", lambda x: x + 0.01), "C1-C2.phi: claimed"),
+    "slack": (_at("baselines", 0, "slack", lambda x: -x), "C1-C2.slack: claimed"),
+    "covered": (_at("baselines", 1, "covered", False), "C2-C1.covered: False is"),
+    "d": (_at("baselines", 1, "d", lambda x: x + 1e-3), "C2-C1.d: claimed"),
+    "lateral": (_at("baselines", 0, "d_lateral", lambda x: x + 1e-3), "C2.d_lateral: "),
+    "axial": (_at("baselines", 0, "d_axial", lambda x: x + 1e-3), "C1-C2.d_axial: "),
+    "d_max": (_at("baselines", 0, "d_max", lambda x: x - 1e-3), "C1-C2.d_max: claimed"),
+    "d_max null": (_at("baselines", 0, "phi_max", 3.5), "must be null: phi_max 3.5"),
+    "phi_max": (
+        _at("baselines", 1, "phi_max", lambda x: x + 0.01),
+        "C1.phi_max: claimed",
+    ),
+    "normals": (_at("baselines", 0, "normals", 1, [0, 1, 0]), "C1-C2.normals: "),
+    "mean normal": (
+        _entry("regions", 0, "mean_normal", lambda x: [1, 0, 0]),
+        "mean_normal",
+    ),
+    "D1": (_at("baselines", 0, "D1", lambda x: x * 1.001), "C1-C2.D1: claimed"),
+    "E": (_at("baselines", 0, "E", 2, lambda x: x + 2e-4), "mm off the surface"),
+    "one order": (lambda document: document["baselines"].pop(), "not the order C2, C1"),
+    "stranger": (
+        _at("baselines", 0, "cameras", ["C1", "C9"]),
+        "two cameras of the plan",
+    ),
+    "standoff1": (_at("baselines", 0, "standoff1", lambda x: x + 2e-4), "standoff1: "),
+    "standoff2": (_at("baselines", 1, "standoff2", lambda x: x - 2e-4), "standoff2: "),
+    "C1": (_at("baselines", 0, "C1", lambda x: x + 2e-4), "C1-C2.C1: claimed"),
+    "C2": (_at("baselines", 0, "C2", lambda x: x * 1.1), "C1-C2.C2: claimed"),
+    "beta": (_at("baselines", 0, "beta", 1, lambda x: -x), "C1-C2.beta.1: claimed"),
+    "beta list": (_at("baselines", 0, "beta", 0.1), "C1-C2.beta.0: None is claimed"),
+    "iota": (_at("baselines", 1, "iota", 0, lambda x: x + 0.01), "C2-C1.iota.0: "),
+    "half_field": (
+        _at("baselines", 0, "half_field", 0, lambda x: x + 0.01),
+        "C1-C2.half_field.0: claimed",
+    ),
+    "theta": (_at("baselines", 0, "max_incidence", 1.3), "C2.max_incidence: claimed"),
+    "delta_axes": (_at("baselines", 0, "delta_axes", 0.0), "C2.delta_axes: claimed 0"),
+    "delta_surface": (_at("baselines", 0, "delta_surface", 0.1), "delta_surface: "),
+    "n_seam": (_at("baselines", 0, "n_seam", 0), "C2.n_seam: 0 must be a positive"),
+    "limit": (_at("baselines", 0, "limit", "weather"), "'weather' is claimed, it is"),
+    "other limit": (
+        _at(
+            "baselines",
+            1,
+            "limit",
+            lambda x: "camera_field" if x == "camera_incidence" else "camera_incidence",
+        ),
+        "is claimed, it is camera_",
+    ),
+    "groups": (
+        _at("camera_groups", [["C1"], ["C2"]]),
+        "C1 and C2 stand in two groups, but share",
+    ),
+    "group twice": (
+        _at("camera_groups", [["C1", "C2"], ["C2"]]),
+        "must name each of C1, C2 exactly once",
+    ),
+    "no groups": (_at("camera_groups", None), "camera_groups: None must name each"),
+    "candidates": (
+        _at("certificates", "cameras", "candidates", "n_candidates", 480),
+        "n_candidates: claimed 480 poses, recomputed 4 poses",
+    ),
+    "needed": (
+        _at("certificates", "cameras", "needed", "count", 3),
+        "needed.count: 3 is claimed for a plan of 2 that is 'feasible'",
+    ),
+    "needed bound": (
+        _at("certificates", "cameras", "needed", "lower_bound", 3),
+        "needed.lower_bound: 3 exceeds the count of 2",
+    ),
+    "best bound": (
+        _at("certificates", "projectors", "best_area", "upper_bound_m2", 0.02),
+        "best_area.upper_bound_m2: 200.00 cm² exceeds the ",
+    ),
+    "one fewer": (
+        _at("certificates", "projectors", "candidates", "lower_bound", 2),
+        "2 are claimed to be the fewest",
+    ),
+    "light": (_at("rig", "light", "parallel"), "but rig.light is 'parallel'"),
+    "limits": (_at("rig", "limits", None), "rig.limits: is missing"),
+    "incidence limit": (
+        _at("rig", "limits", "projector_max_incidence_deg", 50.0),
+        "requirements.projector.max_incidence: claimed",
+    ),
+    "tangent limit": (
+        _at("rig", "limits", "min_tangent_angle_deg", 41.0),
+        "requirements.projector.min_tangent_angle: claimed",
+    ),
+    "camera limit": (
+        _at("rig", "limits", "camera_max_incidence_deg", 60.0),
+        "requirements.camera.max_incidence: claimed",
+    ),
+    "conditioning limit": (
+        _at("rig", "limits", "min_conditioning", 0.2),
+        "requirements.triangulation.min_conditioning: claimed",
+    ),
+    "noise": (
+        _at("rig", "limits", "noise_px", 0.2),
+        "requirements.triangulation.noise_px: claimed",
+    ),
+    "pitch limit": (
+        _at("rig", "limits", "min_ring_pitch_px", None),
+        "requirements.triangulation.min_ring_pitch_px: claimed 7.0, but",
+    ),
+    "up": (_at("requirements", "workspace", "up", [0, 2, 0]), "workspace.up: [0, 2, 0"),
+    "axis": (
+        _at("requirements", "workspace", "axis", [0, 0, 2]),
+        "workspace.axis: [0, 0, 2] must be a unit vector",
+    ),
+    "half_angle": (
+        _at("requirements", "workspace", "half_angle", 4.0),
+        "workspace.half_angle: 4 rad must lie in (0, pi]",
+    ),
+    "shell": (
+        _at("requirements", "workspace", "camera_radius_m", [1.1, 0.9]),
+        "workspace.camera_radius_m: [1.1, 0.9] m must be positive and rise",
+    ),
+    "scale": (_at("meshes", 0, "scale_to_m", 0.0), "scale_to_m: 0.0 must be positive"),
+    "scale of unit": (
+        _at("meshes", 0, "unit", "mm"),
+        "meshes.0.scale_to_m: claimed 1 m (mm), recomputed 0.001 m (mm)",
+    ),
+    "unit": (_at("meshes", 0, "unit", "cubit"), "meshes.0.unit: 'cubit' isn't one of"),
+    "last ring": (
+        _at("requirements", "workspace", "reference_ring_radius", 0.2),
+        "P1.ring_radii (last): claimed",
+    ),
+    "C": (_at("cost", "C", 5.0), "cost.C: claimed 5 s"),
+    "C before": (_at("cost", "C_before", 5.0), "cost.C_before: claimed 5 s"),
+    "cameras before": (_at("cost", "n_cameras_before", 4), "greedy_count is 3"),
+    "greedy": (_at("certificates", "cameras", "greedy_count", 2), "n_cameras_before"),
+    "times": (_at("cost", "t3", None), "cost.C: is claimed with the times"),
+    "pixels": (_at("cost", "pixels", 12), "cost.pixels: claimed 12"),
+    "share": (_at("surface", "dominant_share", 0.5), "surface.dominant_share: claimed"),
+    "mesh area": (_at("meshes", 0, "area_m2", 0.04), "meshes.area_m2 (sum): claimed"),
+    "member": (_at("members", 0, "coverage", {}), "members.0.coverage: differs"),
+    "member check": (
+        _at("members", 0, "reconstruction", {"passed": True}),
+        "members.0.reconstruction: differs",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_a_false_claim_is_named(handmade, name):
+    change, sentence = FALSE[name]
+    found = failures(handmade.tampered(handmade.build_plan(), change))
+    assert any(sentence in failure for failure in found), found
+
+
+@pytest.mark.parametrize(
+    ("overlap", "groups", "sentence"),
+    [
+        (0.030, [["A", "B", "C"]], None),
+        (0.030, [["A", "C", "B"]], None),
+        (0.030, [["A", "B"], ["C"]], "B and C stand in two groups"),
+        (0.010, [["A", "B", "C"]], None),
+        (0.010, [["A", "B"], ["C"]], None),
+        (0.001, [["A", "B"], ["C"]], None),
+        (0.001, [["A", "B", "C"]], "C stand in the group of A, but"),
+        (0.001, [["A", "B"], []], "must name each of A, B, C exactly once"),
+    ],
+)
+def test_groups_hang_together_by_overlaps_of_one_percent(overlap, groups, sentence):
+    """A and B share a tenth of the target, B and C the given share, A and C nothing."""
+    n = 10_000
+    place = np.arange(n) / n
+    measured = np.stack(
+        [place < 0.4, (place >= 0.3) & (place < 0.7), place >= 0.7 - overlap]
+    )
+    samples = SimpleNamespace(in_target=np.ones(n, dtype=bool))
+    own = SimpleNamespace(measured_by=measured, samples=samples)
+    plan = SimpleNamespace(cameras=[SimpleNamespace(id=name) for name in "ABC"])
+    ledger = Ledger({"camera_groups": groups})
+    audit_groups(plan, own, 12_000, ledger)
+    assert [sentence in failure for failure in ledger.failures] == (
+        [] if sentence is None else [True]
+    )
+
+
+def test_one_device_more_may_add_less_to_the_surface(handmade):
+    """Covers are chosen for the target; on it alone must more devices do more."""
+
+    def change(document):
+        rows = document["marginal"]["cameras"]
+        more = {**rows[1], "n_cameras": 3}
+        more["measured_surface_m2"] = 0.5 * rows[1]["measured_surface_m2"]
+        rows.append(more)
+
+    assert failures(handmade.tampered(handmade.build_plan(), change)) == ()
+
+
+def test_a_region_in_the_dark_is_lit_by_nobody(handmade):
+    plan = handmade.build_plan()
+    region = plan.surface.region.copy()
+    region[plan.surface.mesh.face_centroids[:, 2] < -0.03] = 2
+    dark = {
+        "id": 2,
+        "area_m2": 0.0,
+        "n_faces": 0,
+        "lit_by": ["P2"],
+        "lit_fraction": 0.0,
+    }
+    document = plan.document | {"regions": [*plan.document["regions"], dark]}
+    surface = dataclasses.replace(plan.surface, region=region)
+    found = failures(RigPlan(document, surface))
+    key = "regions.2.lit_by: P2 is named, but can light no part"
+    assert any(sentence.startswith(key) for sentence in found)
+
+
+@pytest.mark.parametrize("name", ["pixel_pitch_m", "beam_radius"])
+def test_a_parallel_model_must_be_the_rigs(handmade, name):
+    plan = handmade.build_plan("parallel")
+    found = failures(handmade.tampered(plan, _at("rig", "projector", name, 0.5)))
+    assert any(f"P1.{name}: claimed" in failure for failure in found)
+
+
+def test_a_parallel_ring_frame_must_keep_the_axis_of_the_light(handmade):
+    def change(document):
+        document["projectors"][0]["world_from_ring"] = (
+            np.array(document["projectors"][0]["world_from_ring"]) @ turn
+        ).tolist()
+
+    c, s = math.cos(0.02), math.sin(0.02)
+    turn = np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+    found = failures(handmade.tampered(handmade.build_plan("parallel"), change))
+    assert any("its axis is turned by 0.02 rad against the light" in f for f in found)
+
+
+def test_a_pose_that_is_no_rotation_breaks_the_plan(handmade):
+    change = _at("cameras", 0, "world_from_device", 0, 0, 0.5)
+    with pytest.raises(
+        PlanFileError, match="C1: world_from_device must hold a rotation"
+    ):
+        audit_plan(handmade.tampered(handmade.build_plan(), change))
+
+
+def test_a_pose_with_a_projective_row_is_named(handmade):
+    change = _at("cameras", 0, "world_from_device", 3, 2, 0.1)
+    found = failures(handmade.tampered(handmade.build_plan(), change))
+    assert any("C1.world_from_device" in f and "rigid last row" in f for f in found)
+
+
+def test_what_other_numbers_cover_is_held_against_the_table(handmade):
+    """Claims for one, two and three candidates: true ones pass, each false is named."""
+
+    def planted(*, best=0.0, fewer=0.0, value=0.0, table=0.0):
+        def change(document):
+            areas = document["coverage"]["target"]
+            proof = document["certificates"]["projectors"]
+            marginal = {
+                row["n_projectors"]: row["lit_target_m2"]
+                for row in document["marginal"]["projectors"]
+            }
+            most = {1: marginal[1], 2: areas["reachable_by_projectors_m2"]}
+            proof["by_count"] = [
+                {
+                    "count": n,
+                    "value_m2": marginal[n] * (1.0 + value),
+                    "upper_bound_m2": most[n] * (1.0 - table * (n == 1)),
+                }
+                for n in (1, 2)
+            ]
+            if table:
+                proof["by_count"][0]["value_m2"] = 0.0
+            proof["best_area"]["upper_bound_m2"] = most[2] * (1.0 - best)
+            if best:
+                proof["best_area"]["value_m2"] = 0.0
+            least = proof["by_count"][0]["upper_bound_m2"]
+            proof["one_fewer"] = {"upper_bound_m2": least * (1.0 - fewer)}
+
+        return failures(handmade.tampered(handmade.build_plan(), change))
+
+    assert planted() == ()
+    (line,) = planted(best=0.01)
+    assert "best_area.upper_bound_m2: claimed" in line
+    (line,) = planted(fewer=0.01)
+    assert "one_fewer.upper_bound_m2: claimed" in line
+    assert "by_count: for 1: value_m2" in planted(value=0.01)[0]
+    (line,) = planted(table=0.5)
+    assert "are claimed for 1, but marginal has" in line
+
+
+def test_a_superfluous_device_refutes_the_bound(handmade):
+    def change(document):
+        document["certificates"]["projectors"]["candidates"]["lower_bound"] = 2
+        document["certificates"]["projectors"]["status"] = "optimal"
+        document["certificates"]["projectors"]["one_fewer"]["upper_bound_m2"] = 0.0
+        document["requirements"]["dominant_coverage"] = 0.1
+        document["certificates"]["projectors"]["required_m2"] = (
+            0.1 * document["coverage"]["target"]["reachable_by_projectors_m2"]
+        )
+
+    found = failures(handmade.tampered(handmade.build_plan(), change))
+    assert len(found) == 1
+    assert (
+        "certificates.projectors.candidates.lower_bound: 2 is claimed, but 1"
+        in found[0]
+    )
+
+
+def test_reference_poses_outside_the_workspace_are_counted(handmade):
+    plan = handmade.build_plan()
+    poses = plan.surface.reference_cameras.copy()
+    poses[0, :3, 3] *= 2.0
+    surface = dataclasses.replace(plan.surface, reference_cameras=poses)
+    found = failures(RigPlan(plan.document, surface))
+    assert any("reference_cameras: 1 of 4 poses lie outside" in f for f in found)
+
+
+def test_reference_rings_must_share_the_optical_centre(handmade):
+    plan = handmade.build_plan()
+    rings = plan.surface.reference_rings.copy()
+    rings[3, :3, 3] += 0.01
+    surface = dataclasses.replace(plan.surface, reference_rings=rings)
+    found = failures(RigPlan(plan.document, surface))
+    assert any(
+        "reference_rings: ring frames leave the optical centre" in f for f in found
+    )
+
+
+def test_fewer_reference_poses_change_what_is_reachable(handmade):
+    plan = handmade.build_plan()
+    poses = plan.surface.reference_projectors[:1]
+    surface = dataclasses.replace(
+        plan.surface,
+        reference_projectors=poses,
+        reference_rings=plan.surface.reference_rings[:1],
+    )
+    found = failures(RigPlan(plan.document, surface))
+    assert any(
+        "coverage.target.reachable_by_projectors_m2: claimed" in f for f in found
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [("reference_cameras", (4, 3)), ("reference_rings", (2, 4, 4)), ("steep", (5, 3))],
+)
+def test_arrays_of_the_wrong_shape_break_the_plan(handmade, name, shape):
+    plan = handmade.build_plan()
+    surface = dataclasses.replace(plan.surface, **{name: np.zeros(shape)})
+    with pytest.raises(PlanFileError, match="plan again"):
+        audit_plan(RigPlan(plan.document, surface))
+
+
+def test_an_empty_target_breaks_the_plan(handmade):
+    plan = handmade.build_plan()
+    surface = dataclasses.replace(
+        plan.surface, region=np.full(len(plan.surface.region), -1)
+    )
+    with pytest.raises(PlanFileError, match="the target has no area"):
+        audit_plan(RigPlan(plan.document, surface))
+
+
+def test_an_unmet_requirement_is_no_false_claim(handmade):
+    change = _at("requirements", "min_reachable", 0.999)
+    audit = audit_plan(handmade.tampered(handmade.build_plan(), change))
+    assert audit.passed
+    assert [sentence.split()[1] for sentence in audit.unmet] == [
+        "reachable_by_projectors_m2",
+        "reachable_by_cameras_m2",
+    ]
+
+
+def _mirrored(project):
+    def wrong(camera, local):
+        return project(camera, [-local[0], local[1], local[2]])
+
+    return wrong
+
+
+def _shining_back(light_steps):
+    def wrong(entry, p, n, steep, limits):
+        return light_steps(entry, p, [-x for x in n], steep, limits)
+
+    return wrong
+
+
+MAKER_ERRORS = {
+    "projection": ("project", _mirrored),
+    "visibility": ("light_steps", _shining_back),
+}
+
+
+@pytest.mark.parametrize(
+    ("light", "name"), [("diverging", "projection"), ("parallel", "visibility")]
+)
+def test_a_wrong_sign_in_the_maker_shows_as_areas(handmade, monkeypatch, name, light):
+    function, wrong = MAKER_ERRORS[name]
+    monkeypatch.setattr(handmade, function, wrong(getattr(handmade, function)))
+    found = failures(handmade.make_plan(light))
+    assert any("coverage." in failure for failure in found)
+
+
+def test_a_wrong_sign_in_the_ring_normal_shows_as_areas(handmade, monkeypatch):
+    monkeypatch.setattr(handmade, "RING_SIGN", 1.0)
+    found = failures(handmade.make_plan("diverging"))
+    assert any("coverage.target.measured_m2: claimed" in failure for failure in found)
+
+
+def test_distance_to_surface_is_exact_on_faces_edges_and_corners():
+    mesh = TriangleMesh(
+        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])
+    )
+    for point, expected in (
+        ([0.2, 0.2, 4e-4], 4e-4),
+        ([0.5, -3e-4, 0.0], 3e-4),
+        ([-3e-4, -4e-4, 0.0], 5e-4),
+        ([0.2, 0.2, 0.0], 0.0),
+    ):
+        assert distance_to_surface(mesh, np.array(point)) == pytest.approx(expected)
+    assert distance_to_surface(mesh, np.array([9.0, 0.0, 0.0])) == np.inf
+
+
+@pytest.mark.parametrize(("fraction", "holds"), [(4 / 11, True), (1.0, False)])
+def test_a_region_of_few_samples_is_judged_by_its_few_samples(
+    handmade, fraction, holds
+):
+    plan = handmade.build_plan()
+    z = plan.surface.mesh.face_centroids[:, 2]
+    # Three faces out of the light: about a dozen samples of either side.
+    few = np.isin(np.arange(len(z)), np.argsort(np.abs(z + 0.02))[:3])
+    region = np.where(few, 2, plan.surface.region)
+    few_claims = {"id": 2, "lit_by": [], "lit_fraction": fraction, "n_faces": 3}
+    few_claims["area_m2"] = float(plan.surface.mesh.face_areas[few].sum())
+    document = plan.document | {"regions": [*plan.document["regions"], few_claims]}
+    surface = dataclasses.replace(plan.surface, region=region)
+    found = audit_plan(RigPlan(document, surface), n_samples=2000).failures
+    named = any(f.startswith("regions.2.lit_fraction: claimed") for f in found)
+    assert named is not holds
