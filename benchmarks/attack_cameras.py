@@ -34,8 +34,7 @@ from geometry.devices import PinholeModel
 from geometry.files.readers import load_mesh
 from geometry.poses import look_at
 from planning import load_rig
-from planning.cameras.camera_cover import LitSamples, lit_samples
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
 from planning.prepare import first_projectors, prepared
@@ -43,6 +42,7 @@ from planning.projectors.projector_poses import widen_margins
 from planning.proofs.camera_bound import CameraCells, CameraEffort
 from planning.proofs.cells.image_cone import image_cone
 from planning.report.draft import Order
+from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (

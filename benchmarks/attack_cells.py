@@ -38,7 +38,7 @@ from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
 from planning.prepare import prepared
@@ -47,7 +47,7 @@ from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.projector_bound import Effort, bound_projectors
 from planning.report.draft import Order
-from planning.scene.lighting import Target
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -26,12 +26,13 @@ from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
 from planning.cameras.camera_stage import place_cameras
+from planning.cameras.proved import bound_stage
+from planning.model.devices import PlannedCamera
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.prepare import first_projectors, prepared
 from planning.projectors.projector_poses import widen_margins
-from planning.proofs.camera_bound import DEFAULT, PROVE, bound_stage
+from planning.proofs.camera_bound import DEFAULT, PROVE
 from planning.report.draft import Order
 
 

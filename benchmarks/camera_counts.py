@@ -32,11 +32,10 @@ from from_tests import load
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig, verify_plan
-from planning.cameras.camera_cover import lit_samples, measured_by
 from planning.cameras.camera_routes import slide_routes
 from planning.cameras.camera_stage import CameraSolution, place_cameras
 from planning.cameras.routes import CamerasBy
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.pipeline import _polish
 from planning.prepare import Prepared, first_projectors, prepared
@@ -44,6 +43,7 @@ from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
 from planning.report.assemble import write_plan
 from planning.report.draft import Draft, Order
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
 

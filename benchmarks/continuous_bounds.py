@@ -31,7 +31,8 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.prepare import Prepared, prepared
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
-from planning.proofs.projector_bound import DEFAULT, PROVE, prove_fewest
+from planning.projectors.proved import prove_fewest
+from planning.proofs.projector_bound import DEFAULT, PROVE
 from planning.report.draft import Order
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -25,8 +25,8 @@ from seam_gap import GAP, predicted_limit, seam_samples, wall_rig
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
-from geometry.shapes.sample_head.sample_head import write_sample
 from planning import load_mesh, load_rig, plan_rig
+from planning.cli.sample import write_sample
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit import audit_plan
 from planning.verify.reconstruction.check.check import reconstruct_plan

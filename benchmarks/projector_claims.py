@@ -24,15 +24,15 @@ from continuous_bounds import jobs, ready_for
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.ring_frame import moved_to
 from planning.model.rounding import rounded_pose
 from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.share_margin import margin_at_share
-from planning.rings.ring_radii import moved_to
 from planning.scene import lighting
-from planning.scene.lighting import Target
 from planning.scene.lit import lit_stages
+from planning.scene.samples import Target
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     LIT,

@@ -31,19 +31,20 @@ from continuous_bounds import jobs, ready_for
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
-from planning.cameras.camera_cover import lit_samples, offered_cameras, plan_cameras
+from planning.cameras.camera_cover import offered_cameras, plan_cameras
 from planning.cameras.camera_stage import choose_cameras, move_axes
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.ring_frame import ring_frame
 from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import required_rows
 from planning.rings.axis_moves import AxisJudge
-from planning.rings.ring_radii import ring_frame
 from planning.scene import lighting
 from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.measured import lit_samples
 from planning.scene.scene import Scene
 
 ROWS = 12_000

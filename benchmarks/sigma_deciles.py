@@ -21,11 +21,11 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.rays.proximity import closest_points
 from geometry.shapes.primitives import grid, sphere
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.report.entries.edge_noise import EdgeNoise
 from planning.scene import lighting, measurability
-from planning.scene.lighting import Target
+from planning.scene.samples import Target
 from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from visibility_instances import Instance, covers
 
 from solvers import CoverProblem
-from solvers.covers.reductions import reduce_problem
+from solvers.covers.bounds.reductions import reduce_problem
 
 MESHES = ("vtk_bunny.ply", "vtk_horse.ply", "tm_fixed_top.ply", "face_scan_james.obj")
 COLUMNS = (

@@ -27,8 +27,8 @@ from pathlib import Path
 import numpy as np
 
 from geometry import dominant_regions, principal_curvatures
-from geometry.shapes.sample_head.sample_head import write_sample
 from planning import RigPlan, load_mesh, load_rig, plan_rig, verify_plan
+from planning.cli.sample import write_sample
 from planning.report.drawing.draw import draw_mesh, draw_rig, region_colours
 from planning.report.face_status import face_status
 

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from geometry.files.readers import load_mesh as load_mesh
     from planning.model.errors import InputError as InputError
     from planning.model.errors import PlanningError as PlanningError
-    from planning.model.errors import RequirementError as RequirementError
     from planning.model.plan import RigPlan as RigPlan
+    from planning.model.plan_errors import RequirementError as RequirementError
     from planning.rig.rig import Rig as Rig
     from planning.rig.rig import load_rig as load_rig
     from planning.scene.interest import read_selection as read_selection

@@ -12,20 +12,17 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.camera_cover import CameraStage, NothingMeasuredError
 from planning.cameras.camera_routes import slide_routes
 from planning.cameras.camera_stage import follow_cameras, place_cameras
+from planning.cameras.proved import bound_stage
 from planning.cameras.routes import CamerasBy
-from planning.model.errors import (
-    InfeasibleLimitsError,
-    InputError,
-    InterruptedPlanError,
-    RequirementError,
-    TimeLimitError,
-)
-from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
+from planning.model.plan import RigPlan
+from planning.model.plan_errors import InterruptedPlanError, RequirementError
 from planning.model.progress import Report, Stopwatch
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
-from planning.proofs.camera_bound import bound_stage
-from planning.proofs.projector_bound import DEFAULT, PROVE, prove_fewest
+from planning.projectors.proved import prove_fewest
+from planning.proofs.projector_bound import DEFAULT, PROVE
 from planning.proofs.selection import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.what_helps import falls_short

@@ -10,11 +10,16 @@ from geometry.curvature.curvature import CurvatureField, principal_curvatures
 from geometry.mesh.bearing import bearing
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
-from planning.model.errors import InputError
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
-from planning.projectors.projector_stage import ProjectorStage, plan_projectors
+from planning.projectors.projector_stage import (
+    NothingLitError,
+    ProjectorStage,
+    plan_projectors,
+)
+from planning.report.advice.relaxations import nothing_lit
 from planning.report.draft import Order
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
 from planning.scene.clearance import check_existing_room
@@ -94,12 +99,16 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
     """
     rig = ready.order.rig
     with clock.stage("projectors", "projectors: candidates and cover"):
-        stage = plan_projectors(
-            ready.scene,
-            ready.template,
-            max(rig.n_candidate_projectors, rig.n_reference_projectors),
-            ring_offset=ready.ring_offset,
-        )
+        try:
+            stage = plan_projectors(
+                ready.scene,
+                ready.template,
+                max(rig.n_candidate_projectors, rig.n_reference_projectors),
+                ring_offset=ready.ring_offset,
+            )
+        except NothingLitError as error:
+            helps = nothing_lit(ready.scene, error)
+            raise InfeasibleLimitsError(f"{error}; {helps}") from None
         clock.say(
             f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
             f"{stage.certificate['candidates']['lower_bound']} are needed"

@@ -11,13 +11,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.proofs.conflicts import settle
+from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
 
-from .camera_cover import CameraCover, LitSamples, measured_by
+from .camera_cover import CameraCover
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,18 +116,6 @@ def lit_among(
         points = rows.target.samples.points[own]
         lit[own[blocked_by(bodies, projector, points).any(axis=1)], p] = False
     return lit
-
-
-def taken(
-    rows: LitSamples, chosen: NDArray[np.int64], lit: NDArray[np.bool_]
-) -> LitSamples:
-    """Return some of the samples, lit as stated for all."""
-    return LitSamples(
-        rows.target.take(chosen),
-        lit[chosen],
-        tuple(light.take(chosen) for light in rows.lights),
-        tuple(rings.take(chosen) for rings in rows.rings),
-    )
 
 
 def settled_cover(

@@ -1,14 +1,15 @@
 """Section VI of the paper: the fewest cameras that measure what is lit."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.words import area_words
 from planning.proofs.conflicts import Crowd, settle_others
 from planning.proofs.selection import (
     BODIES_LEFT_OUT,
@@ -18,43 +19,27 @@ from planning.proofs.selection import (
     others_instead,
     select_fewest,
 )
-from planning.report.summary.shortfall import area_words
-from planning.scene import lighting, measurability
+from planning.scene import measurability
 from planning.scene.clearance import offered_with_room
 from planning.scene.existing import existing_cameras
-from planning.scene.lighting import Light, Target
-from planning.scene.lit import lit_stages, merged
-from planning.scene.measurability import Rings
+from planning.scene.lit import merged
+from planning.scene.measured import (
+    LitSamples,
+    furthest_failure,
+    lit_samples,
+    measured_by,
+)
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.sights import Sight, Sights, joined_sight, sights_of, view_of
+from planning.scene.sights import Sights
 from planning.scene.workspace.candidates import camera_candidates
 
 from .routes import Routes
 
 _ROWS = 2000
 _CHECK_ROWS = 4000
-# Seen by several cameras and worked on together: many calls on few rows are slow, and
-# much more leaves the cache.
-_PAIRS = 8192
 ROUNDS = 3
 _STREAM = 200
-
-
-@dataclass(frozen=True, eq=False)
-class LitSamples:
-    """Samples with the light of every projector of the plan on them.
-
-    Attributes:
-        target: The samples that at least one projector lights.
-        lit: Which projector lights which, shape (n, n_projectors).
-        lights: Light of each projector.
-        rings: Ring surfaces of each projector.
-    """
-
-    target: Target
-    lit: NDArray[np.bool_]
-    lights: tuple[Light, ...]
-    rings: tuple[Rings, ...]
 
 
 class NothingMeasuredError(InfeasibleLimitsError):
@@ -120,88 +105,6 @@ class CameraStage:
     def reference(self) -> tuple[PlannedCamera, ...]:
         """The candidates."""
         return self.offered.cameras
-
-
-def lit_samples(
-    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
-) -> LitSamples:
-    """Return the samples that the projectors light, with their light and rings."""
-    lit = lit_stages(scene, projectors, target) == lighting.LIT
-    some = np.flatnonzero(lit.any(axis=1))
-    kept = target.take(some)
-    return LitSamples(
-        kept,
-        lit[some],
-        tuple(lighting.light_on(projector, kept) for projector in projectors),
-        rings_of(projectors, kept),
-    )
-
-
-def rings_of(
-    projectors: Sequence[PlannedProjector], target: Target
-) -> tuple[Rings, ...]:
-    """Return the ring surfaces of every projector at samples."""
-    points = target.samples.points
-    return tuple(measurability.rings_at(projector, points) for projector in projectors)
-
-
-def measured_by(
-    scene: Scene,
-    cameras: Sequence[PlannedCamera],
-    rows: LitSamples,
-    sights: Sequence[Sight] | None = None,
-) -> NDArray[np.bool_]:
-    """Return which camera measures which sample with any projector, (n, n_cameras).
-
-    Args:
-        scene: Surface and requirements.
-        cameras: As they stand.
-        rows: Lit samples.
-        sights: Of these cameras on these samples, where they are at hand.
-    """
-    if sights is None:
-        sights = sights_of(scene, cameras, rows.target)
-    measured = np.zeros((len(rows.target), len(cameras)), dtype=bool)
-    for first, last in _chunks(sights):
-        scene.pulse()
-        column = np.repeat(
-            np.arange(first, last), [len(s.rows) for s in sights[first:last]]
-        )
-        seen = joined_sight(sights[first:last])
-        measured[seen.rows, column] = _measured(scene, seen, rows)
-    return measured
-
-
-def _chunks(sights: Sequence[Sight]) -> Iterator[tuple[int, int]]:
-    """Ranges of cameras that together see about `_PAIRS` samples, or of one."""
-    ends = np.cumsum([len(sight.rows) for sight in sights])
-    first = 0
-    while first < len(sights):
-        before = ends[first - 1] if first else 0
-        last = int(np.searchsorted(ends, before + _PAIRS, side="right"))
-        last = max(last, first + 1)
-        yield first, last
-        first = last
-
-
-def _measured(scene: Scene, sight: Sight, rows: LitSamples) -> NDArray[np.bool_]:
-    """Return which of the samples that are seen, by whatever cameras, are measured."""
-    limits = scene.requirements.triangulation
-    normals = rows.target.samples.normals
-    measured = np.zeros(len(sight.rows), dtype=bool)
-    for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
-        pairs = np.flatnonzero(rows.lit[sight.rows, p] & ~measured)
-        own = sight.rows[pairs]
-        quality = measurability.pair_quality(
-            normals[own],
-            light.take(own),
-            rings.take(own),
-            sight.view.take(pairs),
-            limits,
-        )
-        stage = measurability.first_pair_failure(quality, limits)
-        measured[pairs[stage == measurability.MEASURED]] = True
-    return measured
 
 
 def offered_cameras(scene: Scene, template: PlannedCamera, n_candidates: int) -> Sights:
@@ -369,34 +272,6 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
 def n_given(scene: Scene) -> int:
     """Return how many cameras stand already."""
     return len(scene.requirements.existing_of("camera"))
-
-
-def furthest_failure(
-    scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
-) -> NDArray[np.int8]:
-    """Return how far each sample comes over all pairs: an index in `CAUSES`.
-
-    It is `MEASURED` where some pair measures the sample.
-    """
-    furthest = np.zeros(len(rows.target), dtype=np.int8)
-    required = scene.requirements
-    for camera in cameras:
-        scene.pulse()
-        seen = view_of(scene, camera, rows.target)
-        furthest = np.maximum(furthest, seen.stage)
-        clear = np.flatnonzero(seen.stage == measurability.SEEN)
-        for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
-            pairs = clear[rows.lit[clear, p]]
-            quality = measurability.pair_quality(
-                rows.target.samples.normals[pairs],
-                light.take(pairs),
-                rings.take(pairs),
-                seen.take(pairs),
-                required.triangulation,
-            )
-            stage = measurability.first_pair_failure(quality, required.triangulation)
-            furthest[pairs] = np.maximum(furthest[pairs], stage)
-    return furthest
 
 
 def _nothing_measured(

@@ -22,15 +22,16 @@ from planning.cameras.paper.paper_cameras import (
     cover_of,
     route_among,
 )
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
 from planning.scene.clearance import with_room
+from planning.scene.measured import measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.sights import Sights
 
-from .camera_bodies import settled_cover, taken
-from .camera_cover import CameraCover, CameraStage, measured_by, n_given, plan_cameras
+from .camera_bodies import settled_cover
+from .camera_cover import CameraCover, CameraStage, n_given, plan_cameras
 from .camera_slides import (
     reached_by_candidates,
     rows_to_slide_on,

@@ -13,13 +13,14 @@ from planning.cameras.baselines.spread_problem import (
     SpreadLimits,
     at_poses,
 )
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.scene.clearance import lacks_room
+from planning.scene.measured import LitSamples, lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.scene.standing import moves_bodies
 
 from .camera_bodies import lit_among
-from .camera_cover import CameraStage, LitSamples, lit_samples, measured_by
+from .camera_cover import CameraStage
 
 _ROWS = 6000
 _STREAM = 300

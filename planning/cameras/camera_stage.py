@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.ring_axes import turn_ring_axes

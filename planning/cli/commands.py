@@ -12,9 +12,9 @@ import numpy as np
 
 from geometry.files.readers import UNITS, load_mesh
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.sample_head.sample_head import HeadShape, write_sample
-from planning.model.errors import InterruptedPlanError, RequirementError
+from geometry.shapes.sample_head.sample_head import HeadShape
 from planning.model.plan import RigPlan
+from planning.model.plan_errors import InterruptedPlanError, RequirementError
 from planning.model.progress import Report
 from planning.pipeline import plan_rig
 from planning.report.drawing.draw import save_rig_picture
@@ -31,6 +31,7 @@ from planning.verify.reconstruction.patterns.pattern_files import (
 from planning.verify.verification import verify_plan
 
 from .console import cores, reporter
+from .sample import write_sample
 from .writable import writable
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from geometry.rays.rays import RayCaster
-from planning.model.plan import PlannedProjector, RigPlan
+from planning.model.devices import PlannedProjector
+from planning.model.plan import RigPlan
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import PlannedProjector
-from planning.rings.ring_radii import moved_to
+from planning.model.devices import PlannedProjector
+from planning.model.ring_frame import moved_to
 from planning.scene.existing import movable
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projectors_around

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.proofs.selection import cover_problem, required_rows
 from planning.scene import lighting
 from planning.scene.clearance import with_room

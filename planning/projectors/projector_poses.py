@@ -8,19 +8,20 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.requirements import Workspace
+from planning.model.ring_frame import moved_to
 from planning.proofs.selection import required_rows
-from planning.rings.ring_radii import moved_to
 from planning.scene import lighting
 from planning.scene.clearance import lacks_room
-from planning.scene.lighting import Target
 from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.standing import moves_bodies
 from planning.scene.workspace.zone_limits import half_spaces
 from planning.scene.workspace.zone_positions import is_zoned
-from solvers.poses.pose_program import PoseProgram, pose_margins, pose_slack, solve_pose
+from solvers.poses.pose_problem import PoseProgram, pose_margins
+from solvers.poses.pose_program import pose_slack, solve_pose
 
 from .margin_search import widest_between
 from .projector_stage import ProjectorStage

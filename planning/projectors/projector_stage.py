@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices import PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedProjector
 from planning.proofs.conflicts import LitCrowd, settle, settle_others
 from planning.proofs.selection import (
     BODIES_LEFT_OUT,
@@ -21,12 +21,11 @@ from planning.proofs.selection import (
     required_rows,
     select_fewest,
 )
-from planning.report.advice.relaxations import nothing_lit
 from planning.scene import lighting
 from planning.scene.clearance import offered_with_room, with_room
 from planning.scene.existing import existing_projectors, movable
-from planning.scene.lighting import Target
 from planning.scene.lit import lit_margins, lit_stages, merged
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates, projectors_around
 from solvers import solve_cover
@@ -46,6 +45,37 @@ _STREAM = 100
 _SEEDS_BUDGET = 2e8
 # Counted work of the cover whose count is kept, where less left it unproved.
 _PROOF_BUDGET = 1e10
+
+
+class NothingLitError(InfeasibleLimitsError):
+    """No candidate lights any sample.
+
+    Attributes:
+        candidates: The poses.
+        rows: The samples.
+        stages: First failing limit of each sample and pose.
+    """
+
+    def __init__(
+        self,
+        candidates: tuple[PlannedProjector, ...],
+        rows: Target,
+        stages: NDArray[np.int8],
+    ) -> None:
+        counts = np.bincount(stages.ravel(), minlength=lighting.LIT)[: lighting.LIT]
+        share = 100.0 * counts / counts.sum()
+        named = ", ".join(
+            f"{cause} {part:.0f} %"
+            for cause, part in sorted(
+                zip(lighting.CAUSES, share, strict=True), key=lambda pair: -pair[1]
+            )
+            if part >= 1.0
+        )
+        super().__init__(
+            f"no projector of {len(candidates)} poses lights any part of the target; "
+            f"of all pairs of pose and sample, the first limit that fails is {named}"
+        )
+        self.candidates, self.rows, self.stages = candidates, rows, stages
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +124,7 @@ def plan_projectors(
         rounds: Covers at most, each with more rows.
 
     Raises:
-        InfeasibleLimitsError: If no candidate lights any sample.
+        NothingLitError: If no candidate lights any sample.
     """
     required = scene.requirements
     # Those that stand already come first, and are in every cover.
@@ -110,7 +140,7 @@ def plan_projectors(
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
-        raise InfeasibleLimitsError(nothing_lit(scene, candidates, rows, stages))
+        raise NothingLitError(candidates, rows, stages)
     # The best of a lattice lies beside the best there is.
     n_lattice = len(candidates)
     around = projectors_around(

@@ -22,21 +22,18 @@ from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
 from geometry.lengths import lengths
-from planning.cameras.camera_bodies import taken
-from planning.cameras.camera_cover import CameraStage, LitSamples
 from planning.proofs.cells.aim_cells import AimTree
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.proofs.cells.position_cells import PositionTree
+from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
 from planning.scene.workspace.field import holds_ball
 from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 
-from .all_poses import ContinuousBound, joined
-from .existing_bound import enough
+from .all_poses import ContinuousBound
 from .open_rows import mesh_reach, open_rows
-from .selection import required_rows
 
 
 @dataclass(frozen=True)
@@ -66,41 +63,6 @@ DEFAULT = CameraEffort(
     finest=7, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
 )
 PROVE = CameraEffort(finest=8, aims=5, maps=7, budget=1e10, shadows=np.inf)
-
-
-def bound_stage(
-    scene: Scene, stage: CameraStage, device: PinholeModel, effort: CameraEffort
-) -> CameraStage:
-    """Return the stage with the bound over all poses in its certificate.
-
-    Args:
-        scene: Surface and requirements.
-        stage: Cameras from the cover, for the projectors and ring axes of its rows.
-        device: Optics of the cameras.
-        effort: What to spend.
-    """
-    proof = stage.certificate
-    given = int(proof.get("given", 0))
-    n = min(len(stage.rows.target), effort.most_samples or len(stage.rows.target))
-    reached = np.any(stage.measured[:n], axis=1)
-    free = np.any(stage.measured[:n, :given], axis=1)
-    rest = np.flatnonzero(reached & ~free)
-    if proof["needed"]["count"] <= given or not rest.size:
-        entry = enough(proof, np.any(stage.measured, axis=1))
-        return replace(stage, certificate=proof | {"continuous": entry})
-    required = required_rows(reached, scene.requirements.coverage)
-    bound = bound_cameras(
-        scene,
-        device,
-        taken(stage.rows, rest, stage.rows.lit),
-        max(required - int(free.sum()), 0),
-        proof["needed"]["count"] - given,
-        effort,
-        n_samples=n,
-        row_area_m2=stage.rows.target.samples.weight * len(stage.rows.target) / n,
-    )
-    bound = replace(bound, given=given, n_free=int(free.sum()))
-    return replace(stage, certificate=joined(proof, bound.entry()))
 
 
 def bound_cameras(

@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import PlannedProjector
-from planning.scene.lighting import Target
+from planning.model.devices import PlannedProjector
+from planning.scene.samples import Target
 from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
 from solvers.covers.cover import solve_max_coverage
 

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.scene.existing import existing_projectors
-from planning.scene.lighting import LIT, Target
+from planning.scene.lighting import LIT
 from planning.scene.lit import lit_stages
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits, OpenDirections
 from geometry.directions.silhouettes import POINTS
-from planning.scene.lighting import Target
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.bit_rows import words_for
 

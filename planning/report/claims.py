@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
-from planning.cameras.camera_cover import (
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.scene import lighting, measurability
+from planning.scene.lit import lit_stages, margins_of
+from planning.scene.measured import (
     LitSamples,
     furthest_failure,
     lit_samples,
     measured_by,
 )
-from planning.model.plan import PlannedCamera, PlannedProjector
-from planning.scene import lighting, measurability
-from planning.scene.lighting import Target
-from planning.scene.lit import lit_stages, margins_of
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.sights import view_of
 from planning.scene.standing import Device, blocked_by

@@ -7,7 +7,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
 from planning.cameras.camera_cover import CameraStage
 from planning.cameras.routes import CamerasBy
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig

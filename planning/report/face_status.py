@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.cameras.camera_cover import lit_samples, measured_by
 from planning.model.plan import RigPlan
 from planning.report.drawing.draw import MEASURED, NOT_LIT, NOT_MEASURED, OUTSIDE_TARGET
 from planning.scene import lighting
-from planning.scene.lighting import Target
 from planning.scene.lit import lit_stages
+from planning.scene.measured import lit_samples, measured_by
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 

@@ -18,7 +18,6 @@ from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements
-from planning.scene.existing import build_existing, check_existing
 from planning.scene.workspace.field import overflows
 
 from . import optics
@@ -28,6 +27,7 @@ from .rig_devices import (
     pinhole_device,
     pinhole_document,
 )
+from .rig_existing import build_existing, check_existing
 from .rig_files import Figure, Preset, list_presets, read_rig
 from .rig_requirements import Pattern, Target, build_requirements
 from .rig_tables import RigTable

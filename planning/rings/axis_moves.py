@@ -11,17 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
-from planning.cameras.camera_cover import LitSamples, lit_samples
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
+from planning.model.ring_frame import ring_frame
 from planning.scene import measurability
 from planning.scene.lighting import ring_coordinate
 from planning.scene.measurability import PairQuality, View
+from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
 from planning.scene.sights import view_of
-from solvers.poses.axis_program import PITCH_POWER, AxisProgram, best_start, solve_axis
+from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
+from solvers.poses.axis_program import best_start, solve_axis
 
-from .ring_radii import ring_axis, ring_frame, ring_frame_of_axis
+from .ring_radii import ring_axis, ring_frame_of_axis
 
 _SWEEPS = 2
 _STEPS = (1.0, 0.5, 0.25)

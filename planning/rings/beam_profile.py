@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.scene import lighting
-from planning.scene.lighting import Target
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 # Rays that miss the object's ball by more than this share of its radius aren't cast.

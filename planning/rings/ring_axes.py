@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.camera_cover import LitSamples, lit_samples, rings_of
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.ring_frame import ring_frame
 from planning.scene import measurability
-from planning.scene.lighting import Target, ring_coordinate
+from planning.scene.lighting import ring_coordinate
 from planning.scene.measurability import Rings, View
+from planning.scene.measured import LitSamples, lit_samples, rings_of
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.sights import view_of
-
-from .ring_radii import ring_frame
 
 _AZIMUTHS = 16
 _SWEEPS = 2

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.mesh.topology import face_pairs
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.scene import measurability
-from planning.scene.lighting import LIT, Target, first_failure, light_on
+from planning.scene.lighting import LIT, first_failure, light_on
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 # As in geometry.curvature: sharper turns are creases of the object, not facets.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.scene.lighting import ring_coordinate
 from planning.scene.scene import Scene
 

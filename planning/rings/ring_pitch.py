@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
-from planning.cameras.camera_cover import LitSamples
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.scene import measurability
 from planning.scene.lighting import served_by
 from planning.scene.lit import margins_of
 from planning.scene.measurability import View
+from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
 
 MIN_PROJECTOR_PX = 3.0

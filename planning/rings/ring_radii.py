@@ -4,47 +4,18 @@ The ring axis need not be the device's axis. Turned aside (parallel light: shift
 moves the curves on which a camera is blind (|r.m| = 0) off the object.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
-from planning.model.plan import PlannedProjector
 from planning.model.requirements import TriangulationLimits
+from planning.model.ring_frame import _along, _shifted, ring_frame
 from solvers.poses.axis_program import axis_direction
 
 _MIN_GAP_PROJECTOR_PX = 3.0
 # The gap is chosen for a camera that meets the surface at 60 degrees.
 _GAP_FACING = 0.5
-
-
-def ring_frame(
-    world_from_device: NDArray[np.float64],
-    device: PinholeModel | ParallelModel,
-    tilt: float,
-    azimuth: float,
-) -> NDArray[np.float64]:
-    """Return ``world_from_ring``.
-
-    Args:
-        world_from_device: Pose of the projector, shape (4, 4).
-        device: Its optics; a pinhole's rings are turned against the ray of its image
-            centre, so that lens shift doesn't move them off the object.
-        tilt: Angle of the ring axis against that ray in [rad] (diverging), or shift of
-            the axis in the device plane in [m] (parallel).
-        azimuth: Direction of the tilt, from the device's +x towards +y in [rad].
-    """
-    c, s = np.cos(azimuth), np.sin(azimuth)
-    if isinstance(device, ParallelModel):
-        return world_from_device @ _shifted(np.array([tilt * c, tilt * s]))
-    width, height = device.resolution
-    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
-    aside = np.array([c, s, 0.0])
-    aside -= middle * (aside @ middle)
-    aside /= np.linalg.norm(aside)
-    return world_from_device @ _along(np.cos(tilt) * middle + np.sin(tilt) * aside)
 
 
 def ring_frame_of_axis(
@@ -81,20 +52,6 @@ def ring_axis(
     if isinstance(device, ParallelModel):
         return frame[:2, 3]
     return frame[:2, 2] / (1.0 + frame[2, 2])
-
-
-def _shifted(shift: NDArray[np.float64]) -> NDArray[np.float64]:
-    frame = np.eye(4)
-    frame[:2, 3] = shift
-    return frame
-
-
-def _along(z: NDArray[np.float64]) -> NDArray[np.float64]:
-    x = np.cross([0.0, 1.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    frame = np.eye(4)
-    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    return frame
 
 
 def outer_radius(
@@ -162,15 +119,3 @@ def uniform_radii(outer: float, gap: float) -> NDArray[np.float64]:
     """
     n = max(2, int(np.ceil(outer / gap)))
     return outer * np.arange(1, n + 1) / n
-
-
-def moved_to(
-    projector: PlannedProjector, world_from_device: NDArray[np.float64]
-) -> PlannedProjector:
-    """Return a projector at another pose; its ring frame moves along."""
-    device_from_ring = inverse(projector.world_from_device) @ projector.world_from_ring
-    return replace(
-        projector,
-        world_from_device=world_from_device,
-        world_from_ring=world_from_device @ device_from_ring,
-    )

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.cameras.camera_cover import LitSamples, measured_by
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.scene import lighting, measurability
-from planning.scene.lighting import Target
+from planning.scene.measured import LitSamples, measured_by
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .beam_profile import BeamProfile, beam_rays, cast_beam

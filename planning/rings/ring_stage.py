@@ -15,12 +15,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.camera_cover import LitSamples, lit_samples
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.scene import measurability
 from planning.scene.lighting import ring_coordinate
 from planning.scene.lit import merged
 from planning.scene.measurability import View
+from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
 from planning.scene.sights import view_of
 

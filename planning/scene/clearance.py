@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.shapes.boxes import OrientedBox, boxes_overlap, triangles_touch
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
 

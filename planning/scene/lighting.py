@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.lengths import lengths
-from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import inverse, transform
 from geometry.rays.visibility import Visibility
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 
+from .samples import Target
 from .standing import Standing, blocked_by
 
 CAUSES = (
@@ -28,26 +28,6 @@ LIT = len(CAUSES)
 OCCLUDED = CAUSES.index("projector_occlusion")
 BLOCKED = CAUSES.index("projector_body")
 INCIDENCE = CAUSES.index("projector_incidence")
-
-
-@dataclass(frozen=True, eq=False)
-class Target:
-    """Samples with the steep direction of the face that each lies on.
-
-    Attributes:
-        samples: Where, with normals.
-        steep: Unit T1, zero where arbitrary, shape (n, 3).
-    """
-
-    samples: SurfaceSamples
-    steep: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.samples)
-
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "Target":
-        """Return some of the samples."""
-        return Target(self.samples.take(chosen), self.steep[chosen])
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from geometry.rays.rays import equal_parts
 from geometry.rays.visibility_matrix import visibility_matrix
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 
 from . import lighting
-from .lighting import Target
 from .open_stages import SampleColumns, open_stages
+from .samples import Target
 from .scene import Scene
 
 # Projectors that a thread takes on at a time.

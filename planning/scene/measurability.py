@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from geometry.lengths import lengths
 from geometry.poses import inverse, transform
 from geometry.rays.visibility import Visibility
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 
-from .lighting import Light, Target
+from .lighting import Light
+from .samples import Target
 from .standing import Standing, blocked_by
 
 SEEN_CAUSES = (

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 
-from .lighting import LIT, Target
+from .lighting import LIT
+from .samples import Target
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from geometry.repair.hollow import Shell, measure_shell
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.workspace.view_tiles import Site
 
-from .lighting import Target
+from .samples import Target
 from .standing import Device, Standing, bodies_of, existing_bodies
 
 Kind = Literal["projector", "camera"]

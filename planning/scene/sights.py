@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.visibility_matrix import visibility_matrix
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 
 from . import measurability
-from .lighting import Target
 from .measurability import View
+from .samples import Target
 from .scene import Scene
 from .standing import Standing, blocked_by
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.search.neighbourhood import prune
 from solvers.status import SolveStatus, WorkBudget
-
-from .neighbourhood import prune
-from .reductions import ReducedCover
 
 NONE = np.empty(0, dtype=np.int64)
 INTEGER_PROOF = "branch and bound (HiGHS)"

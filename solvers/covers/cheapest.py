@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from solvers.covers.bounds.lagrangian import ascend
+from solvers.covers.bounds.mixed_integer import fits, linear_multipliers, solve_integer
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import cost_bound
 from solvers.covers.multi.multicover import fewest_multicover
+from solvers.covers.search.neighbourhood import cheapest, greedy
 from solvers.status import SolveStatus, WorkBudget
 
 from .answers import INTEGER_PROOF, NONE, CountAnswer, better, cut_short
 from .counts import fewest_sets
-from .lagrangian import ascend
-from .mixed_integer import fits, linear_multipliers, solve_integer
-from .neighbourhood import cheapest, greedy
-from .reductions import ReducedCover
-from .relaxation import cost_bound
 
 # Relative to the cost; HiGHS' own tolerance is below it.
 _SETTLED = 1e-5

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.covers.bounds.mixed_integer import fits, solve_integer
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import count_bound
+from solvers.covers.search.neighbourhood import prune
 from solvers.status import SolveStatus, WorkBudget
 
 from .answers import INTEGER_PROOF, NONE, CountAnswer, better, cut_short
-from .mixed_integer import fits, solve_integer
-from .neighbourhood import prune
-from .reductions import ReducedCover
-from .relaxation import count_bound
 
 # Tuples are for counts below it; branch and bound on rows and cuts for larger ones.
 _LARGE_COUNT = 8

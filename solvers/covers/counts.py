@@ -11,16 +11,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import coverage_bounds, tighten
 from solvers.covers.exact.exact_cover import TupleSearch, best_tuple
 from solvers.covers.exact.group_branching import GroupSearch, best_by_groups
 from solvers.covers.full.full_cover import fewest_full
+from solvers.covers.search.neighbourhood import greedy, most_coverage, prune
 from solvers.status import SolveStatus, WorkBudget
 
 from .answers import NONE, CountAnswer, WeightAnswer, cut_short
 from .count_ledger import CountLedger
-from .neighbourhood import greedy, most_coverage, prune
-from .reductions import ReducedCover
-from .relaxation import coverage_bounds, tighten
 
 # Moves before a bound is asked whether more are worth it; after that, for each set.
 _FIRST_MOVES = 60

@@ -15,7 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from solvers.covers.bounds.reductions import ReducedCover, forgiven, reduce_problem
 from solvers.covers.multi.multicover import fewest_multicover, heaviest_of
+from solvers.covers.search.neighbourhood import greedy, prune
 from solvers.given_numbers import set_names, whole_number
 from solvers.one_thread import on_one_thread
 from solvers.status import SolveStatus, WorkBudget
@@ -24,8 +26,6 @@ from .answers import NONE, CountAnswer
 from .cheapest import cheapest_sets
 from .counts import fewest_sets, most_weight
 from .cover_problem import CoverProblem
-from .neighbourhood import greedy, prune
-from .reductions import ReducedCover, forgiven, reduce_problem
 
 DEFAULT_BUDGET = 2e9
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from solvers.status import interruptible
 
-from .axis_program import INSET, PITCH_POWER, AxisProgram, Light
+from .axis_problem import INSET, PITCH_POWER, AxisProgram
 from .ipopt import slots_for, strict_solver
+from .light import Light
 
 _COLUMNS = 16
 _SLOTS = (64, 128, 256, 512, 1024)

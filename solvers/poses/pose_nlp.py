@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from solvers.status import interruptible
 
 from .ipopt import slots_for, strict_solver
-from .pose_program import INSET, Light, PoseProgram, pose_margins
+from .light import Light
+from .pose_problem import INSET, PoseProgram, pose_margins
 
 RIDGE = 1e-6
 _N_SCALARS = 44

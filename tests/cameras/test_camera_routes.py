@@ -14,12 +14,7 @@ import pytest
 from geometry.shapes.primitives import box, sphere
 from planning import RigPlan
 from planning.cameras.baselines.camera_spread import CameraSpread
-from planning.cameras.camera_cover import (
-    camera_stage,
-    lit_samples,
-    measured_by,
-    offered_cameras,
-)
+from planning.cameras.camera_cover import camera_stage, offered_cameras
 from planning.cameras.camera_routes import (
     _clearly_wider,
     better_route,
@@ -30,14 +25,15 @@ from planning.cameras.camera_slides import reached_by_candidates, rows_to_slide_
 from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
 from planning.cameras.routes import Routes
 from planning.model.bodies import Body
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.projector_bound import Effort
 from planning.proofs.selection import required_rows
 from planning.report.summary.summary import _routes
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.counts.route_claims import audit_routes

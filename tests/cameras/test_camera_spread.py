@@ -18,7 +18,7 @@ from planning.cameras.baselines.spread_problem import (
     best_rings,
     spread_problem,
 )
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 from planning.model.requirements import TriangulationLimits, Workspace
 from planning.model.zones import Box
 from planning.scene.measurability import (

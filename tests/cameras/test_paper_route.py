@@ -20,7 +20,7 @@ from planning.cameras.paper.paper_ground import Ground, Stand
 from planning.cameras.paper.paper_route import paper_route
 from planning.cameras.paper.paper_seeds import grown
 from planning.cameras.paper.ring_seeds import ring_seeds
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import planning
-from geometry.shapes.sample_head.sample_head import write_sample
 from planning.cli.main import main
+from planning.cli.sample import write_sample
 from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[2]

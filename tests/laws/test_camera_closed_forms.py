@@ -21,10 +21,10 @@ from planning.cameras.baselines.coverage_triangle import (
     round_body_limit,
     sphere_band_limit,
 )
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 from planning.model.requirements import CameraLimits
-from planning.scene.lighting import Target
 from planning.scene.measurability import SEEN, view
+from planning.scene.samples import Target
 from solvers import CoverProblem, solve_cover
 
 UP = np.array([0.0, 0.0, 1.0])

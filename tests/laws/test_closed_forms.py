@@ -16,7 +16,8 @@ from planning.model.progress import Stopwatch
 from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
-from planning.proofs.projector_bound import Effort, prove_fewest
+from planning.projectors.proved import prove_fewest
+from planning.proofs.projector_bound import Effort
 from planning.report.draft import Order
 from planning.rig.rig import load_rig
 from planning.scene.lighting import LIT, served_by

@@ -16,11 +16,11 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.rays import visibility
 from geometry.shapes.primitives import box, sphere
 from planning import pipeline
-from planning.cameras.camera_cover import lit_samples, measured_by
 from planning.report import claims
 from planning.report.assemble import write_plan
 from planning.rig.rig import load_rig
 from planning.scene import measurability
+from planning.scene.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 
 RIG = """

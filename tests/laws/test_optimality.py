@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 from geometry.poses import look_at
 from solvers.poses.cone import max_margin_direction, smallest_cap
 from solvers.poses.pose_nlp import RIDGE, build_pose_nlp, pose_parameters, run_ipopt
-from solvers.poses.pose_program import INSET, PoseProgram, pose_margins, solve_pose
+from solvers.poses.pose_problem import INSET, PoseProgram, pose_margins
+from solvers.poses.pose_program import solve_pose
 from solvers.status import SolveStatus
 
 K = np.array([[1400.0, 0.0, 639.5], [0.0, 1400.0, 399.5], [0.0, 0.0, 1.0]])

@@ -7,12 +7,13 @@ import pytest
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box, sphere
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
+from planning.model.ring_frame import ring_frame
 from planning.projectors.projector_poses import _between, widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.rig.rig import load_rig
-from planning.rings.ring_radii import ring_frame, uniform_radii
+from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
 from planning.scene.lit import lit_margins, lit_stages
 from planning.scene.scene import Scene

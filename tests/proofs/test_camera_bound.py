@@ -10,15 +10,11 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
 from planning.cameras.baselines.coverage_triangle import round_body_limit
-from planning.cameras.camera_cover import (
-    LitSamples,
-    camera_stage,
-    lit_samples,
-    offered_cameras,
-    plan_cameras,
-)
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
+from planning.cameras.proved import bound_stage
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing
+from planning.model.ring_frame import ring_frame
 from planning.proofs import all_poses
 from planning.proofs.camera_bound import (
     DEFAULT,
@@ -26,15 +22,14 @@ from planning.proofs.camera_bound import (
     CameraCells,
     CameraEffort,
     bound_cameras,
-    bound_stage,
 )
 from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
-from planning.rings.ring_radii import ring_frame
 from planning.scene.lighting import Light
 from planning.scene.measurability import Rings
+from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus

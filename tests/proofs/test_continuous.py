@@ -9,13 +9,13 @@ import pytest
 from geometry.directions.cube_map import CubeMap
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.zones import Box
 from planning.proofs import projector_bound as continuous
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.projector_bound import DEFAULT, Effort, bound_projectors
 from planning.rig.rig import load_rig
-from planning.scene.lighting import Target
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cells.cell_bound import CellStatus

@@ -12,13 +12,10 @@ import pytest
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import grid, sphere
-from planning.cameras.camera_cover import (
-    CameraStage,
-    furthest_failure,
-    lit_samples,
-    measured_by,
-)
-from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.cameras.camera_cover import CameraStage
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.plan import RigPlan
+from planning.model.ring_frame import ring_frame
 from planning.report.advice import camera_relaxations
 from planning.report.advice.camera_demands import Demands, demands
 from planning.report.advice.camera_knobs import knobs
@@ -33,8 +30,8 @@ from planning.report.claims import Devices, make_claims
 from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
 from planning.rig.rig import load_rig
-from planning.rings.ring_radii import ring_frame
 from planning.scene.measurability import CAUSES, MEASURED
+from planning.scene.measured import furthest_failure, lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.scene.sights import Sights
 from planning.scene.workspace.candidates import aimed_poses

@@ -9,11 +9,12 @@ import pytest
 from geometry.devices import ParallelModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box, grid, joined, sphere
-from planning.model.plan import PlannedProjector, RigPlan
+from planning.model.devices import PlannedProjector
+from planning.model.plan import RigPlan
+from planning.model.ring_frame import ring_frame
 from planning.report.entries.firing import schedule_line
 from planning.report.entries.overlaps import overlap_entries, shared_areas
 from planning.rig.rig import load_rig
-from planning.rings.ring_radii import ring_frame
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan

@@ -5,7 +5,8 @@ import dataclasses
 
 import pytest
 
-from planning.report.summary.shortfall import area_words, shortfalls
+from planning.model.words import area_words
+from planning.report.summary.shortfall import shortfalls
 from planning.report.summary.summary import _cell
 
 

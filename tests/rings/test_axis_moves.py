@@ -6,20 +6,15 @@ import numpy as np
 import pytest
 
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import (
-    camera_stage,
-    lit_samples,
-    measured_by,
-    offered_cameras,
-    plan_cameras,
-)
+from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
 from planning.cameras.camera_stage import (
     follow_cameras,
     move_axes,
     proves_as_much,
     with_cameras,
 )
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
 from planning.rings.axis_moves import (
     AxisJudge,
@@ -28,14 +23,10 @@ from planning.rings.axis_moves import (
     move_ring_axes,
     proposals,
 )
-from planning.rings.ring_radii import (
-    ring_axis,
-    ring_frame,
-    ring_frame_of_axis,
-    uniform_radii,
-)
+from planning.rings.ring_radii import ring_axis, ring_frame_of_axis, uniform_radii
 from planning.scene import measurability
 from planning.scene.lighting import ring_coordinate
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores

@@ -7,21 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import (
-    camera_stage,
-    lit_samples,
-    measured_by,
-    offered_cameras,
-    plan_cameras,
-)
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.ring_frame import ring_frame
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.advice.relaxations import reachability_relaxations
 from planning.report.claims import Devices, make_claims
 from planning.rig.rig import load_rig
 from planning.rings.ring_axes import turn_ring_axes, widest_gap
-from planning.rings.ring_radii import ring_frame, uniform_radii
+from planning.rings.ring_radii import uniform_radii
 from planning.scene.lit import lit_stages, margins_of, merged
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 
 RADIUS = 0.1

@@ -9,19 +9,20 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import box, sphere
-from planning.cameras.camera_cover import lit_samples, measured_by
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
 from planning.rings import ring_pitch
 from planning.rings.beam_profile import cast_beam
 from planning.rings.ring_axes import widest_gap
 from planning.rings.ring_creases import crease_errors, find_creases
 from planning.rings.ring_pitch import best_pitch, projector_gaps
-from planning.rings.ring_radii import ring_frame, uniform_radii
+from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
 from planning.scene.measurability import rings_at
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 
 RADIUS = 0.1

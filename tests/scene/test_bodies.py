@@ -19,11 +19,11 @@ from geometry.shapes.boxes import (
 from geometry.shapes.primitives import grid
 from planning import load_rig
 from planning.cameras.camera_bodies import MeasuredCrowd, settled_cover
-from planning.cameras.camera_cover import CameraCover, lit_samples, measured_by
+from planning.cameras.camera_cover import CameraCover
 from planning.cameras.camera_slides import measured_among
 from planning.model.bodies import Body
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, RigError
-from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing, Requirements
 from planning.model.zones import Box
 from planning.projectors.projector_poses import _Lit
@@ -33,6 +33,7 @@ from planning.report.drawing.draw_devices import device_figures
 from planning.scene import lighting, measurability
 from planning.scene.clearance import check_existing_room, lacks_room, offered_with_room
 from planning.scene.lit import lit_stages
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.scene.sights import sights_of
 from planning.scene.standing import bodies_of

@@ -5,9 +5,10 @@ import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits, Workspace
-from planning.rings.ring_radii import outer_radius, ring_frame, ring_gap, uniform_radii
+from planning.model.ring_frame import ring_frame
+from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
 from planning.scene.workspace.candidates import (
     aimed_poses,
     camera_candidates,

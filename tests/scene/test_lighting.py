@@ -11,10 +11,11 @@ from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
 from geometry.rays.visibility import Visibility
 from geometry.shapes.primitives import grid, sphere
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
-from planning.scene.lighting import CAUSES, LIT, Target
+from planning.scene.lighting import CAUSES, LIT
+from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])
 LIMITS = ProjectorLimits(np.radians(60.0), np.radians(40.0))

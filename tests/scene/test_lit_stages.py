@@ -10,7 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import transform
 from geometry.shapes.primitives import sphere
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.claims import Devices, _reachable_by_projectors
 from planning.rig.rig import load_rig

@@ -7,10 +7,10 @@ from scipy.optimize import brentq
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import inverse, look_at, transform
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
-from planning.scene.lighting import Target
+from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])
 CAMERA = PinholeModel(

@@ -10,20 +10,21 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.shapes.primitives import box, grid, sphere
 from planning.cameras.camera_cover import offered_cameras
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
+from planning.model.ring_frame import ring_frame
 from planning.model.zones import Box
 from planning.prepare import prepared
 from planning.projectors.one_fewer import Offer, one_fewer
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
+from planning.projectors.proved import prove_fewest
 from planning.projectors.share_margin import margin_at_share
-from planning.proofs.projector_bound import Effort, prove_fewest
+from planning.proofs.projector_bound import Effort
 from planning.report.advice.wider_field import wider_field
 from planning.report.draft import Order
 from planning.rig.rig import load_rig
-from planning.rings.ring_radii import ring_frame
 from planning.scene.lighting import LIT
 from planning.scene.lit import lit_margins, lit_stages
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards

@@ -5,7 +5,7 @@ from math import isfinite
 
 import numpy as np
 
-from planning.model.errors import InputError
+from geometry.mesh.mesh import MeshError
 
 # Least and largest proportion that the sculpture stays a head at, and the standard
 # deviation among adults (rounded from anthropometric surveys), all in [mm].
@@ -62,7 +62,7 @@ class HeadShape:
         scale: Factor on all lengths, a plain number.
 
     Raises:
-        InputError: If a proportion is outside the range in which this is a head.
+        MeshError: If a proportion is outside the range in which this is a head.
     """
 
     width: float = 154.0
@@ -91,7 +91,7 @@ class HeadShape:
         for name, (least, largest, _) in _RANGES.items():
             value = getattr(self, name)
             if not (isfinite(value) and least <= value <= largest):
-                raise InputError(
+                raise MeshError(
                     f"head {name} is {value}: must lie in {least:g} to {largest:g}"
                 )
 

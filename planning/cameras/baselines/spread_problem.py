@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.zone_limits import half_spaces
 from planning.scene.workspace.zone_positions import is_zoned

@@ -10,27 +10,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.camera_bodies import MeasuredCrowd, lit_among, taken
+from planning.cameras.camera_bodies import MeasuredCrowd, lit_among
 from planning.cameras.camera_cover import (
     ROUNDS,
     CameraCover,
-    LitSamples,
     confirms,
     first_target,
     fresh_target,
-    lit_samples,
-    measured_by,
     n_given,
     refuse_unmeasured,
     rows_for,
 )
 from planning.cameras.camera_slides import measured_among, slide_cameras, spread_limits
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection, cover_problem, required_rows
 from planning.scene.clearance import with_room
 from planning.scene.existing import movable
 from planning.scene.lit import merged
+from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.sights import Sights
 from planning.scene.workspace.candidates import cameras_towards, middle_radius_m

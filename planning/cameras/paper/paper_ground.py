@@ -12,7 +12,7 @@ from planning.cameras.baselines.camera_spread import CameraSpread
 from planning.cameras.baselines.limit_poses import Parts
 from planning.cameras.baselines.seams import Adjacency, adjacency
 from planning.cameras.baselines.spread_problem import SpreadLimits
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 
 _Array = NDArray[np.float64]
 _Measured = NDArray[np.bool_]

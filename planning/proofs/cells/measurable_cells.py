@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.cameras.camera_cover import LitSamples
 from planning.model.requirements import Requirements
+from planning.scene.measured import LitSamples
 
 from .image_cone import image_cone
 

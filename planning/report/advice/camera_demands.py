@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse, transform
-from planning.cameras.camera_cover import LitSamples
-from planning.model.plan import PlannedCamera
+from planning.model.devices import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import measurability
 from planning.scene.measurability import CAUSES, SEEN, View
+from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
 
 from .camera_knobs import STEEPEST, Knob, Pairs

@@ -14,22 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.camera_bodies import taken
-from planning.cameras.camera_cover import (
-    CameraStage,
-    LitSamples,
-    NothingMeasuredError,
-    lit_samples,
-    measured_by,
-    n_given,
-)
-from planning.model.plan import PlannedCamera
+from planning.cameras.camera_cover import CameraStage, NothingMeasuredError, n_given
+from planning.model.devices import PlannedCamera
 from planning.proofs.selection import cover_problem, required_rows
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
 from planning.scene import lighting
 from planning.scene.lit import lit_stages
 from planning.scene.measurability import CAUSES, MEASURED
+from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import camera_candidates
 from solvers import solve_max_coverage

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.requirements import ProjectorLimits
+from planning.projectors.projector_stage import NothingLitError
 from planning.scene import lighting
-from planning.scene.lighting import LIT, Target
+from planning.scene.lighting import LIT
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 
@@ -94,43 +96,20 @@ def reachability_relaxations(
     return sorted(gains, key=lambda entry: entry["reachable_share"])
 
 
-def nothing_lit(
-    scene: Scene,
-    candidates: Sequence[PlannedProjector],
-    rows: Target,
-    stages: NDArray[np.int8],
-) -> str:
-    """Say which limits forbid every sample, and the least that would admit one.
+def nothing_lit(scene: Scene, error: NothingLitError) -> str:
+    """Say the least by which a single limit must give way for any light at all.
 
     Args:
         scene: Surface and requirements.
-        candidates: Poses, none of which lights a sample.
-        rows: The samples.
-        stages: First failing limit of each sample and pose.
+        error: What was offered, and which limits forbid it.
     """
-    counts = np.bincount(stages.ravel(), minlength=LIT)[:LIT]
-    share = 100.0 * counts / counts.sum()
-    named = ", ".join(
-        f"{cause} {part:.0f} %"
-        for cause, part in sorted(
-            zip(lighting.CAUSES, share, strict=True), key=lambda pair: -pair[1]
-        )
-        if part >= 1.0
-    )
-    helps = list(
-        least_relaxations(
-            scene, candidates, rows.take(np.arange(min(len(rows), _DARK_ROWS))), 1
-        )
-    )
-    remedy = (
-        f"the least that lights any of it: {'; or '.join(helps)}"
-        if helps
-        else "no single limit of the projector, relaxed, lights any of it: look at the "
-        "workspace and at the target"
-    )
+    dark = error.rows.take(np.arange(min(len(error.rows), _DARK_ROWS)))
+    helps = list(least_relaxations(scene, error.candidates, dark, 1))
+    if helps:
+        return f"the least that lights any of it: {'; or '.join(helps)}"
     return (
-        f"no projector of {len(candidates)} poses lights any part of the target; of "
-        f"all pairs of pose and sample, the first limit that fails is {named}; {remedy}"
+        "no single limit of the projector, relaxed, lights any of it: look at the "
+        "workspace and at the target"
     )
 
 

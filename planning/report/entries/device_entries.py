@@ -11,7 +11,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.repair.hollow import Shell
 from planning.model.bodies import body_entry
-from planning.model.plan import PlannedCamera, PlannedProjector
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.rounding import DECIMALS, rounded_pose
 from planning.report.claims import Claims
 from planning.scene.interest import Interest

@@ -21,11 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import PlannedProjector
+from planning.model.devices import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.claims import N_SAMPLES
 from planning.scene import lighting
-from planning.scene.lighting import LIT, Target
+from planning.scene.lighting import LIT
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .firing import firing_schedule

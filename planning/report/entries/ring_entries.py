@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from planning.cameras.camera_cover import lit_samples, measured_by
 from planning.model.plan import RigPlan
 from planning.report.claims import Claims, Devices
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 
 # As many of the chords between rings may err by more than was asked.

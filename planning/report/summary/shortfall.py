@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from planning.model.requirements import Requirements
+from planning.model.words import area_words
 
-# Areas below this are told in mm² [m²].
-_SMALL_M2 = 1e-4
 # Causes that take less than this share of what is left aren't told.
 _TOLD = 0.01
 _OF_PROJECTORS = ("projector_", "tangent_angle")
@@ -216,10 +215,3 @@ def _down(share: float) -> str:
     """Rounded down to hundredths, or to one digit: no option takes a share of 0."""
     places = 2 if not 0.0 < share < 0.01 else -math.floor(math.log10(share))
     return f"{math.floor(10.0**places * share) / 10.0**places:.{places}f}"
-
-
-def area_words(area_m2: float) -> str:
-    """Return an area in cm², or a small one in mm²."""
-    if area_m2 < _SMALL_M2:
-        return f"{1e6 * area_m2:.3g} mm²"
-    return f"{1e4 * area_m2:.1f} cm²"

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import fibonacci_cap, look_at
+from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
-from planning.rings.ring_radii import ring_frame
+from planning.model.ring_frame import ring_frame
 
 from .field import holds_ball, middle_ray, turned_to
 from .view_tiles import Site, poses_beside, tiled_poses

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.reductions import ReducedCover
-from solvers.covers.relaxation import rounding, tighten
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import rounding, tighten
 from solvers.status import WorkBudget
 
 from .incumbent import Incumbent

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.reductions import ReducedCover
+from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
 
 # Sums of whole numbers up to this are exact in single precision.

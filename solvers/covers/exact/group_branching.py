@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.covers.answers import NONE
-from solvers.covers.reductions import ReducedCover
+from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
 
 from .group_bounds import Part, PartBounds

@@ -9,8 +9,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from solvers.covers.reductions import ReducedCover
-from solvers.covers.relaxation import rounding
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import rounding
 
 _C = TypeVar("_C")
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.covers.answers import CountAnswer
-from solvers.covers.reductions import ReducedCover
+from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import SolveStatus, WorkBudget
 
 from .orbital_branching import OrbitalTree

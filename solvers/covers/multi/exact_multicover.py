@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.lagrangian import ascend
-from solvers.covers.reductions import ReducedCover
-from solvers.covers.relaxation import least_service, rounding
+from solvers.covers.bounds.lagrangian import ascend
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import least_service, rounding
 from solvers.status import WorkBudget
 
 _PAIR_BLOCK = 256

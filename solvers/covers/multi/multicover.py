@@ -17,12 +17,12 @@ from solvers.covers.answers import (
     WeightAnswer,
     cut_short,
 )
+from solvers.covers.bounds.lagrangian import ascend
+from solvers.covers.bounds.mixed_integer import TOLERANCE, fits, heaviest_integer
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import coverage_bounds, rounding, tighten
 from solvers.covers.count_ledger import CountLedger
-from solvers.covers.lagrangian import ascend
-from solvers.covers.mixed_integer import TOLERANCE, fits, heaviest_integer
-from solvers.covers.neighbourhood import greedy, prune
-from solvers.covers.reductions import ReducedCover
-from solvers.covers.relaxation import coverage_bounds, rounding, tighten
+from solvers.covers.search.neighbourhood import greedy, prune
 from solvers.status import SolveStatus, WorkBudget
 
 from .exact_multicover import any_tuple

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.reductions import ReducedCover
+from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
 
 _TOP = 8

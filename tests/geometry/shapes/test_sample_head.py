@@ -8,11 +8,11 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.rays.rays import RayCaster
 from geometry.shapes.sample_head.geodesic import geodesic_grid
-from geometry.shapes.sample_head.sample_head import HeadShape, sample_head, write_sample
-from planning.model.errors import InputError
+from geometry.shapes.sample_head.sample_head import HeadShape, sample_head
+from planning.cli.sample import write_sample
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -253,7 +253,7 @@ def test_the_file_at_the_root_is_what_the_generator_writes(tmp_path):
 
 @pytest.mark.parametrize("n_faces", [0, 499, 1_500_001, float("nan")])
 def test_resolution_out_of_range(n_faces):
-    with pytest.raises(InputError, match="must lie in 500 to 1500000"):
+    with pytest.raises(MeshError, match="must lie in 500 to 1500000"):
         sample_head(n_faces=n_faces)
 
 
@@ -262,7 +262,7 @@ def test_resolution_out_of_range(n_faces):
 )
 def test_proportions_out_of_range(bad):
     name = next(iter(bad))
-    with pytest.raises(InputError, match=f"head {name} is .*: must lie in"):
+    with pytest.raises(MeshError, match=f"head {name} is .*: must lie in"):
         HeadShape(**bad)
 
 

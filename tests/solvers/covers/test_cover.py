@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from solvers import CoverProblem, solve_cover
-from solvers.covers import reductions
+from solvers.covers.bounds import reductions
+from solvers.covers.bounds.reductions import reduce_problem
+from solvers.covers.bounds.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.covers.cover import reduced_problem, solve_max_coverage
 from solvers.covers.cover_problem import MAX_ENTRIES
-from solvers.covers.reductions import reduce_problem
-from solvers.covers.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.status import SolveStatus
 
 

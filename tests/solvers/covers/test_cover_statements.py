@@ -9,6 +9,9 @@ import pytest
 from scipy import sparse
 
 from solvers import CoverProblem
+from solvers.covers.bounds.mixed_integer import linear_multipliers
+from solvers.covers.bounds.reductions import reduce_problem
+from solvers.covers.bounds.relaxation import cost_bound, coverage_bounds
 from solvers.covers.cover_statements import (
     MAX_STATED_ENTRIES,
     StatementError,
@@ -16,9 +19,6 @@ from solvers.covers.cover_statements import (
     state_cover_relaxation,
     state_max_coverage,
 )
-from solvers.covers.mixed_integer import linear_multipliers
-from solvers.covers.reductions import reduce_problem
-from solvers.covers.relaxation import cost_bound, coverage_bounds
 from solvers.status import SolveStatus, WorkBudget
 
 TIGHT = 1e-6

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solvers.covers.bounds.mixed_integer import linear_multipliers, solve_integer
+from solvers.covers.bounds.reductions import reduce_problem
+from solvers.covers.bounds.relaxation import cost_bound, coverage_bounds, tighten
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.exact.exact_cover import best_tuple
-from solvers.covers.mixed_integer import linear_multipliers, solve_integer
-from solvers.covers.neighbourhood import cheapest, greedy, most_coverage, prune
-from solvers.covers.reductions import reduce_problem
-from solvers.covers.relaxation import cost_bound, coverage_bounds, tighten
-from solvers.covers.swaps import Swaps
+from solvers.covers.search.neighbourhood import cheapest, greedy, most_coverage, prune
+from solvers.covers.search.swaps import Swaps
 from solvers.status import WorkBudget
 
 
@@ -290,7 +290,7 @@ def assert_worths_are_true(cover, kept):
 
 @pytest.mark.parametrize("block", [2**18, 40])
 def test_worth_of_swaps_is_kept_to_the_bit_as_sets_come_and_go(block, monkeypatch):
-    monkeypatch.setattr("solvers.covers.swaps._BLOCK", block)
+    monkeypatch.setattr("solvers.covers.search.swaps._BLOCK", block)
     for seed in range(4):
         cover = random_cover(seed, n_e=60, n_s=12, density=0.4)
         rng = np.random.default_rng(seed)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.full.full_cover import fewest_full
 from solvers.covers.full.row_branching import RowTree
 from solvers.covers.full.row_dominance import essential, minimal, separate
 from solvers.covers.full.row_generation import least_count, linear_cover
 from solvers.covers.full.row_weighting import RowWeighting
-from solvers.covers.reductions import reduce_problem
 from solvers.status import SolveStatus, WorkBudget
 
 

@@ -7,11 +7,11 @@ import pytest
 from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
+from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.cover import solve_cover, solve_max_coverage
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.exact.group_bounds import PartBounds
 from solvers.covers.exact.group_branching import _Tree, best_by_groups
-from solvers.covers.reductions import reduce_problem
 from solvers.status import SolveStatus, WorkBudget
 
 

@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solvers import CoverProblem, SolveStatus, solve_cover
+from solvers.covers.bounds.lagrangian import ascend
+from solvers.covers.bounds.mixed_integer import heaviest_integer, linear_multipliers
+from solvers.covers.bounds.reductions import reduce_problem
+from solvers.covers.bounds.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.covers.cover import solve_max_coverage
-from solvers.covers.lagrangian import ascend
-from solvers.covers.mixed_integer import heaviest_integer, linear_multipliers
 from solvers.covers.multi.exact_multicover import any_tuple
 from solvers.covers.multi.multicover_swaps import exchange, worth_of
-from solvers.covers.neighbourhood import greedy
-from solvers.covers.reductions import reduce_problem
-from solvers.covers.relaxation import cost_bound, count_bound, coverage_bounds
+from solvers.covers.search.neighbourhood import greedy
 from solvers.status import WorkBudget
 
 NONE = np.empty(0, dtype=np.int64)

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from solvers.poses.axis_nlp import axis_parameters, build_axis_nlp, run_ipopt
+from solvers.poses.axis_problem import INSET, AxisProgram
 from solvers.poses.axis_program import (
-    INSET,
-    AxisProgram,
     axis_direction,
     axis_scores,
     axis_slack,

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solvers.poses.cone import max_margin_direction, smallest_cap
-from solvers.poses.pose_program import PoseProgram, solve_pose
+from solvers.poses.pose_problem import PoseProgram
+from solvers.poses.pose_program import solve_pose
 from solvers.status import SolveStatus
 
 METHODS = [max_margin_direction, smallest_cap]

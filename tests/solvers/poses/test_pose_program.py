@@ -12,13 +12,8 @@ from solvers.poses.pose_nlp import (
     pose_parameters,
     variables_of,
 )
-from solvers.poses.pose_program import (
-    PoseProgram,
-    light_directions,
-    pose_margins,
-    pose_slack,
-    solve_pose,
-)
+from solvers.poses.pose_problem import PoseProgram, light_directions, pose_margins
+from solvers.poses.pose_program import pose_slack, solve_pose
 from solvers.status import SolveStatus
 
 K = np.array([[1400.0, 0.0, 639.5], [0.0, 1400.0, 399.5], [0.0, 0.0, 1.0]])

@@ -12,13 +12,13 @@ import pytest
 import trimesh
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.cameras.camera_cover import lit_samples, measured_by
 from planning.model.plan import RigPlan
 from planning.report.claims import Devices
 from planning.report.entries.ring_entries import lost_to_rings_m2, with_rings
 from planning.rings.ring_creases import find_creases
 from planning.rings.ring_limits import ring_beam
 from planning.rings.ring_stage import RingStage, _report
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.estimates import Estimator

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel
-from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.verify.audit.ledger import Ledger
 

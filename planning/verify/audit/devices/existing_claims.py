@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.model.plan import PlannedCamera, PlannedProjector, RigPlan
+from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.plan import RigPlan
 from planning.verify.audit.ledger import Ledger, entries
 from planning.verify.audit.predicates.audit_optics import pixels_of
 

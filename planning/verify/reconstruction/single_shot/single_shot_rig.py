@@ -7,7 +7,8 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.plan import PlannedProjector, RigPlan
+from planning.model.devices import PlannedProjector
+from planning.model.plan import RigPlan
 from planning.verify.reconstruction.calibration import (
     PairCalibration,
     calibrate_camera,

@@ -7,9 +7,9 @@ index: the same seed and budget give the same answer on any machine.
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
 
-from .reductions import ReducedCover
 from .swaps import Swaps
 
 # Moves for which a set that went may not come back: from the first to below the second.

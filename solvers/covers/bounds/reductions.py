@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from solvers.bit_rows import pack_shuffled
+from solvers.covers.cover_problem import CoverProblem
 from solvers.dense_rows import sparse_rows
-
-from .cover_problem import CoverProblem
 
 WEIGHT_SLACK = 1e-12
 _SKETCH_WORDS = 4

@@ -16,9 +16,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
-
-from .reductions import ReducedCover
 
 # Entries that are widened from one byte to eight at a time.
 _BLOCK = 2**18

@@ -1,0 +1,56 @@
+"""Planned devices: projectors with their rings, and cameras."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import ParallelModel, PinholeModel
+
+from .bodies import Body
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedProjector:
+    """One projector of a plan.
+
+    Attributes:
+        id: Name, `P1` and so on.
+        light: `diverging` or `parallel`.
+        world_from_device: Pose, shape (4, 4) [m].
+        world_from_ring: Pose of the ring frame, shape (4, 4) [m].
+        device: Its optics.
+        ring_radii: Tangents R = x/z (diverging) or radii in [m] (parallel) of the ring
+            edges, increasing, shape (n_rings,).
+        existing: Name of the device that stands already; empty: it is planned.
+        body: Its housing; None: it takes no room.
+    """
+
+    id: str
+    light: Literal["diverging", "parallel"]
+    world_from_device: NDArray[np.float64]
+    world_from_ring: NDArray[np.float64]
+    device: PinholeModel | ParallelModel
+    ring_radii: NDArray[np.float64]
+    existing: str = ""
+    body: Body | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedCamera:
+    """One camera of a plan.
+
+    Attributes:
+        id: Name, `C1` and so on.
+        world_from_device: Pose, shape (4, 4) [m].
+        device: Its optics.
+        existing: Name of the device that stands already; empty: it is planned.
+        body: Its housing; None: it takes no room.
+    """
+
+    id: str
+    world_from_device: NDArray[np.float64]
+    device: PinholeModel
+    existing: str = ""
+    body: Body | None = None

@@ -1,0 +1,64 @@
+"""The ring frame of a projector: in it its rings are circles about z."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import ParallelModel, PinholeModel
+from geometry.poses import inverse
+
+from .devices import PlannedProjector
+
+
+def ring_frame(
+    world_from_device: NDArray[np.float64],
+    device: PinholeModel | ParallelModel,
+    tilt: float,
+    azimuth: float,
+) -> NDArray[np.float64]:
+    """Return ``world_from_ring``.
+
+    Args:
+        world_from_device: Pose of the projector, shape (4, 4).
+        device: Its optics; a pinhole's rings are turned against the ray of its image
+            centre, so that lens shift doesn't move them off the object.
+        tilt: Angle of the ring axis against that ray in [rad] (diverging), or shift of
+            the axis in the device plane in [m] (parallel).
+        azimuth: Direction of the tilt, from the device's +x towards +y in [rad].
+    """
+    c, s = np.cos(azimuth), np.sin(azimuth)
+    if isinstance(device, ParallelModel):
+        return world_from_device @ _shifted(np.array([tilt * c, tilt * s]))
+    width, height = device.resolution
+    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
+    aside = np.array([c, s, 0.0])
+    aside -= middle * (aside @ middle)
+    aside /= np.linalg.norm(aside)
+    return world_from_device @ _along(np.cos(tilt) * middle + np.sin(tilt) * aside)
+
+
+def _shifted(shift: NDArray[np.float64]) -> NDArray[np.float64]:
+    frame = np.eye(4)
+    frame[:2, 3] = shift
+    return frame
+
+
+def _along(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    x = np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    frame = np.eye(4)
+    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    return frame
+
+
+def moved_to(
+    projector: PlannedProjector, world_from_device: NDArray[np.float64]
+) -> PlannedProjector:
+    """Return a projector at another pose; its ring frame moves along."""
+    device_from_ring = inverse(projector.world_from_device) @ projector.world_from_ring
+    return replace(
+        projector,
+        world_from_device=world_from_device,
+        world_from_ring=world_from_device @ device_from_ring,
+    )

@@ -1,0 +1,1 @@
+"""Smaller covers, and bounds on them from multipliers and programs."""

@@ -1,0 +1,1 @@
+"""Good covers fast, without proof."""

@@ -1,0 +1,5 @@
+"""The two kinds of light that programs know."""
+
+from typing import Literal
+
+Light = Literal["diverging", "parallel"]
