@@ -5,7 +5,7 @@ Usage: python benchmarks/camera_counts.py [--check] [NAME ...]
 
 Plans the sample and the twelve meshes in `../shared/data/meshes` (those named, if any)
 with the default rig and up to three projectors, each in the unit or size that
-`tests/shared_meshes.py` states. For the same projectors it prints
+`tests/support/shared_meshes.py` states. For the same projectors it prints
 
 - by default: cameras, the bound over the candidates, what either route needs and which
   was taken; the smallest baseline of neighbours and the measured share before and after

@@ -3,7 +3,7 @@
 Usage: python benchmarks/cell_bounds.py [WORD ...]   (ringrig installed)
 
 Every row is one run of `bound_count` with its usual budget, asked to prove the truth.
-Trees are `tests/cap_trees.py`'s, made when asked for; what that takes is one column.
+Trees are `tests/support/cap_trees.py`'s, made when asked for; what that takes is one column.
 HiGHS gets the whole mixed-integer program over all leaves, one thread and 60 s, where
 that has at most 5 million nonzeros. WORDs select rows that contain one of them.
 """

@@ -2,7 +2,7 @@
 
 Usage: python benchmarks/fuzz.py [COUNT] [SEED]   (from a checkout)
 
-`tests/fuzzing.py` says how files of every format are damaged and what may happen: a
+`tests/support/fuzzing.py` says how files of every format are damaged and what may happen: a
 one-line MeshError, or a mesh that keeps the laws and isn't silently another one. The
 worker has 4 GB and 20 s for each file, turns warnings into errors and is restarted when
 it dies. A tenth of what is read goes through curvature and regions too. A failure is

@@ -3,7 +3,7 @@
 Usage: python benchmarks/main_job.py [NAME ...]   (ringrig installed, from a checkout)
 
 Plans the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
-each in the unit or size that `tests/shared_meshes.py` states; without that folder only
+each in the unit or size that `tests/support/shared_meshes.py` states; without that folder only
 the sample. The sample, the face scan and the bust are planned in both lights. Prints
 exit code, what was read, counts with their bounds, the coverage, the check, the largest
 difference between a claimed area and the one that the audit recomputes (in points of

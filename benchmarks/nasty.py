@@ -4,7 +4,7 @@ Usage: python benchmarks/nasty.py [NAME ...]   (ringrig installed, from a checko
 
 The files lie in `../shared/data/nasty`. The rig is the default one, the check from
 pixels is on. Prints a table: exit code, seconds of processor and of wall time, what was
-printed last; and whether a file ended otherwise than `tests/test_nasty.py` says, in
+printed last; and whether a file ended otherwise than `tests/geometry/files/test_nasty.py` says, in
 another way than one that is documented (exit 0, 1, 3 or 4, one line on refusal, no
 traceback), or took longer than a minute. It is the processor's minute, over all
 threads, since wall time tells how busy the machine is; a run that hangs without

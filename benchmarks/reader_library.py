@@ -2,7 +2,7 @@
 
 Usage: python benchmarks/reader_library.py   (ringrig installed, from a checkout)
 
-Every file that `tests/test_reader_traps.py` makes, as it is made, and every one of
+Every file that `tests/geometry/files/test_reader_traps.py` makes, as it is made, and every one of
 `../shared/data/nasty` is read by `geometry.files.readers` and by trimesh (as a scene, all
 bodies, without its processing). Counts which come out as the same surface: the same
 triangles, or else the same area and bounding box. Where they don't, the tests say what

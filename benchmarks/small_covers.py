@@ -2,7 +2,7 @@
 
 Usage: python benchmarks/small_covers.py [INSTANCES]   (from a checkout; default 10,000)
 
-What `tests/test_small_covers.py` does with the first few hundred: full and partial,
+What `tests/solvers/covers/test_small_covers.py` does with the first few hundred: full and partial,
 weighted, redundant, several row sets, fixed sets, costs, limits on the number; solved
 whole and cut by a random budget, and the most weight of K sets. Prints how many there
 were of each kind and how many differed from the truth.

@@ -4,7 +4,7 @@ Usage: python benchmarks/whole_plans.py [--max-projectors N] [--cameras-by ROUTE
        [--light LIGHT] [NAME ...]       (ringrig installed, from a checkout)
 
 Runs the command `plan` on the sample and the shared meshes (those named, if any) with
-the default rig, each in the unit or size that `tests/shared_meshes.py` states, the
+the default rig, each in the unit or size that `tests/support/shared_meshes.py` states, the
 check from pixels included. N is 3 by default. Prints, from `plan.json`:
 
 - projectors, and the bounds over the candidates and over all poses; cameras likewise,

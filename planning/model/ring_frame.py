@@ -29,22 +29,22 @@ def ring_frame(
     """
     c, s = np.cos(azimuth), np.sin(azimuth)
     if isinstance(device, ParallelModel):
-        return world_from_device @ _shifted(np.array([tilt * c, tilt * s]))
+        return world_from_device @ shifted_frame(np.array([tilt * c, tilt * s]))
     width, height = device.resolution
     middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
     aside = np.array([c, s, 0.0])
     aside -= middle * (aside @ middle)
     aside /= np.linalg.norm(aside)
-    return world_from_device @ _along(np.cos(tilt) * middle + np.sin(tilt) * aside)
+    return world_from_device @ frame_along(np.cos(tilt) * middle + np.sin(tilt) * aside)
 
 
-def _shifted(shift: NDArray[np.float64]) -> NDArray[np.float64]:
+def shifted_frame(shift: NDArray[np.float64]) -> NDArray[np.float64]:
     frame = np.eye(4)
     frame[:2, 3] = shift
     return frame
 
 
-def _along(z: NDArray[np.float64]) -> NDArray[np.float64]:
+def frame_along(z: NDArray[np.float64]) -> NDArray[np.float64]:
     x = np.cross([0.0, 1.0, 0.0], z)
     x /= np.linalg.norm(x)
     frame = np.eye(4)

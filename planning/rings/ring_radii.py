@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
 from planning.model.requirements import TriangulationLimits
-from planning.model.ring_frame import _along, _shifted, ring_frame
+from planning.model.ring_frame import frame_along, shifted_frame, ring_frame
 from solvers.poses.axis_program import axis_direction
 
 _MIN_GAP_PROJECTOR_PX = 3.0
@@ -31,9 +31,9 @@ def ring_frame_of_axis(
         axis: a, shape (2,).
     """
     if isinstance(device, ParallelModel):
-        return world_from_device @ _shifted(axis)
+        return world_from_device @ shifted_frame(axis)
     middle = ring_frame(np.eye(4), device, 0.0, 0.0)[:3, :3]
-    return world_from_device @ _along(middle @ axis_direction(axis))
+    return world_from_device @ frame_along(middle @ axis_direction(axis))
 
 
 def ring_axis(

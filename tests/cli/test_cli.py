@@ -21,7 +21,7 @@ VOLATILE = ("created", "command", "timings_s", "cost")
 
 
 # A quarter of the samples behind claims: no test of this file is about their number.
-FEW = "import planning.claims as a, planning.overlaps as b\n"
+FEW = "import planning.report.claims as a, planning.report.entries.overlaps as b\n"
 FEW += "a.N_SAMPLES = b.N_SAMPLES = 3000\n"
 
 
@@ -165,7 +165,7 @@ def test_json_is_one_object_and_nothing_else(runs):
 
 def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path):
     code = (
-        "import planning.commands as c, sys\n"
+        "import planning.cli.commands as c, sys\n"
         "def stop(*a, **k): raise KeyboardInterrupt\n"
         "c.plan_rig = stop\n"
         f"sys.argv = ['plan', '--mesh', {str(face)!r}, '--max-projectors', '3']\n"
@@ -280,7 +280,7 @@ def test_an_empty_mesh_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
 
 def test_help_imports_nothing_heavy():
     code = (
-        "import sys\nfrom planning.cli import commands\n"
+        "import sys\nfrom planning.cli.main import commands\n"
         "try:\n    commands.main(['--help'], prog_name='plan')\n"
         "except SystemExit:\n    pass\n"
         "heavy = {'numpy', 'scipy', 'trimesh', 'igl', 'cvxpy', 'casadi', 'PIL'}\n"

@@ -407,7 +407,7 @@ def test_another_highs_with_more_threads_costs_no_bound():
         "other.setOptionValue('threads', 2)\n"
         "other.setOptionValue('parallel', 'on')\n"
         "other.minimize(other.addBinary())\n"
-        "from tests.test_multicover import random_cover\n"
+        "from tests.solvers.covers.test_multicover import random_cover\n"
         "import numpy as np\n"
         "from solvers import solve_cover\n"
         "costs = np.random.default_rng(0).uniform(1, 2, 12)\n"
