@@ -34,26 +34,26 @@ from geometry.devices import PinholeModel
 from geometry.files.readers import load_mesh
 from geometry.poses import look_at
 from planning import load_rig
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
 from planning.prepare import first_projectors, prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.camera_bound import CameraCells, CameraEffort
 from planning.proofs.cells.image_cone import image_cone
-from planning.report.draft import Order
+from planning.report.partial_plan import PlanRequest
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     PAIR_CAUSES,
     SEEN,
-    Eye,
-    Lamp,
+    AuditCamera,
+    AuditProjector,
     pair_steps,
     sight_steps,
 )
-from planning.verify.audit.samples import AuditSamples
 
 _BATCH = 500
 _STREAM = 200
@@ -84,7 +84,9 @@ class OwnSight:
         )
         self._lit, self._limits = rows.lit, limits
         self._lamps = [
-            Lamp(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
+            AuditProjector(
+                p.device, p.world_from_device, p.world_from_ring, p.ring_radii
+            )
             for p in projectors
         ]
         self._shadow = Shadow(scene.mesh, threads=1)
@@ -92,7 +94,7 @@ class OwnSight:
 
     def measured(self, device: PinholeModel, pose: NDArray[np.float64]) -> set[int]:
         """Return the samples that a camera measures with any projector."""
-        eye, limits = Eye(device, pose), self._limits
+        eye, limits = AuditCamera(device, pose), self._limits
         seen = sight_steps(eye, self._samples, limits.camera, self._shadow) == SEEN
         found = np.zeros(len(self._samples), dtype=bool)
         for p, lamp in enumerate(self._lamps):
@@ -216,7 +218,7 @@ def main() -> int:
     for path, options, up in jobs(given.meshes):
         mesh, _ = cut_for_curvature(load_mesh(path, **options))
         asked = {"max_projectors": 3, "target": "dominant", "up": up}
-        order = Order(mesh, load_rig("default"), _every(asked), 0, 2, ())
+        order = PlanRequest(mesh, load_rig("default"), _every(asked), 0, 2, ())
         ready = prepared(order, Stopwatch())
         projectors = widen_margins(ready.scene, first_projectors(ready, Stopwatch()))
         target = ready.scene.target_samples(given.rows, _STREAM)

@@ -38,7 +38,7 @@ from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
 from planning.prepare import prepared
@@ -46,7 +46,7 @@ from planning.proofs.cells.aim_cells import AimTree
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.projector_bound import Effort, bound_projectors
-from planning.report.draft import Order
+from planning.report.partial_plan import PlanRequest
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -429,7 +429,9 @@ def _scene(
         "accuracy_mm": None,
         "up": up,
     }
-    order = Order(mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ())
+    order = PlanRequest(
+        mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ()
+    )
     ready = prepared(order, Stopwatch())
     return fitted(ready.scene, ready.template, fit)
 

@@ -26,14 +26,14 @@ from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
 from planning.cameras.camera_stage import place_cameras
-from planning.cameras.proved import bound_stage
-from planning.model.devices import PlannedCamera
+from planning.cameras.proved_cameras import bound_stage
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.prepare import first_projectors, prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.camera_bound import DEFAULT, PROVE
-from planning.report.draft import Order
+from planning.report.partial_plan import PlanRequest
 
 
 def main() -> int:
@@ -85,7 +85,9 @@ def _case(
         "coverage": share,
         "up": up,
     }
-    order = Order(mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ())
+    order = PlanRequest(
+        mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ()
+    )
     ready = prepared(order, Stopwatch())
     projectors = widen_margins(ready.scene, first_projectors(ready, Stopwatch()))
     rig = order.rig

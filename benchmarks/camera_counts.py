@@ -35,14 +35,14 @@ from planning import load_mesh, load_rig, verify_plan
 from planning.cameras.camera_routes import slide_routes
 from planning.cameras.camera_stage import CameraSolution, place_cameras
 from planning.cameras.routes import CamerasBy
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.pipeline import _polish
 from planning.prepare import Prepared, first_projectors, prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
 from planning.report.assemble import write_plan
-from planning.report.draft import Draft, Order
+from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
@@ -138,7 +138,7 @@ def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh, str | None]]:
 class Job:
     """One mesh with its projectors, as far as the cameras."""
 
-    order: Order
+    order: PlanRequest
     ready: Prepared
     stage: ProjectorStage
     projectors: tuple[PlannedProjector, ...]
@@ -161,7 +161,7 @@ def _job(mesh: TriangleMesh, up: str | None) -> Job:
     asked = dict.fromkeys(
         ("max_cameras", "dominant_coverage", "coverage", "min_reachable", "accuracy_mm")
     ) | {"max_projectors": _PROJECTORS, "target": "dominant", "up": up}
-    order = Order(cut, load_rig("default"), asked, 0, 2, ())
+    order = PlanRequest(cut, load_rig("default"), asked, 0, 2, ())
     clock = Stopwatch(None)
     ready = prepared(order, clock)
     stage = first_projectors(ready, clock)
@@ -212,7 +212,7 @@ def _smallest(scene: Scene, solution: CameraSolution) -> float | None:
 def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:
     """The plan of the paper's route alone, and what the audit says of it."""
     ready, placed, clock = job.ready, job.place("paper"), job.clock
-    draft = Draft(
+    draft = PartialPlan(
         replace(job.order, cameras_by="paper"),
         ready.scene,
         ready.regions,

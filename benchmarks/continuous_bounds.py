@@ -31,9 +31,9 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.prepare import Prepared, prepared
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
-from planning.projectors.proved import prove_fewest
+from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import DEFAULT, PROVE
-from planning.report.draft import Order
+from planning.report.partial_plan import PlanRequest
 
 ROOT = Path(__file__).resolve().parents[1]
 MANY = 200
@@ -132,7 +132,9 @@ def ready_for(
         "accuracy_mm": None,
         "up": up,
     }
-    order = Order(mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ())
+    order = PlanRequest(
+        mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ()
+    )
     ready = prepared(order, Stopwatch())
     if tangent is None:
         return ready

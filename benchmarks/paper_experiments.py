@@ -18,7 +18,7 @@ import numpy as np
 
 from geometry.files.readers import load_mesh
 from planning.experiments.one_image import Prior, judged_labels
-from planning.experiments.point_errors import Errors, Measured
+from planning.experiments.point_errors import Errors, MeasuredErrors
 from planning.experiments.run import DARK, Outcome, run_experiment
 from planning.experiments.second_sequence import double_density
 from planning.experiments.setups import (
@@ -68,7 +68,7 @@ NUMBERS = ["points", "rms", "p95", "bias", "> 1 mm", "rms of the rest"]
 CLOUD = [*NUMBERS, "complete at half a gap", "at one"]
 
 
-def cloud_row(one: Measured) -> list[str]:
+def cloud_row(one: MeasuredErrors) -> list[str]:
     """Return a row of `CLOUD`."""
     return [*numbers(one.errors), *(f"{share:.3f}" for share in one.complete)]
 

@@ -33,14 +33,14 @@ from planning.projectors.share_margin import margin_at_share
 from planning.scene import lighting
 from planning.scene.lit import lit_stages
 from planning.scene.samples import Target
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     LIT,
-    Lamp,
+    AuditProjector,
     light_margin,
     light_steps,
 )
-from planning.verify.audit.samples import AuditSamples
 
 ROWS = 12_000
 STREAM = 800
@@ -102,7 +102,7 @@ def _row(ready: Prepared) -> tuple[str, int]:
     shadow = Shadow(scene.mesh, threads=scene.threads)
     limits = scene.requirements.projector
     lamps = [
-        Lamp(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
+        AuditProjector(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
         for p in written
     ]
     found = np.stack(

@@ -33,8 +33,8 @@ from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.camera_cover import offered_cameras, plan_cameras
 from planning.cameras.camera_stage import choose_cameras, move_axes
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins

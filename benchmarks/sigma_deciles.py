@@ -21,7 +21,7 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.rays.proximity import closest_points
 from geometry.shapes.primitives import grid, sphere
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.report.entries.edge_noise import EdgeNoise
 from planning.scene import lighting, measurability

@@ -40,7 +40,7 @@ from planning.experiments.paper_figures import (
     draw_redundancy,
     draw_viewpoints,
 )
-from planning.experiments.point_panels import Stage
+from planning.experiments.point_panels import PanelStage
 from planning.experiments.run import run_experiment
 from planning.experiments.second_sequence import double_density
 from planning.experiments.setups import box_experiment
@@ -79,7 +79,7 @@ draw_camera_images(outcome)
 # left what one projector and one camera measure, then each camera under both.
 
 # %%
-stage = Stage(outcome.experiment.mesh)
+stage = PanelStage(outcome.experiment.mesh)
 draw_viewpoints(outcome, stage)
 
 # %% [markdown]

@@ -34,7 +34,7 @@ from planning.experiments.paper_figures import (
     draw_redundancy,
     draw_viewpoints,
 )
-from planning.experiments.point_panels import Stage
+from planning.experiments.point_panels import PanelStage
 from planning.experiments.run import run_experiment
 from planning.experiments.setups import face_experiment
 from planning.experiments.table import cloud_lines, label_line, ring_lines, setup_lines
@@ -67,7 +67,7 @@ print("\n".join(ring_lines(outcome)))
 draw_camera_images(outcome)
 
 # %%
-stage = Stage(outcome.experiment.mesh)
+stage = PanelStage(outcome.experiment.mesh)
 draw_viewpoints(outcome, stage)
 
 # %%

@@ -12,23 +12,23 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.camera_cover import CameraStage, NothingMeasuredError
 from planning.cameras.camera_routes import slide_routes
 from planning.cameras.camera_stage import follow_cameras, place_cameras
-from planning.cameras.proved import bound_stage
+from planning.cameras.proved_cameras import bound_stage
 from planning.cameras.routes import CamerasBy
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import InterruptedPlanError, RequirementError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Report, Stopwatch
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
-from planning.projectors.proved import prove_fewest
+from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import DEFAULT, PROVE
 from planning.proofs.selection import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.what_helps import falls_short
 from planning.report.assemble import write_plan
-from planning.report.draft import Draft, Order
 from planning.report.entries.cost import cost_entry
+from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.range_guard import Guard, guarded
 from planning.rig.rig import Rig
@@ -115,7 +115,7 @@ def plan_rig(
     interest = interest_of(surface, select, weight)
     # Planned and judged on places, not on whatever triangles a flat face came in.
     cut, parent = cut_for_curvature(surface)
-    order = Order(
+    order = PlanRequest(
         cut,
         rig,
         {
@@ -153,7 +153,7 @@ def plan_rig(
     return plan
 
 
-def _plan(order: Order, clock: Stopwatch, *, check: bool) -> RigPlan:
+def _plan(order: PlanRequest, clock: Stopwatch, *, check: bool) -> RigPlan:
     draft = _first_draft(order, clock)
     try:
         draft = _polish(draft, clock)
@@ -168,7 +168,7 @@ def _plan(order: Order, clock: Stopwatch, *, check: bool) -> RigPlan:
         return _interrupted(draft, clock, cut)
 
 
-def _first_draft(order: Order, clock: Stopwatch) -> Draft:
+def _first_draft(order: PlanRequest, clock: Stopwatch) -> PartialPlan:
     """Sections III and VI: regions, projectors, cameras; each the fewest."""
     ready = prepared(order, clock)
     stage = first_projectors(ready, clock)
@@ -180,7 +180,7 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
         proof = stage.certificate["continuous"]
         clock.say(f"  projectors: at least {proof['lower_bound']}, {proof['proof']}")
     projectors, cameras = _placed(order, ready.scene, stage, ready.tilt, clock)
-    return Draft(
+    return PartialPlan(
         order,
         ready.scene,
         ready.regions,
@@ -194,7 +194,11 @@ def _first_draft(order: Order, clock: Stopwatch) -> Draft:
 
 
 def _placed(
-    order: Order, scene: Scene, stage: ProjectorStage, tilt: float, clock: Stopwatch
+    order: PlanRequest,
+    scene: Scene,
+    stage: ProjectorStage,
+    tilt: float,
+    clock: Stopwatch,
 ) -> tuple[tuple[PlannedProjector, ...], CameraStage]:
     """Poses of widest margin for chosen projectors, and the cameras for them."""
     rig = order.rig
@@ -220,7 +224,9 @@ def _placed(
     return solution.projectors, cameras
 
 
-def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
+def _one_more(
+    draft: PartialPlan, plan: RigPlan, clock: Stopwatch
+) -> PartialPlan | None:
     """One device more where fresh samples don't confirm a cover that met its rows.
 
     The proved bound stays what it is; the count is then above it, and says so.
@@ -256,7 +262,7 @@ def _one_more(draft: Draft, plan: RigPlan, clock: Stopwatch) -> Draft | None:
     return None
 
 
-def _polish(draft: Draft, clock: Stopwatch) -> Draft:
+def _polish(draft: PartialPlan, clock: Stopwatch) -> PartialPlan:
     """Section VI: cameras slide apart while the coverage holds; then their rings."""
     with clock.stage("baselines", "baselines: cameras slide apart"):
         ranges = draft.order.ranges
@@ -296,7 +302,7 @@ def _polish(draft: Draft, clock: Stopwatch) -> Draft:
     )
 
 
-def _bounded(draft: Draft, clock: Stopwatch) -> Draft:
+def _bounded(draft: PartialPlan, clock: Stopwatch) -> PartialPlan:
     """The cameras' bound over all poses, for the ring axes that were kept.
 
     One that stands already belongs to the same projectors and axes: other axes come
@@ -314,7 +320,7 @@ def _bounded(draft: Draft, clock: Stopwatch) -> Draft:
 
 
 def _interrupted(
-    draft: Draft, clock: Stopwatch, cut: KeyboardInterrupt | TimeLimitError
+    draft: PartialPlan, clock: Stopwatch, cut: KeyboardInterrupt | TimeLimitError
 ) -> RigPlan:
     """Write the best plan so far, marked truncated."""
     clock.lift()
@@ -324,7 +330,7 @@ def _interrupted(
     return plan
 
 
-def _checked(plan: RigPlan, draft: Draft, clock: Stopwatch) -> RigPlan:
+def _checked(plan: RigPlan, draft: PartialPlan, clock: Stopwatch) -> RigPlan:
     """Audit the written plan and reconstruct it from pixels, with foreign code."""
     with clock.stage("check", "check: audit, then reconstruction from pixels"):
         verification = verify_plan(

@@ -10,8 +10,8 @@ from geometry.curvature.curvature import CurvatureField, principal_curvatures
 from geometry.mesh.bearing import bearing
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, InputError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.projectors.projector_stage import (
@@ -20,9 +20,9 @@ from planning.projectors.projector_stage import (
     plan_projectors,
 )
 from planning.report.advice.relaxations import nothing_lit
-from planning.report.draft import Order
+from planning.report.partial_plan import PlanRequest
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
-from planning.scene.clearance import check_existing_room
+from planning.scene.clearance import check_existing_clearance
 from planning.scene.scene import Scene
 
 # Upwards in the image: where the ring axis points until the cameras are known.
@@ -42,7 +42,7 @@ class Prepared:
         tilt: Tilt or shift of ring axes.
     """
 
-    order: Order
+    order: PlanRequest
     scene: Scene
     regions: DominantRegions
     curvature_radius_m: float
@@ -55,7 +55,7 @@ class Prepared:
         return self.tilt, _FIRST_AZIMUTH
 
 
-def prepared(order: Order, clock: Stopwatch) -> Prepared:
+def prepared(order: PlanRequest, clock: Stopwatch) -> Prepared:
     """Find the regions and state what is asked.
 
     Raises:
@@ -87,7 +87,7 @@ def prepared(order: Order, clock: Stopwatch) -> Prepared:
         body=rig.projector_body(),
     )
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
-    check_existing_room(scene, template, camera)
+    check_existing_clearance(scene, template, camera)
     return Prepared(order, scene, regions, field.radius, template, tilt)
 
 
@@ -116,7 +116,7 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
     return stage
 
 
-def _regions(order: Order, field: CurvatureField) -> DominantRegions:
+def _regions(order: PlanRequest, field: CurvatureField) -> DominantRegions:
     """The user's selection, or else the most curved surface."""
     if order.interest is not None:
         return regions_of_faces(order.mesh, field, order.interest.chosen)
@@ -129,7 +129,7 @@ def _regions(order: Order, field: CurvatureField) -> DominantRegions:
     return regions
 
 
-def _resolve(order: Order) -> tuple[Requirements, Any, float]:
+def _resolve(order: PlanRequest) -> tuple[Requirements, Any, float]:
     """Return the requirements, the ring radii, and the tilt or shift of ring axes."""
     mesh, rig = order.mesh, order.rig
     requirements = rig.requirements(

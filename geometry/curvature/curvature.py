@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from geometry.mesh.diffusion import diffused
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import cross, principal, tangent_planes, unpacked
-from geometry.mesh.topology import Edges, components, face_pairs, numbered
+from geometry.mesh.topology import MeshEdges, components, face_pairs, numbered
 
 from .quadric import RINGS, fit_quadrics
 
@@ -197,7 +197,7 @@ def _joined_to(chosen: NDArray[np.bool_], laplacian: csr_array) -> NDArray[np.bo
 
 
 def _near_border(
-    vertices: NDArray[np.float64], edges: Edges, reach: float, rings: int
+    vertices: NDArray[np.float64], edges: MeshEdges, reach: float, rings: int
 ) -> NDArray[np.bool_]:
     """Vertices on a border or branching edge, or in reach or rings of a long border.
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import Edges, mesh_edges
+from geometry.mesh.topology import MeshEdges, mesh_edges
 
 from .curvature import DEFAULT_RADIUS_SHARE, facet_size
 
@@ -148,7 +148,7 @@ def refined(
 
 
 def _to_cut(
-    edges: Edges, lengths: NDArray[np.float64], longest: float
+    edges: MeshEdges, lengths: NDArray[np.float64], longest: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Which edges are long, and for each face the key of its pattern."""
     long = lengths > longest

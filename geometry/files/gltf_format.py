@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from .scene_parts import Part, joined
+from .scene_parts import ScenePart, joined
 from .text_formats import FormatError
 
 Fetch = Callable[[str], bytes]
@@ -87,7 +87,7 @@ def read_gltf(
     _check_extensions(tree)
     buffers = _Buffers(tree, fetch, stored)
     meshes: dict[int, list[tuple[NDArray[np.float64], NDArray[np.int64]]]] = {}
-    parts: list[Part] = []
+    parts: list[ScenePart] = []
     units: set[str] = set()
     for node, world_from_node in _placed(tree):
         if "mesh" not in node:
@@ -99,7 +99,7 @@ def read_gltf(
             shapes = [_primitive(tree, buffers, p) for p in mesh["primitives"]]
             meshes[index] = [shape for shape in shapes if shape is not None]
         units.add(_unit(mesh))
-        parts += [Part(v, f, world_from_node) for v, f in meshes[index]]
+        parts += [ScenePart(v, f, world_from_node) for v, f in meshes[index]]
     if not parts and tree.get("meshes"):
         raise FormatError("its default scene shows no triangle mesh")
     if len(units) > 1:

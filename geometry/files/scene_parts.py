@@ -13,7 +13,7 @@ _MAX_FACES = 50_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ScenePart:
     """A body in its own coordinates, and where it stands.
 
     Attributes:
@@ -27,7 +27,7 @@ class Part:
     world_from_part: NDArray[np.float64]
 
 
-def joined(parts: Sequence[Part]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def joined(parts: Sequence[ScenePart]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return all parts in the world; mirrored ones keep their outside outside.
 
     Raises:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from .scene_parts import Part, joined
+from .scene_parts import ScenePart, joined
 from .text_formats import FormatError, numbers, whole
 
 _NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/"
@@ -48,7 +48,7 @@ def read_three_mf(
     items = root.findall(f"{_CORE}build/{_CORE}item")
     if not items:
         raise FormatError("its build lists no object")
-    parts: list[Part] = []
+    parts: list[ScenePart] = []
     for item in items:
         _collect(package, package.root, item, np.eye(4), (), parts)
     return *joined(parts), root.get("unit", "millimeter")
@@ -136,7 +136,7 @@ def _collect(
     reference: ElementTree.Element,
     world_from_parent: NDArray[np.float64],
     above: Sequence[tuple[str, str]],
-    parts: list[Part],
+    parts: list[ScenePart],
 ) -> None:
     """Append the parts of an item or component and of all that it is made of."""
     path = [v for k, v in reference.attrib.items() if k.endswith("}path")]
@@ -149,7 +149,7 @@ def _collect(
         raise FormatError("its components are nested or repeated without end")
     world_from_object = world_from_parent @ _transform(reference.get("transform"))
     held = package.object(*key)
-    parts += [Part(v, f, world_from_object) for v, f in held.meshes]
+    parts += [ScenePart(v, f, world_from_object) for v, f in held.meshes]
     for component in held.components:
         _collect(package, model, component, world_from_object, (*above, key), parts)
 

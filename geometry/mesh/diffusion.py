@@ -7,7 +7,7 @@ from scipy.sparse import coo_array, csr_array
 from geometry.parallel import mapped
 
 from .tensors import cross
-from .topology import Edges, mesh_edges
+from .topology import MeshEdges, mesh_edges
 
 # Share of the change that may be missing. A solve that has come this far moves nothing
 # that is larger than rounding in what is made of it, and takes tens of steps.
@@ -23,7 +23,7 @@ _LARGEST_WEIGHT = 3.0
 def surface_laplacian(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
-    edges: Edges | None = None,
+    edges: MeshEdges | None = None,
 ) -> csr_array:
     """Return the stiffness L of linear elements, (n, n), positive semi-definite.
 

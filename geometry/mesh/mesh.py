@@ -12,7 +12,7 @@ from .diffusion import surface_laplacian, vertex_areas
 from .extent import enclosing_ball, main_bodies
 from .file_origin import FileOrigin
 from .tensors import cross
-from .topology import Edges, mesh_edges
+from .topology import MeshEdges, mesh_edges
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -128,7 +128,7 @@ class TriangleMesh:
         return _read_only((a + b + c) / 3.0)
 
     @cached_property
-    def edges(self) -> Edges:
+    def edges(self) -> MeshEdges:
         """Undirected edges of the faces."""
         return mesh_edges(self.faces)
 

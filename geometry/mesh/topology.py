@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 
 @dataclass(frozen=True, eq=False)
-class Edges:
+class MeshEdges:
     """The undirected edges of a mesh and the three that each face has.
 
     Attributes:
@@ -28,7 +28,7 @@ class Edges:
         return self.n_faces == 1
 
 
-def mesh_edges(faces: NDArray[np.int64]) -> Edges:
+def mesh_edges(faces: NDArray[np.int64]) -> MeshEdges:
     """Return the edges of triangles (n_f, 3)."""
     begin, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
     low, high = np.minimum(begin, end), np.maximum(begin, end)
@@ -36,14 +36,16 @@ def mesh_edges(faces: NDArray[np.int64]) -> Edges:
     key, of_face, counts = np.unique(
         low * span + high, return_inverse=True, return_counts=True
     )
-    return Edges(
+    return MeshEdges(
         np.stack([key // span, key % span], axis=1),
         of_face.reshape(-1, 3),
         counts.astype(np.int64),
     )
 
 
-def adjacent_faces(edges: Edges, *, manifold_only: bool = True) -> NDArray[np.int64]:
+def adjacent_faces(
+    edges: MeshEdges, *, manifold_only: bool = True
+) -> NDArray[np.int64]:
     """Return pairs of faces that share an edge, shape (m, 2).
 
     Around an edge of more than two faces, consecutive faces are paired, unless
@@ -53,7 +55,7 @@ def adjacent_faces(edges: Edges, *, manifold_only: bool = True) -> NDArray[np.in
 
 
 def face_pairs(
-    edges: Edges, *, manifold_only: bool = True
+    edges: MeshEdges, *, manifold_only: bool = True
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return `adjacent_faces`, shape (m, 2), and the edge that each pair shares."""
     flat = edges.of_face.ravel()

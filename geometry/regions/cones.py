@@ -8,7 +8,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import components
 from geometry.parallel import mapped
 
-from .cone_crumbs import join_crumbs
+from .cone_fragments import join_fragments
 from .cone_sums import CONE_SHARE, Patch, merged, renumbered
 
 _MAX_ROUNDS = 60
@@ -106,7 +106,7 @@ def _pieces(
     areas = np.append(patch.sums(split)[1], 0.0)
     large = (split >= 0) & (areas[split] >= least)
     piece = merged(patch, renumbered(np.where(large, split, -1)), CONE_SHARE[0])
-    piece = join_crumbs(patch, piece)
+    piece = join_fragments(patch, piece)
     if keep_all and np.any(piece < 0):
         rest = _split(patch, piece < 0, 0.0)
         piece = np.where(piece < 0, rest + piece.max(initial=-1) + 1, piece)

@@ -42,7 +42,7 @@ _OFFSET = 2e-6
 
 
 @dataclass(frozen=True)
-class Shell:
+class MeshShell:
     """What kind of body a surface bounds.
 
     Attributes:
@@ -77,7 +77,7 @@ class _Sight:
     inside: NDArray[np.bool_]
 
 
-def measure_shell(caster: RayCaster) -> Shell:
+def measure_shell(caster: RayCaster) -> MeshShell:
     """Tell a hollow shell from a solid, from rays at spots all over the surface.
 
     Args:
@@ -93,14 +93,14 @@ def measure_shell(caster: RayCaster) -> Shell:
     weight = (areas[: len(n_spots)] / np.maximum(n_spots, 1))[of]
     leaks = look_out(caster, spots, _RAYS_BEHIND, behind=True).escaped
     if weight @ leaks > _LEAK * _RAYS_BEHIND * mesh.area:
-        return Shell(OPEN, None, None, 0.0, 0.0)
+        return MeshShell(OPEN, None, None, 0.0, 0.0)
     sight = _sight(caster, spots)
     seen = np.bincount(of, sight.openness) > 0
     inside, wall = sight.inside, sight.wall
     inside_m2 = float(weight @ inside)
     lining = inside & np.isfinite(wall)
     wall_m = _weighted_median(wall[lining], weight[lining]) if lining.any() else None
-    return Shell(
+    return MeshShell(
         _kind(inside_m2 / mesh.area, wall_m, THIN * 2.0 * mesh.radius),
         wall_m,
         _mean_wall(mesh),

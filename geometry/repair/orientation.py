@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import Repair, TriangleMesh
-from geometry.mesh.topology import Edges, adjacent_faces, components
+from geometry.mesh.topology import MeshEdges, adjacent_faces, components
 from geometry.rays.rays import RayCaster
 
 from .nesting import containers
@@ -123,7 +123,7 @@ def _closed_patches(
     return closed, alike
 
 
-def _alike(faces: NDArray[np.int64], edges: Edges) -> NDArray[np.bool_]:
+def _alike(faces: NDArray[np.int64], edges: MeshEdges) -> NDArray[np.bool_]:
     """Whether the two faces at an edge run it the same way, shape (n_e,)."""
     forward = faces < faces[:, [1, 2, 0]]
     way = np.where(forward, 1, -1).ravel()

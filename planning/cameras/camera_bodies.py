@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.proofs.conflicts import settle
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs.conflicts import resolve_conflicts
 from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
@@ -22,7 +22,7 @@ from .camera_cover import CameraCover
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredCrowd:
+class CameraInterference:
     """Cameras, and the lit samples that they measure.
 
     Attributes:
@@ -118,12 +118,12 @@ def lit_among(
     return lit
 
 
-def settled_cover(
+def resolved_cover(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
     cover: CameraCover,
 ) -> CameraCover:
-    """Return a cover whose cameras bear each other's bodies, as `settle` says.
+    """Return a cover whose cameras bear each other's bodies, as `resolve_conflicts` says.
 
     Args:
         scene: With the bodies of the projectors.
@@ -134,10 +134,10 @@ def settled_cover(
         InfeasibleLimitsError: If the body of every camera is in the way.
     """
     required = scene.requirements
-    crowd = MeasuredCrowd(
+    crowd = CameraInterference(
         scene, projectors, cover.offered.cameras, cover.rows, cover.measured
     )
-    selection = settle(
+    selection = resolve_conflicts(
         crowd,
         cover.measured,
         cover.selection,

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
-from planning.proofs.conflicts import Crowd, settle_others
+from planning.proofs.conflicts import Interference, resolve_others
 from planning.proofs.selection import (
     BODIES_LEFT_OUT,
     Selection,
@@ -20,7 +20,8 @@ from planning.proofs.selection import (
     select_fewest,
 )
 from planning.scene import measurability
-from planning.scene.clearance import offered_with_room
+from planning.scene.camera_views import CandidateViews
+from planning.scene.clearance import candidates_with_clearance
 from planning.scene.existing import existing_cameras
 from planning.scene.lit import merged
 from planning.scene.measured import (
@@ -31,7 +32,6 @@ from planning.scene.measured import (
 )
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.sights import Sights
 from planning.scene.workspace.candidates import camera_candidates
 
 from .routes import Routes
@@ -71,11 +71,11 @@ class CameraCover:
             them; None: the best there are.
     """
 
-    offered: Sights
+    offered: CandidateViews
     rows: LitSamples
     measured: NDArray[np.bool_]
     selection: Selection
-    crowd: Crowd | None = None
+    crowd: Interference | None = None
     by_count: Mapping[int, NDArray[np.int64]] | None = None
 
     @property
@@ -94,7 +94,7 @@ class CameraStage:
     """
 
     cameras: tuple[PlannedCamera, ...]
-    offered: Sights
+    offered: CandidateViews
     rows: LitSamples
     measured: NDArray[np.bool_]
     by_count: dict[int, tuple[PlannedCamera, ...]]
@@ -107,7 +107,9 @@ class CameraStage:
         return self.offered.cameras
 
 
-def offered_cameras(scene: Scene, template: PlannedCamera, n_candidates: int) -> Sights:
+def offered_cameras(
+    scene: Scene, template: PlannedCamera, n_candidates: int
+) -> CandidateViews:
     """Return the candidates, those that stand already first: they are in every cover.
 
     Args:
@@ -122,14 +124,14 @@ def offered_cameras(scene: Scene, template: PlannedCamera, n_candidates: int) ->
     def lattice(n: int) -> tuple[PlannedCamera, ...]:
         return camera_candidates(template, required.workspace, n, site)
 
-    candidates += offered_with_room(scene, n_candidates, lattice)
-    return Sights(scene, candidates)
+    candidates += candidates_with_clearance(scene, n_candidates, lattice)
+    return CandidateViews(scene, candidates)
 
 
 def plan_cameras(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    offered: Sights,
+    offered: CandidateViews,
     known: NDArray[np.int64] | None = None,
 ) -> CameraCover:
     """Choose the fewest cameras that measure the required share of what is lit.
@@ -156,7 +158,7 @@ def plan_cameras(
             max_count=required.max_cameras,
             seed=scene.seed,
             known=known,
-            given=n_given(scene),
+            given=n_fixed(scene),
         )
         fresh = fresh_target(scene, attempt)
         _, seen = rows_for(scene, projectors, offered, fresh)
@@ -185,7 +187,7 @@ def fresh_target(scene: Scene, attempt: int) -> Target:
 def rows_for(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    offered: Sights,
+    offered: CandidateViews,
     target: Target,
 ) -> tuple[LitSamples, NDArray[np.bool_]]:
     """Return the samples that are lit, and which candidate measures which.
@@ -201,7 +203,7 @@ def rows_for(
 
 
 def refuse_unmeasured(
-    scene: Scene, offered: Sights, rows: LitSamples, measured: NDArray[np.bool_]
+    scene: Scene, offered: CandidateViews, rows: LitSamples, measured: NDArray[np.bool_]
 ) -> None:
     """Refuse to plan where no candidate measures any lit sample.
 
@@ -233,13 +235,13 @@ def confirms(seen: NDArray[np.bool_], chosen: NDArray[np.int64], share: float) -
 
 def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     """Return what the stage found, with the best cameras for every other count."""
-    given = n_given(scene)
+    given = n_fixed(scene)
     others = marginals(cover.measured, cover.selection, seed=scene.seed, given=given)
     if cover.by_count is not None:
         others = others_instead(others, cover.by_count, cover.measured)
     bodied = cover.crowd is not None and cover.crowd.bodied
     if cover.crowd is not None:
-        others = settle_others(
+        others = resolve_others(
             cover.crowd,
             cover.measured,
             others,
@@ -269,7 +271,7 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     )
 
 
-def n_given(scene: Scene) -> int:
+def n_fixed(scene: Scene) -> int:
     """Return how many cameras stand already."""
     return len(scene.requirements.existing_of("camera"))
 

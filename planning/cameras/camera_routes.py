@@ -22,16 +22,16 @@ from planning.cameras.paper.paper_cameras import (
     cover_of,
     route_among,
 )
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
-from planning.scene.clearance import with_room
+from planning.scene.camera_views import CandidateViews
+from planning.scene.clearance import with_clearance
 from planning.scene.measured import measured_by, taken
 from planning.scene.scene import Scene
-from planning.scene.sights import Sights
 
-from .camera_bodies import settled_cover
-from .camera_cover import CameraCover, CameraStage, n_given, plan_cameras
+from .camera_bodies import resolved_cover
+from .camera_cover import CameraCover, CameraStage, n_fixed, plan_cameras
 from .camera_slides import (
     reached_by_candidates,
     rows_to_slide_on,
@@ -43,7 +43,7 @@ from .routes import CamerasBy, Routes
 # Of a scene, projectors, candidates, and those that a route passed under other axes.
 ByCount = Mapping[int, NDArray[np.int64]]
 Chooser = Callable[
-    [Scene, tuple[PlannedProjector, ...], Sights, ByCount | None], CameraCover
+    [Scene, tuple[PlannedProjector, ...], CandidateViews, ByCount | None], CameraCover
 ]
 
 # A smallest baseline counts as clearly larger from this ratio on.
@@ -55,7 +55,7 @@ _ROWS = 2000
 def cover_by_cover(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
-    offered: Sights,
+    offered: CandidateViews,
     known: NDArray[np.int64] | None = None,
 ) -> CameraCover:
     """Choose the fewest candidates for these ring axes that bear each other's bodies.
@@ -63,7 +63,7 @@ def cover_by_cover(
     The arguments are those of `plan_cameras`.
     """
     cover = plan_cameras(scene, projectors, offered, known)
-    return settled_cover(scene, projectors, cover)
+    return resolved_cover(scene, projectors, cover)
 
 
 def chooser(by: CamerasBy) -> Chooser:
@@ -74,7 +74,7 @@ def chooser(by: CamerasBy) -> Chooser:
 def _chosen_anew(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
-    offered: Sights,
+    offered: CandidateViews,
     by_count: ByCount | None = None,
 ) -> CameraCover:
     """The cover; a cover leaves nothing to keep."""
@@ -214,7 +214,7 @@ def _with_more(
     and poses at the limit (10) of the cover's.
     """
     needed = cover.selection.needed
-    if needed <= n_given(scene) + 1:
+    if needed <= n_fixed(scene) + 1:
         return cover
     offered = cover.offered if routed is None else routed.offered
     measured = cover.measured if routed is None else routed.measured
@@ -231,7 +231,7 @@ def _with_more(
             measured,
             scene.requirements.coverage,
             seed=scene.seed,
-            given=n_given(scene),
+            given=n_fixed(scene),
         )
         if count >= needed:
             return cover
@@ -256,7 +256,9 @@ def _at_limit(scene: Scene, cover: CameraCover) -> tuple[PlannedCamera, ...]:
         adjacency(samples.points, samples.normals),
         cover.measured[np.ix_(some, chosen)],
     )
-    return with_room(scene, limit_poses(cover.cameras, parts, spread_limits(scene)))
+    return with_clearance(
+        scene, limit_poses(cover.cameras, parts, spread_limits(scene))
+    )
 
 
 def _compared(

@@ -13,8 +13,8 @@ from planning.cameras.baselines.spread_problem import (
     SpreadLimits,
     at_poses,
 )
-from planning.model.devices import PlannedCamera, PlannedProjector
-from planning.scene.clearance import lacks_room
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.scene.clearance import lacks_clearance
 from planning.scene.measured import LitSamples, lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.scene.standing import moves_bodies
@@ -192,7 +192,7 @@ def measured_among(
         return measured_by(scene, cameras, rows)
     among = scene.among((*projectors, *cameras))
     lit = lit_among(projectors, rows, cameras)
-    fits = not any(lacks_room(among, camera) for camera in cameras)
+    fits = not any(lacks_clearance(among, camera) for camera in cameras)
     if not fits or lit.any(axis=1).sum() < spared:
         return np.zeros((len(rows.target), len(cameras)), dtype=bool)
     return measured_by(among, cameras, replace(rows, lit=lit))

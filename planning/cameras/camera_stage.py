@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.ring_axes import turn_ring_axes
+from planning.scene.camera_views import CandidateViews
 from planning.scene.scene import Scene
-from planning.scene.sights import Sights
 
 from .camera_cover import CameraCover, CameraStage, camera_stage, offered_cameras
 from .camera_routes import better_route, chooser, passed_by
@@ -65,7 +65,7 @@ def place_cameras(
 def choose_cameras(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    offered: Sights,
+    offered: CandidateViews,
     tilt: float,
     by: CamerasBy = "cover",
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 
 CamerasBy = Literal["cover", "paper", "both"]
 

@@ -21,7 +21,7 @@ from planning.experiments.paper_figures import (
     draw_redundancy,
     draw_viewpoints,
 )
-from planning.experiments.point_panels import Stage
+from planning.experiments.point_panels import PanelStage
 from planning.experiments.run import DARK, Outcome, run_experiment
 from planning.experiments.second_sequence import Doubled, double_density
 from planning.experiments.setups import Experiment, box_experiment, face_experiment
@@ -92,7 +92,7 @@ def experiment_of(options: Mapping[str, Any]) -> Experiment:
 
 
 def _save(outcome: Outcome, doubled: Doubled | None, folder: Path) -> list[str]:
-    stage = Stage(outcome.experiment.mesh)
+    stage = PanelStage(outcome.experiment.mesh)
     pictures = {
         "cameras.png": draw_camera_images(outcome),
         "viewpoints.png": draw_viewpoints(outcome, stage),

@@ -18,13 +18,13 @@ from planning.verify.reconstruction.render.view import view
 from planning.verify.reconstruction.single_shot.single_shot_rig import drawn_lines
 
 from .paper_devices import CAMERA_PX
-from .point_errors import Measured
+from .point_errors import MeasuredErrors
 from .point_panels import (
     KEPT,
     PROJECTORS,
     REMOVED,
     RINGS,
-    Stage,
+    PanelStage,
     captioned,
     chosen_colours,
     colour_bar,
@@ -94,7 +94,7 @@ def draw_camera_images(outcome: Outcome) -> Image.Image:
     return side_by_side(panels, columns=2)
 
 
-def draw_viewpoints(outcome: Outcome, stage: Stage) -> Image.Image:
+def draw_viewpoints(outcome: Outcome, stage: PanelStage) -> Image.Image:
     """Return the points of each viewpoint, coloured by ring: the paper's Fig. 7."""
     clouds = (outcome.single, *outcome.viewpoints)
     legend = [
@@ -113,7 +113,7 @@ def draw_viewpoints(outcome: Outcome, stage: Stage) -> Image.Image:
     return side_by_side(panels, columns=3)
 
 
-def draw_redundancy(outcome: Outcome, stage: Stage) -> Image.Image:
+def draw_redundancy(outcome: Outcome, stage: PanelStage) -> Image.Image:
     """Return what is removed and what stays, merged: the paper's Figs. 8 and 9."""
     everything, merged = outcome.union.cloud, outcome.merged.cloud
     stays = outcome.stays
@@ -136,13 +136,13 @@ def draw_redundancy(outcome: Outcome, stage: Stage) -> Image.Image:
     return side_by_side(panels, columns=2)
 
 
-def draw_errors(outcome: Outcome, stage: Stage) -> Image.Image:
+def draw_errors(outcome: Outcome, stage: PanelStage) -> Image.Image:
     """Return signed errors of one viewpoint and of the merged cloud, and their scale.
 
     The ground truth that the authors did not have.
     """
 
-    def panel(one: Measured) -> Image.Image:
+    def panel(one: MeasuredErrors) -> Image.Image:
         p95 = one.errors.p95_m
         far = "no point" if p95 is None else f"95 % within {_MM * p95:.3f} mm"
         colours = signed_colours(_MM * one.distances, _ERROR_MM)
@@ -153,7 +153,9 @@ def draw_errors(outcome: Outcome, stage: Stage) -> Image.Image:
     return side_by_side(panels, columns=2, foot=bar)
 
 
-def draw_densities(first: Measured, both: Measured, stage: Stage) -> Image.Image:
+def draw_densities(
+    first: MeasuredErrors, both: MeasuredErrors, stage: PanelStage
+) -> Image.Image:
     """Return the points of one sequence beside those of two."""
     panels = [
         stage.panel(

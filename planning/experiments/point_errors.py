@@ -59,7 +59,7 @@ class Errors:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredErrors:
     """A cloud held to the truth.
 
     Attributes:
@@ -86,7 +86,7 @@ def measured(
     mesh: TriangleMesh,
     samples: SurfaceSamples,
     gap_m: float,
-) -> Measured:
+) -> MeasuredErrors:
     """Hold a cloud to the truth.
 
     Args:
@@ -97,8 +97,8 @@ def measured(
         gap_m: Ring gap that completeness is counted by [m].
     """
     if len(cloud) == 0:
-        return Measured(name, cloud, np.zeros(0), (0.0, 0.0))
+        return MeasuredErrors(name, cloud, np.zeros(0), (0.0, 0.0))
     apart = nearest_distance(cloud, samples, 1.01 * gap_m)
     distances = measure_accuracy(cloud, mesh, threads=1).distances
     half, whole = (float(np.mean(apart <= part * gap_m)) for part in (0.5, 1.0))
-    return Measured(name, cloud, distances, (half, whole))
+    return MeasuredErrors(name, cloud, distances, (half, whole))

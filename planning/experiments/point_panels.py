@@ -13,8 +13,8 @@ from planning.report.drawing.draw_views import (
     BACKGROUND,
     SUPERSAMPLING,
     Colour,
+    PictureView,
     Shader,
-    View,
     fitted,
 )
 
@@ -49,7 +49,7 @@ _RADIUS_PX = 2
 Legend = Sequence[tuple[str, Colour]]
 
 
-class Stage:
+class PanelStage:
     """The object from the front, where clouds are drawn on it.
 
     Args:
@@ -68,7 +68,7 @@ class Stage:
         fine = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
         corners = mesh.corners.reshape(-1, 3)
         direction = bearing(20.0, 8.0)
-        self.view: View = fitted(
+        self.view: PictureView = fitted(
             corners, direction, UP, fine, margin_px=0.05 * min(fine)
         )
         colours = np.tile(np.array(_OBJECT, dtype=np.float64), (len(mesh.faces), 1))

@@ -14,8 +14,8 @@ from planning.verify.reconstruction.render.rendered import Progress
 from planning.verify.reconstruction.single_shot.single_shot_rig import shoot_rig
 
 from .one_image import LabelCount, Prior, judged_labels
-from .point_errors import Measured, measured
-from .ring_fates import RingFate, lit_and_seen, ring_fates
+from .point_errors import MeasuredErrors, measured
+from .ring_outcomes import RingOutcome, lit_and_seen, ring_outcomes
 from .setups import Experiment
 
 # The paper assumes that there is no light but the projectors'.
@@ -46,15 +46,15 @@ class Outcome:
     reconstruction: Reconstruction
     samples: SurfaceSamples
     visible: float
-    single: Measured
-    viewpoints: tuple[Measured, ...]
-    union: Measured
-    merged: Measured
-    fates: tuple[RingFate, ...]
+    single: MeasuredErrors
+    viewpoints: tuple[MeasuredErrors, ...]
+    union: MeasuredErrors
+    merged: MeasuredErrors
+    fates: tuple[RingOutcome, ...]
     labels: LabelCount | None
 
     @property
-    def clouds(self) -> tuple[Measured, ...]:
+    def clouds(self) -> tuple[MeasuredErrors, ...]:
         """Every cloud that was held to the truth, from few devices to all."""
         return (self.single, *self.viewpoints, self.union, self.merged)
 
@@ -128,7 +128,7 @@ def run_experiment(
         viewpoints,
         measured("all points", everything, mesh, samples, gap_m),
         measured("merged", merged, mesh, samples, gap_m),
-        ring_fates(plan, everything),
+        ring_outcomes(plan, everything),
         labels,
     )
 

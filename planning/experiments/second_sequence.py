@@ -14,7 +14,7 @@ from planning.model.plan import RigPlan
 from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.cloud import Cloud
 
-from .point_errors import Measured, measured
+from .point_errors import MeasuredErrors, measured
 from .run import Outcome, observable
 
 
@@ -27,8 +27,8 @@ class Doubled:
         both: All points of both; rings are numbered outwards through both.
     """
 
-    first: Measured
-    both: Measured
+    first: MeasuredErrors
+    both: MeasuredErrors
 
 
 def midway(radii: NDArray[np.float64]) -> NDArray[np.float64]:

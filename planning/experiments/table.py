@@ -7,7 +7,7 @@ import numpy as np
 
 from .one_image import LabelCount
 from .paper_devices import CAMERA_PX, PROJECTOR_PX
-from .point_errors import Errors, Measured
+from .point_errors import Errors, MeasuredErrors
 from .run import Outcome
 from .second_sequence import Doubled
 from .setups import Experiment
@@ -38,7 +38,7 @@ def setup_lines(experiment: Experiment) -> list[str]:
     ]
 
 
-def cloud_lines(clouds: Sequence[Measured]) -> list[str]:
+def cloud_lines(clouds: Sequence[MeasuredErrors]) -> list[str]:
     """Return a table of errors, a row for each cloud."""
     lines = [f"{'points of':24s}{_NUMBERS}{'half gap':>10s}{'one gap':>9s}"]
     for one in clouds:
@@ -139,7 +139,7 @@ def doubled_document(doubled: Doubled) -> dict[str, Any]:
     }
 
 
-def _cloud_document(one: Measured) -> dict[str, Any]:
+def _cloud_document(one: MeasuredErrors) -> dict[str, Any]:
     return {
         "name": one.name,
         "errors": one.errors.to_document(),

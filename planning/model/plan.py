@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 
 from .bodies import Body
-from .devices import PlannedCamera, PlannedProjector
 from .errors import PlanFileError
 from .files import sha256_of, write_together
+from .planned import PlannedCamera, PlannedProjector
 from .requirements import Requirements
 from .surface import Surface
 

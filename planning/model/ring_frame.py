@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
 
-from .devices import PlannedProjector
+from .planned import PlannedProjector
 
 
 def ring_frame(
@@ -39,12 +39,14 @@ def ring_frame(
 
 
 def shifted_frame(shift: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a frame moved in its x-y plane by a shift, shape (2,) [m]."""
     frame = np.eye(4)
     frame[:2, 3] = shift
     return frame
 
 
 def frame_along(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a frame whose z is a unit vector and whose x lies across +y."""
     x = np.cross([0.0, 1.0, 0.0], z)
     x /= np.linalg.norm(x)
     frame = np.eye(4)

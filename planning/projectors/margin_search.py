@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import moved_to
 from planning.scene.existing import movable
 from planning.scene.scene import Scene

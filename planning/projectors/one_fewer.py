@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.proofs.selection import cover_problem, required_rows
 from planning.scene import lighting
-from planning.scene.clearance import with_room
+from planning.scene.clearance import with_clearance
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projectors_around
 from solvers import solve_max_coverage
@@ -118,7 +118,7 @@ def one_fewer(
                 scale=scale,
                 site=site,
             )
-            between = with_room(scene, between)
+            between = with_clearance(scene, between)
             # They join the others: the best may be of both.
             offer = offer.joined(Offer(between, stages_of(between)))
         if nearest > near and start + 1 >= starts:

@@ -8,12 +8,12 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.ring_frame import moved_to
 from planning.proofs.selection import required_rows
 from planning.scene import lighting
-from planning.scene.clearance import lacks_room
+from planning.scene.clearance import lacks_clearance
 from planning.scene.lit import lit_margins, lit_stages
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -147,7 +147,7 @@ class _Lit:
         # Its body moves along, and what others light may change.
         projectors = [*self.projectors]
         projectors[p] = offered
-        if lacks_room(self.scene.among(projectors), offered):
+        if lacks_clearance(self.scene.among(projectors), offered):
             return None
         return self.margins(projectors)
 

@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.proofs.conflicts import LitCrowd, settle, settle_others
+from planning.model.planned import PlannedProjector
+from planning.proofs.conflicts import (
+    ProjectorInterference,
+    resolve_conflicts,
+    resolve_others,
+)
 from planning.proofs.selection import (
     BODIES_LEFT_OUT,
     Selection,
@@ -22,7 +26,7 @@ from planning.proofs.selection import (
     select_fewest,
 )
 from planning.scene import lighting
-from planning.scene.clearance import offered_with_room, with_room
+from planning.scene.clearance import candidates_with_clearance, with_clearance
 from planning.scene.existing import existing_projectors, movable
 from planning.scene.lit import lit_margins, lit_stages, merged
 from planning.scene.samples import Target
@@ -136,7 +140,7 @@ def plan_projectors(
             template, required.workspace, n, ring_offset=ring_offset, site=site
         )
 
-    candidates += offered_with_room(scene, n_candidates, lattice)
+    candidates += candidates_with_clearance(scene, n_candidates, lattice)
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
     if not np.any(stages == lighting.LIT):
@@ -150,13 +154,13 @@ def plan_projectors(
         ring_offset=ring_offset,
         site=site,
     )
-    around = with_room(scene, around)
+    around = with_clearance(scene, around)
     stages = np.concatenate([stages, lit_stages(scene, around, rows)], axis=1)
     candidates += around
     given = _n_given(scene)
 
     def finer(rows: Target) -> Offer:
-        more = offered_with_room(scene, _FINER * n_candidates, lattice)
+        more = candidates_with_clearance(scene, _FINER * n_candidates, lattice)
         more = candidates[:given] + more
         return Offer(more, lit_stages(scene, more, rows))
 
@@ -320,8 +324,8 @@ def _stage(
     most_area: NDArray[np.int64],
 ) -> ProjectorStage:
     lit, given = stages == lighting.LIT, _n_given(scene)
-    crowd, as_before = LitCrowd(candidates, rows, lit), selection
-    selection = settle(
+    crowd, as_before = ProjectorInterference(candidates, rows, lit), selection
+    selection = resolve_conflicts(
         crowd,
         lit,
         selection,
@@ -332,7 +336,7 @@ def _stage(
     if selection is not as_before:
         most_area = selection.chosen
     others = marginals(lit, selection, seed=scene.seed, given=given)
-    others = settle_others(
+    others = resolve_others(
         crowd, lit, others, len(selection.chosen), seed=scene.seed, given=given
     )
     proof = certificate(

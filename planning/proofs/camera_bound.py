@@ -33,7 +33,7 @@ from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 
 from .all_poses import ContinuousBound
-from .open_rows import mesh_reach, open_rows
+from .optimistic_coverage import mesh_reach, open_rows
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class CameraCells:
         self._scene, self._device, self._rows = scene, device, rows
         self._effort = effort
         self._limits = MeasurableCells(
-            rows, scene.requirements, device, pulse=scene.pulse
+            rows, scene.requirements, device, check_cancelled=scene.check_cancelled
         )
         near = scene.requirements.workspace.camera_radius_m[0]
         pairs = len(rows.target) * len(scene.mesh.faces)

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.scene.samples import Target
 from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
 from solvers.covers.cover import solve_max_coverage
@@ -27,7 +27,7 @@ _BUDGET = 1e8
 _HELD = 0.99
 
 
-class Crowd(Protocol):
+class Interference(Protocol):
     """Candidates, and what each covers with the bodies of some in the way."""
 
     @property
@@ -56,7 +56,7 @@ class Crowd(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class LitCrowd:
+class ProjectorInterference:
     """Projectors, and the samples that they light.
 
     Attributes:
@@ -97,8 +97,8 @@ class LitCrowd:
         return not any(collide(device, bodies) for device in devices)
 
 
-def settle(
-    crowd: Crowd,
+def resolve_conflicts(
+    crowd: Interference,
     covers: NDArray[np.bool_],
     selection: Selection,
     *,
@@ -159,8 +159,8 @@ def settle(
     )
 
 
-def settle_others(
-    crowd: Crowd,
+def resolve_others(
+    crowd: Interference,
     covers: NDArray[np.bool_],
     others: Marginals,
     taken: int,
@@ -172,11 +172,11 @@ def settle_others(
 
     Args:
         crowd: The candidates.
-        covers: As for `settle`.
+        covers: As for `resolve_conflicts`.
         others: Chosen without regard to bodies.
         taken: The count that is settled already.
         seed: Of the heuristics.
-        given: As for `settle`.
+        given: As for `resolve_conflicts`.
     """
     if not crowd.bodied:
         return others
@@ -211,7 +211,7 @@ class _Wanted:
 
 
 def _settled(
-    crowd: Crowd, n_candidates: int, chosen: NDArray[np.int64], wanted: _Wanted
+    crowd: Interference, n_candidates: int, chosen: NDArray[np.int64], wanted: _Wanted
 ) -> tuple[NDArray[np.int64], int]:
     """Return candidates that bear each other, and the rows that they cover."""
     standing = list(range(wanted.given))
@@ -242,7 +242,7 @@ def _settled(
 
 
 def _harmless(
-    crowd: Crowd, standing: list[int], every: list[int], spare: int
+    crowd: Interference, standing: list[int], every: list[int], spare: int
 ) -> NDArray[np.bool_]:
     """What candidates cover; nothing where they cost those that stand more than spare.
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.scene.existing import existing_projectors
 from planning.scene.lighting import LIT
 from planning.scene.lit import lit_stages

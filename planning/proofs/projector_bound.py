@@ -15,7 +15,7 @@ from geometry.devices import ParallelModel
 from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
@@ -27,7 +27,7 @@ from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 
 from .all_poses import ContinuousBound
-from .open_rows import mesh_reach, open_rows
+from .optimistic_coverage import mesh_reach, open_rows
 
 
 @dataclass(frozen=True)

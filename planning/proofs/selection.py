@@ -308,7 +308,7 @@ def _areas(by_count: list[dict[str, Any]], count: int, given: int) -> dict[str, 
     }
 
 
-class Stage(Protocol):
+class PlannedStage(Protocol):
     """What projector and camera stages have in common."""
 
     @property
@@ -322,7 +322,7 @@ class Stage(Protocol):
         ...
 
 
-_S = TypeVar("_S", bound=Stage)
+_S = TypeVar("_S", bound=PlannedStage)
 
 
 def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | None:

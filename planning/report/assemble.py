@@ -25,12 +25,12 @@ from planning.report.entries.ring_entries import (
 from planning.rings.ring_axes import widest_gap
 
 from .claims import Claims, Devices, make_claims
-from .draft import Draft
 from .entries import device_entries as entries
 from .marginal import camera_table, projector_table
+from .partial_plan import PartialPlan
 
 
-def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
+def write_plan(draft: PartialPlan, clock: Stopwatch) -> RigPlan:
     """Round the poses, recompute every claim from them, and write the document."""
     projectors = tuple(
         entries.rounded_projector(p, f"P{i}")
@@ -82,7 +82,9 @@ def write_plan(draft: Draft, clock: Stopwatch) -> RigPlan:
     return plan
 
 
-def _final_requirements(draft: Draft, claims: Claims, devices: Devices) -> Requirements:
+def _final_requirements(
+    draft: PartialPlan, claims: Claims, devices: Devices
+) -> Requirements:
     """State tau, one ring gap, and the reference sets as they are."""
     requirements = draft.scene.requirements
     workspace = replace(
@@ -97,7 +99,7 @@ def _final_requirements(draft: Draft, claims: Claims, devices: Devices) -> Requi
 
 
 def _document(
-    draft: Draft,
+    draft: PartialPlan,
     clock: Stopwatch,
     devices: Devices,
     claims: Claims,

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import lighting, measurability
+from planning.scene.camera_views import view_of
 from planning.scene.lit import lit_stages, margins_of
 from planning.scene.measured import (
     LitSamples,
@@ -19,7 +20,6 @@ from planning.scene.measured import (
 )
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.sights import view_of
 from planning.scene.standing import Device, blocked_by
 
 N_SAMPLES = 12_000
@@ -99,7 +99,9 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
     measured = _any(seen)
     reachable, furthest = _reachable_by_projectors(scene, devices, target, _any(lit))
     areas = _areas(scene, devices, target, reachable, lit, measured)
-    served = lighting.served_by(lit, margins_of(scene, devices.projectors, target))
+    served = lighting.assigned_projectors(
+        lit, margins_of(scene, devices.projectors, target)
+    )
     return Claims(
         _surface_areas(scene, devices),
         areas,

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
 from planning.model.ring_frame import ring_frame
 from planning.scene import measurability
+from planning.scene.camera_views import view_of
 from planning.scene.lighting import ring_coordinate
-from planning.scene.measurability import PairQuality, View
+from planning.scene.measurability import PairQuality, ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
-from planning.scene.sights import view_of
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
 from solvers.poses.axis_program import best_start, solve_axis
 
@@ -133,7 +133,7 @@ def _move(
 ) -> bool:
     """Move one axis if that is better; the judges keep what it then measures."""
     scene, projector = judges[0].scene, moved[p]
-    scene.pulse()
+    scene.check_cancelled()
     for axis in proposals(
         axis_program(scene, moved, p, judges[0].rows, judges[0].views)
     ):
@@ -189,7 +189,7 @@ def axis_program(
     projectors: Sequence[PlannedProjector],
     p: int,
     rows: LitSamples,
-    views: Sequence[View],
+    views: Sequence[ViewedSamples],
 ) -> AxisProgram:
     """State the axis program of projector p.
 
@@ -245,7 +245,7 @@ def _scores_of(
     which: Sequence[int],
     rows: LitSamples,
     chosen: NDArray[np.int64],
-    seen: Sequence[View],
+    seen: Sequence[ViewedSamples],
 ) -> NDArray[np.float64]:
     """Largest 1/(1 + e) of chosen samples by some projectors and every camera."""
     limits = scene.requirements.triangulation

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.scene import lighting
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -79,7 +79,7 @@ def cast_beam(
     found, faces, points = found[inside], faces[inside], points[inside]
     normals = scene.mesh.face_normals[faces]
     met = Target(SurfaceSamples(points, normals, faces, 0.0), scene.steep[faces])
-    stage = lighting.first_failure_in_the_open(
+    stage = lighting.first_failure_ignoring_occlusion(
         projector, met, scene.requirements.projector
     )
     lighting.mark_blocked(stage, projector, points, scene.standing)

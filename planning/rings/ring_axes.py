@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.scene import measurability
+from planning.scene.camera_views import view_of
 from planning.scene.lighting import ring_coordinate
-from planning.scene.measurability import Rings, View
+from planning.scene.measurability import Rings, ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples, rings_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.sights import view_of
 
 _AZIMUTHS = 16
 _SWEEPS = 2
@@ -99,7 +99,7 @@ def _inside_rings(projector: PlannedProjector, points: NDArray[np.float64]) -> b
 
 
 def _scores(
-    scene: Scene, rows: LitSamples, p: int, views: Sequence[View], rings: Rings
+    scene: Scene, rows: LitSamples, p: int, views: Sequence[ViewedSamples], rings: Rings
 ) -> NDArray[np.float64]:
     """Best |r.m| of projector p at each sample over the cameras; 0 if not measured."""
     limits = scene.requirements.triangulation

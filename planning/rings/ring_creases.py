@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.mesh.topology import face_pairs
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.scene import measurability
 from planning.scene.lighting import LIT, first_failure, light_on
 from planning.scene.samples import Target

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.scene.lighting import ring_coordinate
 from planning.scene.scene import Scene
 
@@ -121,7 +121,7 @@ class RingBeam:
 
 def ring_beam(scene: Scene, projector: PlannedProjector, creases: Creases) -> RingBeam:
     """Cast the light of a projector with evenly spaced rings."""
-    scene.pulse()
+    scene.check_cancelled()
     radii = projector.ring_radii
     edges = np.linspace(0.0, float(radii[-1]), CELLS * len(radii) + 1)
     profile = cast_beam(scene, projector, edges[1:], _AZIMUTHS)

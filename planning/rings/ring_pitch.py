@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.scene import measurability
-from planning.scene.lighting import served_by
+from planning.scene.lighting import assigned_projectors
 from planning.scene.lit import margins_of
-from planning.scene.measurability import View
+from planning.scene.measurability import ViewedSamples
 from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
 
@@ -24,7 +24,7 @@ _ROOM = 1.08
 def best_pitch(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    views: Sequence[View],
+    views: Sequence[ViewedSamples],
     rows: LitSamples,
 ) -> NDArray[np.float64]:
     """Return each projector's largest pitch among the cameras that measure a sample.
@@ -68,7 +68,7 @@ def users(
     The one that serves it, if a camera measures the sample with it, else the one whose
     rings lie widest in some camera's image.
     """
-    served = served_by(rows.lit, margins_of(scene, projectors, rows.target))
+    served = assigned_projectors(rows.lit, margins_of(scene, projectors, rows.target))
     own = pitch[np.arange(len(served)), served] > 0
     best = np.where(own, served, np.argmax(pitch, axis=1))
     return np.where(pitch.max(axis=1) > 0, best, -1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import lighting, measurability
 from planning.scene.measured import LitSamples, measured_by
 from planning.scene.samples import Target
@@ -58,7 +58,7 @@ def ring_shares(
         projector: With its final rings.
         cameras: As planned.
     """
-    scene.pulse()
+    scene.check_cancelled()
     profile = cast_beam(scene, projector, _INSIDE * projector.ring_radii, _AZIMUTHS)
     origins, rays = beam_rays(projector, profile.coordinates, profile.azimuths)
     drawn = lighting.in_panel(projector, origins + rays)

@@ -15,14 +15,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import measurability
+from planning.scene.camera_views import view_of
 from planning.scene.lighting import ring_coordinate
 from planning.scene.lit import merged
-from planning.scene.measurability import View
+from planning.scene.measurability import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
-from planning.scene.sights import view_of
 
 from .ring_creases import Creases, crease_errors, find_creases
 from .ring_limits import RingBeam, least_pitch_px, ring_beam
@@ -55,7 +55,7 @@ class _Draw:
     """Lit samples of target and surface, how cameras see them, and their best pitch."""
 
     rows: LitSamples
-    views: tuple[View, ...]
+    views: tuple[ViewedSamples, ...]
     pitch: NDArray[np.float64]
 
 

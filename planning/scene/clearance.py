@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.shapes.boxes import OrientedBox, boxes_overlap, triangles_touch
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
 
@@ -23,7 +23,7 @@ _MOST_OFFERED = 20
 _TOLD = 1000
 
 
-def lacks_room(scene: Scene, device: Device) -> str:
+def lacks_clearance(scene: Scene, device: Device) -> str:
     """Return what a device's body would touch or reach into; empty if nothing.
 
     The object, the body of another device, a keep-out volume; below the floor; out of
@@ -39,17 +39,17 @@ def lacks_room(scene: Scene, device: Device) -> str:
     return "" if device.existing else _zone_broken(scene.requirements.workspace, box)
 
 
-def with_room(scene: Scene, devices: Sequence[_D]) -> tuple[_D, ...]:
+def with_clearance(scene: Scene, devices: Sequence[_D]) -> tuple[_D, ...]:
     """Return the devices whose bodies have room among those that stand already."""
     kept: list[_D] = []
     for device in devices:
-        scene.pulse()
-        if not lacks_room(scene, device):
+        scene.check_cancelled()
+        if not lacks_clearance(scene, device):
             kept.append(device)
     return tuple(kept)
 
 
-def offered_with_room(
+def candidates_with_clearance(
     scene: Scene, n: int, offer: Callable[[int], tuple[_D, ...]]
 ) -> tuple[_D, ...]:
     """Return at least n candidates that have room, if a finer lattice has as many.
@@ -65,7 +65,7 @@ def offered_with_room(
     offered, most = n, _MOST_OFFERED * n
     while True:
         candidates = offer(offered)
-        kept = with_room(scene, candidates)
+        kept = with_clearance(scene, candidates)
         if len(kept) >= min(n, len(candidates)) or offered >= most:
             break
         more = np.ceil(1.1 * offered * n / max(len(kept), 1))
@@ -75,7 +75,7 @@ def offered_with_room(
     return kept
 
 
-def check_existing_room(
+def check_existing_clearance(
     scene: Scene, projector: PlannedProjector, camera: PlannedCamera
 ) -> None:
     """Refuse existing devices whose bodies touch each other or the object.
@@ -94,7 +94,7 @@ def check_existing_room(
         *existing_cameras(required, camera),
     )
     for device in devices:
-        if what := lacks_room(scene, device):
+        if what := lacks_clearance(scene, device):
             raise InfeasibleLimitsError(
                 f"existing {device.existing!r}: its body touches {what}, bodies must "
                 f"stand at least {1e3 * CLEARANCE_M:g} mm apart; correct its place or "
@@ -105,8 +105,8 @@ def check_existing_room(
 def _no_room(scene: Scene, candidates: Sequence[Device]) -> str:
     causes: list[str] = []
     for device in candidates[:: max(1, len(candidates) // _TOLD)]:
-        scene.pulse()
-        causes.append(lacks_room(scene, device))
+        scene.check_cancelled()
+        causes.append(lacks_clearance(scene, device))
     kind = "projector" if isinstance(candidates[0], PlannedProjector) else "camera"
     named = ", ".join(
         f"{what} {100.0 * causes.count(what) / len(causes):.0f} %"

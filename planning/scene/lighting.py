@@ -10,7 +10,7 @@ from geometry.devices import PinholeModel
 from geometry.lengths import lengths
 from geometry.poses import inverse, transform
 from geometry.rays.visibility import Visibility
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 
 from .samples import Target
@@ -31,7 +31,7 @@ INCIDENCE = CAUSES.index("projector_incidence")
 
 
 @dataclass(frozen=True, eq=False)
-class Light:
+class LightOnSamples:
     """One projector's light on n samples, before occlusion.
 
     Attributes:
@@ -48,9 +48,9 @@ class Light:
     tangent_cos: NDArray[np.float64]
     ring_coordinate: NDArray[np.float64]
 
-    def take(self, chosen: NDArray[np.int64]) -> "Light":
+    def take(self, chosen: NDArray[np.int64]) -> "LightOnSamples":
         """Return the light on some of the samples."""
-        return Light(
+        return LightOnSamples(
             self.directions[chosen],
             self.distances[chosen],
             self.incidence_cos[chosen],
@@ -59,7 +59,7 @@ class Light:
         )
 
 
-def light_on(projector: PlannedProjector, target: Target) -> Light:
+def light_on(projector: PlannedProjector, target: Target) -> LightOnSamples:
     """Return the light of a projector at samples, wherever they are."""
     points, normals = target.samples.points, target.samples.normals
     pose = projector.world_from_device
@@ -70,7 +70,7 @@ def light_on(projector: PlannedProjector, target: Target) -> Light:
     else:
         distances = lengths(offsets)
         directions = offsets / np.where(distances > 0, distances, 1.0)[:, None]
-    return Light(
+    return LightOnSamples(
         directions,
         distances,
         -np.einsum("ij,ij->i", normals, directions),
@@ -100,7 +100,7 @@ def first_failure(
     limits: ProjectorLimits,
     visibility: Visibility,
     *,
-    light: Light | None = None,
+    light: LightOnSamples | None = None,
     bodies: Sequence[Standing] = (),
 ) -> NDArray[np.int8]:
     """Return the index in `CAUSES` of the first limit that fails; `LIT` if none does.
@@ -116,7 +116,7 @@ def first_failure(
     Returns:
         Shape (n,).
     """
-    stage = first_failure_in_the_open(projector, target, limits, light=light)
+    stage = first_failure_ignoring_occlusion(projector, target, limits, light=light)
     clear = np.flatnonzero(stage == LIT)
     samples, pose = target.samples, projector.world_from_device
     blocked = visibility.blocked(
@@ -144,12 +144,12 @@ def mark_blocked(
     stage[lit[blocked]] = BLOCKED
 
 
-def first_failure_in_the_open(
+def first_failure_ignoring_occlusion(
     projector: PlannedProjector,
     target: Target,
     limits: ProjectorLimits,
     *,
-    light: Light | None = None,
+    light: LightOnSamples | None = None,
 ) -> NDArray[np.int8]:
     """Return what `first_failure` does, were there nothing in between."""
     light = light_on(projector, target) if light is None else light
@@ -181,7 +181,7 @@ def faces_away(projector: PlannedProjector, target: Target) -> NDArray[np.bool_]
     return behind > 1e-9 * np.abs(offsets).max(axis=0, initial=0.0).sum()
 
 
-def margins(light: Light, limits: ProjectorLimits) -> NDArray[np.float64]:
+def margins(light: LightOnSamples, limits: ProjectorLimits) -> NDArray[np.float64]:
     """Return min(theta_max - incidence, tangent angle - tau_min) in [rad], shape (n,).
 
     Where T1 is arbitrary, only the first term counts.
@@ -193,7 +193,9 @@ def margins(light: Light, limits: ProjectorLimits) -> NDArray[np.float64]:
     return np.where(light.tangent_cos > 0, np.minimum(margin, tangent), margin)
 
 
-def served_by(lit: NDArray[np.bool_], margin: NDArray[np.float64]) -> NDArray[np.int64]:
+def assigned_projectors(
+    lit: NDArray[np.bool_], margin: NDArray[np.float64]
+) -> NDArray[np.int64]:
     """Return the projector that serves each sample, -1 where none lights it.
 
     Args:
@@ -222,7 +224,7 @@ def in_panel(
 
 
 def _in_beam(
-    projector: PlannedProjector, points: NDArray[np.float64], light: Light
+    projector: PlannedProjector, points: NDArray[np.float64], light: LightOnSamples
 ) -> NDArray[np.bool_]:
     inside = light.ring_coordinate <= projector.ring_radii[-1]
     return inside & in_panel(projector, points)

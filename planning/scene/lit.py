@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from geometry.rays.rays import equal_parts
 from geometry.rays.visibility_matrix import visibility_matrix
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 
 from . import lighting
 from .open_stages import SampleColumns, open_stages
@@ -43,7 +43,7 @@ def _in_the_open(
     found = np.empty((len(projectors), len(target)), dtype=np.int8)
 
     def fill(part: slice) -> None:
-        scene.pulse()
+        scene.check_cancelled()
         for own in range(part.start, part.stop):
             found[own] = open_stages(projectors[own], samples, limits)
 

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from geometry.lengths import lengths
 from geometry.poses import inverse, transform
 from geometry.rays.visibility import Visibility
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 
-from .lighting import Light
+from .lighting import LightOnSamples
 from .samples import Target
 from .standing import Standing, blocked_by
 
@@ -43,7 +43,7 @@ _OCCLUDED, _COARSE = BLOCKED - 1, BLOCKED + 1
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class ViewedSamples:
     """One camera's view of n samples.
 
     Attributes:
@@ -60,9 +60,9 @@ class View:
     facing: NDArray[np.float64]
     jacobian: NDArray[np.float64]
 
-    def take(self, chosen: NDArray[np.int64]) -> "View":
+    def take(self, chosen: NDArray[np.int64]) -> "ViewedSamples":
         """Return the view of some of the samples."""
-        return View(
+        return ViewedSamples(
             self.stage[chosen],
             self.rays[chosen],
             self.distances[chosen],
@@ -77,7 +77,7 @@ def view(
     limits: CameraLimits,
     visibility: Visibility | None,
     bodies: Sequence[Standing] = (),
-) -> View:
+) -> ViewedSamples:
     """Return how a camera sees samples; without `visibility`, occlusion is left out.
 
     Args:
@@ -117,7 +117,7 @@ def view(
     jacobian = np.zeros((len(points), 3, 2))
     seen = stage == SEEN
     jacobian[seen] = pose[:3, :3] @ device.ray_jacobian(local[seen])
-    return View(stage, rays, distances, facing, jacobian)
+    return ViewedSamples(stage, rays, distances, facing, jacobian)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,9 +177,9 @@ class PairQuality:
 
 def pair_quality(
     normals: NDArray[np.float64],
-    light: Light,
+    light: LightOnSamples,
     rings: Rings,
-    seen: View,
+    seen: ViewedSamples,
     limits: TriangulationLimits,
 ) -> PairQuality:
     """Return |r.m|, s_N and pitch of a pair at samples."""

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 
 from . import lighting, measurability
-from .lighting import Light
+from .camera_views import CameraView, camera_views, joined_view, view_of
+from .lighting import LightOnSamples
 from .lit import lit_stages
 from .measurability import Rings
 from .samples import Target
 from .scene import Scene
-from .sights import Sight, joined_sight, sights_of, view_of
 
 # Seen by several cameras and worked on together: many calls on few rows are slow, and
 # much more leaves the cache.
@@ -34,7 +34,7 @@ class LitSamples:
 
     target: Target
     lit: NDArray[np.bool_]
-    lights: tuple[Light, ...]
+    lights: tuple[LightOnSamples, ...]
     rings: tuple[Rings, ...]
 
 
@@ -65,7 +65,7 @@ def measured_by(
     scene: Scene,
     cameras: Sequence[PlannedCamera],
     rows: LitSamples,
-    sights: Sequence[Sight] | None = None,
+    sights: Sequence[CameraView] | None = None,
 ) -> NDArray[np.bool_]:
     """Return which camera measures which sample with any projector, (n, n_cameras).
 
@@ -76,19 +76,19 @@ def measured_by(
         sights: Of these cameras on these samples, where they are at hand.
     """
     if sights is None:
-        sights = sights_of(scene, cameras, rows.target)
+        sights = camera_views(scene, cameras, rows.target)
     measured = np.zeros((len(rows.target), len(cameras)), dtype=bool)
     for first, last in _chunks(sights):
-        scene.pulse()
+        scene.check_cancelled()
         column = np.repeat(
             np.arange(first, last), [len(s.rows) for s in sights[first:last]]
         )
-        seen = joined_sight(sights[first:last])
+        seen = joined_view(sights[first:last])
         measured[seen.rows, column] = _measured(scene, seen, rows)
     return measured
 
 
-def _chunks(sights: Sequence[Sight]) -> Iterator[tuple[int, int]]:
+def _chunks(sights: Sequence[CameraView]) -> Iterator[tuple[int, int]]:
     """Ranges of cameras that together see about `_PAIRS` samples, or of one."""
     ends = np.cumsum([len(sight.rows) for sight in sights])
     first = 0
@@ -100,7 +100,7 @@ def _chunks(sights: Sequence[Sight]) -> Iterator[tuple[int, int]]:
         first = last
 
 
-def _measured(scene: Scene, sight: Sight, rows: LitSamples) -> NDArray[np.bool_]:
+def _measured(scene: Scene, sight: CameraView, rows: LitSamples) -> NDArray[np.bool_]:
     """Return which of the samples that are seen, by whatever cameras, are measured."""
     limits = scene.requirements.triangulation
     normals = rows.target.samples.normals
@@ -130,7 +130,7 @@ def furthest_failure(
     furthest = np.zeros(len(rows.target), dtype=np.int8)
     required = scene.requirements
     for camera in cameras:
-        scene.pulse()
+        scene.check_cancelled()
         seen = view_of(scene, camera, rows.target)
         furthest = np.maximum(furthest, seen.stage)
         clear = np.flatnonzero(seen.stage == measurability.SEEN)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 
 from .lighting import LIT

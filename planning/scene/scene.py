@@ -12,7 +12,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.rays.visibility import Visibility
-from geometry.repair.hollow import Shell, measure_shell
+from geometry.repair.hollow import MeshShell, measure_shell
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.workspace.view_tiles import Site
 
@@ -49,7 +49,7 @@ class Scene:
     requirements: Requirements
     seed: int
     threads: int
-    pulse: Callable[[], None] = lambda: None
+    check_cancelled: Callable[[], None] = lambda: None
     placed: tuple[Standing, ...] = ()
 
     @cached_property
@@ -78,7 +78,7 @@ class Scene:
         return Visibility(self.mesh, threads=self.threads)
 
     @cached_property
-    def shell(self) -> Shell:
+    def shell(self) -> MeshShell:
         """Whether the mesh is hollow, and what of it lies inside."""
         return measure_shell(self.visibility.caster)
 

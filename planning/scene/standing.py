@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.shapes.boxes import OrientedBox, boxes_overlap, lines_cross
 from planning.model.bodies import Body
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 
 Device = PlannedProjector | PlannedCamera

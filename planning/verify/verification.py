@@ -15,7 +15,7 @@ from planning.verify.audit.figure_claims import compare_figures, contradictions
 
 if TYPE_CHECKING:
     from geometry.mesh.sampling import SurfaceSamples
-    from planning.verify.audit.samples import AuditSamples
+    from planning.verify.audit.audit_samples import AuditSamples
     from planning.verify.reconstruction.check.check import Reconstruction
     from planning.verify.reconstruction.check.comparison import Prediction
 

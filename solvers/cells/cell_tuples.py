@@ -18,7 +18,7 @@ from solvers.status import WorkBudget
 
 from .cell_problem import WholeRows
 from .cell_store import CellStore
-from .cell_twigs import VOID, Twigs
+from .cell_subtrees import VOID, Subtrees
 
 _BATCH = 2048
 # Words that a batch's rows may take.
@@ -59,7 +59,7 @@ def refute_tuples(
         multipliers: Any non-negative integers of the store's rows; good ones prune.
         budget: Counted work.
     """
-    twigs = Twigs(whole, store, n_poses, multipliers)
+    twigs = Subtrees(whole, store, n_poses, multipliers)
     if twigs.root == VOID:
         return TupleAnswer(refuted=True, survivor=None, met=0)
     enough = Enough(whole, n_poses)
@@ -129,7 +129,7 @@ class Enough:
 
 
 def _weigh(
-    nodes: NDArray[np.int64], twigs: Twigs, enough: Enough
+    nodes: NDArray[np.int64], twigs: Subtrees, enough: Enough
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the multisets that remain, and what they serve at most."""
     nodes = nodes[np.all(nodes != VOID, axis=1)]
@@ -142,7 +142,7 @@ def _weigh(
 
 
 def _split(
-    nodes: NDArray[np.int64], twigs: Twigs
+    nodes: NDArray[np.int64], twigs: Subtrees
 ) -> tuple[NDArray[np.int64], NDArray[np.int64] | None]:
     """Split each multiset's coarsest twig; or return one that can't be split."""
     final = np.zeros(nodes.shape, dtype=bool)

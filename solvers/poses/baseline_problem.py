@@ -12,7 +12,7 @@ _Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Shell:
+class PositionShell:
     """Where camera centres may stand: a shell, a cone cut from it, a floor.
 
     Attributes:
@@ -114,7 +114,7 @@ class BaselineProblem:
     centres: _Array
     aims: _Array
     pairs: NDArray[np.int64]
-    shell: Shell
+    shell: PositionShell
     seams: SeamPoints
     kept: KeptPoints
     max_incidence: float

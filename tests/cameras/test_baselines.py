@@ -23,7 +23,7 @@ from planning.cameras.baselines.seams import (
     overlap_components,
     overlap_graph_connected,
 )
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 
 K = np.array([[800.0, 0.0, 319.5], [0.0, 800.0, 239.5], [0.0, 0.0, 1.0]])
 RESOLUTION = (640, 480)

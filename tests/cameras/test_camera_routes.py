@@ -25,8 +25,8 @@ from planning.cameras.camera_slides import reached_by_candidates, rows_to_slide_
 from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
 from planning.cameras.routes import Routes
 from planning.model.bodies import Body
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.projector_bound import Effort
 from planning.proofs.selection import required_rows

@@ -18,13 +18,13 @@ from planning.cameras.baselines.spread_problem import (
     best_rings,
     spread_problem,
 )
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.model.requirements import TriangulationLimits, Workspace
 from planning.model.zones import Box
 from planning.scene.measurability import (
     MEASURED,
     Rings,
-    View,
+    ViewedSamples,
     first_pair_failure,
     pair_quality,
 )
@@ -325,7 +325,9 @@ def test_what_rings_ask_is_what_measurability_says():
     t = np.linalg.norm(ray, axis=1)
     r, normal = ray / t[:, None], ball.normals[rows]
     jacobian = pose[:3, :3] @ DEVICE.ray_jacobian(ray @ pose[:3, :3])
-    view = View(np.zeros(len(rows)), r, t, -np.sum(r * normal, axis=1), jacobian)
+    view = ViewedSamples(
+        np.zeros(len(rows)), r, t, -np.sum(r * normal, axis=1), jacobian
+    )
     asked = TriangulationLimits(0.1, 0.1, 3e-4, 6.0)
     measured = np.zeros((len(rows), 2), dtype=bool)
     for k in range(2):

@@ -16,11 +16,11 @@ from planning.cameras.baselines.coverage_triangle import (
 from planning.cameras.baselines.limit_poses import Parts, limit_poses
 from planning.cameras.baselines.seams import adjacency
 from planning.cameras.baselines.spread_problem import SpreadLimits
-from planning.cameras.paper.paper_ground import Ground, Stand
 from planning.cameras.paper.paper_route import paper_route
 from planning.cameras.paper.paper_seeds import grown
 from planning.cameras.paper.ring_seeds import ring_seeds
-from planning.model.devices import PlannedCamera
+from planning.cameras.paper.route_problem import CameraSet, RouteProblem
+from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
 
@@ -117,7 +117,7 @@ class Body:
             "required": int(np.ceil(share * len(self.points))),
             **changes,
         }
-        return Ground(**values)
+        return RouteProblem(**values)
 
 
 def around(z, n=150, span=np.pi):
@@ -194,7 +194,7 @@ def test_a_ring_that_misses_a_part_grows_a_camera_over_it():
     )
     ground = body.ground()
     level = tuple(at(azimuth) for azimuth in np.arange(4) * np.pi / 2)
-    short = Stand(level, body.measure(level))
+    short = CameraSet(level, body.measure(level))
     assert short.rows == len(ring.points)
     more = grown(ground, short)
     assert len(more.cameras) == 5

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.report.entries.cost import cost_entry, cost_lines
 from planning.report.summary.summary import aim_angles

@@ -30,8 +30,8 @@ from planning.experiments.paper_figures import (
     draw_viewpoints,
 )
 from planning.experiments.point_errors import Errors
-from planning.experiments.point_panels import RINGS, Stage, signed_colours
-from planning.experiments.ring_fates import lit_and_seen, ring_fates
+from planning.experiments.point_panels import RINGS, PanelStage, signed_colours
+from planning.experiments.ring_outcomes import lit_and_seen, ring_outcomes
 from planning.experiments.run import DARK, Outcome, run_experiment
 from planning.experiments.second_sequence import double_density, midway, second_sequence
 from planning.experiments.setups import (
@@ -224,7 +224,7 @@ def test_fates_of_rings_on_a_plate_are_the_arcs_that_fit(light):
         [projector_entry("P1", light, straight, target, radii)],
         [camera_entry("C1", PRINTED, straight, target)],
     )
-    fates = ring_fates(plan, Cloud.empty())
+    fates = ring_outcomes(plan, Cloud.empty())
     width, height = (0.3072, 0.2304) if light == "parallel" else (0.5, 0.375)
     for fate, radius in zip(fates, radii, strict=True):
         assert fate.on_object == pytest.approx(arc(radius, width, height), abs=2e-3)
@@ -233,7 +233,7 @@ def test_fates_of_rings_on_a_plate_are_the_arcs_that_fit(light):
         # The lens looks past the plate, so that its image is no exact rectangle.
         assert fate.seen["C1"] == pytest.approx(seen, abs=0.03)
         assert fate.measured["C1"] == fate.measured_by_any == 0.0
-    everywhere = ring_fates(plan, on_plate(radii))
+    everywhere = ring_outcomes(plan, on_plate(radii))
     for fate in everywhere:
         assert fate.measured == fate.seen
         assert fate.measured_by_any == fate.seen["C1"]
@@ -312,7 +312,7 @@ def test_few_rings_make_false_edges_where_one_surface_hides_another(of_face, of_
 
 def test_as_printed_the_image_holds_a_fraction_of_the_rings(of_face):
     printed = face_experiment()
-    fates = ring_fates(printed.plan, Cloud.empty())
+    fates = ring_outcomes(printed.plan, Cloud.empty())
     outer = [fate for fate in fates if fate.ring == 2]
     assert all(max(fate.seen.values()) < 0.05 for fate in outer)
     inner = [fate for fate in fates if fate.ring == 0]
@@ -474,7 +474,7 @@ def test_camera_images_show_bright_rings_where_edges_were_measured(of_box):
 
 
 def test_figures_are_drawn_and_show_what_stays(of_box):
-    stage = Stage(of_box.experiment.mesh, (200, 150))
+    stage = PanelStage(of_box.experiment.mesh, (200, 150))
     for draw, size in (
         (draw_viewpoints, (600, 210)),
         (draw_redundancy, (400, 210)),
@@ -487,7 +487,7 @@ def test_figures_are_drawn_and_show_what_stays(of_box):
 
 
 def test_points_behind_the_object_are_not_drawn():
-    stage = Stage(box((0.1, 0.1, 0.1)), (100, 100))
+    stage = PanelStage(box((0.1, 0.1, 0.1)), (100, 100))
     red = np.array([[255.0, 0.0, 0.0]])
     front, back = (
         np.asarray(stage.panel("x", np.array([[0.0, y, 0.0]]), red)).astype(int)

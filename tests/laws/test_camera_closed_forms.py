@@ -21,7 +21,7 @@ from planning.cameras.baselines.coverage_triangle import (
     round_body_limit,
     sphere_band_limit,
 )
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
 from planning.scene.measurability import SEEN, view
 from planning.scene.samples import Target

@@ -16,11 +16,11 @@ from planning.model.progress import Stopwatch
 from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
-from planning.projectors.proved import prove_fewest
+from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import Effort
-from planning.report.draft import Order
+from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
-from planning.scene.lighting import LIT, served_by
+from planning.scene.lighting import LIT, assigned_projectors
 from planning.scene.lit import lit_stages, margins_of
 from solvers.poses.cone import max_margin_direction, smallest_cap
 
@@ -54,7 +54,7 @@ def planned(
     """Plan the projectors of a surface; shadows count where the effort says so."""
     asked = ASKED | {"max_projectors": 20, "target": "surface"}
     rig = load_rig("default", light)
-    order = Order(mesh, rig, asked | {"dominant_coverage": share}, 0, 2, ())
+    order = PlanRequest(mesh, rig, asked | {"dominant_coverage": share}, 0, 2, ())
     ready = prepared(order, Stopwatch())
     required = ready.scene.requirements
     limits = replace(
@@ -188,7 +188,7 @@ def served_normals(found, projectors):
     """Normals of the rows that each projector serves."""
     rows = found.stage.rows
     lit = lit_stages(found.scene, projectors, rows) == LIT
-    server = served_by(lit, margins_of(found.scene, projectors, rows))
+    server = assigned_projectors(lit, margins_of(found.scene, projectors, rows))
     return [rows.samples.normals[server == p] for p in range(len(projectors))]
 
 

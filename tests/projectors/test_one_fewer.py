@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from geometry.shapes.primitives import sphere
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.projectors.margin_search import widest_between
 from planning.projectors.one_fewer import Offer, one_fewer
 from planning.projectors.share_margin import margin_at_share

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box, sphere
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.projectors.projector_poses import _between, widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors

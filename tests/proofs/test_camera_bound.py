@@ -11,8 +11,8 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
 from planning.cameras.baselines.coverage_triangle import round_body_limit
 from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
-from planning.cameras.proved import bound_stage
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.cameras.proved_cameras import bound_stage
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing
 from planning.model.ring_frame import ring_frame
 from planning.proofs import all_poses
@@ -27,7 +27,7 @@ from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
-from planning.scene.lighting import Light
+from planning.scene.lighting import LightOnSamples
 from planning.scene.measurability import Rings
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
@@ -91,7 +91,7 @@ def everything_lit(scene, n):
     normals, one = target.samples.normals, np.ones(n)
     across = np.cross(normals, [0.3, 0.5, 0.8])
     across /= np.linalg.norm(across, axis=1)[:, None]
-    light = Light(-normals, one, one, 0.0 * one, 0.1 * one)
+    light = LightOnSamples(-normals, one, one, 0.0 * one, 0.1 * one)
     lit = np.ones((n, 1), dtype=bool)
     return LitSamples(target, lit, (light,), (Rings(across, 0.01 * one),))
 

@@ -9,7 +9,7 @@ import pytest
 from geometry.directions.cube_map import CubeMap
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.zones import Box
 from planning.proofs import projector_bound as continuous
 from planning.proofs.cells.direction_cells import DirectionTree

@@ -13,8 +13,8 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import grid, sphere
 from planning.cameras.camera_cover import CameraStage
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.report.advice import camera_relaxations
 from planning.report.advice.camera_demands import Demands, demands
@@ -30,10 +30,10 @@ from planning.report.claims import Devices, make_claims
 from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
 from planning.rig.rig import load_rig
+from planning.scene.camera_views import CandidateViews
 from planning.scene.measurability import CAUSES, MEASURED
 from planning.scene.measured import furthest_failure, lit_samples, measured_by
 from planning.scene.scene import Scene
-from planning.scene.sights import Sights
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 
@@ -364,7 +364,7 @@ def test_one_camera_is_enough_at_what_is_told_and_not_below(rig, world):
     scene, _, rows, cameras = world
     scene = tightened(scene, camera={"max_incidence": np.radians(40.0)})
     scene = replace(scene, requirements=replace(scene.requirements, coverage=0.6))
-    offered = Sights(scene, cameras)
+    offered = CandidateViews(scene, cameras)
     measured = measured_by(scene, cameras, rows)
     stage = CameraStage(tuple(cameras[:1]), offered, rows, measured, {}, {})
     told = " ".join(for_so_many(scene, rig, stage, 1))

@@ -22,7 +22,13 @@ from planning.report.drawing.draw import (
 )
 from planning.report.drawing.draw_devices import best_direction, device_figures
 from planning.report.drawing.draw_marks import Panel, round_length
-from planning.report.drawing.draw_views import BACKGROUND, Shader, View, facing, fitted
+from planning.report.drawing.draw_views import (
+    BACKGROUND,
+    PictureView,
+    Shader,
+    facing,
+    fitted,
+)
 from planning.report.drawing.draw_zones import ZONES, draw_zones, zone_figures
 
 K_PROJECTOR = [[2100.0, 0, 639.5], [0, 2100.0, 399.5], [0, 0, 1]]
@@ -213,7 +219,7 @@ def test_a_fitted_view_holds_every_point_and_is_tight():
 
 def test_a_sphere_is_a_disc_of_its_own_size():
     ball = sphere(0.1, (3.0, -2.0, 5.0))
-    view = View(ball.centre, *facing((1, -1, 1), (0, 0, 1)), (240, 200), 0.001)
+    view = PictureView(ball.centre, *facing((1, -1, 1), (0, 0, 1)), (240, 200), 0.001)
     shader = Shader(RayCaster(ball), np.full((len(ball.faces), 3), 200.0))
     seen = np.any(pixels(shader.shade(view)) < 250, axis=2)
     assert seen.sum() == pytest.approx(np.pi * 100**2, rel=0.01)
@@ -279,7 +285,7 @@ def test_colours_that_do_not_fit_are_refused(colours):
 
 def test_lines_behind_the_object_are_faint():
     ball = sphere()
-    view = View(np.zeros(3), *facing((0, -1, 0), (0, 0, 1)), (200, 200), 0.002)
+    view = PictureView(np.zeros(3), *facing((0, -1, 0), (0, 0, 1)), (200, 200), 0.002)
     ink = {}
     for y in (-0.5, 0.5):
         panel = Panel(Image.new("RGB", (200, 200), "white"), view)
@@ -339,7 +345,7 @@ def test_the_best_direction_looks_down_and_parts_the_devices(up):
 
 
 def test_labels_find_room_of_their_own():
-    view = View(np.zeros(3), *facing((0, -1, 0), (0, 0, 1)), (800, 800), 0.001)
+    view = PictureView(np.zeros(3), *facing((0, -1, 0), (0, 0, 1)), (800, 800), 0.001)
     panel = Panel(Image.new("RGB", (800, 800), "white"), view)
     for k in range(8):
         panel.label(np.array([0.004 * k, 0, 0]), f"C{k} 1100 mm", (0, 0, 0), size=12)
@@ -361,7 +367,7 @@ def test_scale_bars_have_round_lengths(room, length):
 
 
 def test_a_scale_bar_is_as_long_as_it_says():
-    view = View(np.zeros(3), *facing((0, -1, 0), (0, 0, 1)), (800, 600), 0.0007)
+    view = PictureView(np.zeros(3), *facing((0, -1, 0), (0, 0, 1)), (800, 600), 0.0007)
     panel = Panel(Image.new("RGB", (800, 600), "white"), view)
     panel.scale_bar(size=14)
     rows, columns = np.nonzero(pixels(panel.image)[:, :, 0] < 128)
@@ -380,7 +386,7 @@ def test_a_scale_bar_is_as_long_as_it_says():
     ],
 )
 def test_axes_point_where_the_file_has_them(towards, up, rightwards, upwards):
-    view = View(np.zeros(3), *facing(towards, up), (400, 400), 0.001)
+    view = PictureView(np.zeros(3), *facing(towards, up), (400, 400), 0.001)
     panel = Panel(Image.new("RGB", (400, 400), "white"), view)
     panel.axes(size=15)
     all_rows, all_columns = np.nonzero(pixels(panel.image).min(axis=2) < 200)
@@ -517,7 +523,7 @@ def test_zones_are_boxes_about_the_centre_of_the_object(plan):
 def test_a_zone_is_tinted_inside_its_outline_and_nowhere_else(plan):
     (press,) = zone_figures(zoned(plan, keep_out=[PRESS]))
     middle = press.corners.mean(axis=0)
-    view = View(middle, np.eye(3)[0], np.eye(3)[1], (400, 400), 2.5e-3)
+    view = PictureView(middle, np.eye(3)[0], np.eye(3)[1], (400, 400), 2.5e-3)
     panel = Panel(Image.new("RGB", view.size, BACKGROUND), view)
     draw_zones(panel, [press], RayCaster(plan.surface.mesh))
     drawn = pixels(panel.image)
@@ -536,7 +542,7 @@ def test_a_zone_is_tinted_inside_its_outline_and_nowhere_else(plan):
 def test_a_slab_seen_edge_on_is_a_line(plan):
     (ceiling,) = zone_figures(zoned(plan, mounting=[CEILING]))
     middle = ceiling.corners.mean(axis=0)
-    view = View(middle, np.eye(3)[0], np.eye(3)[2], (400, 400), 0.1)
+    view = PictureView(middle, np.eye(3)[0], np.eye(3)[2], (400, 400), 0.1)
     panel = Panel(Image.new("RGB", view.size, BACKGROUND), view)
     draw_zones(panel, [ceiling], RayCaster(plan.surface.mesh))
     rows, _ = np.nonzero(pixels(panel.image).sum(axis=2) < 3 * 255)

@@ -9,8 +9,8 @@ import pytest
 from geometry.devices import ParallelModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box, grid, joined, sphere
-from planning.model.devices import PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.report.entries.firing import schedule_line
 from planning.report.entries.overlaps import overlap_entries, shared_areas
@@ -18,13 +18,13 @@ from planning.rig.rig import load_rig
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.audit_samples import AuditSamples, draw_samples
 from planning.verify.audit.counts.overlap_claims import audit_overlaps, light_falls
 from planning.verify.audit.counts.schedule_claims import audit_schedule
 from planning.verify.audit.estimates import Estimator
 from planning.verify.audit.ledger import Ledger
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import Lamp
-from planning.verify.audit.samples import AuditSamples, draw_samples
+from planning.verify.audit.predicates.predicates import AuditProjector
 
 # A panel of 0.4 m a side.
 WIDE = ParallelModel((2000, 2000), 2e-4, (0.8, 1.2))
@@ -140,7 +140,7 @@ def test_what_is_drawn_beyond_the_last_ring_spoils_codes_too():
         own.points, own.normals, own.faces, steep, ones.astype(int), ones > 0, ones
     )
     lamps = [
-        Lamp(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
+        AuditProjector(p.device, p.world_from_device, p.world_from_ring, p.ring_radii)
         for p in pair
     ]
     shadow = Shadow(scene.mesh, threads=2)

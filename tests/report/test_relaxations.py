@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from geometry.shapes.primitives import grid, sphere
-from planning.model.devices import PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.rig import load_rig

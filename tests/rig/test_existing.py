@@ -9,14 +9,14 @@ import pytest
 
 from geometry.shapes.primitives import box, sphere
 from planning import load_rig, plan_rig
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import RequirementError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing, Requirements
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
-from planning.projectors.proved import prove_fewest
+from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import Effort
 from planning.proofs.selection import marginals, select_fewest
 from planning.report.claims import Devices, make_claims

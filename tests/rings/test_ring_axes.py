@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.advice.relaxations import reachability_relaxations

@@ -9,7 +9,7 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import box, sphere
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
 from planning.rings import ring_pitch

@@ -18,36 +18,44 @@ from geometry.shapes.boxes import (
 )
 from geometry.shapes.primitives import grid
 from planning import load_rig
-from planning.cameras.camera_bodies import MeasuredCrowd, settled_cover
+from planning.cameras.camera_bodies import CameraInterference, resolved_cover
 from planning.cameras.camera_cover import CameraCover
 from planning.cameras.camera_slides import measured_among
 from planning.model.bodies import Body
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing, Requirements
 from planning.model.zones import Box
 from planning.projectors.projector_poses import _Lit
-from planning.proofs.conflicts import LitCrowd, settle, settle_others
+from planning.proofs.conflicts import (
+    ProjectorInterference,
+    resolve_conflicts,
+    resolve_others,
+)
 from planning.proofs.selection import marginals, select_fewest
 from planning.report.drawing.draw_devices import device_figures
 from planning.scene import lighting, measurability
-from planning.scene.clearance import check_existing_room, lacks_room, offered_with_room
+from planning.scene.camera_views import camera_views
+from planning.scene.clearance import (
+    candidates_with_clearance,
+    check_existing_clearance,
+    lacks_clearance,
+)
 from planning.scene.lit import lit_stages
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
-from planning.scene.sights import sights_of
 from planning.scene.standing import bodies_of
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.blocks import Block, block_of
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
     PROJECTOR_BODY,
-    Eye,
-    Lamp,
+    AuditCamera,
+    AuditProjector,
     light_steps,
     sight_steps,
 )
-from planning.verify.audit.samples import AuditSamples
 from planning.verify.reconstruction.render.occluders import Both, obstacles_of
 
 # ---- boxes
@@ -203,7 +211,7 @@ def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
     assert np.array_equal(single, expected)
     # The audit and the check from pixels, each with code of its own.
     samples = audit_samples(target)
-    shade = Lamp(
+    shade = AuditProjector(
         lamp.device, lamp.world_from_device, lamp.world_from_ring, lamp.ring_radii
     )
     limits = scene.requirements.projector
@@ -237,11 +245,11 @@ def test_a_body_before_a_camera_hides_the_same_rectangle_but_never_its_own(scene
     assert np.array_equal(
         stage, np.where(dark, measurability.BLOCKED, measurability.SEEN)
     )
-    over, own = sights_of(among, [blind, eye], target)
+    over, own = camera_views(among, [blind, eye], target)
     assert np.array_equal(over.rows, np.flatnonzero(~dark))
-    assert np.array_equal(own.rows, sights_of(scene, [eye], target)[0].rows)
+    assert np.array_equal(own.rows, camera_views(scene, [eye], target)[0].rows)
     samples = audit_samples(target)
-    looks = Eye(LENS, blind.world_from_device, (block_of(eye),))
+    looks = AuditCamera(LENS, blind.world_from_device, (block_of(eye),))
     steps = sight_steps(looks, samples, limits, Shadow(scene.mesh, threads=1))
     assert np.array_equal(steps == CAMERA_BODY, dark)
 
@@ -290,10 +298,10 @@ SQUARE = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 def test_what_a_body_may_not_touch_is_named(scene, changes, moved, what):
     lamp = projector(0.5, 0.3, 0.04, body=HOUSING)
     space = with_space(scene, **changes).among([lamp])
-    assert lacks_room(space, camera(**moved)) == what
+    assert lacks_clearance(space, camera(**moved)) == what
     if not moved and what:
         # Devices that stand already may stand beyond the floor and the zones.
-        assert lacks_room(space, replace(camera(), existing="old")) == ""
+        assert lacks_clearance(space, replace(camera(), existing="old")) == ""
 
 
 def test_lattices_are_refined_until_enough_have_room(scene):
@@ -304,7 +312,7 @@ def test_lattices_are_refined_until_enough_have_room(scene):
         asked.append(n)
         return tuple(camera(z=z) for z in np.linspace(0.2, 1.0, n))
 
-    kept = offered_with_room(low, 10, offer)
+    kept = candidates_with_clearance(low, 10, offer)
     assert len(kept) >= 10
     assert asked[0] == 10
     assert len(asked) > 1
@@ -312,7 +320,7 @@ def test_lattices_are_refined_until_enough_have_room(scene):
     with pytest.raises(
         InfeasibleLimitsError, match=r"no camera of .* has room .* the floor 100 %"
     ):
-        offered_with_room(with_space(scene, floor_m=9.0), 10, offer)
+        candidates_with_clearance(with_space(scene, floor_m=9.0), 10, offer)
 
 
 def test_existing_bodies_that_overlap_are_refused(scene):
@@ -323,7 +331,7 @@ def test_existing_bodies_that_overlap_are_refused(scene):
     def checked(x):
         pair = (standing("left", 0.0), standing("right", x))
         required = replace(scene.requirements, existing=pair)
-        check_existing_room(
+        check_existing_clearance(
             replace(scene, requirements=required), projector(), camera()
         )
 
@@ -341,7 +349,7 @@ def crowd_of(devices, lit):
     n = len(lit)
     points = np.column_stack([np.linspace(-0.2, 0.2, n), np.zeros((n, 2))])
     rows = SimpleNamespace(samples=SimpleNamespace(points=points))
-    return LitCrowd(devices, rows, lit)  # type: ignore[arg-type]
+    return ProjectorInterference(devices, rows, lit)  # type: ignore[arg-type]
 
 
 def shares(*parts):
@@ -354,7 +362,7 @@ def shares(*parts):
 def settled(devices, lit, share, max_count=None):
     found = select_fewest(lit, share, max_count=max_count, seed=0)
     crowd = crowd_of(devices, lit)
-    selection = settle(crowd, lit, found, max_count=max_count, seed=0)
+    selection = resolve_conflicts(crowd, lit, found, max_count=max_count, seed=0)
     return found, selection, crowd
 
 
@@ -374,7 +382,7 @@ def test_two_that_would_collide_are_kept_apart(scene):
     assert (kept.best_rows, kept.status, kept.but_for_bodies) == (96, "optimal", None)
     assert not crowd.stand_together([0, 1])
     others = marginals(PARTS, kept, seed=0)
-    others = settle_others(crowd, PARTS, others, 2, seed=0)
+    others = resolve_others(crowd, PARTS, others, 2, seed=0)
     assert all(crowd.stand_together(c) for c in others.by_count.values())
     assert crowd.covers([0], [0, 1, 2]).sum(axis=0).tolist() == [50, 0, 46]
 
@@ -427,7 +435,7 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
     dark = np.all((points > low) & (points < high), axis=1)
     among = scene.among([lamp])
 
-    crowd = MeasuredCrowd(among, (lamp,), eyes, rows, measured)
+    crowd = CameraInterference(among, (lamp,), eyes, rows, measured)
     assert not crowd.stand_together([0, 1])
     assert crowd.stand_together([1, 3])
     assert crowd.covers([1], [0, 1]).sum(axis=0).tolist() == [0, len(dark)]
@@ -565,4 +573,4 @@ def test_where_every_camera_keeps_something_dark_the_bodies_are_blamed(scene):
     offered = SimpleNamespace(cameras=eyes)
     cover = CameraCover(offered, rows, measured, selection)  # type: ignore[arg-type]
     with pytest.raises(InfeasibleLimitsError, match="each of 2 camera bodies"):
-        settled_cover(scene.among([lamp]), (lamp,), cover)
+        resolved_cover(scene.among([lamp]), (lamp,), cover)

@@ -5,7 +5,7 @@ import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits, Workspace
 from planning.model.ring_frame import ring_frame
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii

@@ -11,7 +11,7 @@ from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
 from geometry.rays.visibility import Visibility
 from geometry.shapes.primitives import grid, sphere
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
 from planning.scene.lighting import CAUSES, LIT
@@ -164,4 +164,4 @@ def test_margin_is_the_smaller_of_the_two_and_ties_go_to_the_lower_id():
     assert np.degrees(lighting.margins(arbitrary, LIMITS)) == pytest.approx(15.0)
     lit = np.array([[True, True], [True, True], [False, True], [False, False]])
     margin = np.array([[0.1, 0.1], [0.1, 0.2], [0.3, 0.1], [0.1, 0.1]])
-    assert lighting.served_by(lit, margin).tolist() == [0, 1, 1, -1]
+    assert lighting.assigned_projectors(lit, margin).tolist() == [0, 1, 1, -1]

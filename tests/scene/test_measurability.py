@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import inverse, look_at, transform
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
 from planning.scene.samples import Target

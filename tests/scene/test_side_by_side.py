@@ -10,7 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.shapes.primitives import box, grid, sphere
 from planning.cameras.camera_cover import offered_cameras
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.ring_frame import ring_frame
@@ -19,11 +19,11 @@ from planning.prepare import prepared
 from planning.projectors.one_fewer import Offer, one_fewer
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
-from planning.projectors.proved import prove_fewest
+from planning.projectors.proved_projectors import prove_fewest
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.projector_bound import Effort
 from planning.report.advice.wider_field import wider_field
-from planning.report.draft import Order
+from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
 from planning.scene.lighting import LIT
 from planning.scene.lit import lit_margins, lit_stages
@@ -58,7 +58,7 @@ def readied(mesh, light, incidence, most=9, share=0.99, **workspace):
     """The scene, the template and the offset of rings, limits as given in degrees."""
     asked = ASKED | {"max_projectors": most, "target": "surface"}
     asked |= {"dominant_coverage": share}
-    order = Order(mesh, load_rig("default", light), asked, 0, 2, ())
+    order = PlanRequest(mesh, load_rig("default", light), asked, 0, 2, ())
     ready = prepared(order, Stopwatch())
     required = ready.scene.requirements
     required = replace(

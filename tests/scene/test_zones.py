@@ -10,10 +10,10 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
 from geometry.shapes.primitives import box as plate_of
 from planning import load_rig, plan_rig
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import RequirementError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 from planning.scene.workspace.candidates import (
     camera_candidates,

@@ -8,9 +8,9 @@ import pytest
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.floors import receding
-from planning.verify.audit.predicates.predicates import Eye, Lamp
-from planning.verify.audit.samples import AuditSamples
+from planning.verify.audit.predicates.predicates import AuditCamera, AuditProjector
 from planning.verify.reconstruction.check.accuracy import Accuracy
 from planning.verify.reconstruction.check.comparison import (
     Confusion,
@@ -129,8 +129,8 @@ def test_how_fast_a_ring_recedes_is_the_incidence_along_it(degrees):
         *(np.ones(1, bool), np.ones(1)),
     )
     beam = ParallelModel((100, 100), pixel_pitch_m=1e-2, range_m=(0.1, 9.0))
-    lamp = Lamp(beam, np.eye(4), np.eye(4), np.array([0.05, 0.2]))
+    lamp = AuditProjector(beam, np.eye(4), np.eye(4), np.array([0.05, 0.2]))
     pose = look_at(camera, point[0], np.array([1.0, 0.0, 0.0]))
     lens = PinholeModel(np.diag([900.0, 900.0, 1.0]), (100, 100), range_m=(0.1, 9.0))
-    slant = receding(lamp, Eye(lens, pose), samples)
+    slant = receding(lamp, AuditCamera(lens, pose), samples)
     assert slant == pytest.approx(np.sin(tilt), abs=1e-12)

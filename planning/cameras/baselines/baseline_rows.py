@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 
 from .coverage_triangle import SeamAngles, baseline_parts, largest_baseline, seam_angles
 from .seams import Seam, adjacency, find_seam, neighbouring_pairs

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.zone_limits import stands
 from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.scene.workspace.zone_positions import admissible
 
 from .baseline_rows import check_seam

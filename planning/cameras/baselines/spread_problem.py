@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.zone_limits import half_spaces
 from planning.scene.workspace.zone_positions import is_zoned
@@ -18,8 +18,8 @@ from solvers.poses.baseline_problem import (
     BaselineProblem,
     HalfSpaces,
     KeptPoints,
+    PositionShell,
     SeamPoints,
-    Shell,
 )
 
 from .baseline_rows import check_seam, half_field
@@ -99,9 +99,9 @@ class SpreadLimits:
     spare_field: float = 0.0
 
 
-def camera_shell(workspace: Workspace) -> Shell:
+def camera_shell(workspace: Workspace) -> PositionShell:
     """Return where camera centres may stand."""
-    return Shell(
+    return PositionShell(
         np.array(workspace.centre),
         workspace.camera_radius_m,
         np.array(workspace.axis),

@@ -10,33 +10,33 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.camera_bodies import MeasuredCrowd, lit_among
+from planning.cameras.camera_bodies import CameraInterference, lit_among
 from planning.cameras.camera_cover import (
     ROUNDS,
     CameraCover,
     confirms,
     first_target,
     fresh_target,
-    n_given,
+    n_fixed,
     refuse_unmeasured,
     rows_for,
 )
 from planning.cameras.camera_slides import measured_among, slide_cameras, spread_limits
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection, cover_problem, required_rows
-from planning.scene.clearance import with_room
+from planning.scene.camera_views import CandidateViews
+from planning.scene.clearance import with_clearance
 from planning.scene.existing import movable
 from planning.scene.lit import merged
 from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
 from planning.scene.scene import Scene
-from planning.scene.sights import Sights
 from planning.scene.workspace.candidates import cameras_towards, middle_radius_m
 from solvers import solve_cover
 from solvers.covers.cover import solve_max_coverage
 
-from .paper_ground import Cameras, Ground
 from .paper_route import PaperRoute, paper_route
+from .route_problem import Cameras, RouteProblem
 
 # Samples that the route looks at; what it finds is judged on all.
 _ROWS = 1500
@@ -58,7 +58,7 @@ class Routed:
             measure.
     """
 
-    offered: Sights
+    offered: CandidateViews
     measured: NDArray[np.bool_]
     by_count: Mapping[int, NDArray[np.int64]]
     needed: int | None
@@ -80,7 +80,7 @@ class Routed:
 def cover_by_paper(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
-    offered: Sights,
+    offered: CandidateViews,
     by_count: Mapping[int, NDArray[np.int64]] | None = None,
 ) -> CameraCover:
     """Choose the cameras by the paper's route alone, confirmed on fresh samples.
@@ -123,7 +123,7 @@ def cover_by_paper(
 def route_among(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
-    offered: Sights,
+    offered: CandidateViews,
     rows: LitSamples,
     measured: NDArray[np.bool_],
 ) -> Routed:
@@ -149,7 +149,7 @@ def route_among(
             "the paper's route found no camera that measures a lit sample, though "
             "candidates do; plan with --cameras-by cover"
         )
-    joined, by_count = _joined(offered, route, n_given(scene))
+    joined, by_count = _joined(offered, route, n_fixed(scene))
     more = joined.cameras[len(offered.cameras) :]
     sights = joined.on(rows.target)[len(offered.cameras) :]
     theirs = measured_by(scene, more, rows, sights)
@@ -161,7 +161,7 @@ def route_among(
 
 def _judged(
     scene: Scene,
-    offered: Sights,
+    offered: CandidateViews,
     measured: NDArray[np.bool_],
     by_count: Mapping[int, NDArray[np.int64]],
     least: int,
@@ -180,20 +180,20 @@ def _judged(
 def _ground(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
-    offered: Sights,
+    offered: CandidateViews,
     rows: LitSamples,
     required: int,
-) -> Ground:
+) -> RouteProblem:
     samples, space = rows.target.samples, scene.safe_workspace
     template = movable(offered.cameras)[-1]
     site = scene.site("camera", template.device)
-    given = offered.cameras[: n_given(scene)]
+    given = offered.cameras[: n_fixed(scene)]
     spared = int(lit_among(projectors, rows, given).any(axis=1).sum())
 
     def stand(directions: NDArray[np.float64]) -> Cameras:
-        return with_room(scene, cameras_towards(template, space, directions, site))
+        return with_clearance(scene, cameras_towards(template, space, directions, site))
 
-    return Ground(
+    return RouteProblem(
         samples.points,
         samples.normals,
         _of_none(rows, lambda cameras: measured_by(scene, cameras, rows)),
@@ -231,8 +231,8 @@ def _of_none(
 
 
 def _joined(
-    offered: Sights, route: PaperRoute, given: int
-) -> tuple[Sights, dict[int, NDArray[np.int64]]]:
+    offered: CandidateViews, route: PaperRoute, given: int
+) -> tuple[CandidateViews, dict[int, NDArray[np.int64]]]:
     """The candidates with the route's cameras, and which are those of each count."""
     places: dict[int, int] = {}
     more: list[PlannedCamera] = []
@@ -261,7 +261,7 @@ def cover_of(
         rows: Lit samples that the route was judged on.
         found: The route.
     """
-    crowd = MeasuredCrowd(
+    crowd = CameraInterference(
         scene, projectors, found.offered.cameras, rows, found.measured
     )
     return CameraCover(
@@ -276,7 +276,7 @@ def cover_of(
 
 def _selection(scene: Scene, found: Routed) -> Selection:
     asked, measured = scene.requirements, found.measured
-    given = n_given(scene)
+    given = n_fixed(scene)
     required = required_rows(np.any(measured, axis=1), asked.coverage)
     problem = cover_problem(measured, required, given)
     bound = solve_cover(problem, seed=scene.seed, heaviest=False)

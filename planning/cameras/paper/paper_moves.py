@@ -4,7 +4,7 @@ import numpy as np
 
 from planning.cameras.baselines.limit_poses import limit_poses
 
-from .paper_ground import Cameras, Ground, Stand
+from .route_problem import Cameras, CameraSet, RouteProblem
 
 # Turns about the centre by which cameras close a gap [rad].
 _TURNS = np.radians([3.0, 8.0, 18.0])
@@ -17,9 +17,11 @@ _BISECTIONS = 8
 _CLOSABLE = 0.2
 
 
-def one_fewer(ground: Ground, stand: Stand, most: int = 3) -> Stand | None:
+def one_fewer(
+    ground: RouteProblem, stand: CameraSet, most: int = 3
+) -> CameraSet | None:
     """Return the best of one camera fewer, the gap closed; None where none may go."""
-    best: Stand | None = None
+    best: CameraSet | None = None
     for out in stand.least_missed(len(ground.given))[:most]:
         rest = stand.without(out)
         if ground.required - rest.rows <= _CLOSABLE * ground.required:
@@ -31,7 +33,7 @@ def one_fewer(ground: Ground, stand: Stand, most: int = 3) -> Stand | None:
     return best
 
 
-def _closed(ground: Ground, stand: Stand) -> Stand:
+def _closed(ground: RouteProblem, stand: CameraSet) -> CameraSet:
     """Move cameras over the gap until enough is measured, or too little helps."""
     for sweep in range(_SWEEPS):
         short = ground.required - stand.rows
@@ -45,7 +47,9 @@ def _closed(ground: Ground, stand: Stand) -> Stand:
     return stand
 
 
-def swept(ground: Ground, stand: Stand, *, to_limit: bool = False) -> Stand:
+def swept(
+    ground: RouteProblem, stand: CameraSet, *, to_limit: bool = False
+) -> CameraSet:
     """Move one camera after the other to where all together measure most."""
     for camera in range(len(ground.given), len(stand.cameras)):
         offered = _turned(ground, stand, camera)
@@ -55,7 +59,9 @@ def swept(ground: Ground, stand: Stand, *, to_limit: bool = False) -> Stand:
     return stand
 
 
-def _moved(ground: Ground, stand: Stand, camera: int, offered: Cameras) -> Stand:
+def _moved(
+    ground: RouteProblem, stand: CameraSet, camera: int, offered: Cameras
+) -> CameraSet:
     """Return the stand with a camera at the best of its poses, or as it was."""
     if not offered:
         return stand
@@ -66,11 +72,11 @@ def _moved(ground: Ground, stand: Stand, camera: int, offered: Cameras) -> Stand
         return stand
     cameras = list(stand.cameras)
     cameras[camera] = offered[best]
-    moved = Stand(tuple(cameras), ground.together(cameras))
+    moved = CameraSet(tuple(cameras), ground.together(cameras))
     return moved if moved.rows > stand.rows else stand
 
 
-def _turned(ground: Ground, stand: Stand, camera: int) -> Cameras:
+def _turned(ground: RouteProblem, stand: CameraSet, camera: int) -> Cameras:
     """Poses around one, turned about the centre."""
     centre = np.array(ground.limits.workspace.centre)
     pose = stand.cameras[camera].world_from_device
@@ -86,7 +92,7 @@ def _turned(ground: Ground, stand: Stand, camera: int) -> Cameras:
     return ground.stand(np.concatenate(turned))
 
 
-def _to_limit(ground: Ground, stand: Stand, camera: int) -> Cameras:
+def _to_limit(ground: RouteProblem, stand: CameraSet, camera: int) -> Cameras:
     """Poses of one at d_max from its neighbours."""
     parts = ground.parts(stand.measured)
     found = limit_poses(

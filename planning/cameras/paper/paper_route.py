@@ -11,9 +11,9 @@ Source: Lee and Krim, 2014, section VI; `docs/baselines.md`, *The two routes*.
 
 from dataclasses import dataclass
 
-from .paper_ground import Cameras, Ground, Stand
 from .paper_moves import one_fewer, swept
 from .paper_seeds import one_more, rank, rank_by_spare, seeds
+from .route_problem import Cameras, CameraSet, RouteProblem
 
 # Counts beyond the final one for which cameras are wanted.
 _MORE = 2
@@ -31,13 +31,13 @@ class PaperRoute:
         best_without_one: Most samples that one camera fewer was found to measure.
     """
 
-    stand: Stand
+    stand: CameraSet
     by_count: dict[int, Cameras]
     met: bool
     best_without_one: int
 
 
-def paper_route(ground: Ground) -> PaperRoute:
+def paper_route(ground: RouteProblem) -> PaperRoute:
     """Plan cameras by the largest baselines alone.
 
     Args:
@@ -51,7 +51,7 @@ def paper_route(ground: Ground) -> PaperRoute:
     stand, best_without_one = _best_start(ground, by_count)
     while len(stand.cameras) > len(ground.given):
         slid = ground.slide(stand.cameras)
-        stand = Stand(slid.cameras, slid.measured_by)
+        stand = CameraSet(slid.cameras, slid.measured_by)
         by_count[len(stand.cameras)] = stand.cameras
         fewer = one_fewer(ground, stand, most=1)
         best_without_one = max(best_without_one, 0 if fewer is None else fewer.rows)
@@ -65,7 +65,9 @@ def paper_route(ground: Ground) -> PaperRoute:
     return PaperRoute(stand, by_count, met, best_without_one)
 
 
-def _best_start(ground: Ground, by_count: dict[int, Cameras]) -> tuple[Stand, int]:
+def _best_start(
+    ground: RouteProblem, by_count: dict[int, Cameras]
+) -> tuple[CameraSet, int]:
     """What is left of the best ring, when none can go; and what one fewer measured.
 
     The ring that measures most isn't always the one that can spare a camera.
@@ -83,8 +85,8 @@ def _best_start(ground: Ground, by_count: dict[int, Cameras]) -> tuple[Stand, in
 
 
 def _fewest(
-    ground: Ground, stand: Stand, by_count: dict[int, Cameras]
-) -> tuple[Stand, int]:
+    ground: RouteProblem, stand: CameraSet, by_count: dict[int, Cameras]
+) -> tuple[CameraSet, int]:
     """Let cameras go as long as one can; and what was measured without one more."""
     while True:
         by_count[len(stand.cameras)] = stand.cameras
@@ -94,7 +96,7 @@ def _fewest(
         stand = fewer
 
 
-def _fill(ground: Ground, stand: Stand, by_count: dict[int, Cameras]) -> None:
+def _fill(ground: RouteProblem, stand: CameraSet, by_count: dict[int, Cameras]) -> None:
     """Note cameras for every count up to some more than the final one."""
     fewer = stand
     while len(fewer.cameras) > max(1, len(ground.given)):

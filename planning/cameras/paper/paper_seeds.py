@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .paper_ground import Ground, Stand
 from .ring_seeds import Ring, ring_seeds
+from .route_problem import CameraSet, RouteProblem
 
 _Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ _TRIED = 4
 _MOST = 64
 
 
-def seeds(ground: Ground) -> list[Stand]:
+def seeds(ground: RouteProblem) -> list[CameraSet]:
     """Rings that promise most, grown and thinned."""
     return [
         _thinned(ground, grown(ground, _bearing(ground, ring)))
@@ -26,7 +26,7 @@ def seeds(ground: Ground) -> list[Stand]:
     ]
 
 
-def _rings(ground: Ground) -> list[Stand]:
+def _rings(ground: RouteProblem) -> list[CameraSet]:
     """The most promising rings; at least the given cameras, where there is none."""
     space = ground.limits.workspace
     rings = list(
@@ -38,7 +38,7 @@ def _rings(ground: Ground) -> list[Stand]:
             ground.limits.max_incidence,
         )
     )
-    given = Stand(ground.given, ground.measure(ground.given))
+    given = CameraSet(ground.given, ground.measure(ground.given))
     stands = [given, *_stood(ground, rings, given)]
     thinned = [_thinned(ground, stand) for stand in stands]
     best: dict[int, None] = {}
@@ -48,7 +48,9 @@ def _rings(ground: Ground) -> list[Stand]:
     return [thinned[i] for i in best]
 
 
-def _stood(ground: Ground, rings: Sequence[Ring], given: Stand) -> list[Stand]:
+def _stood(
+    ground: RouteProblem, rings: Sequence[Ring], given: CameraSet
+) -> list[CameraSet]:
     """Rings with what their cameras measure, all looked at in one go."""
     groups = [ground.stand(ring.directions) for ring in rings]
     every = [camera for group in groups for camera in group]
@@ -57,7 +59,7 @@ def _stood(ground: Ground, rings: Sequence[Ring], given: Stand) -> list[Stand]:
     measured = ground.measure(every)
     ends = np.cumsum([len(group) for group in groups])
     return [
-        Stand(
+        CameraSet(
             (*given.cameras, *group),
             np.concatenate(
                 [given.measured, measured[:, end - len(group) : end]], axis=1
@@ -67,36 +69,36 @@ def _stood(ground: Ground, rings: Sequence[Ring], given: Stand) -> list[Stand]:
     ]
 
 
-def rank(ground: Ground, stand: Stand) -> tuple[int, int, int]:
+def rank(ground: RouteProblem, stand: CameraSet) -> tuple[int, int, int]:
     """Least for what meets the requirement with fewest, then for most measured."""
     short = max(ground.required - stand.rows, 0)
     return short, len(stand.cameras), -stand.rows
 
 
-def rank_by_spare(ground: Ground, stand: Stand) -> tuple[int, int, int]:
+def rank_by_spare(ground: RouteProblem, stand: CameraSet) -> tuple[int, int, int]:
     """The same, but last for what most is measured of with one camera fewer."""
     short, count, rows = rank(ground, stand)
     free = stand.least_missed(len(ground.given))
     return short, count, -stand.without(free[0]).rows if free else rows
 
 
-def _bearing(ground: Ground, stand: Stand) -> Stand:
+def _bearing(ground: RouteProblem, stand: CameraSet) -> CameraSet:
     """Those that bear each other's bodies, the one that measures most set first."""
     n_given = len(ground.given)
     together = ground.together(stand.cameras) if stand.cameras else stand.measured
     if np.array_equal(together, stand.measured):
         return stand
-    kept = Stand(ground.given, ground.together(ground.given))
+    kept = CameraSet(ground.given, ground.together(ground.given))
     order = np.argsort(-stand.measured[:, n_given:].sum(axis=0), kind="stable")
     for i in order:
         cameras = (*kept.cameras, stand.cameras[n_given + int(i)])
-        trial = Stand(cameras, ground.together(cameras))
+        trial = CameraSet(cameras, ground.together(cameras))
         if trial.rows > kept.rows:
             kept = trial
     return kept
 
 
-def grown(ground: Ground, stand: Stand) -> Stand:
+def grown(ground: RouteProblem, stand: CameraSet) -> CameraSet:
     """Return a stand with cameras added until enough is measured, or none helps."""
     while stand.rows < ground.required and len(stand.cameras) < _MOST:
         more = one_more(ground, stand)
@@ -106,7 +108,7 @@ def grown(ground: Ground, stand: Stand) -> Stand:
     return stand
 
 
-def one_more(ground: Ground, stand: Stand) -> Stand | None:
+def one_more(ground: RouteProblem, stand: CameraSet) -> CameraSet | None:
     """Return the stand with the camera that measures most of what is left."""
     left = np.flatnonzero(~stand.measured.any(axis=1))
     offered = ground.stand(_over(ground, left))
@@ -115,13 +117,13 @@ def one_more(ground: Ground, stand: Stand) -> Stand | None:
     gain = ground.measure(offered)[left].sum(axis=0)
     for i in np.argsort(-gain, kind="stable")[:_TRIED]:
         cameras = (*stand.cameras, offered[int(i)])
-        more = Stand(cameras, ground.together(cameras))
+        more = CameraSet(cameras, ground.together(cameras))
         if gain[i] and more.rows > stand.rows:
             return more
     return None
 
 
-def _over(ground: Ground, left: NDArray[np.int64]) -> _Array:
+def _over(ground: RouteProblem, left: NDArray[np.int64]) -> _Array:
     """Directions from the centre of places square over samples that face apart."""
     chosen: list[int] = []
     normals = ground.normals[left]
@@ -138,7 +140,7 @@ def _over(ground: Ground, left: NDArray[np.int64]) -> _Array:
     return places / np.linalg.norm(places, axis=1, keepdims=True)
 
 
-def _thinned(ground: Ground, stand: Stand) -> Stand:
+def _thinned(ground: RouteProblem, stand: CameraSet) -> CameraSet:
     """Drop cameras as long as the rest measures enough."""
     enough = min(ground.required, stand.rows)
     while len(stand.cameras) > len(ground.given):

@@ -49,9 +49,9 @@ class MeasurableCells:
         required: Requirements,
         device: PinholeModel,
         *,
-        pulse: Callable[[], None] = lambda: None,
+        check_cancelled: Callable[[], None] = lambda: None,
     ) -> None:
-        self._pulse = pulse
+        self._pulse = check_cancelled
         self._camera, self._pair = required.camera, required.triangulation
         self._image, self._focal = image_cone(device), device.focal_px
         normals = rows.target.samples.normals

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import measurability
-from planning.scene.measurability import CAUSES, SEEN, View
+from planning.scene.measurability import CAUSES, SEEN, ViewedSamples
 from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
 
-from .camera_knobs import STEEPEST, Knob, Pairs
+from .camera_knobs import STEEPEST, Pairs, Relaxation
 
 # An image no wider than so many times is worth asking for.
 _WIDER = 3
@@ -44,7 +44,7 @@ class Demands:
 
 
 def demands(
-    scene: Scene, camera: PlannedCamera, rows: LitSamples, knobs: tuple[Knob, ...]
+    scene: Scene, camera: PlannedCamera, rows: LitSamples, knobs: tuple[Relaxation, ...]
 ) -> Demands:
     """Return what lit samples ask of the limits at a camera's pose.
 
@@ -54,7 +54,7 @@ def demands(
         rows: Lit samples.
         knobs: Limits that may give way.
     """
-    scene.pulse()
+    scene.check_cancelled()
     sight = _sight(scene, camera, rows)
     limits, normals = scene.requirements.triangulation, rows.target.samples.normals
     furthest = sight.stage.copy()
@@ -89,13 +89,13 @@ class _Sight:
     Attributes:
         view: With no limits but what stands in between.
         clear: Whether nothing does.
-        stage: First limit of *seen* that fails, `SEEN` if none, as in a `View`.
+        stage: First limit of *seen* that fails, `SEEN` if none, as in a `ViewedSamples`.
         failed: Whether field, range, incidence and sampling distance fail, (4, n).
         off_axis: From the middle of the image [rad].
         sample_distance: z / (f cos(incidence)) [m].
     """
 
-    view: View
+    view: ViewedSamples
     clear: NDArray[np.bool_]
     stage: NDArray[np.int8]
     failed: NDArray[np.bool_]
@@ -157,7 +157,9 @@ def _failed(
     )
 
 
-def _lifted_view(scene: Scene, camera: PlannedCamera, rows: LitSamples) -> View:
+def _lifted_view(
+    scene: Scene, camera: PlannedCamera, rows: LitSamples
+) -> ViewedSamples:
     """How a camera would see samples without any limit but what stands between."""
     wide = replace(camera, device=_widened(camera.device))
     return measurability.view(

@@ -57,7 +57,7 @@ class Pairs:
 
 
 @dataclass(frozen=True, eq=False)
-class Knob:
+class Relaxation:
     """A limit that may give way, all others as they are.
 
     Attributes:
@@ -74,7 +74,7 @@ class Knob:
     say: Callable[[float], str]
 
 
-def knobs(rig: Rig, required: Requirements) -> tuple[Knob, ...]:
+def knobs(rig: Rig, required: Requirements) -> tuple[Relaxation, ...]:
     """Return every limit of the cameras that binds.
 
     Args:
@@ -92,9 +92,9 @@ def knobs(rig: Rig, required: Requirements) -> tuple[Knob, ...]:
     )
 
 
-def _incidence(required: Requirements) -> Knob:
+def _incidence(required: Requirements) -> Relaxation:
     now = np.degrees(required.camera.max_incidence)
-    return Knob(
+    return Relaxation(
         CAUSES.index("camera_incidence"),
         lambda pairs: np.degrees(pairs.incidence),
         _to_step(1.0),
@@ -102,7 +102,7 @@ def _incidence(required: Requirements) -> Knob:
     )
 
 
-def _depth(rig: Rig) -> tuple[Knob, ...]:
+def _depth(rig: Rig) -> tuple[Relaxation, ...]:
     """Sharpness: the blur that is let pass, or else the ends of the range."""
     table, device = rig.table.camera, rig.camera_device()
     allowed = (0.0, np.inf)
@@ -116,7 +116,7 @@ def _depth(rig: Rig) -> tuple[Knob, ...]:
 
 def _focus(
     table: PinholeTable, device: PinholeModel, allowed: tuple[float, float]
-) -> Knob | None:
+) -> Relaxation | None:
     """The blur that counts as sharp, where the range follows from it."""
     if table.focus is None or table.pixel_um is None:
         return None
@@ -143,18 +143,20 @@ def _focus(
             f"camera.focus.f_number = {stopped:.3g} (now {number:g})"
         )
 
-    return Knob(CAUSES.index("camera_range"), ask, _to_digits(3), say)
+    return Relaxation(CAUSES.index("camera_range"), ask, _to_digits(3), say)
 
 
-def _ends(ends: tuple[float, float], sharp: tuple[float, float]) -> tuple[Knob, ...]:
+def _ends(
+    ends: tuple[float, float], sharp: tuple[float, float]
+) -> tuple[Relaxation, ...]:
     """The ends of `range_mm`, where these and not the focus bind."""
-    cause, found = CAUSES.index("camera_range"), list[Knob]()
+    cause, found = CAUSES.index("camera_range"), list[Relaxation]()
     near, far = ends
     low, high = 1e3 * sharp[0], 1e3 * sharp[1]
     binds = (near > 0.0 and near >= sharp[0], far < np.inf and far <= sharp[1])
     if binds[0]:
         found.append(
-            Knob(
+            Relaxation(
                 cause,
                 lambda pairs: np.where(
                     pairs.distances <= sharp[1], -1e3 * pairs.distances, np.inf
@@ -165,7 +167,7 @@ def _ends(ends: tuple[float, float], sharp: tuple[float, float]) -> tuple[Knob, 
         )
     if binds[1]:
         found.append(
-            Knob(
+            Relaxation(
                 cause,
                 lambda pairs: np.where(
                     pairs.distances >= sharp[0], 1e3 * pairs.distances, np.inf
@@ -176,7 +178,7 @@ def _ends(ends: tuple[float, float], sharp: tuple[float, float]) -> tuple[Knob, 
         )
     if all(binds):
         found.append(
-            Knob(
+            Relaxation(
                 cause,
                 lambda pairs: np.maximum(
                     low - 1e3 * pairs.distances, 1e3 * pairs.distances - high
@@ -191,8 +193,8 @@ def _ends(ends: tuple[float, float], sharp: tuple[float, float]) -> tuple[Knob, 
     return tuple(found)
 
 
-def _field() -> Knob:
-    return Knob(
+def _field() -> Relaxation:
+    return Relaxation(
         CAUSES.index("camera_field"),
         lambda pairs: np.degrees(pairs.off_axis),
         _to_step(1.0),
@@ -203,12 +205,12 @@ def _field() -> Knob:
     )
 
 
-def _sampling(required: Requirements) -> tuple[Knob, ...]:
+def _sampling(required: Requirements) -> tuple[Relaxation, ...]:
     limit = required.camera.max_sample_distance_m
     if limit is None:
         return ()
     return (
-        Knob(
+        Relaxation(
             CAUSES.index("sample_distance"),
             lambda pairs: 1e3 * pairs.sample_distance,
             _to_digits(3),
@@ -219,9 +221,9 @@ def _sampling(required: Requirements) -> tuple[Knob, ...]:
     )
 
 
-def _conditioning(required: Requirements) -> Knob:
+def _conditioning(required: Requirements) -> Relaxation:
     now = required.triangulation.min_conditioning
-    return Knob(
+    return Relaxation(
         CAUSES.index("conditioning"),
         lambda pairs: np.where(
             pairs.conditioning >= _LEAST_CONDITIONING, -pairs.conditioning, np.inf
@@ -231,12 +233,12 @@ def _conditioning(required: Requirements) -> Knob:
     )
 
 
-def _sigma(required: Requirements) -> tuple[Knob, ...]:
+def _sigma(required: Requirements) -> tuple[Relaxation, ...]:
     limit = required.triangulation.max_sigma_m
     if limit is None:
         return ()
     return (
-        Knob(
+        Relaxation(
             CAUSES.index("sigma"),
             lambda pairs: 1e3 * pairs.sigma,
             _to_digits(3),
@@ -245,7 +247,7 @@ def _sigma(required: Requirements) -> tuple[Knob, ...]:
     )
 
 
-def _rings(rig: Rig, required: Requirements) -> tuple[Knob, ...]:
+def _rings(rig: Rig, required: Requirements) -> tuple[Relaxation, ...]:
     """The gap of the rings; the limit too where the gap doesn't follow from it."""
     limits, cause = required.triangulation, CAUSES.index("pitch")
     limit = limits.min_ring_pitch_px
@@ -255,7 +257,7 @@ def _rings(rig: Rig, required: Requirements) -> tuple[Knob, ...]:
         rig.projector_device(), rig.camera_device(), limits, rig.standoff_m
     )
     said = f"now {1e3 * gap:.3g}" + ("" if rig.ring_gap_m else ", chosen")
-    wider = Knob(
+    wider = Relaxation(
         cause,
         lambda pairs: 1e3 * gap * limit / np.maximum(pairs.pitch, 1e-12),
         _to_digits(3),
@@ -263,7 +265,7 @@ def _rings(rig: Rig, required: Requirements) -> tuple[Knob, ...]:
     )
     if rig.ring_gap_m is None:
         return (wider,)
-    closer = Knob(
+    closer = Relaxation(
         cause,
         lambda pairs: np.where(pairs.pitch >= _LEAST_PITCH_PX, -pairs.pitch, np.inf),
         _to_step(0.1),

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.camera_cover import CameraStage, NothingMeasuredError, n_given
-from planning.model.devices import PlannedCamera
+from planning.cameras.camera_cover import CameraStage, NothingMeasuredError, n_fixed
+from planning.model.planned import PlannedCamera
 from planning.proofs.selection import cover_problem, required_rows
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
@@ -28,7 +28,7 @@ from planning.scene.workspace.candidates import camera_candidates
 from solvers import solve_max_coverage
 
 from .camera_demands import demands
-from .camera_knobs import Knob, knobs
+from .camera_knobs import Relaxation, knobs
 
 _GAIN = 0.01
 # Rows that covers are looked for on, and what they cover beyond the requirement, so
@@ -180,7 +180,7 @@ class _Least:
         n: Samples.
     """
 
-    def __init__(self, turned: tuple[Knob, ...], n: int) -> None:
+    def __init__(self, turned: tuple[Relaxation, ...], n: int) -> None:
         self._knobs = turned
         self._asked = np.full((len(turned), n), np.inf)
         self.furthest = np.zeros(n, dtype=np.int8)
@@ -230,7 +230,7 @@ class _Covers:
         share = min(self.scene.requirements.coverage + _SPARE, 1.0)
         required = required_rows(np.any(measured, axis=1), share)
         best = solve_max_coverage(
-            cover_problem(measured, required, n_given(self.scene)),
+            cover_problem(measured, required, n_fixed(self.scene)),
             self.count,
             seed=self.scene.seed,
             budget=_BUDGET,
@@ -238,7 +238,7 @@ class _Covers:
         return bool(measured[:, best].any(axis=1).sum() >= required)
 
 
-def _least_enough(knob: Knob, covers: _Covers) -> float | None:
+def _least_enough(knob: Relaxation, covers: _Covers) -> float | None:
     """Return the least value of a knob, rounded, at which a cover is enough."""
     finite = covers.asked[np.isfinite(covers.asked)]
     values = np.unique(knob.rounded(finite)).tolist()

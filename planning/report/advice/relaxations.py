@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.projectors.projector_stage import NothingLitError
 from planning.scene import lighting
@@ -34,7 +34,7 @@ _GAIN = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Lifted:
+class LiftedLimit:
     """One limit out of force.
 
     Attributes:
@@ -128,7 +128,7 @@ def least_relaxations(
     for lifted in _limits(scene, projectors[0]):
         least = np.full(len(dark), np.inf)
         for projector in projectors:
-            scene.pulse()
+            scene.check_cancelled()
             stage = lighting.first_failure(
                 lifted.projector(projector),
                 dark,
@@ -147,7 +147,7 @@ def least_relaxations(
     return found
 
 
-def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
+def _limits(scene: Scene, template: PlannedProjector) -> tuple[LiftedLimit, ...]:
     limits, device = scene.requirements.projector, template.device
     near, far = (1e3 * edge for edge in device.range_m)
     now = np.degrees([limits.max_incidence, limits.min_tangent_angle])
@@ -173,7 +173,7 @@ def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
         return np.where(away >= near, away, np.inf)
 
     return (
-        Lifted(
+        LiftedLimit(
             lambda value: (
                 f"limits.projector_max_incidence_deg = {value:.0f} (now {now[0]:g})"
             ),
@@ -181,7 +181,7 @@ def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
             replace(limits, max_incidence=max(limits.max_incidence, _STEEPEST)),
             incidence,
         ),
-        Lifted(
+        LiftedLimit(
             lambda value: (
                 f"limits.min_tangent_angle_deg = {-value:.0f} (now {now[1]:g})"
             ),
@@ -189,7 +189,7 @@ def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
             replace(limits, min_tangent_angle=0.0),
             along_steep,
         ),
-        Lifted(
+        LiftedLimit(
             lambda value: f"a projector sharp from {-value:.0f} mm (now {near:.0f})",
             lambda p: replace(
                 p, device=replace(p.device, range_m=(0.0, p.device.range_m[1]))
@@ -197,7 +197,7 @@ def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
             limits,
             nearer,
         ),
-        Lifted(
+        LiftedLimit(
             lambda value: f"a projector sharp to {value:.0f} mm (now {far:.0f})",
             lambda p: replace(
                 p, device=replace(p.device, range_m=(p.device.range_m[0], np.inf))
@@ -209,10 +209,10 @@ def _limits(scene: Scene, template: PlannedProjector) -> tuple[Lifted, ...]:
     )
 
 
-def field_limit(scene: Scene, template: PlannedProjector) -> Lifted:
+def field_limit(scene: Scene, template: PlannedProjector) -> LiftedLimit:
     """Return the field of projectors, image or beam, out of force."""
     parallel = isinstance(template.device, ParallelModel)
-    return Lifted(
+    return LiftedLimit(
         lambda value: (
             f"a beam of {value:.0f} mm about its axis"
             if parallel

@@ -6,7 +6,7 @@ from typing import Any
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.report.claims import Claims, Devices
-from planning.report.draft import Draft
+from planning.report.partial_plan import PartialPlan
 
 from .camera_relaxations import for_so_many, out_of_reach
 from .relaxations import reachability_relaxations
@@ -15,7 +15,7 @@ from .wider_field import wider_field
 
 def add_what_helps(
     document: dict[str, Any],
-    draft: Draft,
+    draft: PartialPlan,
     devices: Devices,
     claims: Claims,
     clock: Stopwatch,
@@ -57,7 +57,7 @@ def falls_short(areas: dict[str, float], part: str, whole: str, share: float) ->
 
 
 def _add_for_so_many(
-    proofs: dict[str, Any], draft: Draft, asked: Requirements, clock: Stopwatch
+    proofs: dict[str, Any], draft: PartialPlan, asked: Requirements, clock: Stopwatch
 ) -> None:
     """What would let the cameras that are allowed be enough."""
     with _timed(clock):

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.selection import cover_problem, required_rows
 from planning.scene.lighting import LIT

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import transform
 from planning.model.bodies import Body
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .draw_views import facing
 

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 
-from .draw_views import SUPERSAMPLING, Colour, View
+from .draw_views import SUPERSAMPLING, Colour, PictureView
 
 INK: Colour = (30, 30, 34)
 PALE: Colour = (120, 120, 126)
@@ -38,7 +38,7 @@ class Panel:
     """
 
     image: Image.Image
-    view: View
+    view: PictureView
     taken: list[_Box] = field(default_factory=list[_Box])
 
     @property
@@ -213,7 +213,7 @@ def round_length(room: float) -> float:
 
 
 def _hidden(
-    points: NDArray[np.float64], view: View, caster: RayCaster | None
+    points: NDArray[np.float64], view: PictureView, caster: RayCaster | None
 ) -> NDArray[np.bool_]:
     """Whether the mesh lies between points of the world and the viewer, (n,)."""
     if caster is None:

@@ -24,7 +24,7 @@ _CREASE = np.cos(np.deg2rad(40.0))
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class PictureView:
     """An orthographic view of the world, +x right and +y down in the picture.
 
     Attributes:
@@ -90,7 +90,7 @@ def fitted(
     size: tuple[int, int],
     *,
     margin_px: float,
-) -> View:
+) -> PictureView:
     """Return the view from a direction that holds all points, as large as can be.
 
     Args:
@@ -108,7 +108,7 @@ def fitted(
     back = np.cross(right, upward)
     middle = 0.5 * (low + high)
     focus = middle[0] * right + middle[1] * upward + points.mean(axis=0) @ back * back
-    return View(focus, right, upward, size, m_per_px or 1.0)
+    return PictureView(focus, right, upward, size, m_per_px or 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class Shader:
     caster: RayCaster
     colours: NDArray[np.float64]
 
-    def shade(self, view: View) -> Image.Image:
+    def shade(self, view: PictureView) -> Image.Image:
         """Return the mesh as seen in a view, on the background colour."""
         mesh, (width, height) = self.caster.mesh, view.size
         picture = np.empty((height, width, 3), dtype=np.uint8)
@@ -137,7 +137,7 @@ class Shader:
         return Image.fromarray(picture)
 
     def _rays(
-        self, view: View, columns: NDArray[np.int64], rows: NDArray[np.int64]
+        self, view: PictureView, columns: NDArray[np.int64], rows: NDArray[np.int64]
     ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
         mesh, back = self.caster.mesh, view.to_viewer
         centre = 0.5 * np.array(view.size)
@@ -243,7 +243,7 @@ def checked_colours(
     return colours
 
 
-def _window(view: View, points: NDArray[np.float64]) -> list[tuple[int, int]]:
+def _window(view: PictureView, points: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Columns and rows of the picture that the points fall into."""
     pixels = view.project(points)
     low = np.clip(np.floor(pixels.min(axis=0)), 0, view.size).astype(int)
@@ -257,7 +257,7 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
-def _brightness(normals: NDArray[np.float64], view: View) -> NDArray[np.float64]:
+def _brightness(normals: NDArray[np.float64], view: PictureView) -> NDArray[np.float64]:
     back = view.to_viewer
     key = 0.62 * back - 0.5 * view.right + 0.6 * view.up
     fill = 0.5 * back + 0.8 * view.right - 0.1 * view.up

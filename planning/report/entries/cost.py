@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 
 # Stages of planning that place light, with what they need to know of the surface, and
 # those that place cameras.

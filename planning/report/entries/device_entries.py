@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
-from geometry.repair.hollow import Shell
+from geometry.repair.hollow import MeshShell
 from planning.model.bodies import body_entry
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.rounding import DECIMALS, rounded_pose
 from planning.report.claims import Claims
 from planning.scene.interest import Interest
@@ -79,7 +79,7 @@ def camera_entries(
     ]
 
 
-def mesh_entry(mesh: TriangleMesh, shell: Shell) -> dict[str, Any]:
+def mesh_entry(mesh: TriangleMesh, shell: MeshShell) -> dict[str, Any]:
     """Return one entry of the plan's `meshes`."""
     source = mesh.source
     if source is None:

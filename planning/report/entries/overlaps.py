@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.claims import N_SAMPLES
 from planning.scene import lighting
@@ -69,7 +69,7 @@ def shared_areas(
     """
     falls = np.zeros((len(target), len(projectors)))
     for column, projector in enumerate(projectors):
-        scene.pulse()
+        scene.check_cancelled()
         falls[:, column] = light_falls(scene, projector, target)
     return target.samples.weight * (falls.T @ falls)
 

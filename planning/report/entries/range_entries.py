@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from geometry.shapes.best_sphere import BestSphere
 from planning.cameras.baselines.baseline_rows import angles_and_fields
 from planning.cameras.baselines.coverage_triangle import largest_baseline
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.rig.range_guard import Guard
 from planning.scene.ranges.ranged_body import SIGNIFICANCE, RangedBody, told
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import fibonacci_cap, look_at
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.ring_frame import ring_frame
 

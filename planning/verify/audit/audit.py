@@ -40,9 +40,9 @@ from planning.verify.audit.predicates.recompute import (
 )
 from planning.verify.audit.rings.ring_claims import audit_rings
 
+from .audit_samples import AuditSamples, draw_samples
 from .estimates import Estimator
 from .ledger import Ledger, as_number
-from .samples import AuditSamples, draw_samples
 from .unmet import unmet_requirements
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .samples import AuditSamples
+from .audit_samples import AuditSamples
 
 # What is promised: 1 percentage point of the area that a claim is a share of.
 POINT = 0.01

@@ -34,7 +34,7 @@ _ROUND = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class GroupPart:
     """Selections of K sets, bounded.
 
     Attributes:
@@ -80,10 +80,10 @@ class PartBounds:
         self._target, self._budget = target, budget
         self._grid = 2.0 ** max(0.0, np.ceil(np.log2(self._total / _EXACT)))
 
-    def whole(self, shares: NDArray[np.float64]) -> Part:
+    def whole(self, shares: NDArray[np.float64]) -> GroupPart:
         """Return the part of all selections, not bounded yet."""
         n = len(self.covers)
-        return Part(
+        return GroupPart(
             np.zeros(n, dtype=bool),
             (),
             shares.astype(np.float32),
@@ -92,12 +92,12 @@ class PartBounds:
             np.inf,
         )
 
-    def lowered(self, parts: list[Part], steps: int) -> list[Part]:
+    def lowered(self, parts: list[GroupPart], steps: int) -> list[GroupPart]:
         """Return the parts with bounds as low as so many steps bring them.
 
         Bounds below the target are as good as any: the steps end there.
         """
-        bounded: list[Part] = []
+        bounded: list[GroupPart] = []
         live = parts
         for _ in range(0, steps, _ROUND):
             if not live or self._budget.exhausted:
@@ -111,7 +111,7 @@ class PartBounds:
         """Return the weight that sets cover."""
         return float(self._weights[self.covers[chosen].any(axis=0)].sum())
 
-    def _stepped(self, parts: list[Part]) -> list[Part]:
+    def _stepped(self, parts: list[GroupPart]) -> list[GroupPart]:
         """Some steps of the volume algorithm on all parts."""
         weights, aim = self._weights, 0.998 * self._target
         shares = np.stack([part.shares for part in parts]).astype(np.float64)
@@ -153,7 +153,7 @@ class PartBounds:
         ]
 
     def _bounds(
-        self, parts: list[Part], shares: NDArray[np.float64]
+        self, parts: list[GroupPart], shares: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
         """Return the bound of each part by its multipliers, and what is dearest."""
         steps = np.floor(shares * (self._weights / self._grid))
@@ -174,7 +174,9 @@ class PartBounds:
         )
         return self._total + self._grid * (paid - steps.sum(axis=1)), chosen
 
-    def _dearest(self, part: Part, prices: NDArray[np.float32]) -> NDArray[np.int64]:
+    def _dearest(
+        self, part: GroupPart, prices: NDArray[np.float32]
+    ) -> NDArray[np.int64]:
         """Return the dearest selection of a part."""
         picks = [int(group[np.argmax(prices[group])]) for group in part.groups]
         left = self.n_sets - len(picks)

@@ -23,7 +23,7 @@ from solvers.covers.answers import NONE
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
 
-from .group_bounds import Part, PartBounds
+from .group_bounds import GroupPart, PartBounds
 from .incumbent import Incumbent
 
 # Larger covers aren't searched: the dense copy takes four bytes an entry, the table
@@ -103,7 +103,7 @@ class _Tree(Incumbent[NDArray[np.int64]]):
         super().__init__(cover, target, first=first)
         self.cover, self.n_sets, self.budget = cover, n_sets, budget
         self._names = count()
-        self._open: list[tuple[float, int, Part]] = []
+        self._open: list[tuple[float, int, GroupPart]] = []
         self.bounds = PartBounds(cover, n_sets, target, budget)
         self._alike = _likeness(self.bounds.covers, cover.weights)
 
@@ -117,7 +117,7 @@ class _Tree(Incumbent[NDArray[np.int64]]):
                 left = min(-self._open[0][0], self.cover.total)
                 upper = max(self.weight, left // self.cover.grain * self.cover.grain)
                 return GroupSearch(self.selected, self.weight, upper, complete=False)
-            split: list[Part] = []
+            split: list[GroupPart] = []
             while self._promising and len(split) < _BATCH:
                 split += self._children(heapq.heappop(self._open)[2])
             self._take(split, _STEPS)
@@ -128,9 +128,9 @@ class _Tree(Incumbent[NDArray[np.int64]]):
         """Whether a part is open that may reach the target."""
         return bool(self._open) and -self._open[0][0] >= self.target
 
-    def _take(self, parts: list[Part], steps: int) -> None:
+    def _take(self, parts: list[GroupPart], steps: int) -> None:
         """Bound parts, look at what they would take, and keep those still open."""
-        still: list[Part] = []
+        still: list[GroupPart] = []
         for part in self.bounds.lowered(parts, steps):
             only = self._only(part)
             if only is not None:
@@ -144,7 +144,7 @@ class _Tree(Incumbent[NDArray[np.int64]]):
             if part.bound >= self.target:
                 heapq.heappush(self._open, (-part.bound, next(self._names), part))
 
-    def _only(self, part: Part) -> NDArray[np.int64] | None:
+    def _only(self, part: GroupPart) -> NDArray[np.int64] | None:
         """Return the selection that covers all that a part's can, if it is one."""
         if any(group.size > 1 for group in part.groups):
             return None
@@ -155,7 +155,7 @@ class _Tree(Incumbent[NDArray[np.int64]]):
         left = self.n_sets - taken.size
         return np.concatenate([taken, others]) if others.size <= left else None
 
-    def _children(self, part: Part) -> list[Part]:
+    def _children(self, part: GroupPart) -> list[GroupPart]:
         """Return the part without a group, and with at least one of it."""
         home, group = self._group(part)
         closed = part.closed.copy()
@@ -168,7 +168,7 @@ class _Tree(Incumbent[NDArray[np.int64]]):
         fewer = replace(part, closed=closed, groups=without)
         return [replace(part, groups=(*kept, group)), fewer]
 
-    def _group(self, part: Part) -> tuple[int, NDArray[np.int64]]:
+    def _group(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
         """Return sets to branch on, and the group of the part that holds them, or -1.
 
         Half of a set, by the running mean, splits evenly.
@@ -195,7 +195,7 @@ class _Tree(Incumbent[NDArray[np.int64]]):
                     best, chosen = worth, (int(home[centre]), group)
         return chosen if chosen[1].size else self._halves(part)
 
-    def _halves(self, part: Part) -> tuple[int, NDArray[np.int64]]:
+    def _halves(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
         """Half of the largest group, where no set of it is alike to some only."""
         i = int(np.argmax([group.size for group in part.groups]))
         return i, part.groups[i][: part.groups[i].size // 2]

@@ -26,7 +26,7 @@ Basis = tuple[list[Any], list[Any], list[Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class NodePart:
     """A part of the covers.
 
     Attributes:
@@ -46,7 +46,7 @@ class Part:
 class Node:
     """A part of the covers with its bound and what its program left."""
 
-    part: Part
+    part: NodePart
     bound: float
     basis: Basis
     primal: NDArray[np.float64]
@@ -72,7 +72,7 @@ class NodeProgram:
         self._solver.setOptionValue("presolve", "off")
         self._solver.setOptionValue("objective_bound", enough)
         whole = np.ones(rows.shape[1], dtype=bool)
-        self._whole = self._part = Part(whole, ~whole)
+        self._whole = self._part = NodePart(whole, ~whole)
         self._basic = highspy.HighsBasisStatus.kBasic
         self._basis = highspy.HighsBasis()
         self._measure()
@@ -88,7 +88,7 @@ class NodeProgram:
         self.rows = np.concatenate([self.rows, rows])
         self._measure()
 
-    def solve(self, part: Part, basis: Basis | None) -> Node | None:
+    def solve(self, part: NodePart, basis: Basis | None) -> Node | None:
         """Return a part bounded, or None where the budget ended before."""
         if self.budget.exhausted:
             return None
@@ -128,13 +128,13 @@ class NodeProgram:
         self._values = self.rows.astype(np.float64)
         self._entries = float(np.count_nonzero(self.rows) + sum(self.rows.shape))
 
-    def _served(self, part: Part) -> bool:
+    def _served(self, part: NodePart) -> bool:
         """Whether the sets allowed cover every row at all."""
         if not np.all(self._values @ part.allowed.astype(np.float64) > 0):
             return False
         return all(bool(np.any(row & part.allowed)) for row in part.added)
 
-    def _change(self, part: Part) -> None:
+    def _change(self, part: NodePart) -> None:
         """Bring the program from the part solved last to another."""
         old, self._part = self._part, part
         other = (part.allowed != old.allowed) | (part.taken != old.taken)

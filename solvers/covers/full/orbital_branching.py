@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .branching import Tree
-from .node_program import Node, Part
+from .node_program import Node, NodePart
 from .row_dominance import essential
 from .symmetry import column_orbits
 
@@ -53,7 +53,9 @@ class OrbitalTree(Tree):
         only = rest[rest.sum(axis=1) == 1].any(axis=0)
         if only.any() or columns.size < left.size or np.any(taken & ~part.taken):
             taken[left[columns[only]]] = True
-            return self._solved(node, Part(allowed, taken, symmetric=part.symmetric))
+            return self._solved(
+                node, NodePart(allowed, taken, symmetric=part.symmetric)
+            )
         return self._split(node, rest, left, allowed)
 
     def _split(
@@ -78,11 +80,11 @@ class OrbitalTree(Tree):
         fewer[orbit] = False
         return self._solved(
             node,
-            Part(fewer, part.taken, symmetric=symmetric),
-            Part(allowed, taken, symmetric=symmetric),
+            NodePart(fewer, part.taken, symmetric=symmetric),
+            NodePart(allowed, taken, symmetric=symmetric),
         )
 
-    def _solved(self, node: Node, *parts: Part) -> list[Node] | None:
+    def _solved(self, node: Node, *parts: NodePart) -> list[Node] | None:
         """Return parts of a node bounded, or None where the budget ended before."""
         nodes = [self.linear.solve(part, node.basis) for part in parts]
         return None if None in nodes else [n for n in nodes if n is not None]

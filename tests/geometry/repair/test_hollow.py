@@ -16,7 +16,7 @@ from geometry.repair.hollow import (
     HOLLOW,
     OPEN,
     SOLID,
-    Shell,
+    MeshShell,
     faces_inside,
     lies_inside,
     measure_shell,
@@ -107,7 +107,7 @@ def slotted(slot: float, depth: float, length: float) -> TriangleMesh:
 
 
 @cache
-def shell_of(name: str) -> tuple[TriangleMesh, Shell]:
+def shell_of(name: str) -> tuple[TriangleMesh, MeshShell]:
     mesh = BODIES[name]
     return mesh, measure_shell(RayCaster(mesh))
 

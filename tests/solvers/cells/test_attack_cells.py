@@ -7,7 +7,7 @@ import pytest
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.cells.shell_cells import spread

@@ -16,9 +16,9 @@ from solvers.cells.cell_bound import CellStatus, bound_count, multiplier_bound
 from solvers.cells.cell_multipliers import MultiplierSearch
 from solvers.cells.cell_problem import CellProblem, whole_rows
 from solvers.cells.cell_store import CellStore
+from solvers.cells.cell_subtrees import Subtrees
 from solvers.cells.cell_tree import ArrayTree
 from solvers.cells.cell_tuples import _split, refute_tuples
-from solvers.cells.cell_twigs import Twigs
 from solvers.status import WorkBudget
 
 DEG = np.pi / 180.0
@@ -177,7 +177,7 @@ def test_every_multiset_of_leaves_is_met_once(n_poses):
     for seed in range(3):
         tree, leaves, problem = random_case(seed)
         store = CellStore(tree, WorkBudget(PLENTY))
-        twigs = Twigs(
+        twigs = Subtrees(
             whole_rows(problem), store, n_poses, np.zeros(tree.n_rows, dtype=np.int64)
         )
         stack, ends = [np.full((1, n_poses), twigs.root)], []

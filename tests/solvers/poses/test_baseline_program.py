@@ -12,8 +12,8 @@ from solvers.poses.baseline_problem import (
     BaselineProblem,
     HalfSpaces,
     KeptPoints,
+    PositionShell,
     SeamPoints,
-    Shell,
 )
 from solvers.poses.baseline_program import build_baseline_program, solve_baseline
 from solvers.status import SolveStatus
@@ -45,7 +45,7 @@ def _problem(centres, **changes):
         "centres": np.array(centres, dtype=float),
         "aims": np.zeros((len(centres), 3)),
         "pairs": np.array([[0, 1]]),
-        "shell": Shell(np.zeros(3), (RING, RING), Z, np.pi, Z),
+        "shell": PositionShell(np.zeros(3), (RING, RING), Z, np.pi, Z),
         "seams": NO_SEAMS,
         "kept": NOTHING_KEPT,
         "max_incidence": THETA,
@@ -188,7 +188,9 @@ def test_what_is_past_a_limit_at_the_start_gets_no_worse():
 
 
 def test_workspace_and_step_bound_the_centres():
-    shell = Shell(np.zeros(3), (0.9, 1.2), np.array([1.0, 0, 0]), 0.6, Z, floor=0.1)
+    shell = PositionShell(
+        np.zeros(3), (0.9, 1.2), np.array([1.0, 0, 0]), 0.6, Z, floor=0.1
+    )
     start = [[1.0, -0.1, 0.2], [1.0, 0.1, 0.2]]
     solution = solve_baseline(_problem(start, shell=shell))
     distance = np.linalg.norm(solution.centres, axis=1)
@@ -288,7 +290,9 @@ def test_the_same_problem_gives_the_same_answer():
 
 
 def test_a_failed_solve_is_an_answer_without_a_point():
-    nowhere = Shell(np.zeros(3), (RING, RING), Z, 0.1, Z)  # No start lies in the cone.
+    nowhere = PositionShell(
+        np.zeros(3), (RING, RING), Z, 0.1, Z
+    )  # No start lies in the cone.
     hopeless = _problem([_on_ring(0.0), _on_ring(0.5)], shell=nowhere, max_step=0.01)
     solution = solve_baseline(hopeless)
     assert solution.status is SolveStatus.UNKNOWN

@@ -12,6 +12,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import box, grid, joined
 from planning.model.requirements import ProjectorLimits
+from planning.verify.audit.audit_samples import AuditSamples, draw_samples
 from planning.verify.audit.predicates.audit_optics import (
     pixel_gradient,
     ring_coordinate,
@@ -23,11 +24,10 @@ from planning.verify.audit.predicates.predicates import (
     LIT,
     PAIR_CAUSES,
     SIGHT_CAUSES,
-    Lamp,
+    AuditProjector,
     light_steps,
 )
 from planning.verify.audit.predicates.recompute import recompute
-from planning.verify.audit.samples import AuditSamples, draw_samples
 
 AUDIT = Path(__file__).resolve().parents[3] / "planning" / "verify" / "audit"
 FREE_LIMITS = ProjectorLimits(math.radians(89.9), 0.0)
@@ -143,7 +143,7 @@ def test_parallel_shadow_of_a_plate_is_its_outline_at_any_scale(scale, shift):
     plate = moved(grid(0.08, 0.05, divisions=(2, 2)), (0.02, 0.01, 0.04))
     mesh = moved(joined(floor, plate), tuple(scale * x for x in shift), scale)
     samples = samples_on(mesh, 4000)
-    lamp = Lamp(
+    lamp = AuditProjector(
         ParallelModel((1000, 1000), 1e-3 * scale, (0.0, 5.0 * scale)),
         pose := look_at(
             scale * np.add(shift, (0.0, 0.0, 1.0)),
@@ -166,7 +166,7 @@ def test_diverging_light_meets_exactly_the_faces_of_a_box_that_face_it(distance)
     samples = samples_on(mesh, 4000)
     at = distance * np.array([0.5, 0.3, 0.8])
     pose = look_at(at, np.zeros(3), up=np.array([0.0, 0.0, 1.0]))
-    lamp = Lamp(
+    lamp = AuditProjector(
         PinholeModel(
             np.array([[300.0, 0, 500], [0, 300.0, 500], [0, 0, 1]]),
             (1001, 1001),
@@ -188,7 +188,7 @@ def test_a_point_source_casts_a_magnified_shadow():
     mesh = joined(floor, plate)
     samples = samples_on(mesh, 4000)
     pose = look_at(np.array([0, 0, 0.5]), np.zeros(3), up=np.array([0.0, 1.0, 0.0]))
-    lamp = Lamp(
+    lamp = AuditProjector(
         PinholeModel(
             np.array([[100.0, 0, 99.5], [0, 100.0, 99.5], [0, 0, 1]]),
             (200, 200),
@@ -222,7 +222,7 @@ def test_draws_are_uniform_and_split_between_target_and_rest(handmade):
 
 def test_the_audit_imports_nothing_of_the_maker():
     allowed = {
-        "planning.model.devices",
+        "planning.model.planned",
         "planning.model.plan",
         "planning.model.requirements",
         "planning.model.surface",

@@ -9,16 +9,16 @@ import pytest
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from geometry.repair.hollow import Shell, measure_shell
+from geometry.repair.hollow import MeshShell, measure_shell
 from geometry.shapes.primitives import sphere
 from planning.model.surface import Surface
 from planning.report.entries.device_entries import mesh_entry
 from planning.report.summary.shortfall import shortfalls
 from planning.report.summary.summary import shell_line
+from planning.verify.audit.audit_samples import draw_samples
 from planning.verify.audit.coverage.inside_claims import audit_inside
 from planning.verify.audit.ledger import Ledger
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.samples import draw_samples
 
 OUTER, INNER = sphere(0.1, subdivisions=3), sphere(0.096, subdivisions=3)
 HOLLOW = TriangleMesh(
@@ -53,7 +53,7 @@ def found(mesh: TriangleMesh, document: dict[str, Any]) -> tuple[str, ...]:
 
 
 @cache
-def shell_of(mesh: TriangleMesh) -> Shell:
+def shell_of(mesh: TriangleMesh) -> MeshShell:
     return measure_shell(RayCaster(mesh))
 
 

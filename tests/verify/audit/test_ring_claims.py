@@ -21,16 +21,16 @@ from planning.rings.ring_stage import RingStage, _report
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.audit_samples import draw_samples
 from planning.verify.audit.estimates import Estimator
 from planning.verify.audit.ledger import Ledger
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import Lamp
+from planning.verify.audit.predicates.predicates import AuditProjector
 from planning.verify.audit.predicates.recompute import recompute
 from planning.verify.audit.rings.chords import random_beam
 from planning.verify.audit.rings.ring_claims import audit_rings
 from planning.verify.audit.rings.ring_gaps import audit_gaps
 from planning.verify.audit.rings.ring_light import RingLight, ring_spacing
-from planning.verify.audit.samples import draw_samples
 
 LIGHTS = ["diverging", "parallel"]
 # So many that none stands closer than the plan's where anything is lit.
@@ -276,7 +276,7 @@ def test_the_audit_of_a_plan_looks_at_its_rings(handmade, light):
 def test_rings_stand_apart_along_their_normal(handmade, light, expected):
     """Cones of tangents 0.9 and 1 at R = 1, z = 2 sqrt 2: 0.1 z / sqrt(1 + R^2)."""
     device = handmade.build_plan(light).projectors[0].device
-    lamp = Lamp(device, np.eye(4), np.eye(4), np.array([0.9, 1.0]))
+    lamp = AuditProjector(device, np.eye(4), np.eye(4), np.array([0.9, 1.0]))
     z = 2.0 * np.sqrt(2.0)
     point = [[z, 0.0, z] if light == "diverging" else [0.6, 0.8, z]]
     assert ring_spacing(lamp, np.array(point)) == pytest.approx(expected)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 from planning.verify.audit.predicates.audit_optics import in_image, pixels_of
 
 _STEPS = 2000

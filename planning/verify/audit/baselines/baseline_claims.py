@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.devices import PlannedCamera
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera
 from planning.verify.audit.ledger import Ledger, as_number, entries
 
 from .audit_seams import Section, distance_to_surface, normals_of_row, onward_of_row

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.verify.audit.coverage.area_claims import ROUNDING
 from planning.verify.audit.devices.existing_claims import droppable
 from planning.verify.audit.estimates import POINT, Estimator

@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.estimates import Estimator
 from planning.verify.audit.ledger import Ledger, entries
 from planning.verify.audit.predicates.blocks import free_of
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import Lamp, in_beam, light_of
-from planning.verify.audit.predicates.recompute import lamps_of
-from planning.verify.audit.samples import AuditSamples
+from planning.verify.audit.predicates.predicates import (
+    AuditProjector,
+    in_beam,
+    light_of,
+)
+from planning.verify.audit.predicates.recompute import audit_projectors
 
 # Light that grazes a face at more than this is left out.
 _GRAZING = np.cos(np.radians(89.0))
@@ -41,7 +45,7 @@ def audit_overlaps(
     names = [projector.id for projector in plan.projectors]
     falls = {
         name: light_falls(lamp, samples, shadow)
-        for name, lamp in zip(names, lamps_of(plan), strict=True)
+        for name, lamp in zip(names, audit_projectors(plan), strict=True)
     }
     claims = _by_pair(ledger, names)
     for pair in combinations(names, 2):
@@ -60,7 +64,9 @@ def audit_overlaps(
             )
 
 
-def light_falls(lamp: Lamp, samples: AuditSamples, shadow: Shadow) -> NDArray[np.bool_]:
+def light_falls(
+    lamp: AuditProjector, samples: AuditSamples, shadow: Shadow
+) -> NDArray[np.bool_]:
     """Return on which samples any light of a projector falls, shape (n,).
 
     Its last annulus ends one gap beyond its last ring.

@@ -7,15 +7,23 @@ from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_optics import (
     in_frame,
     in_world,
     ring_gradient,
 )
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import MEASURED, Eye, Lamp
-from planning.verify.audit.predicates.recompute import eyes_of, lamps_of, recompute
-from planning.verify.audit.samples import AuditSamples
+from planning.verify.audit.predicates.predicates import (
+    MEASURED,
+    AuditCamera,
+    AuditProjector,
+)
+from planning.verify.audit.predicates.recompute import (
+    audit_cameras,
+    audit_projectors,
+    recompute,
+)
 
 _INCIDENCE = float(np.deg2rad(85.0))
 # Below it hardly any label is right: study-reconstruction.md, section 3.2 [px].
@@ -55,15 +63,17 @@ def possible_at_floors(
     steepest = plan.requirements.camera.max_incidence - _SLANT_MARGIN
     most = np.sin(max(steepest, _SLANT))
     possible = np.zeros(pairs.shape[1:], dtype=bool)
-    for row, lamp in enumerate(lamps_of(plan)):
-        for column, eye in enumerate(eyes_of(plan)):
+    for row, lamp in enumerate(audit_projectors(plan)):
+        for column, eye in enumerate(audit_cameras(plan)):
             able = np.flatnonzero(pairs[row, column] == MEASURED)
             along = receding(lamp, eye, samples.take(able))
             possible[column, able[along <= most]] = True
     return possible
 
 
-def receding(lamp: Lamp, eye: Eye, samples: AuditSamples) -> NDArray[np.float64]:
+def receding(
+    lamp: AuditProjector, eye: AuditCamera, samples: AuditSamples
+) -> NDArray[np.float64]:
     """Return |r.T|, T = N x m / |N x m|: the sine of the slant along a ring, (n,)."""
     ring = in_frame(lamp.world_from_ring, samples.points)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.estimates import POINT
 from planning.verify.audit.ledger import Ledger, as_number
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.recompute import Reach, Recomputed
-from planning.verify.audit.samples import AuditSamples
 
 # As `docs/orientation.md` has them.
 _HIDDEN = 0.05

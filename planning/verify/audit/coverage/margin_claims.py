@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit_samples import samples_at_centroids
 from planning.verify.audit.estimates import POINT
 from planning.verify.audit.ledger import Ledger, as_number
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.recompute import Recomputed, light_only
-from planning.verify.audit.samples import samples_at_centroids
 
 from .area_claims import ROUNDING
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit_samples import AuditSamples, draw_samples
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import MEASURED
 from planning.verify.audit.predicates.recompute import recompute
-from planning.verify.audit.samples import AuditSamples, draw_samples
 
 
 @dataclass(frozen=True, eq=False)

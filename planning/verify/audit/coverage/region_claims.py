@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
 from planning.model.requirements import ProjectorLimits
+from planning.verify.audit.audit_samples import AuditSamples, samples_at_centroids
 from planning.verify.audit.estimates import POINT, Estimator
 from planning.verify.audit.ledger import Ledger, as_number
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import LIGHT_CAUSES, light_steps
-from planning.verify.audit.predicates.recompute import Recomputed, lamps_of
-from planning.verify.audit.samples import AuditSamples, samples_at_centroids
+from planning.verify.audit.predicates.recompute import Recomputed, audit_projectors
 
 from .area_claims import ROUNDING
 from .margin_claims import MARGIN_SLACK
@@ -84,7 +84,9 @@ def _able(plan: RigPlan, samples: AuditSamples, shadow: Shadow) -> NDArray[np.bo
     relaxed = ProjectorLimits(
         limits.max_incidence + MARGIN_SLACK, limits.min_tangent_angle - MARGIN_SLACK
     )
-    steps = [light_steps(lamp, samples, relaxed, shadow) for lamp in lamps_of(plan)]
+    steps = [
+        light_steps(lamp, samples, relaxed, shadow) for lamp in audit_projectors(plan)
+    ]
     return np.array(steps).reshape(-1, len(samples)) >= LIGHT_CAUSES.index(
         "projector_occlusion"
     )

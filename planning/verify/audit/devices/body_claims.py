@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from planning.model.bodies import Body
-from planning.model.devices import PlannedCamera
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera
 from planning.verify.audit.estimates import Estimator
 from planning.verify.audit.ledger import Ledger, entries
 from planning.verify.audit.predicates.blocks import block_of, way_to

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.verify.audit.ledger import Ledger
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.verify.audit.ledger import Ledger, entries
 from planning.verify.audit.predicates.audit_optics import pixels_of
 

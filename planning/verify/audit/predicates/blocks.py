@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel
 from planning.model.bodies import Body
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.zones import Box
 from planning.verify.audit.ledger import Ledger
 

@@ -15,7 +15,7 @@ from planning.model.requirements import (
     ProjectorLimits,
     TriangulationLimits,
 )
-from planning.verify.audit.samples import AuditSamples
+from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_optics import (
     in_frame,
@@ -56,7 +56,7 @@ CAMERA_BODY = SIGHT_CAUSES.index("camera_body")
 
 
 @dataclass(frozen=True, eq=False)
-class Lamp:
+class AuditProjector:
     """A projector at a pose: the plan's own, or one of the reference set.
 
     Attributes:
@@ -80,7 +80,7 @@ class Lamp:
 
 
 @dataclass(frozen=True, eq=False)
-class Eye:
+class AuditCamera:
     """A camera at a pose, and the bodies of other devices."""
 
     device: PinholeModel
@@ -89,7 +89,7 @@ class Eye:
 
 
 def light_of(
-    lamp: Lamp, points: NDArray[np.float64]
+    lamp: AuditProjector, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return L (n, 3) and the length of the light's way to each point (n,) [m]."""
     if lamp.diverging:
@@ -100,7 +100,7 @@ def light_of(
 
 
 def light_steps(
-    lamp: Lamp, samples: AuditSamples, limits: ProjectorLimits, shadow: Shadow
+    lamp: AuditProjector, samples: AuditSamples, limits: ProjectorLimits, shadow: Shadow
 ) -> NDArray[np.int8]:
     """Return how many limits of *lit* each sample passes, shape (n,); `LIT`: lit."""
     steps = np.zeros(len(samples), dtype=np.int8)
@@ -130,7 +130,7 @@ def light_steps(
 
 
 def light_margin(
-    lamp: Lamp, samples: AuditSamples, limits: ProjectorLimits
+    lamp: AuditProjector, samples: AuditSamples, limits: ProjectorLimits
 ) -> NDArray[np.float64]:
     """Return min(theta_max - incidence, tangent angle - tau_min) [rad], shape (n,).
 
@@ -144,7 +144,7 @@ def light_margin(
 
 
 def sight_steps(
-    eye: Eye, samples: AuditSamples, limits: CameraLimits, shadow: Shadow
+    eye: AuditCamera, samples: AuditSamples, limits: CameraLimits, shadow: Shadow
 ) -> NDArray[np.int8]:
     """Return how many limits of *seen* each sample passes, shape (n,); `SEEN`: seen."""
     steps = np.zeros(len(samples), dtype=np.int8)
@@ -175,7 +175,10 @@ def sight_steps(
 
 
 def pair_steps(
-    lamp: Lamp, eye: Eye, samples: AuditSamples, limits: TriangulationLimits
+    lamp: AuditProjector,
+    eye: AuditCamera,
+    samples: AuditSamples,
+    limits: TriangulationLimits,
 ) -> NDArray[np.int8]:
     """Return how many limits of *measurable* lit and seen samples pass, shape (n,)."""
     light, _ = light_of(lamp, samples.points)
@@ -206,7 +209,7 @@ def pair_steps(
     return passed.sum(axis=0, dtype=np.int8)
 
 
-def in_beam(lamp: Lamp, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def in_beam(lamp: AuditProjector, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return whether points lie in the image or beam and the last ring, shape (n,)."""
     device, last = lamp.device, lamp.radii[-1]
     local = in_frame(lamp.world_from_device, points)
@@ -228,7 +231,7 @@ def in_beam(lamp: Lamp, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     return inside & (ring_coordinate(ring, False) <= last)
 
 
-def _gap(lamp: Lamp, ring: NDArray[np.float64]) -> NDArray[np.float64]:
+def _gap(lamp: AuditProjector, ring: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance of the two rings about each point in their coordinate, shape (n,)."""
     coordinate = ring_coordinate(ring, lamp.diverging)
     upper = np.searchsorted(lamp.radii, coordinate, side="left")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from geometry.devices import PinholeModel
 from planning.model.plan import RigPlan
 from planning.model.requirements import ProjectorLimits, Requirements
-from planning.verify.audit.samples import AuditSamples
+from planning.verify.audit.audit_samples import AuditSamples
 
 from .blocks import blocks_before, blocks_beside
 from .occlusion import Shadow
@@ -17,8 +17,8 @@ from .predicates import (
     LIT,
     MEASURED,
     SEEN,
-    Eye,
-    Lamp,
+    AuditCamera,
+    AuditProjector,
     light_margin,
     light_steps,
     pair_steps,
@@ -105,10 +105,10 @@ class Reach:
     furthest_pair: NDArray[np.int8]
 
 
-def lamps_of(plan: RigPlan) -> tuple[Lamp, ...]:
+def audit_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
     """Return the plan's projectors."""
     return tuple(
-        Lamp(
+        AuditProjector(
             p.device,
             p.world_from_device,
             p.world_from_ring,
@@ -119,10 +119,11 @@ def lamps_of(plan: RigPlan) -> tuple[Lamp, ...]:
     )
 
 
-def eyes_of(plan: RigPlan) -> tuple[Eye, ...]:
+def audit_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
     """Return the plan's cameras."""
     return tuple(
-        Eye(c.device, c.world_from_device, blocks_beside(plan, c)) for c in plan.cameras
+        AuditCamera(c.device, c.world_from_device, blocks_beside(plan, c))
+        for c in plan.cameras
     )
 
 
@@ -134,7 +135,7 @@ def light_only(
 ) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
     """Return `light` and `margins` of `Recomputed`; by the plan's limits or others."""
     limits = plan.requirements.projector if limits is None else limits
-    lamps = lamps_of(plan)
+    lamps = audit_projectors(plan)
     light = np.zeros((len(lamps), len(samples)), dtype=np.int8)
     margins = np.full(light.shape, -np.inf)
     for row, lamp in enumerate(lamps):
@@ -160,7 +161,7 @@ def recompute(
     """
     limits = plan.requirements if requirements is None else requirements
     light, margins = light_only(plan, samples, shadow, limits.projector)
-    lamps, eyes = lamps_of(plan), eyes_of(plan)
+    lamps, eyes = audit_projectors(plan), audit_cameras(plan)
     lit = np.any(light == LIT, axis=0)
     pairs = np.full((len(lamps), len(eyes), len(samples)), _NOT_LIT, dtype=np.int8)
     for column, eye in enumerate(eyes):
@@ -189,7 +190,7 @@ def reach_of(plan: RigPlan, own: Recomputed, shadow: Shadow, seed: int) -> Reach
     return Reach(by_projectors, by_cameras, furthest, furthest_pair)
 
 
-def reference_lamps(plan: RigPlan) -> list[Lamp]:
+def reference_lamps(plan: RigPlan) -> list[AuditProjector]:
     """Return the reference projectors: the plan's own model at every reference pose."""
     surface = plan.surface
     if not plan.projectors:
@@ -197,7 +198,7 @@ def reference_lamps(plan: RigPlan) -> list[Lamp]:
     device = plan.projectors[0].device
     last = np.array([plan.requirements.workspace.reference_ring_radius])
     return [
-        Lamp(device, pose, ring, last, blocks_before(plan, "projector", pose))
+        AuditProjector(device, pose, ring, last, blocks_before(plan, "projector", pose))
         for pose, ring in zip(
             surface.reference_projectors, surface.reference_rings, strict=True
         )
@@ -229,7 +230,7 @@ def _reach_by_cameras(
     if not plan.cameras:
         return own.measured.copy(), furthest
     device: PinholeModel = plan.cameras[0].device
-    lamps = lamps_of(plan)
+    lamps = audit_projectors(plan)
     left = np.flatnonzero(own.lit & ~own.measured)
     rest = own.samples.take(left)
     poses = plan.surface.reference_cameras
@@ -237,7 +238,9 @@ def _reach_by_cameras(
         if len(left) == 0:
             break
         steps = _steps_with_any(
-            Eye(device, poses[index], blocks_before(plan, "camera", poses[index])),
+            AuditCamera(
+                device, poses[index], blocks_before(plan, "camera", poses[index])
+            ),
             lamps,
             rest,
             own.lit_by[:, left],
@@ -252,8 +255,8 @@ def _reach_by_cameras(
 
 
 def _steps_with_any(
-    eye: Eye,
-    lamps: tuple[Lamp, ...],
+    eye: AuditCamera,
+    lamps: tuple[AuditProjector, ...],
     samples: AuditSamples,
     lit_by: NDArray[np.bool_],
     requirements: Requirements,

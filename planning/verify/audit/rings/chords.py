@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from planning.verify.audit.predicates.audit_optics import in_frame, ring_coordinate
-from planning.verify.audit.predicates.predicates import Lamp
+from planning.verify.audit.predicates.predicates import AuditProjector
 
 from .ring_light import RingLight, Strikes
 
@@ -30,7 +30,7 @@ class Beam:
         strikes: Where they meet the surface.
     """
 
-    lamp: Lamp
+    lamp: AuditProjector
     coordinates: NDArray[np.float64]
     azimuths: NDArray[np.float64]
     strikes: Strikes
@@ -50,7 +50,7 @@ class Chords:
 
 
 def random_beam(
-    light: RingLight, lamp: Lamp, margin: float, rng: np.random.Generator
+    light: RingLight, lamp: AuditProjector, margin: float, rng: np.random.Generator
 ) -> Beam:
     """Cast rays, uniform in ring coordinate and azimuth where anything is lit.
 
@@ -128,7 +128,7 @@ def counted_chords(
 
 def _lit_heights(
     light: RingLight,
-    lamp: Lamp,
+    lamp: AuditProjector,
     coordinates: NDArray[np.float64],
     azimuths: NDArray[np.float64],
 ) -> NDArray[np.float64]:
@@ -140,7 +140,7 @@ def _lit_heights(
 
 
 def _meridian(
-    lamp: Lamp, coordinates: NDArray[np.float64], heights: NDArray[np.float64]
+    lamp: AuditProjector, coordinates: NDArray[np.float64], heights: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Points (distance from the ring axis, height) in [m], shape (n, 2)."""
     radii = coordinates * heights if lamp.diverging else coordinates
@@ -148,7 +148,7 @@ def _meridian(
 
 
 def _rise(
-    lamp: Lamp,
+    lamp: AuditProjector,
     c_0: NDArray[np.float64],
     z_0: NDArray[np.float64],
     c_1: NDArray[np.float64],
@@ -166,7 +166,7 @@ def _rise(
 
 
 def _near_crease(
-    lamp: Lamp,
+    lamp: AuditProjector,
     coordinates: NDArray[np.float64],
     azimuths: NDArray[np.float64],
     creases: NDArray[np.float64],

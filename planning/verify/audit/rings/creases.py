@@ -14,7 +14,7 @@ from planning.verify.audit.predicates.audit_optics import (
     in_world,
     ring_gradient,
 )
-from planning.verify.audit.predicates.predicates import Lamp, light_of
+from planning.verify.audit.predicates.predicates import AuditProjector, light_of
 
 from .extremes import audit_extreme
 from .ring_light import RingLight, ring_spacing
@@ -69,7 +69,7 @@ def find_creases(mesh: TriangleMesh, rng: np.random.Generator) -> Creases:
 def audit_creases(
     key: str,
     claims: object,
-    lamp: Lamp,
+    lamp: AuditProjector,
     light: RingLight,
     mesh: TriangleMesh,
     creases: Creases,
@@ -118,7 +118,7 @@ def audit_creases(
 
 
 def _jumps(
-    lamp: Lamp, light: RingLight, mesh: TriangleMesh, creases: Creases
+    lamp: AuditProjector, light: RingLight, mesh: TriangleMesh, creases: Creases
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Which points are lit on both sides (n,), and J of those that are (k,).
 

@@ -12,8 +12,17 @@ from planning.model.requirements import Requirements
 from planning.verify.audit.estimates import Estimator
 from planning.verify.audit.ledger import Ledger, as_number
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import MEASURED, SEEN, Lamp, pair_steps
-from planning.verify.audit.predicates.recompute import Recomputed, eyes_of, lamps_of
+from planning.verify.audit.predicates.predicates import (
+    MEASURED,
+    SEEN,
+    AuditProjector,
+    pair_steps,
+)
+from planning.verify.audit.predicates.recompute import (
+    Recomputed,
+    audit_cameras,
+    audit_projectors,
+)
 
 from .chords import Chords, counted_chords, random_beam
 from .creases import audit_creases, find_creases
@@ -102,7 +111,7 @@ def audit_rings(
 def _audit_errors(
     key: str,
     rings: Mapping[str, Any],
-    lamp: Lamp,
+    lamp: AuditProjector,
     even: float,
     chords: Chords,
     limits: Requirements,
@@ -171,9 +180,9 @@ def _lost(
     """Whether only even rings would measure each sample of the target, (n,)."""
     lost = np.zeros(len(own.samples), dtype=bool)
     left = own.samples.in_target & ~own.measured
-    for row, (lamp, radii) in enumerate(zip(lamps_of(plan), even, strict=True)):
+    for row, (lamp, radii) in enumerate(zip(audit_projectors(plan), even, strict=True)):
         evenly = replace(lamp, radii=radii)
-        for column, eye in enumerate(eyes_of(plan)):
+        for column, eye in enumerate(audit_cameras(plan)):
             seen = np.flatnonzero(left & (own.pairs[row, column] >= SEEN))
             steps = pair_steps(
                 evenly, eye, own.samples.take(seen), plan.requirements.triangulation

@@ -12,7 +12,7 @@ from planning.verify.audit.coverage.area_claims import ROUNDING
 from planning.verify.audit.estimates import POINT
 from planning.verify.audit.ledger import Ledger
 from planning.verify.audit.predicates.audit_optics import in_frame
-from planning.verify.audit.predicates.predicates import Lamp
+from planning.verify.audit.predicates.predicates import AuditProjector
 
 from .extremes import audit_extreme
 from .ring_light import RingLight, Strikes, ring_spacing
@@ -23,7 +23,11 @@ _LOOKS = 8
 
 
 def audit_spacing(
-    key: str, rings: Mapping[str, Any], lamp: Lamp, wish: object, ledger: Ledger
+    key: str,
+    rings: Mapping[str, Any],
+    lamp: AuditProjector,
+    wish: object,
+    ledger: Ledger,
 ) -> NDArray[np.float64] | None:
     """Check `spacing`, `kept_even` and `n_even` against the radii.
 
@@ -74,7 +78,7 @@ def audit_spacing(
 def audit_gaps(
     key: str,
     rings: Mapping[str, Any],
-    lamp: Lamp,
+    lamp: AuditProjector,
     even: NDArray[np.float64],
     strikes: Strikes,
     ledger: Ledger,
@@ -126,7 +130,7 @@ def audit_gaps(
 
 def _closer(
     light: RingLight,
-    lamp: Lamp,
+    lamp: AuditProjector,
     rng: np.random.Generator,
     largest: bool,
     bound: float,

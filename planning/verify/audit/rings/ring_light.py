@@ -9,6 +9,7 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_optics import (
     in_frame,
     in_image,
@@ -17,9 +18,8 @@ from planning.verify.audit.predicates.audit_optics import (
     ring_coordinate,
 )
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import LIT, Lamp, light_steps
-from planning.verify.audit.predicates.recompute import lamps_of
-from planning.verify.audit.samples import AuditSamples
+from planning.verify.audit.predicates.predicates import LIT, AuditProjector, light_steps
+from planning.verify.audit.predicates.recompute import audit_projectors
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class RingLight:
     """
 
     def __init__(self, plan: RigPlan, shadow: Shadow) -> None:
-        self.lamps = lamps_of(plan)
+        self.lamps = audit_projectors(plan)
         self._surface: Surface = plan.surface
         self._within = plan.surface.target_faces(plan.requirements.target)
         self._limits = plan.requirements.projector
@@ -63,7 +63,7 @@ class RingLight:
 
     def strike(
         self,
-        lamp: Lamp,
+        lamp: AuditProjector,
         coordinates: NDArray[np.float64],
         azimuths: NDArray[np.float64],
     ) -> Strikes:
@@ -87,7 +87,10 @@ class RingLight:
         return Strikes(drawn, rays, samples, height, lit)
 
     def lit_beside(
-        self, lamp: Lamp, points: NDArray[np.float64], faces: NDArray[np.int64]
+        self,
+        lamp: AuditProjector,
+        points: NDArray[np.float64],
+        faces: NDArray[np.int64],
     ) -> NDArray[np.bool_]:
         """Return whether a projector lights points (n, 3) of given faces, (n,)."""
         samples = self._samples(points, faces)
@@ -117,7 +120,9 @@ def gap_about(
     return radii[upper] - radii[upper - 1]
 
 
-def ring_spacing(lamp: Lamp, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def ring_spacing(
+    lamp: AuditProjector, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the distance along m of the rings about each point, shape (n,) [m].
 
     Both kinds of light: the gap in the ring coordinate c, divided by |grad c|, which is
@@ -132,7 +137,9 @@ def ring_spacing(lamp: Lamp, points: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _rays(
-    lamp: Lamp, coordinates: NDArray[np.float64], azimuths: NDArray[np.float64]
+    lamp: AuditProjector,
+    coordinates: NDArray[np.float64],
+    azimuths: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Origins in [m] and unit directions, (n, 3) each."""
     frame = lamp.world_from_ring
@@ -148,7 +155,7 @@ def _rays(
 
 
 def _drawn(
-    lamp: Lamp, origins: NDArray[np.float64], along: NDArray[np.float64]
+    lamp: AuditProjector, origins: NDArray[np.float64], along: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Whether rays leave the panel (diverging) or the beam (parallel), shape (n,)."""
     device = lamp.device

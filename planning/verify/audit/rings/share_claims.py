@@ -11,11 +11,11 @@ from planning.verify.audit.ledger import Ledger, as_number
 from planning.verify.audit.predicates.predicates import (
     MEASURED,
     SEEN,
-    Lamp,
+    AuditProjector,
     pair_steps,
     sight_steps,
 )
-from planning.verify.audit.predicates.recompute import eyes_of
+from planning.verify.audit.predicates.recompute import audit_cameras
 
 from .ring_light import RingLight
 
@@ -58,7 +58,7 @@ def audit_ring_shares(
 
 
 def _shares(
-    plan: RigPlan, light: RingLight, lamp: Lamp, start: float
+    plan: RigPlan, light: RingLight, lamp: AuditProjector, start: float
 ) -> dict[str, NDArray[np.bool_]]:
     """What each ray of each ring does, shape (n_rings, n_rays) each."""
     n = len(lamp.radii)
@@ -68,7 +68,7 @@ def _shares(
     lit = strikes.rays[strikes.lit]
     samples = strikes.samples.take(strikes.lit)
     measured = np.zeros(len(lit), dtype=bool)
-    for eye in eyes_of(plan):
+    for eye in audit_cameras(plan):
         left = np.flatnonzero(~measured)
         rest = samples.take(left)
         seen = sight_steps(eye, rest, plan.requirements.camera, light.shadow) == SEEN

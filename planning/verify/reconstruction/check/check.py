@@ -13,7 +13,11 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import Decoded
-from planning.verify.reconstruction.faults.causes import Measured, explained, rejection
+from planning.verify.reconstruction.faults.causes import (
+    MeasuredClouds,
+    explained,
+    rejection,
+)
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import (
     Pairs,
@@ -130,7 +134,7 @@ def conclude(
         accuracy = measure_accuracy(merged.cloud, mesh, threads=threads)
         failures = judge(accuracy, completeness, limits)
     if accuracy is not None and failures:
-        measured = Measured(
+        measured = MeasuredClouds(
             plan, decoded, pairs, everything, samples, predicted, completeness.missing
         )
         failures = explained(failures, measured)

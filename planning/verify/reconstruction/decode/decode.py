@@ -12,7 +12,7 @@ from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingPatterns
 
-from .edges import SATURATED, Edges, find_edges
+from .edges import SATURATED, ImageEdges, find_edges
 from .triangulate import RingHits, intersect_rings
 
 # Neighbours along a ring edge are looked for this far away in the image [px].
@@ -71,7 +71,7 @@ class Decoded:
     lit_pixels: int
     n_edges: int
     rejected: dict[str, int]
-    edges: Edges
+    edges: ImageEdges
     fates: NDArray[np.int8]
     n_saturated: int
     saturated: NDArray[np.float64]
@@ -81,7 +81,7 @@ class Decoded:
         """Return what a device that is off gives."""
         fates = np.zeros(0, dtype=np.int8)
         nowhere = np.zeros((0, 2))
-        return cls(Cloud.empty(), 0, 0, {}, Edges.nothing(), fates, 0, nowhere)
+        return cls(Cloud.empty(), 0, 0, {}, ImageEdges.nothing(), fates, 0, nowhere)
 
 
 def decode(
@@ -130,7 +130,7 @@ def decode(
 
 
 def measure_edges(
-    edges: Edges,
+    edges: ImageEdges,
     patterns: RingPatterns,
     calibration: PairCalibration,
     lit_pixels: int,
@@ -187,7 +187,7 @@ def measure_edges(
 
 
 def _doubtful_root(
-    edges: Edges,
+    edges: ImageEdges,
     rays: NDArray[np.float64],
     patterns: RingPatterns,
     calibration: PairCalibration,
@@ -215,7 +215,7 @@ def _doubtful_root(
     return fits(edges.roots) == fits(-edges.roots)
 
 
-def _out_of_order(edges: Edges) -> bool:
+def _out_of_order(edges: ImageEdges) -> bool:
     """Whether some frame isn't the bit that it is taken for.
 
     In a Gray code any change of one bit alone between neighbouring annuli is a ring;
@@ -228,7 +228,7 @@ def _out_of_order(edges: Edges) -> bool:
 
 
 def _chains(
-    edges: Edges, hits: RingHits, focal_px: float, max_slant: float
+    edges: ImageEdges, hits: RingHits, focal_px: float, max_slant: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """How far edges go on as a surface, along their rings and from ring to ring.
 
@@ -270,7 +270,7 @@ def _chains(
 
 
 def _cloud(
-    edges: Edges,
+    edges: ImageEdges,
     rays: NDArray[np.float64],
     hits: RingHits,
     calibration: PairCalibration,
@@ -290,7 +290,7 @@ def _cloud(
 
 
 def _shift(
-    edges: Edges,
+    edges: ImageEdges,
     rays: NDArray[np.float64],
     hits: RingHits,
     calibration: PairCalibration,

@@ -30,7 +30,7 @@ _MAX_LEVEL = 0.98
 
 
 @dataclass(frozen=True, eq=False)
-class Edges:
+class ImageEdges:
     """Ring edges in one camera's image.
 
     Attributes:
@@ -55,7 +55,7 @@ class Edges:
         return len(self.pixels)
 
     @classmethod
-    def nothing(cls) -> "Edges":
+    def nothing(cls) -> "ImageEdges":
         """Return no edges."""
         none, places = np.zeros(0), np.zeros((0, 2))
         count = np.zeros(0, dtype=np.int64)
@@ -64,7 +64,7 @@ class Edges:
         )
 
 
-def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[Edges, int]:
+def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[ImageEdges, int]:
     """Return the labelled ring edges of a stack of images, and its lit pixels."""
     reader = _Reader(frames.stack, patterns)
     noise = reader.grey_noise()
@@ -74,7 +74,7 @@ def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[Edges, int]:
     # A crossing is kept in the one direction that runs more squarely into the edge.
     a = np.abs(along_rows.across[:, 0]) >= np.abs(along_rows.across[:, 1])
     b = np.abs(swapped[1][:, 1]) > np.abs(swapped[1][:, 0])
-    edges = Edges(
+    edges = ImageEdges(
         np.concatenate([along_rows.pixels[a], swapped[0][b]]) + np.array(frames.corner),
         np.concatenate([along_rows.rings[a], along_columns.rings[b]]),
         np.concatenate([along_rows.roots[a], along_columns.roots[b]]),
@@ -158,7 +158,7 @@ def _even(contrast: NDArray[np.float32], noise: float) -> NDArray[np.bool_]:
     return low >= np.float32(_MIN_EVENNESS) * high - np.float32(4.0 * noise)
 
 
-def _crossings(reader: _Reader, noise: float) -> Edges:
+def _crossings(reader: _Reader, noise: float) -> ImageEdges:
     """Edges between pixels of one row, in pixels (column, row) of the reader."""
     index, sure = reader.index, reader.sure
     before, after = index[:, 1:-2], index[:, 2:-1]
@@ -186,7 +186,7 @@ def _crossings(reader: _Reader, noise: float) -> Edges:
     along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
     slope = np.hypot(along, cross)
     contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
-    return Edges(
+    return ImageEdges(
         np.column_stack([j + part, i.astype(np.float64)]),
         rings[good],
         np.where(root[good] > 0.0, 1, -1).astype(np.int8),

@@ -58,7 +58,7 @@ def rejection(pairs: tuple[PairCount, ...]) -> str | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredClouds:
     """What a check found, for the search for causes.
 
     Attributes:
@@ -80,7 +80,7 @@ class Measured:
     missing: NDArray[np.bool_]
 
 
-def explained(failures: tuple[str, ...], measured: Measured) -> tuple[str, ...]:
+def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str, ...]:
     """Return failures of a check with what their likely causes are.
 
     What is wrong with devices or object as a whole explains every failure: dark
@@ -114,14 +114,14 @@ def _of_coverage(clause: str) -> bool:
     return "predicted measured" in clause
 
 
-def _unordered(measured: Measured) -> list[str]:
+def _unordered(measured: MeasuredClouds) -> list[str]:
     pairs = measured.counts
     unordered = tuple(p for p in pairs if 2 * p.rejected.get("labels", 0) > p.n_edges)
     names = ", ".join(f"{pair.projector} with {pair.camera}" for pair in unordered)
     return [f"{names}: {rejection(unordered)}"] if unordered else []
 
 
-def _dark(measured: Measured) -> list[str]:
+def _dark(measured: MeasuredClouds) -> list[str]:
     """Name devices that gave hardly any edge, or edges but no point."""
     counts, plan = measured.counts, measured.plan
     by_projector = {
@@ -151,7 +151,7 @@ def _silent(pairs: dict[str, list[PairCount]], dark: str) -> list[str]:
     return silent
 
 
-def _double_light(measured: Measured) -> list[str]:
+def _double_light(measured: MeasuredClouds) -> list[str]:
     """Name projectors that saturate many pixels, and what else lights these."""
     plan = measured.plan
     found: dict[tuple[str, ...], list[str]] = {}
@@ -174,7 +174,7 @@ def _double_light(measured: Measured) -> list[str]:
     ]
 
 
-def _wrong_roots(measured: Measured) -> list[str]:
+def _wrong_roots(measured: MeasuredClouds) -> list[str]:
     return [
         f"{projector} with {camera}: {100 * share:.0f} % of the points took the wrong "
         f"one of the two roots; the root disc isn't the one drawn for {camera}"
@@ -182,7 +182,7 @@ def _wrong_roots(measured: Measured) -> list[str]:
     ]
 
 
-def _lost(measured: Measured, *, displaced: bool) -> list[str]:
+def _lost(measured: MeasuredClouds, *, displaced: bool) -> list[str]:
     """Say where samples are missing, and why unless devices are to blame as a whole."""
     plan, samples, missing = measured.plan, measured.samples, measured.missing
     if measured.predicted is None or not missing.any():

@@ -9,7 +9,7 @@ from planning.model.files import write_together
 from planning.model.plan import RigPlan
 
 from .pattern_frames import Frame, PatternSequence, pattern_sequence
-from .pattern_images import Canvas, canvas
+from .pattern_images import PatternCanvas, canvas
 from .pattern_svg import TOLERANCE_PX, VectorFrames
 from .png import write_grey_png
 
@@ -107,7 +107,7 @@ def _entry(sequence: PatternSequence) -> dict[str, Any]:
     }
 
 
-def _png_writer(drawn: Canvas, frame: Frame) -> Callable[[BinaryIO], object]:
+def _png_writer(drawn: PatternCanvas, frame: Frame) -> Callable[[BinaryIO], object]:
     return lambda file: write_grey_png(drawn.image(frame), file)
 
 

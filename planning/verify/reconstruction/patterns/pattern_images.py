@@ -20,7 +20,7 @@ _NEIGHBOURS = (slice(None, -1), slice(1, None))
 
 
 @dataclass(frozen=True, eq=False)
-class Canvas:
+class PatternCanvas:
     """Where a projector's pixels lie among the rings, shape (h, w) each.
 
     Attributes:
@@ -60,7 +60,7 @@ class Canvas:
         return found
 
 
-def canvas(sequence: PatternSequence) -> Canvas:
+def canvas(sequence: PatternSequence) -> PatternCanvas:
     """Return where a projector's pixels lie among its rings."""
     patterns, projector = sequence.rings, sequence.projector
     width, height = projector.resolution
@@ -78,7 +78,7 @@ def canvas(sequence: PatternSequence) -> Canvas:
         drawn = drawn * _share(projector.beam_radius - away, _slope(away))
     white = np.rint(_WHITE * drawn).astype(np.uint8)
     beyond = np.rint(white * _share(rho - radii[edge], slope)).astype(np.uint8)
-    return Canvas(sequence, x, y, edge, white - beyond, beyond)
+    return PatternCanvas(sequence, x, y, edge, white - beyond, beyond)
 
 
 def _root_level(

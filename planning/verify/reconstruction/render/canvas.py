@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .photometry import Photometry
-from .view import View
+from .view import RenderedView
 
 # Blurred light reaches no further than this beyond the samples that are lit [px].
 _MARGIN_PX = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Canvas:
+class ImageCanvas:
     """The part of a view's window that a projector lights.
 
     Without its light a frame and its inverse are alike, so nothing is decoded there.
@@ -35,7 +35,7 @@ class Canvas:
     inside: NDArray[np.int64]
 
     @classmethod
-    def about(cls, seen: View, lit: NDArray[np.int64]) -> "Canvas":
+    def about(cls, seen: RenderedView, lit: NDArray[np.int64]) -> "ImageCanvas":
         """Return the bounding box of samples and a margin; all where there is none."""
         fold, (rows, columns) = seen.fold, seen.shape
         y, x = np.divmod(seen.cells, fold * columns)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.devices import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 
 # Six quads of a box whose corner i has the signs of the bits of i.
 _QUADS = np.array(

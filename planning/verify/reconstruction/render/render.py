@@ -14,12 +14,12 @@ from planning.verify.reconstruction.patterns.ring_patterns import (
     RingPatterns,
 )
 
-from .canvas import Canvas
+from .canvas import ImageCanvas
 from .defocus import Defocus
-from .light import Blur, Light, shine
 from .occluders import Occluder
 from .photometry import Photometry
-from .view import View
+from .rendered_light import Blur, RenderedLight, shine
+from .view import RenderedView
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Shown:
     caster: Occluder
     defocus: Defocus | None = None
 
-    def light(self, seen: View, photometry: Photometry) -> Light:
+    def light(self, seen: RenderedView, photometry: Photometry) -> RenderedLight:
         """Return its light on the samples of a view."""
         blur = Blur(photometry.projector_blur_m, self.defocus)
         devices = self.projector, self.design, self.patterns, self.caster
@@ -48,7 +48,7 @@ class Shown:
 
 
 def render_pair(
-    seen: View,
+    seen: RenderedView,
     projector: ProjectorCalibration,
     design: ProjectorCalibration,
     patterns: RingPatterns,
@@ -77,7 +77,7 @@ def render_pair(
     light = one.light(seen, photometry)
     others = [(other.patterns, other.light(seen, photometry)) for other in beside]
     reached = [light.samples, *(other.samples for _, other in others)]
-    canvas = Canvas.about(seen, np.concatenate(reached))
+    canvas = ImageCanvas.about(seen, np.concatenate(reached))
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
     ambient = canvas.image(around, canvas.inside, photometry)
     white = canvas.image(light.white, light.samples, photometry)
@@ -105,7 +105,10 @@ def render_pair(
 
 
 def render_whites(
-    seen: View, shown: tuple[Shown, ...], photometry: Photometry, seed: tuple[int, ...]
+    seen: RenderedView,
+    shown: tuple[Shown, ...],
+    photometry: Photometry,
+    seed: tuple[int, ...],
 ) -> Whites:
     """Return one camera's images of several projectors' white, alone and together.
 
@@ -117,7 +120,7 @@ def render_whites(
         photometry: Light and sensor.
         seed: Of the noise of these images.
     """
-    canvas = Canvas.about(seen, np.zeros(0, dtype=np.int64))
+    canvas = ImageCanvas.about(seen, np.zeros(0, dtype=np.int64))
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
     ambient = canvas.image(around, canvas.inside, photometry)
     lights = [one.light(seen, photometry) for one in shown]
@@ -132,8 +135,8 @@ def render_whites(
 
 
 def _added(
-    canvas: Canvas,
-    light: Light,
+    canvas: ImageCanvas,
+    light: RenderedLight,
     patterns: RingPatterns,
     n_bits: int,
     photometry: Photometry,
@@ -149,7 +152,10 @@ def _added(
 
 
 def render_lines(
-    seen: View, shown: Sequence[Shown], photometry: Photometry, seed: tuple[int, ...]
+    seen: RenderedView,
+    shown: Sequence[Shown],
+    photometry: Photometry,
+    seed: tuple[int, ...],
 ) -> Frames:
     """Return one image of bright rings, under projectors that shine at once.
 
@@ -162,7 +168,7 @@ def render_lines(
         seed: Of the noise.
     """
     everything = np.arange(len(seen.cells))
-    canvas = Canvas.about(seen, everything)
+    canvas = ImageCanvas.about(seen, everything)
     around = seen.albedo * np.float32(photometry.ambient)
     image = canvas.image(around, everything, photometry)
     for one in shown:
@@ -176,7 +182,7 @@ def render_lines(
     return Frames(photometry.capture(image, seed, gain)[None], canvas.corner)
 
 
-def _level(bright: NDArray[np.float32], light: Light) -> NDArray[np.float32]:
+def _level(bright: NDArray[np.float32], light: RenderedLight) -> NDArray[np.float32]:
     """Blurred brightness of a bit's frame at each lit sample."""
     inwards = np.concatenate([bright[:1], bright[:-1]]) - bright
     outwards = np.concatenate([bright[1:], bright[-1:]]) - bright

@@ -24,7 +24,7 @@ from .occluders import Both, obstacles_of
 from .photometry import Photometry
 from .render import Shown, render_pair
 from .render_schedule import on_at_once
-from .view import View, view
+from .view import RenderedView, view
 
 # Rings that run more steeply along the viewing ray cross steps between surfaces, unless
 # the plan counts on surface seen at such incidence [rad].
@@ -76,7 +76,7 @@ def decode_rendered(
     blurred = defocus_of(truth, "projector")
     limits = decoder_limits(plan)
 
-    def look(c: int) -> View | None:
+    def look(c: int) -> RenderedView | None:
         camera = standing.get(drawn[c].id)
         with spent.on("render"):
             if camera is None:

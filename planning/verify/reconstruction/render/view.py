@@ -19,7 +19,7 @@ _SUB = np.array([[-0.25, -0.25], [-0.25, 0.25], [0.25, -0.25], [0.25, 0.25]])
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class RenderedView:
     """What a camera sees: samples of the surface, one a cell and 4 at steps of depth.
 
     A cell is a pixel, or a quarter of one where drawn edges are sharper than that.
@@ -57,7 +57,7 @@ def view(
     caster: RayCaster,
     photometry: Photometry,
     obstacles: RayCaster | None = None,
-) -> View | None:
+) -> RenderedView | None:
     """Cast a camera's pixels against the mesh; None if it sees nothing of it.
 
     Args:
@@ -96,7 +96,7 @@ def view(
     weights = np.ones(len(cells), dtype=np.float32)
     weights[len(whole) :] = 1.0 / len(_SUB)
     points = camera.centre + reach[:, None] * all_rays
-    return View(
+    return RenderedView(
         camera,
         (left, top),
         shape,

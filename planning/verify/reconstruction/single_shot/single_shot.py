@@ -7,7 +7,7 @@ import numpy as np
 from geometry.mesh.mesh import TriangleMesh
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.decode.decode import Decoded, measure_edges
-from planning.verify.reconstruction.decode.edges import Edges
+from planning.verify.reconstruction.decode.edges import ImageEdges
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingPatterns
 
 from .prior_labels import PriorLabels, label_by_prior
@@ -49,7 +49,7 @@ def decode_single_shot(
     )
     sure = labels.rings >= 0
     none = np.zeros(0, dtype=np.int64)
-    edges = Edges(
+    edges = ImageEdges(
         lines.pixels[sure],
         labels.rings[sure],
         labels.roots[sure],

@@ -7,8 +7,8 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.devices import PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.verify.reconstruction.calibration import (
     PairCalibration,
     calibrate_camera,

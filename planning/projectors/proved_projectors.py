@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from planning.model.devices import PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.proofs.all_poses import ContinuousBound, joined
 from planning.proofs.existing_bound import enough, given_on
 from planning.proofs.projector_bound import Effort, bound_projectors
 from planning.proofs.selection import required_rows
-from planning.scene.clearance import with_room
+from planning.scene.clearance import with_clearance
 from planning.scene.lighting import LIT
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projectors_towards
@@ -47,7 +47,7 @@ def prove_fewest(
             ring_offset=ring_offset,
             site=scene.site("projector", template.device),
         )
-        found = with_room(scene, found)
+        found = with_clearance(scene, found)
         better = with_more(scene, stage, found) if found else stage
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.entry()))

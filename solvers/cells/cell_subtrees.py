@@ -20,7 +20,7 @@ VOID = -1
 _UNKNOWN = -2
 
 
-class Twigs:
+class Subtrees:
     """Groups of sibling cells, made when the search comes to them.
 
     Attributes:

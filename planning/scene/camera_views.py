@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.visibility_matrix import visibility_matrix
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 
 from . import measurability
-from .measurability import View
+from .measurability import ViewedSamples
 from .samples import Target
 from .scene import Scene
 from .standing import Standing, blocked_by
@@ -23,7 +23,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class CameraView:
     """What one camera sees.
 
     Attributes:
@@ -32,18 +32,18 @@ class Sight:
     """
 
     rows: NDArray[np.int64]
-    view: View
+    view: ViewedSamples
 
 
-def sights_of(
+def camera_views(
     scene: Scene, cameras: Sequence[PlannedCamera], target: Target
-) -> tuple[Sight, ...]:
+) -> tuple[CameraView, ...]:
     """Return what each camera sees of samples."""
-    offered: list[Sight] = []
+    offered: list[CameraView] = []
     wanted = np.zeros((len(cameras), len(target)), dtype=bool)
     facing = _facing(cameras, target, scene.requirements.camera.max_incidence)
     for row, camera in enumerate(cameras):
-        scene.pulse()
+        scene.check_cancelled()
         sight = _in_the_open(scene, camera, target, np.flatnonzero(facing[row]))
         wanted[row, sight.rows] = True
         offered.append(sight)
@@ -65,12 +65,12 @@ def sights_of(
     )
 
 
-def joined_sight(sights: Sequence[Sight]) -> Sight:
+def joined_view(sights: Sequence[CameraView]) -> CameraView:
     """Return the sights of several cameras, one after the other."""
     views = [sight.view for sight in sights]
-    return Sight(
+    return CameraView(
         np.concatenate([sight.rows for sight in sights]),
-        View(
+        ViewedSamples(
             np.concatenate([view.stage for view in views]),
             np.concatenate([view.rays for view in views]),
             np.concatenate([view.distances for view in views]),
@@ -81,11 +81,11 @@ def joined_sight(sights: Sequence[Sight]) -> Sight:
 
 
 def unblocked(
-    sight: Sight,
+    sight: CameraView,
     camera: PlannedCamera,
     points: NDArray[np.float64],
     bodies: Sequence[Standing],
-) -> Sight:
+) -> CameraView:
     """Return what is left of a sight of points (n, 3) with bodies in the way."""
     if not bodies:
         return sight
@@ -93,13 +93,13 @@ def unblocked(
     return _taken(sight, np.flatnonzero(~blocked))
 
 
-def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> View:
+def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> ViewedSamples:
     """Return how a camera sees samples, everything in between included."""
     limits = scene.requirements.camera
     return measurability.view(camera, target, limits, scene.visibility, scene.standing)
 
 
-class Sights:
+class CandidateViews:
     """Sights of the same cameras on sets of samples, each looked at once.
 
     Args:
@@ -109,16 +109,16 @@ class Sights:
 
     def __init__(self, scene: Scene, cameras: Sequence[PlannedCamera]) -> None:
         self._scene, self.cameras = scene, tuple(cameras)
-        self._known: list[tuple[NDArray[np.float64], tuple[Sight, ...]]] = []
-        self._first: Sights | None = None
+        self._known: list[tuple[NDArray[np.float64], tuple[CameraView, ...]]] = []
+        self._first: CandidateViews | None = None
 
-    def joined(self, more: Sequence[PlannedCamera]) -> "Sights":
+    def joined(self, more: Sequence[PlannedCamera]) -> "CandidateViews":
         """Return the sights of these cameras, then of more; what is known is kept."""
-        both = Sights(self._scene, (*self.cameras, *more))
+        both = CandidateViews(self._scene, (*self.cameras, *more))
         both._first = self
         return both
 
-    def on(self, target: Target) -> tuple[Sight, ...]:
+    def on(self, target: Target) -> tuple[CameraView, ...]:
         """Return what each camera sees of samples."""
         points = target.samples.points
         for known, found in self._known:
@@ -126,22 +126,24 @@ class Sights:
                 return found
         first = () if self._first is None else self._first.on(target)
         rest = self.cameras[len(first) :]
-        found = first + (sights_of(self._scene, rest, target) if rest else ())
+        found = first + (camera_views(self._scene, rest, target) if rest else ())
         self._known.append((points, found))
         return found
 
 
 def _in_the_open(
     scene: Scene, camera: PlannedCamera, target: Target, some: NDArray[np.int64]
-) -> Sight:
+) -> CameraView:
     """Return which of some samples a camera would see, were nothing in between."""
     limits = scene.requirements.camera
     seen = measurability.view(camera, target.take(some), limits, None)
-    return _taken(Sight(some, seen), np.flatnonzero(seen.stage == measurability.SEEN))
+    return _taken(
+        CameraView(some, seen), np.flatnonzero(seen.stage == measurability.SEEN)
+    )
 
 
-def _taken(sight: Sight, chosen: NDArray[np.int64]) -> Sight:
-    return Sight(sight.rows[chosen], sight.view.take(chosen))
+def _taken(sight: CameraView, chosen: NDArray[np.int64]) -> CameraView:
+    return CameraView(sight.rows[chosen], sight.view.take(chosen))
 
 
 def _facing(

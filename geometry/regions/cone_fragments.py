@@ -12,7 +12,7 @@ _ROOM = 0.7
 _EQUAL = 1e-9
 
 
-def join_crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def join_fragments(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     """Give connected faces without a piece to adjacent ones; -1 where they fit none.
 
     No piece takes more area outside its cone than leaves the last of `CONE_SHARE` in.

@@ -15,7 +15,7 @@ from planning.verify.reconstruction.patterns.ring_patterns import (
 
 from .defocus import Defocus
 from .occluders import Occluder
-from .view import View
+from .view import RenderedView
 
 # Standard deviation of the unit square that a pixel gathers light over.
 _PIXEL_SPREAD = 1.0 / np.sqrt(12.0)
@@ -24,7 +24,7 @@ _SHADOW_SLACK = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Light:
+class RenderedLight:
     """A projector's light on the samples of a view that it reaches, shape (n,) each.
 
     `annulus` is where a sample lies; `inner` and `outer` the shares of blurred light
@@ -40,7 +40,7 @@ class Light:
     root: NDArray[np.float32]
 
     @classmethod
-    def joined(cls, parts: "list[Light]") -> "Light":
+    def joined(cls, parts: "list[RenderedLight]") -> "RenderedLight":
         """Return the light on the samples of all parts."""
         names = [field.name for field in fields(cls)]
         return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
@@ -61,13 +61,13 @@ class Blur:
 
 
 def shine(
-    seen: View,
+    seen: RenderedView,
     projector: ProjectorCalibration,
     design: ProjectorCalibration,
     patterns: RingPatterns,
     caster: Occluder,
     blur: Blur,
-) -> Light:
+) -> RenderedLight:
     """Return a projector's light on the samples of a view.
 
     Args:
@@ -84,7 +84,7 @@ def shine(
         _shine_on(seen, facing[part], projector, design, patterns, caster, blur)
         for part in equal_parts(len(facing), CHUNK) or [slice(0)]
     ]
-    light = Light.joined([light for light, _ in parts])
+    light = RenderedLight.joined([light for light, _ in parts])
     if projector.light == "parallel" or not len(light.samples):
         return light
     depth = np.concatenate([depth for _, depth in parts])
@@ -93,14 +93,14 @@ def shine(
 
 
 def _shine_on(
-    seen: View,
+    seen: RenderedView,
     facing: NDArray[np.int64],
     projector: ProjectorCalibration,
     design: ProjectorCalibration,
     patterns: RingPatterns,
     caster: Occluder,
     blur: Blur,
-) -> tuple[Light, NDArray[np.float64]]:
+) -> tuple[RenderedLight, NDArray[np.float64]]:
     """Light on those of some samples that it reaches, and their depths.
 
     How it falls off with depth is left to the caller.
@@ -122,7 +122,7 @@ def _shine_on(
     annulus = np.searchsorted(patterns.radii, rho)
     edges = np.concatenate([[-np.inf], patterns.radii, [np.inf]])
     drawn = ndtr((patterns.outer_radius - rho) / spread)
-    light = Light(
+    light = RenderedLight(
         lit,
         (seen.albedo[lit] * cosine * drawn).astype(np.float32),
         annulus,
@@ -134,7 +134,7 @@ def _shine_on(
 
 
 def _reached(
-    seen: View,
+    seen: RenderedView,
     facing: NDArray[np.int64],
     projector: ProjectorCalibration,
     caster: Occluder,
@@ -160,7 +160,7 @@ def _reached(
     return able[lit], cosine[lit], pixels[lit], depth[lit]
 
 
-def _facing(seen: View, projector: ProjectorCalibration) -> NDArray[np.int64]:
+def _facing(seen: RenderedView, projector: ProjectorCalibration) -> NDArray[np.int64]:
     """Samples whose faces are turned towards the projector."""
     along = seen.normals @ projector.axis
     if projector.light == "diverging":

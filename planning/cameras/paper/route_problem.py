@@ -12,7 +12,7 @@ from planning.cameras.baselines.camera_spread import CameraSpread
 from planning.cameras.baselines.limit_poses import Parts
 from planning.cameras.baselines.seams import Adjacency, adjacency
 from planning.cameras.baselines.spread_problem import SpreadLimits
-from planning.model.devices import PlannedCamera
+from planning.model.planned import PlannedCamera
 
 _Array = NDArray[np.float64]
 _Measured = NDArray[np.bool_]
@@ -20,7 +20,7 @@ Cameras = tuple[PlannedCamera, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class RouteProblem:
     """What the route stands on: samples, rays, and places to stand.
 
     Attributes:
@@ -60,7 +60,7 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class CameraSet:
     """Cameras as they stand, given ones first.
 
     Attributes:
@@ -87,7 +87,7 @@ class Stand:
         order = [int(i) for i in np.argsort(sole, kind="stable")]
         return [i for i in order if i >= n_given]
 
-    def without(self, camera: int) -> "Stand":
+    def without(self, camera: int) -> "CameraSet":
         """Return the others, as far as bodies don't count."""
         rest = [i for i in range(len(self.cameras)) if i != camera]
-        return Stand(tuple(self.cameras[i] for i in rest), self.measured[:, rest])
+        return CameraSet(tuple(self.cameras[i] for i in rest), self.measured[:, rest])

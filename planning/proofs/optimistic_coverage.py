@@ -43,7 +43,7 @@ def open_rows(
     points, normals = rows.samples.points, rows.samples.normals
 
     def fill(part: slice) -> None:
-        scene.pulse()
+        scene.check_cancelled()
         marks = maps.maps(
             points[part], normals[part], rows.steep[part], rows.samples.faces[part]
         )

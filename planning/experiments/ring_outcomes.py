@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from geometry.rays.rays import RayCaster
-from planning.model.devices import PlannedProjector
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
@@ -28,7 +28,7 @@ _SLACK = 1e-5
 
 
 @dataclass(frozen=True)
-class RingFate:
+class RingOutcome:
     """Shares of one ring's circumference.
 
     Attributes:
@@ -48,7 +48,7 @@ class RingFate:
     measured_by_any: float
 
 
-def ring_fates(plan: RigPlan, cloud: Cloud) -> tuple[RingFate, ...]:
+def ring_outcomes(plan: RigPlan, cloud: Cloud) -> tuple[RingOutcome, ...]:
     """Return what became of every ring of every projector.
 
     Args:
@@ -57,7 +57,7 @@ def ring_fates(plan: RigPlan, cloud: Cloud) -> tuple[RingFate, ...]:
     """
     caster = RayCaster(plan.surface.mesh, threads=1)
     cameras = [calibrate_camera(camera) for camera in plan.cameras]
-    fates: list[RingFate] = []
+    fates: list[RingOutcome] = []
     for p, planned in enumerate(plan.projectors):
         projector = calibrate_projector(planned)
         for k, radius in enumerate(planned.ring_radii):
@@ -68,7 +68,7 @@ def ring_fates(plan: RigPlan, cloud: Cloud) -> tuple[RingFate, ...]:
                 for c in range(len(cameras))
             ]
             fates.append(
-                RingFate(
+                RingOutcome(
                     planned.id,
                     k,
                     len(points) / _PLACES,

@@ -7,7 +7,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
 from planning.cameras.camera_cover import CameraStage
 from planning.cameras.routes import CamerasBy
-from planning.model.devices import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
@@ -18,7 +18,7 @@ from planning.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class PlanRequest:
     """What was ordered: the mesh, the rig, and how to go about it.
 
     Attributes:
@@ -48,13 +48,13 @@ class Order:
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
+class PartialPlan:
     """All stages as far as they came; enough to write a plan from.
 
     `projectors` have evenly spaced rings; `rings` holds those that cameras let finer.
     """
 
-    order: Order
+    order: PlanRequest
     scene: Scene
     regions: DominantRegions
     curvature_radius_m: float
