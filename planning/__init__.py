@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _EXPORTS = {
     "InputError": "planning.model.errors",
     "PlanningError": "planning.model.errors",
-    "RequirementError": "planning.model.errors",
+    "RequirementError": "planning.model.plan_errors",
     "RangedBody": "planning.scene.ranges.ranged_body",
     "Rig": "planning.rig.rig",
     "RigPlan": "planning.model.plan",

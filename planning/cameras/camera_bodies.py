@@ -123,7 +123,7 @@ def resolved_cover(
     projectors: tuple[PlannedProjector, ...],
     cover: CameraCover,
 ) -> CameraCover:
-    """Return a cover whose cameras bear each other's bodies, as `resolve_conflicts` says.
+    """Return a cover whose cameras are compatible, as `resolve_conflicts` says.
 
     Args:
         scene: With the bodies of the projectors.

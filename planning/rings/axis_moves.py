@@ -1,7 +1,7 @@
 """Move the ring axes, tilt and azimuth, to where the cameras measure most exactly.
 
-`solvers.poses.axis_program` proposes from where `ring_axes` turned them; the exact predicate
-decides, on the cover's rows and on samples that neither has seen.
+`solvers.poses.axis_program` proposes from where `ring_axes` turned them; the exact
+predicate decides, on the cover's rows and on samples that neither has seen.
 """
 
 from collections.abc import Sequence
@@ -267,7 +267,7 @@ def _scores_of(
 def smooth_count(
     quality: PairQuality, limits: TriangulationLimits
 ) -> NDArray[np.float64]:
-    """Return 1/(1 + e) of a pair at samples, as `solvers.poses.axis_program` has it, (n,)."""
+    """Return 1/(1 + e) of a pair at samples, as `axis_program` has it, (n,)."""
     least = max(limits.min_conditioning, _LEAST_CONDITIONING)
     excess = (least / np.maximum(quality.conditioning, 1e-12)) ** 2
     excess += (quality.sigma / (limits.max_sigma_m or np.inf)) ** 2

@@ -22,7 +22,8 @@ from planning.model.errors import InfeasibleLimitsError, InputError
 
 
 def _benchmark():
-    path = Path(__file__).resolve().parents[2] / "benchmarks" / "coverage_triangle.py"
+    folder = Path(__file__).resolve().parents[2] / "benchmarks" / "paper"
+    path = folder / "coverage_triangle.py"
     spec = importlib.util.spec_from_file_location("_coverage_triangle_benchmark", path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses look their own module up.

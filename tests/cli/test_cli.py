@@ -317,7 +317,7 @@ def test_sample_writes_the_file_at_the_root(tmp_path, monkeypatch, capsys):
 
 
 def test_the_real_face_scan_is_planned(tmp_path):
-    """In parallel light too: benchmarks/main_job.py."""
+    """In parallel light too: benchmarks/plans/main_job.py."""
     mesh = SHARED / "meshes" / "face_scan_james.obj"
     if not mesh.exists():
         pytest.skip("../shared/data isn't there")

@@ -9,7 +9,7 @@ from planning.report.entries.edge_noise import EdgeNoise
 
 @pytest.fixture(scope="module")
 def table(benchmark_module):
-    return benchmark_module("sigma_deciles")
+    return benchmark_module("pixels.sigma_deciles")
 
 
 @pytest.fixture(scope="module")

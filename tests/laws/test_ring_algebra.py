@@ -5,7 +5,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def algebra(benchmark_module):
-    return benchmark_module("ring_algebra")
+    return benchmark_module("paper.ring_algebra")
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])

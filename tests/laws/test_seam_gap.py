@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def wall(benchmark_module):
-    return benchmark_module("seam_gap")
+    return benchmark_module("pixels.seam_gap")
 
 
 def test_d_max_of_two_images_is_their_width_on_the_wall(wall):

@@ -40,7 +40,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module")
 def attack_cameras(benchmark_module):
-    return benchmark_module("attack_cameras")
+    return benchmark_module("bounds.attack_cameras")
 
 
 def scene_of(mesh, *, existing=(), coverage=None, limits=None, **workspace):

@@ -1,7 +1,8 @@
 """Damaged mesh files, made from a seed and a number, and what reading them may do.
 
-`python tests/support/fuzzing.py` is the worker: it reads "seed number" lines, answers each with
-a line of JSON, and may die or hang without hurting whoever asked. `run` asks it.
+`python tests/support/fuzzing.py` is the worker: it reads "seed number" lines, answers
+each with a line of JSON, and may die or hang without hurting whoever asked. `run` asks
+it.
 """
 
 import base64

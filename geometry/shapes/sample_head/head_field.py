@@ -3,8 +3,8 @@
 A head is the set where its field is negative. Joins are the cubic smooth minimum, so
 the surface has continuous curvature wherever its solids have. Near the surface the
 field is roughly the distance to it. Lengths in mm, in the frame of
-`geometry.shapes.sample_head.sample_head`. Only correctly rounded arithmetic is used, so that every machine
-gets the same numbers.
+`geometry.shapes.sample_head.sample_head`. Only correctly rounded arithmetic is used, so
+that every machine gets the same numbers.
 """
 
 from typing import TypeAlias

@@ -1,9 +1,9 @@
 """Slides neighbouring cameras apart to the largest baselines that coverage allows.
 
-`solvers.poses.baseline_program` proposes by eqs. (9)-(10); rays decide: a move counts only if
-the measured area stays at least what it was, and the parts stay registered. Samples
-that a proposal lost are demanded of the next one; steps are halved where that doesn't
-help.
+`solvers.poses.baseline_program` proposes by eqs. (9)-(10); rays decide: a move counts
+only if the measured area stays at least what it was, and the parts stay registered.
+Samples that a proposal lost are demanded of the next one; steps are halved where that
+doesn't help.
 """
 
 from collections.abc import Callable, Sequence

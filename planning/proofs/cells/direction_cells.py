@@ -3,8 +3,8 @@
 A projector of parallel light lights what its one direction allows, wherever else its
 beam stands. So the space of its poses is the sphere of directions u = -L, cut into the
 cells of a cube map; a cell's row holds each sample to which it is open
-(`geometry.directions.open_directions`). Beam, panel and range are left out: that only adds
-samples, and what is proved holds for beams of any width.
+(`geometry.directions.open_directions`). Beam, panel and range are left out: that only
+adds samples, and what is proved holds for beams of any width.
 
 The workspace leaves out directions. A device at Q that lights a sample at P by a beam
 of half width h stands at Q - C = t u + (P - C) + o, |o| <= h, about the centre C. With

@@ -89,9 +89,9 @@ class _Sight:
     Attributes:
         view: With no limits but what stands in between.
         clear: Whether nothing does.
-        stage: First limit of *seen* that fails, `SEEN` if none, as in a `ViewedSamples`.
-        failed: Whether field, range, incidence and sampling distance fail, (4, n).
-        off_axis: From the middle of the image [rad].
+        stage: First limit of *seen* that fails, `SEEN` if none, as in a
+        `ViewedSamples`. failed: Whether field, range, incidence and sampling distance
+        fail, (4, n). off_axis: From the middle of the image [rad].
         sample_distance: z / (f cos(incidence)) [m].
     """
 

@@ -2,8 +2,8 @@
 
 `REFUSED`, `READ` and `ENDS` are the table. Here all that are refused go through the
 command line, all others through the reader, and the cheapest of those (`CHEAP`) through
-planning with few candidates. `benchmarks/nasty.py` sends all 64 through the whole
-default job, each in a process, and holds exit codes and messages against `ENDS`.
+planning with few candidates. `benchmarks/meshes/nasty.py` sends all 64 through the
+whole default job, each in a process, and holds exit codes and messages against `ENDS`.
 """
 
 import warnings
@@ -112,7 +112,7 @@ READ = {
     "tm_whitespace.off": (12, 12, 3.2660, {}),
 }
 # Exit code of the whole default job, and words of its message, which
-# `benchmarks/nasty.py` holds every file to.
+# `benchmarks/meshes/nasty.py` holds every file to.
 ENDS = {
     "as_3DSMaxExport.STL": (1, "of the reachable target, 90.0 % is required"),
     "as_Spider_ascii.stl": (1, "of the reachable target, 90.0 % is required"),

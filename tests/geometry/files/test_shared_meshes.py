@@ -1,6 +1,6 @@
 """The twelve shared meshes: read as what they are, curved, divided, planned.
 
-`benchmarks/main_job.py` plans all of them with the default rig.
+`benchmarks/plans/main_job.py` plans all of them with the default rig.
 """
 
 from pathlib import Path
@@ -33,7 +33,7 @@ NAMES = [
     "vtk_horse.ply",
     "vtk_turbineblade.ply",
 ]
-# Curvature and regions of larger ones: `benchmarks/main_job.py`.
+# Curvature and regions of larger ones: `benchmarks/plans/main_job.py`.
 LARGE = 50_000
 
 

@@ -20,7 +20,7 @@ POSES = 2000
 
 @pytest.fixture(scope="module")
 def attack_cells(benchmark_module):
-    return benchmark_module("attack_cells")
+    return benchmark_module("bounds.attack_cells")
 
 
 def notched_box(side=0.03):

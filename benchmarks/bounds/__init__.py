@@ -1,0 +1,1 @@
+"""Bounds over all poses, and attacks on them."""

@@ -1,0 +1,202 @@
+"""How many projectors: found, proved over candidates, proved over all poses.
+
+Usage: python -m benchmarks.bounds.continuous_bounds [NAME ...] [--lights parallel
+    diverging]
+       [--shares 0.9 0.95] [--tangents 0 40] [--prove] [--more N]
+
+For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any):
+`count / bound over candidates / bound over all poses` for each light, required share
+and tangent limit, on the 2,000 samples that the planner starts from; what the search
+over cells proved it by, and the seconds of maps and search together. With `--more N`
+the count that N times as many candidates need stands beside it, and no bound over all
+poses. `*`: shadows were left out. A bound in bold equals the count.
+"""
+
+import argparse
+import os
+import platform
+import sys
+import time
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from support import shared_meshes
+
+from geometry.curvature.refinement import cut_for_curvature
+from geometry.files.readers import load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from planning import load_rig
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.progress import Stopwatch
+from planning.prepare import Prepared, prepared
+from planning.projectors.projector_stage import ProjectorStage, plan_projectors
+from planning.projectors.proved_projectors import prove_fewest
+from planning.proofs.projector_bound import DEFAULT, PROVE
+from planning.report.partial_plan import PlanRequest
+
+ROOT = Path(__file__).resolve().parents[2]
+MANY = 200
+
+
+def main() -> int:
+    """Print the table; return 1 where a bound contradicts a count."""
+    given = _arguments()
+    print(
+        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
+        f"cores, python {platform.python_version()}, numpy {np.__version__}\n\n"
+        f"{'--prove' if given.prove else 'default'} effort\n"
+    )
+    cases = [(a, b) for b in given.tangents for a in given.shares]
+    heads = [f"{100 * share:g} %, tangent {tangent:g}°" for share, tangent in cases]
+    print(
+        f"| mesh | faces | light | {' | '.join(heads)} |\n|{(3 + len(cases)) * '---|'}"
+    )
+    below: dict[tuple[str, str], Counter[int]] = {}
+    for path, options, up in jobs(given.names):
+        mesh, _ = cut_for_curvature(load_mesh(path, **options))
+        for light in given.lights:
+            cells = []
+            for (share, tangent), head in zip(cases, heads, strict=True):
+                ready = ready_for(mesh, light, up, share, tangent)
+                if given.more > 1:
+                    cell, gap = _with_more(ready, given.more)
+                else:
+                    cell, gap = _cell(ready, prove=given.prove)
+                cells.append(cell)
+                below.setdefault((light, head), Counter())[gap] += 1
+            row = " | ".join(cells)
+            print(
+                f"| {path.name} | {len(mesh.faces):,} | {light} | {row} |", flush=True
+            )
+    print()
+    for (light, head), counts in below.items():
+        said = ", ".join(f"{n} by {gap}" for gap, n in sorted(counts.items()))
+        what = "bound over all poses below the count"
+        if given.more > 1:
+            what = f"{given.more} times the candidates need fewer"
+        print(f"* {light}, {head}: {what}: {said}")
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="bounds over all poses")
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    lights = ("parallel", "diverging")
+    parser.add_argument("--lights", nargs="+", default=lights, choices=lights)
+    parser.add_argument("--shares", nargs="+", type=float, default=(0.9, 0.95))
+    parser.add_argument("--tangents", nargs="+", type=float, default=(0.0, 40.0))
+    parser.add_argument("--prove", action="store_true")
+    parser.add_argument("--more", type=int, default=1, help="times the candidates")
+    return parser.parse_args()
+
+
+def jobs(names: list[str]) -> list[tuple[Path, dict[str, object], str | None]]:
+    """Return path, reading options and `up` of the meshes named, or of all."""
+    table = shared_meshes
+    jobs = [(ROOT / "face.obj", {"unit": "mm"}, None)]
+    if table.FOLDER.is_dir():
+        for mesh in table.MESHES:
+            words = dict(zip(mesh.words[::2], mesh.words[1::2], strict=True))
+            jobs.append((mesh.path, mesh.options, words.get("--up")))
+    return [job for job in jobs if not names or job[0].name in names]
+
+
+def ready_for(
+    mesh: TriangleMesh,
+    light: str,
+    up: str | None,
+    share: float | None,
+    tangent: float | None,
+    *,
+    devices: int | None = None,
+) -> Prepared:
+    """Return a mesh ready for planning.
+
+    Args:
+        mesh: The surface.
+        light: Kind of light.
+        up: Axis that points up; None: the rig's.
+        share: Of the target that must be lit; None: the rig's.
+        tangent: Least tangent angle in degrees; None: the rig's.
+        devices: Projectors and cameras at most, and as much measured as they can;
+            None: as many as needed.
+    """
+    asked = {
+        "max_projectors": devices or MANY,
+        "max_cameras": devices,
+        "target": "dominant",
+        "dominant_coverage": share,
+        "coverage": devices and 1.0,
+        "min_reachable": None,
+        "accuracy_mm": None,
+        "up": up,
+    }
+    order = PlanRequest(
+        mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ()
+    )
+    ready = prepared(order, Stopwatch())
+    if tangent is None:
+        return ready
+    required = ready.scene.requirements
+    limits = replace(required.projector, min_tangent_angle=float(np.deg2rad(tangent)))
+    scene = replace(ready.scene, requirements=replace(required, projector=limits))
+    return replace(ready, scene=scene)
+
+
+def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
+    """Return the projectors chosen of so many times the candidates; None: no light."""
+    rig = ready.order.rig
+    number = times * max(rig.n_candidate_projectors, rig.n_reference_projectors)
+    try:
+        return plan_projectors(
+            ready.scene,
+            ready.template,
+            number,
+            ring_offset=ready.ring_offset,
+            rounds=1,
+        )
+    except InfeasibleLimitsError:
+        return None
+
+
+def _with_more(ready: Prepared, times: int) -> tuple[str, int]:
+    """Return count and bound with more candidates too, and how many they save."""
+    stages = [_stage(ready, number) for number in (1, times)]
+    needed = [None if s is None else s.certificate["needed"] for s in stages]
+    if needed[0] is None or needed[1] is None:
+        return "nothing lit", 0
+    told = " -> ".join(f"{n['count']} / {n['lower_bound']}" for n in needed if n)
+    return told, needed[0]["count"] - needed[1]["count"]
+
+
+def _cell(ready: Prepared, *, prove: bool) -> tuple[str, int]:
+    """Return the table's cell, and by how many the bound is below the count."""
+    stage = _stage(ready)
+    if stage is None:
+        return "nothing lit", 0
+    before = stage.certificate["needed"]["count"]
+    begin = time.perf_counter()
+    stage = prove_fewest(
+        ready.scene,
+        stage,
+        ready.template,
+        PROVE if prove else DEFAULT,
+        ring_offset=ready.ring_offset,
+    )
+    seconds = time.perf_counter() - begin
+    needed, bound = (stage.certificate[k] for k in ("needed", "continuous"))
+    count, least = needed["count"], bound["lower_bound"]
+    shown = f"**{least}**" if least == count else f"{least}"
+    star = "" if bound["occlusion"] else "*"
+    saved = f" (was {before})" if count < before else ""
+    return (
+        f"{count}{saved} / {needed['lower_bound']} / {shown}{star} "
+        f"({bound['proof'].split(';')[0]}, {seconds:.1f} s)",
+        count - least,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Set covers, beside other solvers."""

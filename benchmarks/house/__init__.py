@@ -1,0 +1,1 @@
+"""The house itself: its size, its graph, its plans before and after."""

@@ -1,0 +1,1 @@
+"""Readers, rays, curvature and regions."""

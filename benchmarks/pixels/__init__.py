@@ -1,0 +1,1 @@
+"""What rendered pixels say of plans."""

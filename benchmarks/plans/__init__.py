@@ -1,0 +1,1 @@
+"""Whole plans, and the stages that make them."""
