@@ -28,11 +28,6 @@
 # %%
 import numpy as np
 
-from planning.experiments.equations import (
-    coordinate_transform,
-    projected,
-    projection_matrix,
-)
 from planning.experiments.paper_figures import (
     draw_camera_images,
     draw_densities,
@@ -90,9 +85,11 @@ draw_viewpoints(outcome, stage)
 cloud = outcome.union.cloud
 camera = calibrate_camera(outcome.experiment.plan.cameras[0])
 own = cloud.take(cloud.camera == 0)
-matrix = projection_matrix(camera)
+turn = camera.world_from_device[:3, :3].T
+matrix = camera.matrix @ np.column_stack([turn, -turn @ camera.centre])
 print(np.round(matrix, 3))
-print(f"{np.abs(projected(matrix, own.points) - own.pixels).max():.1e} px")
+u, v, w = matrix @ np.column_stack([own.points, np.ones(len(own))]).T
+print(f"{np.abs(np.column_stack([u / w, v / w]) - own.pixels).max():.1e} px")
 
 # %% [markdown]
 # ## Redundancy removed, merged (Figs. 8 to 10)
@@ -105,7 +102,7 @@ print(f"{np.abs(projected(matrix, own.points) - own.pixels).max():.1e} px")
 
 # %%
 first, second = (calibrate_projector(p) for p in outcome.experiment.plan.projectors)
-print(np.round(coordinate_transform(first, second), 4))
+print(np.round(np.linalg.inv(first.world_from_ring) @ second.world_from_ring, 4))
 draw_redundancy(outcome, stage)
 
 # %% [markdown]

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from support import reconstruction_rigs
+from support.white_frames import balanced_accuracy, best_threshold, render_whites
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
@@ -33,18 +34,18 @@ from planning.verify.reconstruction.check.accuracy import (
     nearest_distance,
 )
 from planning.verify.reconstruction.check.check import reconstruct_plan
-from planning.verify.reconstruction.faults.overlapping_light import (
-    balanced_accuracy,
-    best_threshold,
-    light_falls,
-    outer_radius,
+from planning.verify.reconstruction.check.image_overlap import (
     overlap_by_frames,
     overlap_by_intensity,
+)
+from planning.verify.reconstruction.faults.overlapping_light import (
+    light_falls,
+    outer_radius,
 )
 from planning.verify.reconstruction.faults.supposed import incidence_cosine
 from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.render.render import Shown, render_whites
+from planning.verify.reconstruction.render.render import Shown
 from planning.verify.reconstruction.render.view import view
 
 RIGS = reconstruction_rigs

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 from support import reconstruction_rigs
+from support.edge_noise import EdgeNoise
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
@@ -23,7 +24,6 @@ from geometry.rays.proximity import closest_points
 from geometry.shapes.primitives import grid, sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
-from planning.report.entries.edge_noise import EdgeNoise
 from planning.scene import lighting, measurability
 from planning.scene.samples import Target
 from planning.verify.reconstruction.check.check import reconstruct_plan

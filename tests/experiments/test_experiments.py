@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-
-from geometry.mesh.mesh import TriangleMesh
-from geometry.rays.rays import RayCaster
-from geometry.shapes.primitives import box, grid, joined
-from planning.experiments.equations import (
+from support.paper_equations import (
     coordinate_transform,
     projected,
     projection_matrix,
 )
+
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.rays import RayCaster
+from geometry.shapes.primitives import box, grid, joined
 from planning.experiments.one_image import Prior, judged_labels, true_labels
 from planning.experiments.paper_devices import (
     CAMERA_PX,

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.edge_noise import EdgeNoise
 
 from geometry.shapes.primitives import sphere
-from planning.report.entries.edge_noise import EdgeNoise
 
 
 @pytest.fixture(scope="module")

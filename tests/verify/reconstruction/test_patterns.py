@@ -1,7 +1,6 @@
 """Pattern files: decoded, from the files alone, by code of this test's own."""
 
 import json
-import re
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -14,12 +13,6 @@ from planning.model.plan import RigPlan
 from planning.verify.reconstruction.patterns.pattern_files import (
     remove_patterns,
     write_patterns,
-)
-from planning.verify.reconstruction.patterns.pattern_frames import pattern_sequence
-from planning.verify.reconstruction.patterns.pattern_svg import (
-    Circle,
-    outline_of,
-    pixels_from_plane,
 )
 
 
@@ -88,7 +81,7 @@ def test_the_sequence_has_as_many_frames_as_the_formula_says(written):
             same = ("kind", "bit", "camera")
             assert [plain[k] for k in same] == [inverse[k] for k in same]
     files = {p.relative_to(folder).as_posix() for p in folder.rglob("*.*")}
-    listed = {f[kind] for f in entry["frames"] for kind in ("png", "svg")}
+    listed = {f["png"] for f in entry["frames"]}
     assert files == listed | {"sequence.json"}
 
 
@@ -190,79 +183,6 @@ def test_root_discs_tell_the_sign_of_r_dot_m(written):
         sure = (white == 255) & (np.abs(along) > 0.01)
         assert np.array_equal(bright[sure] > 127, along[sure] > 0)
         assert 0.02 < np.mean(along[sure] > 0) < 0.98
-
-
-_ELLIPSE = re.compile(
-    r'rx="(\S+)" ry="(\S+)" transform="translate\((\S+) (\S+)\) rotate\((\S+)\)"'
-)
-
-
-def inside_of(element, points):
-    """Whether points lie inside an ellipse or polygon of an SVG file."""
-    found = _ELLIPSE.search(element)
-    if found:
-        a, b, u, v, turn = map(float, found.groups())
-        x, y = (points - [u, v]).T
-        c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
-        return ((c * x + s * y) / a) ** 2 + ((c * y - s * x) / b) ** 2 <= 1.0
-    text = re.search(r'points="([^"]*)"', element).group(1)
-    corners = np.array([[float(x) for x in p.split(",")] for p in text.split()])
-    begin, end = corners, np.roll(corners, -1, axis=0)
-    inside = np.zeros(len(points), dtype=bool)
-    for (x0, y0), (x1, y1) in zip(begin, end, strict=True):
-        between = (y0 > points[:, 1]) != (y1 > points[:, 1])
-        if y0 != y1:
-            at = x0 + (points[:, 1] - y0) * (x1 - x0) / (y1 - y0)
-            inside ^= between & (points[:, 0] < at)
-    return inside
-
-
-def painted(text, points):
-    """Brightness that an SVG file of ours gives to points: the last shape wins."""
-    bright = np.zeros(len(points), dtype=bool)
-    for element in re.findall(r"<(?:ellipse|polygon)[^>]*fill=[^>]*>", text):
-        bright[inside_of(element, points)] = 'fill="#fff"' in element
-    clip = re.search(r'id="drawn">(<[^>]*>)', text).group(1)
-    beam = re.search(r'<circle cx="(\S+)" cy="(\S+)" r="(\S+)"/>', text)
-    if beam:
-        u, v, radius = map(float, beam.groups())
-        bright &= np.hypot(*(points - [u, v]).T) <= radius
-    return bright & inside_of(clip, points)
-
-
-def test_curves_and_images_agree_on_every_frame(written):
-    plan, folder = written
-    width, height = plan.projectors[0].device.resolution
-    rng = np.random.default_rng(1)
-    points = rng.integers([0, 0], [width, height], (3000, 2))
-    for frame in frames_of(folder)["frames"]:
-        image = read(folder, frame["png"])[points[:, 1], points[:, 0]]
-        sure = (image == 0) | (image == 255)
-        bright = painted((folder / frame["svg"]).read_text(), points.astype(float))
-        assert np.array_equal(bright[sure], image[sure] == 255), frame["svg"]
-
-
-@pytest.mark.parametrize("depth", [0.3, 0.0, -0.3])
-def test_a_root_disc_that_reaches_behind_the_device_is_an_outline(rigs, depth):
-    """A camera beside the projector: its disc is all but a half plane."""
-    plan = _plan(rigs, "diverging")
-    sequence = pattern_sequence(plan.projectors[0], plan.cameras)
-    pixels = pixels_from_plane(sequence.projector)
-    away = np.array([0.4, -0.1])
-    z = depth or 1e-7
-    circle = Circle(away / (2 * z), float(np.hypot(*away)) / abs(2 * z))
-    corners = outline_of(circle, pixels, (1280, 800))
-    assert len(corners) < 4000
-    rng = np.random.default_rng(2)
-    points = rng.uniform([0, 0], [1279, 799], (2000, 2))
-    back = np.column_stack([points, np.ones(2000)]) @ np.linalg.inv(pixels).T
-    plane = back[:, :2] / back[:, 2:]
-    off = np.linalg.norm(plane - circle.centre, axis=1) - circle.radius
-    text = " ".join(f"{u:.4f},{v:.4f}" for u, v in corners)
-    inside = inside_of(f'<polygon points="{text}"/>', points)
-    sure = np.abs(off) * pixels[0, 0] > 0.05
-    assert np.array_equal(inside[sure], off[sure] < 0)
-    assert 0.02 < np.mean(inside) < 0.98
 
 
 def test_the_same_plan_gives_the_same_bytes(written, tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.white_frames import balanced_accuracy, best_threshold, render_whites
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
@@ -10,19 +11,19 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from planning.verify.reconstruction.faults.overlapping_light import (
-    balanced_accuracy,
-    best_threshold,
-    light_falls,
-    lit_twice,
-    outer_radius,
+from planning.verify.reconstruction.check.image_overlap import (
     overlap_by_frames,
     overlap_by_intensity,
     three_classes,
 )
+from planning.verify.reconstruction.faults.overlapping_light import (
+    light_falls,
+    lit_twice,
+    outer_radius,
+)
 from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.render.render import Shown, render_whites
+from planning.verify.reconstruction.render.render import Shown
 from planning.verify.reconstruction.render.view import view
 
 

@@ -5,13 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from PIL import Image
+
 from planning.model.files import write_together
 from planning.model.plan import RigPlan
 
 from .pattern_frames import Frame, PatternSequence, pattern_sequence
 from .pattern_images import PatternCanvas, canvas
-from .pattern_svg import TOLERANCE_PX, VectorFrames
-from .png import write_grey_png
 
 FOLDER = "patterns"
 _MANIFEST = "sequence.json"
@@ -33,7 +33,7 @@ _NOTES = {
 
 
 def write_patterns(plan: RigPlan, folder: Path) -> Path:
-    """Write `patterns/` into a plan's folder: PNG, SVG and `sequence.json`.
+    """Write `patterns/` into a plan's folder: PNG images and `sequence.json`.
 
     No file is moved into place before all are complete, and the manifest is the last.
     Files that an earlier manifest lists and this one doesn't are removed.
@@ -54,12 +54,11 @@ def write_patterns(plan: RigPlan, folder: Path) -> Path:
     entries: list[dict[str, Any]] = []
     for projector in plan.projectors:
         sequence = pattern_sequence(projector, plan.cameras)
-        drawn, vectors = canvas(sequence), VectorFrames(sequence)
+        drawn = canvas(sequence)
         (place / projector.id).mkdir(parents=True, exist_ok=True)
         for frame in sequence.frames:
-            path = place / projector.id / frame.name
-            files[path.with_suffix(".png")] = _png_writer(drawn, frame)
-            files[path.with_suffix(".svg")] = _svg_writer(vectors, frame)
+            path = place / projector.id / f"{frame.name}.png"
+            files[path] = _png_writer(drawn, frame)
         entries.append(_entry(sequence))
     text = json.dumps(_manifest(entries), indent=1, allow_nan=False) + "\n"
     files[place / _MANIFEST] = lambda file: file.write(text.encode())
@@ -80,7 +79,6 @@ def _manifest(entries: list[dict[str, Any]]) -> dict[str, Any]:
         "format": _SECTION,
         "version": 1,
         **_NOTES,
-        "svg_tolerance_px": TOLERANCE_PX,
         "projectors": entries,
     }
 
@@ -97,22 +95,17 @@ def _entry(sequence: PatternSequence) -> dict[str, Any]:
         "ring_radii": rings.radii.tolist(),
         "flipping_bit": rings.flipping_bit.tolist(),
         "frames": [
-            {
-                "png": f"{projector.id}/{frame.name}.png",
-                "svg": f"{projector.id}/{frame.name}.svg",
-                **frame.to_document(),
-            }
+            {"png": f"{projector.id}/{frame.name}.png", **vars(frame)}
             for frame in sequence.frames
         ],
     }
 
 
 def _png_writer(drawn: PatternCanvas, frame: Frame) -> Callable[[BinaryIO], object]:
-    return lambda file: write_grey_png(drawn.image(frame), file)
-
-
-def _svg_writer(vectors: VectorFrames, frame: Frame) -> Callable[[BinaryIO], object]:
-    return lambda file: file.write(vectors.svg(frame).encode())
+    # Frames are large and flat: the fastest packing is small enough.
+    return lambda file: Image.fromarray(drawn.image(frame)).save(
+        file, format="PNG", compress_level=1
+    )
 
 
 def _listed(place: Path) -> set[Path]:
@@ -122,10 +115,11 @@ def _listed(place: Path) -> set[Path]:
         if manifest["format"] != _SECTION:
             return set()
         names = [
-            frame[kind]
+            name
             for projector in manifest["projectors"]
             for frame in projector["frames"]
-            for kind in ("png", "svg")
+            # Earlier versions wrote each frame as SVG, too.
+            for name in (frame["png"], frame.get("svg"))
         ]
     except (OSError, ValueError, KeyError, TypeError):
         return set()

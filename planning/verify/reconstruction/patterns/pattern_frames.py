@@ -6,7 +6,7 @@ What is drawn is defined once, in `reconstruction.patterns`, which the check ren
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,10 +47,6 @@ class Frame:
         what = {"bit": f"bit{self.bit}", "root": f"root-{self.camera}"}
         name = f"{self.number:02d}-{what.get(self.kind, self.kind)}"
         return f"{name}-inverse" if self.inverse else name
-
-    def to_document(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        return dict(vars(self))
 
 
 @dataclass(frozen=True, eq=False)

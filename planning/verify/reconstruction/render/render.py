@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.verify.reconstruction.calibration import ProjectorCalibration
-from planning.verify.reconstruction.faults.overlapping_light import Whites
 from planning.verify.reconstruction.patterns.ring_patterns import (
     Frames,
     Images,
@@ -102,36 +101,6 @@ def render_pair(
         dark = white - bright + ambient
         stack[first + 1] = photometry.capture(dark, (*seed, first + 1), gain)
     return Frames(stack, canvas.corner)
-
-
-def render_whites(
-    seen: RenderedView,
-    shown: tuple[Shown, ...],
-    photometry: Photometry,
-    seed: tuple[int, ...],
-) -> Whites:
-    """Return one camera's images of several projectors' white, alone and together.
-
-    The exposure suits each projector alone, so that what two light may saturate.
-
-    Args:
-        seen: What the camera sees.
-        shown: The projectors.
-        photometry: Light and sensor.
-        seed: Of the noise of these images.
-    """
-    canvas = ImageCanvas.about(seen, np.zeros(0, dtype=np.int64))
-    around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
-    ambient = canvas.image(around, canvas.inside, photometry)
-    lights = [one.light(seen, photometry) for one in shown]
-    whites = [canvas.image(one.white, one.samples, photometry) for one in lights]
-    brightest = max(float(np.percentile(white + ambient, 99.9)) for white in whites)
-    gain = photometry.exposure * 255.0 / max(brightest, 1e-9)
-    images = [ambient, *(white + ambient for white in whites), sum(whites, ambient)]
-    dark, *alone, together = (
-        photometry.capture(image, (*seed, k), gain) for k, image in enumerate(images)
-    )
-    return Whites(dark, np.stack(alone), together, canvas.corner)
 
 
 def _added(
