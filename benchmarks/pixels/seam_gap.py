@@ -15,7 +15,6 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.shapes.primitives import grid
 from planning.cameras.baselines.baseline_rows import half_field
-from planning.cameras.baselines.coverage_triangle import flat_limit
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan
 
@@ -49,7 +48,7 @@ def predicted_limit() -> float:
         STANDOFF * float(np.tan(half_field(camera, ahead, side, np.zeros(1))[0]))
         for camera, side in ((one, inwards), (two, -inwards))
     ]
-    return flat_limit(extents[0], extents[1])
+    return extents[0] + extents[1]
 
 
 def seam_samples() -> tuple[SurfaceSamples, NDArray[np.bool_]]:

@@ -10,15 +10,16 @@ from scipy.spatial.transform import Rotation
 
 from planning.cameras.baselines.coverage_triangle import (
     baseline_parts,
-    bent_limit,
-    cylinder_limit,
-    flat_limit,
     largest_baseline,
     round_body_limit,
     seam_angles,
+)
+from tests.support.closed_forms import (
+    bent_limit,
+    cylinder_limit,
+    flat_limit,
     sphere_band_limit,
 )
-from planning.model.errors import InfeasibleLimitsError, InputError
 
 
 def _benchmark():
@@ -264,32 +265,3 @@ def test_sphere_band_and_cylinder_end_where_the_incidence_ends():
     ):
         assert limit.half_angle == pytest.approx(flat.half_angle)
         assert limit.n_min == flat.n_min
-
-
-def test_what_no_ring_covers_says_so():
-    with pytest.raises(InfeasibleLimitsError, match=r"the band reaches 60\.0 deg"):
-        sphere_band_limit(0.1, 1.0, np.radians(60), np.radians(60))
-    with pytest.raises(InfeasibleLimitsError, match="half height 2000 mm"):
-        cylinder_limit(0.1, 1.0, np.radians(60), 2.0)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((1.0, 0.5, 1.0), "must stand outside"),
-        ((np.nan, 0.5, 1.0), "must stand outside"),
-        ((0.1, 0.5, 1.6), "max_incidence"),
-        ((0.1, 0.5, np.nan), "max_incidence"),
-        ((0.1, 0.5, 1.0, 0.0), "half field"),
-    ],
-)
-def test_guards_of_the_closed_forms(arguments, message):
-    with pytest.raises(InputError, match=message):
-        round_body_limit(*arguments)
-
-
-def test_guards_of_heights_and_latitudes():
-    with pytest.raises(InputError, match="latitude"):
-        sphere_band_limit(0.1, 1.0, 1.0, -0.1)
-    with pytest.raises(InputError, match="half height"):
-        cylinder_limit(0.1, 1.0, 1.0, np.nan)

@@ -9,9 +9,7 @@ from geometry.devices import PinholeModel
 from geometry.poses import look_at
 from planning.cameras.baselines.camera_spread import spread_cameras
 from planning.cameras.baselines.coverage_triangle import (
-    cylinder_limit,
     round_body_limit,
-    sphere_band_limit,
 )
 from planning.cameras.baselines.limit_poses import Parts, limit_poses
 from planning.cameras.baselines.seams import adjacency
@@ -23,6 +21,7 @@ from planning.cameras.paper.route_problem import CameraSet, RouteProblem
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
+from tests.support.closed_forms import cylinder_limit, sphere_band_limit
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

@@ -15,17 +15,19 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.coverage_triangle import (
-    bent_limit,
-    cylinder_limit,
-    flat_limit,
     round_body_limit,
-    sphere_band_limit,
 )
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
 from planning.scene.measurability import SEEN, view
 from planning.scene.samples import Target
 from solvers import CoverProblem, solve_cover
+from tests.support.closed_forms import (
+    bent_limit,
+    cylinder_limit,
+    flat_limit,
+    sphere_band_limit,
+)
 
 UP = np.array([0.0, 0.0, 1.0])
 RING = 1.0

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.errors import InfeasibleLimitsError, InputError
-
 _Array = NDArray[np.float64]
 
 # Below this, relative to the lengths involved, a direction counts as undefined.
@@ -194,37 +192,6 @@ def _wrapped(angle: _Array) -> _Array:
     return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
 
 
-def flat_limit(half_extent1: float, half_extent2: float) -> float:
-    """Return d'_max = C1 + C2 of a flat wall, axes square to it, field-limited [m]."""
-    return half_extent1 + half_extent2
-
-
-def bent_limit(
-    standoff1: float,
-    half_extent1: float,
-    standoff2: float,
-    half_extent2: float,
-    turn: float,
-) -> float:
-    """Return d_max over an edge, each axis square to its own plane, field-limited.
-
-    ::
-
-        d_max^2 = s1^2 + C1^2 + s2^2 + C2^2
-                  - 2 [(s1 s2 - C1 C2) cos(turn) - (C1 s2 + C2 s1) sin(turn)]
-
-    Args:
-        standoff1: s1, the paper's d_1, in [m].
-        half_extent1: C1 = s1 tan(b_1) in [m].
-        standoff2: s2 in [m].
-        half_extent2: C2 in [m].
-        turn: Angle between the planes' normals, convex positive [rad].
-    """
-    s1, c1, s2, c2 = standoff1, half_extent1, standoff2, half_extent2
-    mixed = (s1 * s2 - c1 * c2) * np.cos(turn) - (c1 * s2 + c2 * s1) * np.sin(turn)
-    return float(np.sqrt(s1**2 + c1**2 + s2**2 + c2**2 - 2.0 * mixed))
-
-
 @dataclass(frozen=True)
 class RingLimit:
     """Cameras on a ring about a round body.
@@ -255,99 +222,20 @@ def round_body_limit(
     The second only if sin(alpha) < rho/S: else the whole body is in the field.
 
     Args:
-        radius: rho in [m].
+        radius: rho in [m], less than S.
         ring_radius: S, of the camera centres about the body's centre, in [m].
         max_incidence: theta in [rad].
         half_field: alpha in [rad]; None: no limit.
-
-    Raises:
-        InputError: If a length or angle is out of range.
     """
-    _check_round(radius, ring_radius, max_incidence)
     ratio = radius / ring_radius
     eta = max_incidence - np.arcsin(ratio * np.sin(max_incidence))
-    if half_field is not None:
-        if not 0.0 < half_field < np.pi / 2:
-            raise InputError(f"half field is {half_field} rad, must be in (0, pi/2)")
-        if np.sin(half_field) < ratio:
-            eta = min(eta, np.arcsin(np.sin(half_field) / ratio) - half_field)
-    return _ring(float(eta), ring_radius)
+    if half_field is not None and np.sin(half_field) < ratio:
+        eta = min(eta, np.arcsin(np.sin(half_field) / ratio) - half_field)
+    return ring_limit(float(eta), ring_radius)
 
 
-def sphere_band_limit(
-    radius: float,
-    ring_radius: float,
-    max_incidence: float,
-    latitude: float,
-    half_field: float | None = None,
-) -> RingLimit:
-    """Return the limits for the band within a latitude of a sphere's equator.
-
-    ::
-
-        cos(eta_l) = cos(eta) / cos(latitude)
-
-    Raises:
-        InputError: If a length or angle is out of range.
-        InfeasibleLimitsError: If no camera in the equator's plane reaches the latitude.
-    """
-    cap = round_body_limit(radius, ring_radius, max_incidence, half_field).half_angle
-    if not 0.0 <= latitude < np.pi / 2:
-        raise InputError(f"latitude is {latitude} rad; it must lie in [0, pi/2)")
-    cosine = np.cos(cap) / np.cos(latitude)
-    if not cosine < 1.0:
-        raise InfeasibleLimitsError(
-            f"a camera in the equator's plane covers a cap of {np.degrees(cap):.1f} "
-            f"deg, the band reaches {np.degrees(latitude):.1f} deg: no number of "
-            f"cameras on this ring covers it; stand farther off or accept more "
-            f"incidence"
-        )
-    return _ring(float(np.arccos(cosine)), ring_radius)
-
-
-def cylinder_limit(
-    radius: float, ring_radius: float, max_incidence: float, half_height: float
-) -> RingLimit:
-    """Return the limits for an upright cylinder, cameras at its mid height.
-
-    ::
-
-        cos(eta) = [rho sin^2 theta
-                    + cos theta sqrt(S^2 - rho^2 sin^2 theta + z^2)] / S
-
-    Raises:
-        InputError: If a length or angle is out of range.
-        InfeasibleLimitsError: If the ends are seen too obliquely from anywhere.
-    """
-    _check_round(radius, ring_radius, max_incidence)
-    if not 0.0 <= half_height < np.inf:
-        raise InputError(f"half height is {half_height} m; it must be 0 or more")
-    s2 = np.sin(max_incidence) ** 2
-    root = np.sqrt(ring_radius**2 - radius**2 * s2 + half_height**2)
-    cosine = (radius * s2 + np.cos(max_incidence) * root) / ring_radius
-    if not cosine < 1.0:
-        raise InfeasibleLimitsError(
-            f"the ends of a cylinder of half height {1e3 * half_height:.4g} mm are "
-            f"seen beyond {np.degrees(max_incidence):.1f} deg of incidence from every "
-            f"camera at mid height {1e3 * ring_radius:.4g} mm from its axis; stand "
-            f"farther off, accept more incidence or use several heights"
-        )
-    return _ring(float(np.arccos(cosine)), ring_radius)
-
-
-def _ring(eta: float, ring_radius: float) -> RingLimit:
+def ring_limit(half_angle: float, ring_radius: float) -> RingLimit:
+    """Return the limits of cameras that cover eta [rad] to either side."""
     # Parts that only touch don't cover: pi/eta = 4 takes five cameras, however rounded.
-    n_min = int(np.floor(np.pi / eta + 1e-9)) + 1
-    return RingLimit(eta, n_min, float(2.0 * ring_radius * np.sin(eta)))
-
-
-def _check_round(radius: float, ring_radius: float, max_incidence: float) -> None:
-    if not 0.0 < radius < ring_radius < np.inf:
-        raise InputError(
-            f"body radius {radius} m and ring radius {ring_radius} m: "
-            f"the cameras must stand outside the body"
-        )
-    if not 0.0 < max_incidence < np.pi / 2:
-        raise InputError(
-            f"max_incidence is {max_incidence} rad; it must lie in (0, pi/2)"
-        )
+    n_min = int(np.floor(np.pi / half_angle + 1e-9)) + 1
+    return RingLimit(half_angle, n_min, float(2.0 * ring_radius * np.sin(half_angle)))

@@ -209,23 +209,6 @@ def overlap_components(
     return list(groups.values())
 
 
-def overlap_graph_connected(
-    measured_by: NDArray[np.bool_],
-    weights: _Array | float,
-    *,
-    min_overlap_share: float = 0.01,
-    target_weight: float | None = None,
-) -> bool:
-    """Return whether all parts can be registered with each other, directly or not."""
-    components = overlap_components(
-        measured_by,
-        weights,
-        min_overlap_share=min_overlap_share,
-        target_weight=target_weight,
-    )
-    return len(components) <= 1
-
-
 def _mean(points: _Array, chosen: NDArray[np.bool_]) -> _Array:
     """Mean of the chosen points; of all where none is."""
     return points[chosen if chosen.any() else slice(None)].mean(axis=0)

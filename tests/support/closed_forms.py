@@ -1,0 +1,74 @@
+"""Closed forms of eqs. (9)-(10) on walls, edges, spheres and cylinders."""
+
+import numpy as np
+
+from planning.cameras.baselines.coverage_triangle import (
+    RingLimit,
+    ring_limit,
+    round_body_limit,
+)
+
+
+def flat_limit(half_extent1: float, half_extent2: float) -> float:
+    """Return d'_max = C1 + C2 of a flat wall, axes square to it, field-limited [m]."""
+    return half_extent1 + half_extent2
+
+
+def bent_limit(
+    standoff1: float,
+    half_extent1: float,
+    standoff2: float,
+    half_extent2: float,
+    turn: float,
+) -> float:
+    """Return d_max over an edge, each axis square to its own plane, field-limited.
+
+    ::
+
+        d_max^2 = s1^2 + C1^2 + s2^2 + C2^2
+                  - 2 [(s1 s2 - C1 C2) cos(turn) - (C1 s2 + C2 s1) sin(turn)]
+
+    Args:
+        standoff1: s1, the paper's d_1, in [m].
+        half_extent1: C1 = s1 tan(b_1) in [m].
+        standoff2: s2 in [m].
+        half_extent2: C2 in [m].
+        turn: Angle between the planes' normals, convex positive [rad].
+    """
+    s1, c1, s2, c2 = standoff1, half_extent1, standoff2, half_extent2
+    mixed = (s1 * s2 - c1 * c2) * np.cos(turn) - (c1 * s2 + c2 * s1) * np.sin(turn)
+    return float(np.sqrt(s1**2 + c1**2 + s2**2 + c2**2 - 2.0 * mixed))
+
+
+def sphere_band_limit(
+    radius: float,
+    ring_radius: float,
+    max_incidence: float,
+    latitude: float,
+    half_field: float | None = None,
+) -> RingLimit:
+    """Return the limits for the band within a latitude of a sphere's equator.
+
+    ::
+
+        cos(eta_l) = cos(eta) / cos(latitude)
+    """
+    cap = round_body_limit(radius, ring_radius, max_incidence, half_field).half_angle
+    cosine = np.cos(cap) / np.cos(latitude)
+    return ring_limit(float(np.arccos(cosine)), ring_radius)
+
+
+def cylinder_limit(
+    radius: float, ring_radius: float, max_incidence: float, half_height: float
+) -> RingLimit:
+    """Return the limits for an upright cylinder, cameras at its mid height.
+
+    ::
+
+        cos(eta) = [rho sin^2 theta
+                    + cos theta sqrt(S^2 - rho^2 sin^2 theta + z^2)] / S
+    """
+    s2 = np.sin(max_incidence) ** 2
+    root = np.sqrt(ring_radius**2 - radius**2 * s2 + half_height**2)
+    cosine = (radius * s2 + np.cos(max_incidence) * root) / ring_radius
+    return ring_limit(float(np.arccos(cosine)), ring_radius)
