@@ -2,11 +2,11 @@
 
 Usage: python -m benchmarks.house.house_graph [OUT.svg]       (from a checkout's root)
 
-A room is a folder right below one of the three packages; modules beside the folders make
-one room, named after the package. Its floor is one above the highest that it imports.
-Arrows that another path implies are left out of the picture, not of the count. Returns 1
-if rooms, folders inside them or modules import each other in a circle, or if there are
-more than `FLOORS` floors.
+A room is a folder right below one of the three packages; modules beside the folders
+make one room, named after the package. Its floor is one above the highest that it
+imports. Arrows that another path implies are left out of the picture, not of the count.
+Returns 1 if rooms, folders inside them or modules import each other in a circle, or if
+there are more than `FLOORS` floors.
 """
 
 import sys

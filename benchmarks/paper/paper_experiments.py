@@ -3,10 +3,11 @@
     python -m benchmarks.paper.paper_experiments >
         benchmarks/paper/results/paper_experiments.md
 
-Prints, as the tables of docs/experiments.md: errors and completeness of each cloud for
-the lens as printed and one that fits, in parallel and diverging light; what becomes of
-each ring; a second, shifted sequence; rings labelled by a prior mesh in single images;
-ambient light and lens distortion; and the planner's own single viewpoint on the sample.
+Prints, as the tables of docs/use/experiments.md: errors and completeness of each cloud
+for the lens as printed and one that fits, in parallel and diverging light; what becomes
+of each ring; a second, shifted sequence; rings labelled by a prior mesh in single
+images; ambient light and lens distortion; and the planner's own single viewpoint on the
+sample.
 """
 
 import os

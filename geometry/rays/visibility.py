@@ -15,7 +15,7 @@ for falsely clear ones. Three things make it hold at any scale.
   0.1 mm have no useful mean edge. An occluder is lost only if it is nearer than
   `slack` above the sample's own face: 0.2 micrometres on a part of 200 mm.
 
-`docs/rays.md` has the measurements behind it.
+`docs/method/rays.md` has the measurements behind it.
 """
 
 import threading

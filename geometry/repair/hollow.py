@@ -1,8 +1,8 @@
 """Hollow or solid, how thick the wall is, and which part of a surface lies inside.
 
-`docs/orientation.md` has the definitions. Nothing here depends on where a mesh lies,
-how it is turned or scaled: rays start from the surface, and lengths are compared with
-lengths of the object.
+`docs/method/orientation.md` has the definitions. Nothing here depends on where a mesh
+lies, how it is turned or scaled: rays start from the surface, and lengths are compared
+with lengths of the object.
 """
 
 from dataclasses import dataclass

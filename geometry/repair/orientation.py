@@ -2,8 +2,8 @@
 
 A *patch* is connected across edges of exactly two faces: the largest piece whose
 winding can be made consistent without a choice. Each patch is then decided on its own,
-so that a floating fragment never decides for the rest. `docs/orientation.md` has the
-rules.
+so that a floating fragment never decides for the rest. `docs/method/orientation.md` has
+the rules.
 """
 
 import igl

@@ -1,7 +1,7 @@
 """The rig: which devices there are, where they may stand, and what counts as measured.
 
-A rig is a preset or a TOML file (`docs/rig-files.md`); `load_rig` gives the devices in
-pixels, metres and radians and the requirements that a plan is held to.
+A rig is a preset or a TOML file (`docs/reference/rig-files.md`); `load_rig` gives the
+devices in pixels, metres and radians and the requirements that a plan is held to.
 """
 
 import math

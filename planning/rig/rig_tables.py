@@ -78,8 +78,8 @@ class SourcedTable(Table):
 class PinholeTable(SourcedTable):
     """A camera or a diverging projector, `[camera]` or `[projector]`.
 
-    The focal length comes in exactly one of three ways; `docs/rig-files.md` defines
-    each key.
+    The focal length comes in exactly one of three ways; `docs/reference/rig-files.md`
+    defines each key.
     """
 
     resolution_px: Resolution

@@ -591,11 +591,11 @@ def test_documents_are_plain_and_say_what_was_used(light):
     assert again == asked
 
 
-# ---- docs/rig-files.md
+# ---- docs/reference/rig-files.md
 
 
 def test_example_of_the_documentation_loads(write):
-    page = Path(__file__).parents[2] / "docs" / "rig-files.md"
+    page = Path(__file__).parents[2] / "docs" / "reference" / "rig-files.md"
     text = page.read_text(encoding="utf-8")
     example = text.split("```toml\n")[1].split("```")[0]
     rig = load_rig(write(example))
@@ -608,7 +608,9 @@ def test_example_of_the_documentation_loads(write):
 
 
 def test_documentation_names_every_key():
-    page = (Path(__file__).parents[2] / "docs" / "rig-files.md").read_text("utf-8")
+    page = (
+        Path(__file__).parents[2] / "docs" / "reference" / "rig-files.md"
+    ).read_text("utf-8")
     tables = [RigTable]
     while tables:
         for name, field in tables.pop().model_fields.items():

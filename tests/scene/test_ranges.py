@@ -537,6 +537,8 @@ def test_a_plan_of_a_mesh_has_no_such_claims(plan):
 
 
 def test_documented_columns_are_those_that_are_read():
-    text = (Path(__file__).resolve().parents[2] / "docs" / "ranges.md").read_text()
+    text = (
+        Path(__file__).resolve().parents[2] / "docs" / "use" / "ranges.md"
+    ).read_text()
     for name in RANGED.split(","):
         assert f"`{name}`" in text or f"{name}," in text

@@ -3,7 +3,7 @@
 For planning one constant serves, s_px = s_0 / (-N.L): `noise_px` of a rig. Where s_N is
 to be compared with errors, s_0 is measured on a plane, and what differs between that
 plane and the object is known: how wide edges are in the image, and how much of the
-noise is shot noise. `docs/accuracy.md`.
+noise is shot noise. `docs/method/accuracy.md`.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """Plans made by hand on a sphere, with claims from a slow loop over points.
 
-The loop is written a third time, from `docs/semantics.md`, in scalars and with the
-definitions taken literally (J_r by differences of rays, rays by inverting the
+The loop is written a third time, from `docs/reference/semantics.md`, in scalars and
+with the definitions taken literally (J_r by differences of rays, rays by inverting the
 distortion; no shadow rays, because a convex body shadows nothing that faces the light).
 Neither planner nor audit is used. `build_plan` is cached, `make_plan` isn't, `tampered`
 gives a changed copy.

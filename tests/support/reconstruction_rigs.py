@@ -175,7 +175,7 @@ def predict_on_sphere(plan: RigPlan, samples: SurfaceSamples) -> np.ndarray:
     """Samples of a sphere about the origin that some pair measures, with a margin.
 
     On a convex body what faces a device is seen by it. Incidence up to 55 degrees, and
-    |r.m| and the ring pitch as in docs/semantics.md, 0.11 and 6 px.
+    |r.m| and the ring pitch as in docs/reference/semantics.md, 0.11 and 6 px.
     """
     measured = np.zeros(len(samples), dtype=bool)
     p, n = samples.points, samples.normals

@@ -82,8 +82,8 @@ def baseline_rows(
         target_weight: Area of the target in [m^2]; None: that of the samples.
 
     Returns:
-        Rows of the plan's `baselines`, JSON values only; `docs/baselines.md` defines
-        every key.
+        Rows of the plan's `baselines`, JSON values only; `docs/method/baselines.md`
+        defines every key.
     """
     weights = np.broadcast_to(np.asarray(sample_weight, np.float64), (len(points),))
     adjacent = adjacency(points, normals)

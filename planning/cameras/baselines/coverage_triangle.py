@@ -6,7 +6,8 @@ E is where the parts of two cameras meet. In the triangle O1, E, O2::
     covered <=> d'^2 < d_max^2 - d''^2 <=> d < d_max <=> phi < phi_max       (10)
 
 (the last step for phi and phi_max in (0, pi); outside, the signed phi decides).
-`docs/baselines.md` derives what stands here. Source: Lee and Krim, 2014, section VI.
+`docs/method/baselines.md` derives what stands here. Source: Lee and Krim, 2014, section
+VI.
 """
 
 from dataclasses import dataclass

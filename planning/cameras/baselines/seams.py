@@ -2,7 +2,7 @@
 
 A camera's *part* is the set of samples that it measures with any projector. Parts and
 their borders are known on samples only, so a border is where a sample of one part has
-near samples outside it. `docs/baselines.md` gives the definitions in words.
+near samples outside it. `docs/method/baselines.md` gives the definitions in words.
 """
 
 from dataclasses import dataclass

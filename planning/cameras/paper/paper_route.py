@@ -6,7 +6,7 @@
 3. A camera whose loss the rest can bear goes, or can once they have closed the gap to
    that limit. Again from 2, until none can go.
 
-Source: Lee and Krim, 2014, section VI; `docs/baselines.md`, *The two routes*.
+Source: Lee and Krim, 2014, section VI; `docs/method/baselines.md`, *The two routes*.
 """
 
 from dataclasses import dataclass

@@ -4,7 +4,7 @@ About an axis through the centre of the workspace, the target's section is taken
 disc of radius rho, that of its farthest sample from the axis. Cameras on a ring of
 radius S that face the centre then cover eta to either side of themselves, so n_min of
 them stand at a pitch of at most 2 eta, neighbours d_max = 2 S sin(eta) apart at most
-(`round_body_limit`, `docs/baselines.md`).
+(`round_body_limit`, `docs/method/baselines.md`).
 """
 
 from collections.abc import Iterator

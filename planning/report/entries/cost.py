@@ -16,7 +16,7 @@ def cost_entry(
     n_before: int,
     seconds: Mapping[str, float],
 ) -> dict[str, Any]:
-    """Return the plan's `cost`; `docs/cost.md` defines every key.
+    """Return the plan's `cost`; `docs/method/cost.md` defines every key.
 
     With M_j N_j pixels of camera j::
 

@@ -21,7 +21,7 @@ _STEP = 1e-5
 
 
 def ranges_entry(body: RangedBody, guard: Guard) -> dict[str, Any]:
-    """Return the plan's `ranges`; `docs/ranges.md` defines every key."""
+    """Return the plan's `ranges`; `docs/use/ranges.md` defines every key."""
     ball = body.ball
     return {
         "path": body.file.path,

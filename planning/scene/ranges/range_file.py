@@ -1,4 +1,4 @@
-"""Observations of points on an object, read from a CSV file: `docs/ranges.md`.
+"""Observations of points on an object, read from a CSV file: `docs/use/ranges.md`.
 
 Millimetres and degrees in the file, metres and radians from here on.
 """

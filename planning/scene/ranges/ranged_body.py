@@ -1,7 +1,7 @@
 """The object where nothing was known of its ranges: points, sphere, uncertainty.
 
 The paper's case without prior information of ranges: they come by least squares from
-what a few trial views or a few measured distances say. `docs/ranges.md`.
+what a few trial views or a few measured distances say. `docs/use/ranges.md`.
 """
 
 from dataclasses import dataclass

@@ -51,7 +51,7 @@ class Cloud:
 
         Grey noise isn't all: where brightness changes across an edge, the blur of the
         lens moves it, and normals are estimated from few points around. Without both
-        the surest points would seem surer than they are (docs/accuracy.md).
+        the surest points would seem surer than they are (docs/method/accuracy.md).
         """
         along = np.einsum("ij,ij->i", self.shift, normals)
         astray = _NORMAL_RAD * np.linalg.norm(self.shift, axis=1)

@@ -511,7 +511,7 @@ def test_values_are_frozen():
 
 
 def test_the_example_of_the_page_runs(capsys):
-    page = Path(__file__).resolve().parents[3] / "docs" / "covers.md"
+    page = Path(__file__).resolve().parents[3] / "docs" / "method" / "covers.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.S)
     exec(compile(code, page, "exec"), {})
     assert capsys.readouterr().out.startswith("[0 2] 2.0 proven optimal ")

@@ -1,7 +1,7 @@
 """Claims about ranges that were estimated: points, sphere, and what they tightened.
 
 Nothing is fitted again: each estimate must satisfy the equations that define it in
-`docs/ranges.md`, so that a Newton step from it leads nowhere.
+`docs/use/ranges.md`, so that a Newton step from it leads nowhere.
 """
 
 from collections.abc import Mapping, Sequence

@@ -10,7 +10,7 @@ from planning.verify.audit.ledger import Ledger, as_number
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.recompute import Reach, Recomputed
 
-# As `docs/orientation.md` has them.
+# As `docs/method/orientation.md` has them.
 _HIDDEN = 0.05
 _LESS_THAN_BEHIND = 1.0 / 3.0
 _THIN_DIAMETERS = 0.05

@@ -1,1 +1,1 @@
-"""Lit, seen and measured, written again from `docs/semantics.md`."""
+"""Lit, seen and measured, written again from `docs/reference/semantics.md`."""

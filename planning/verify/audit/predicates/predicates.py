@@ -1,4 +1,4 @@
-"""Lit, seen and measurable, as `docs/semantics.md` states them, sample by sample.
+"""What is lit, seen and measured, again, from `docs/reference/semantics.md`.
 
 Each predicate returns how many of its limits a sample passes in the order of the page,
 so that the first limit that fails, and the device that came furthest, are both known.

@@ -22,7 +22,7 @@ from .ring_light import RingLight
 _SHARES = ("drawn", "on_object", "on_target", "measured")
 # What each is a part of.
 _WHOLE = {"on_object": "drawn", "on_target": "on_object", "measured": "on_object"}
-# Azimuths behind a plan's claims (docs/rings.md), and the audit's own.
+# Azimuths behind a plan's claims (docs/method/rings.md), and the audit's own.
 _CLAIMED_RAYS, _RAYS = 360, 480
 # Rays of a ring are told from the next gap by taking them from just inside it.
 _INSIDE = 1.0 - 1e-9

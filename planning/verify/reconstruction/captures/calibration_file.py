@@ -211,7 +211,7 @@ def _fault(error: ValidationError) -> str:
     if first["type"] == "missing":
         return f"`{where}` is missing; write it"
     if first["type"] == "extra_forbidden":
-        return f"`{where}` is not a known key; see docs/captures.md"
+        return f"`{where}` is not a known key; see docs/use/captures.md"
     rule = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
     if first["type"] == "value_error":
         return f"[{where}] {rule}"

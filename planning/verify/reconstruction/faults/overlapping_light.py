@@ -9,7 +9,7 @@ from planning.verify.reconstruction.render.occluders import Occluder
 
 from .supposed import Evidence, Supposed, places
 
-# Light met more obliquely isn't told from none (docs/semantics.md) [cosine].
+# Light met more obliquely isn't told from none (docs/reference/semantics.md) [cosine].
 _GLANCING = np.cos(np.deg2rad(89.0))
 # Shadow rays stop this share of their length before the point they ask about.
 _SHADOW_SLACK = 2e-5
