@@ -2,7 +2,8 @@
 
 Device frames follow OpenCV: +x right, +y down, +z along the optical axis; the centre of
 the top-left pixel is (u, v) = (0, 0), so an image w pixels wide spans -0.5 to w - 0.5.
-A projector is an inverse camera and uses the same pinhole.
+A projector is an inverse camera and uses the same pinhole. Both models answer the same
+questions about their field, so that callers needn't ask which one they have.
 """
 
 from dataclasses import dataclass
@@ -52,6 +53,53 @@ class PinholeModel:
         # Column by column: numpy is slow to reduce over an axis of two.
         across = (u >= -0.5) & (u <= width - 0.5)
         return across & (v >= -0.5) & (v <= height - 0.5)
+
+    def in_field(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether points (..., 3) of the device frame lie in its image."""
+        return self.contains(self.project(points))
+
+    @property
+    def middle_ray(self) -> NDArray[np.float64]:
+        """Unit direction in which the middle of the image looks, shape (3,)."""
+        return self.rays(0.5 * (np.array(self.resolution) - 1.0))
+
+    def holds_ball(self, radius: float, distance: float) -> bool:
+        """Return whether a sphere about the aim lies inside the image.
+
+        Args:
+            radius: Of the sphere [m].
+            distance: From the device to its centre [m].
+        """
+        width, height = self.resolution
+        x, y = (width - 1) / 2, (height - 1) / 2
+        edges = np.array([[-0.5, y], [x, -0.5], [width - 0.5, y], [x, height - 0.5]])
+        half_angle = np.arccos(np.clip(self.rays(edges) @ self.middle_ray, -1.0, 1.0))
+        return bool(
+            radius < distance and np.arcsin(radius / distance) <= half_angle.min()
+        )
+
+    def half_rectangle(self, distance: float) -> NDArray[np.float64]:
+        """Return half the sides of a rectangle in the field, in [m], shape (2,).
+
+        It is across the line of sight, sides along the image's, its middle on the aim.
+
+        Args:
+            distance: From the device to the rectangle [m].
+        """
+        width, height = self.resolution
+        u, v = np.array([-0.5, width - 0.5]), np.array([-0.5, height - 0.5])
+        corners = self.rays(np.stack(np.meshgrid(u, v), axis=-1).reshape(4, 2))
+        across = corners @ turned_to(self.middle_ray).T
+        # With lens shift the image is a trapezoid across the line of sight.
+        return distance * np.min(np.abs(across[:, :2] / across[:, 2:]), axis=0)
+
+    def pixel_m(self, distance: float) -> float:
+        """Return the side of a pixel on a surface across the axis [m]."""
+        return distance / self.focal_px
+
+    def ray_starts(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where the rays to points (..., 3) of the device frame start."""
+        return np.zeros_like(points)
 
     def rays(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return unit viewing directions in the device frame; (..., 2) to (..., 3)."""
@@ -155,3 +203,66 @@ class ParallelModel:
     def half_panel(self) -> NDArray[np.float64]:
         """Half width and half height of the panel in [m], shape (2,)."""
         return 0.5 * self.pixel_pitch_m * np.array(self.resolution, dtype=np.float64)
+
+    @property
+    def beam_reach(self) -> float:
+        """Radius that the beam fills in [m], inf where only the panel bounds it."""
+        return np.inf if self.beam_radius is None else self.beam_radius
+
+    def in_field(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether points (..., 3) of the device frame lie in its beam."""
+        x, y = points[..., 0], points[..., 1]
+        across, down = self.half_panel
+        inside = (np.abs(x) <= across) & (np.abs(y) <= down)
+        if self.beam_radius is not None:
+            inside &= np.hypot(x, y) <= self.beam_radius
+        return inside
+
+    @property
+    def middle_ray(self) -> NDArray[np.float64]:
+        """Unit direction of the light, shape (3,)."""
+        return np.array([0.0, 0.0, 1.0])
+
+    def holds_ball(self, radius: float, distance: float) -> bool:
+        """Return whether a sphere about the aim lies inside the beam, at any distance.
+
+        Args:
+            radius: Of the sphere [m].
+            distance: From the device to its centre [m].
+        """
+        return bool(radius <= min(float(self.half_panel.min()), self.beam_reach))
+
+    def half_rectangle(self, distance: float) -> NDArray[np.float64]:
+        """Return half the sides of a rectangle in the field, in [m], shape (2,).
+
+        Sides along the panel's, its middle on the axis. In a round beam, of the
+        rectangles inside, the one that is nearest to a square.
+
+        Args:
+            distance: From the device to the rectangle [m].
+        """
+        half, beam = self.half_panel, self.beam_reach
+        if beam >= np.hypot(*half):
+            return half
+        short = min(float(half.min()), beam / np.sqrt(2.0))
+        return np.minimum(half, max(short, np.sqrt(beam**2 - short**2)))
+
+    def pixel_m(self, distance: float) -> float:
+        """Return the side of a pixel on a surface across the axis [m]."""
+        return self.pixel_pitch_m
+
+    def ray_starts(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where the rays to points (..., 3) of the device frame start."""
+        return points * [1.0, 1.0, 0.0]
+
+
+DeviceModel = PinholeModel | ParallelModel
+
+
+def turned_to(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the smallest rotation that takes a unit direction to +z (Rodrigues)."""
+    axis = np.cross(direction, [0.0, 0.0, 1.0])
+    skew = np.array(
+        [[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]]
+    )
+    return np.eye(3) + (skew + skew @ skew / (1.0 + direction[2]))

@@ -30,8 +30,7 @@ def ring_frame(
     c, s = np.cos(azimuth), np.sin(azimuth)
     if isinstance(device, ParallelModel):
         return world_from_device @ shifted_frame(np.array([tilt * c, tilt * s]))
-    width, height = device.resolution
-    middle = device.rays(np.array([(width - 1) / 2, (height - 1) / 2]))
+    middle = device.middle_ray
     aside = np.array([c, s, 0.0])
     aside -= middle * (aside @ middle)
     aside /= np.linalg.norm(aside)

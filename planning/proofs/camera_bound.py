@@ -28,7 +28,6 @@ from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.proofs.cells.position_cells import PositionTree
 from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
-from planning.scene.workspace.field import holds_ball
 from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 
@@ -166,7 +165,7 @@ class CameraCells:
         space = self._scene.requirements.workspace
         offsets = self._rows.target.samples.points - np.array(space.centre)
         reach = float(lengths(offsets).max())
-        return not holds_ball(self._device, reach, space.camera_radius_m[0])
+        return not self._device.holds_ball(reach, space.camera_radius_m[0])
 
     def _positions(self, finest: int, maps: WidenedMaps | None) -> PositionTree:
         space = self._scene.requirements.workspace

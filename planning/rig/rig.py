@@ -18,7 +18,6 @@ from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements
-from planning.scene.workspace.field import overflows
 
 from . import optics
 from .rig_devices import (
@@ -151,16 +150,6 @@ class Rig:
         """Return the body of a camera, None where none is given."""
         return Body.of(self.table.camera.body)
 
-    def projector_centre_ray(self) -> NDArray[np.float64]:
-        """Return the unit direction of the image centre in the projector's frame, (3,).
-
-        With a vertical offset the optical axis misses the image: aim this ray.
-        """
-        device = self.projector_device()
-        if isinstance(device, ParallelModel):
-            return np.array([0.0, 0.0, 1.0])
-        return device.rays(0.5 * (np.array(device.resolution) - 1.0))
-
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to.
 
@@ -257,6 +246,7 @@ class Rig:
                 more devices stand already than are allowed.
         """
         projector, camera = self.projector_device(), self.camera_device()
+        middle_m = self.standoff_m + object_radius_m
         required = build_requirements(
             self.table,
             self.outer_ring_radius(),
@@ -273,8 +263,8 @@ class Rig:
             accuracy_mm=accuracy_mm,
             up=up,
             overflowing=(
-                overflows(projector, object_radius_m, self.standoff_m),
-                overflows(camera, object_radius_m, self.standoff_m),
+                not projector.holds_ball(object_radius_m, middle_m),
+                not camera.holds_ball(object_radius_m, middle_m),
             ),
         )
         tables = self.table.existing

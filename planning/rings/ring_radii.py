@@ -102,12 +102,7 @@ def ring_gap(
     """
     pitch = limits.min_ring_pitch_px or 6.0
     for_camera = pitch * distance / (camera.focal_px * _GAP_FACING)
-    pixel = (
-        projector.pixel_pitch_m
-        if isinstance(projector, ParallelModel)
-        else distance / projector.focal_px
-    )
-    return max(for_camera, _MIN_GAP_PROJECTOR_PX * pixel)
+    return max(for_camera, _MIN_GAP_PROJECTOR_PX * projector.pixel_m(distance))
 
 
 def uniform_radii(outer: float, gap: float) -> NDArray[np.float64]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import PinholeModel
 from geometry.lengths import lengths
 from geometry.poses import inverse, transform
 from geometry.rays.visibility import Visibility
@@ -214,13 +213,7 @@ def in_panel(
 ) -> NDArray[np.bool_]:
     """Return whether points lie in the light that leaves the device, shape (n,)."""
     local = transform(inverse(projector.world_from_device), points)
-    device = projector.device
-    if isinstance(device, PinholeModel):
-        return device.contains(device.project(local))
-    inside = np.all(np.abs(local[:, :2]) <= device.half_panel, axis=1)
-    if device.beam_radius is not None:
-        inside &= np.hypot(local[:, 0], local[:, 1]) <= device.beam_radius
-    return inside
+    return projector.device.in_field(local)
 
 
 def _in_beam(

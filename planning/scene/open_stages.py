@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import PinholeModel
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 
@@ -64,7 +63,7 @@ def open_stages(
         tangent = np.abs(_dots(samples.steep, offsets)) / apart
     low, high = projector.device.range_m
     tests = (
-        _in_rings(projector, samples.points) & _in_panel(projector, local),
+        _in_rings(projector, samples.points) & projector.device.in_field(local.T),
         (distances >= low) & (distances <= high),
         incidence >= np.cos(limits.max_incidence),
         tangent <= np.cos(limits.min_tangent_angle),
@@ -97,17 +96,3 @@ def _in_rings(
     if projector.light == "parallel":
         return x * x + y * y <= outer * outer
     return (x * x + y * y <= (outer * z) ** 2) & (z > 0.0)
-
-
-def _in_panel(
-    projector: PlannedProjector, local: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Return which points of the device frame, (3, n), are in its light, shape (n,)."""
-    device, (x, y, _) = projector.device, local
-    if isinstance(device, PinholeModel):
-        return device.contains(device.project(local.T))
-    across, down = device.half_panel
-    inside = (np.abs(x) <= across) & (np.abs(y) <= down)
-    if device.beam_radius is not None:
-        inside &= x * x + y * y <= device.beam_radius**2
-    return inside

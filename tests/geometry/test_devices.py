@@ -118,3 +118,16 @@ def test_focal_length_and_panel_are_what_they_say() -> None:
     panel = ParallelModel((1000, 600), 2e-4, (0.5, 1.5))
     np.testing.assert_allclose(panel.half_panel, [0.1, 0.06], rtol=1e-15)
     assert panel.beam_radius is None
+
+
+def test_a_beam_and_an_image_answer_the_same_questions_about_their_field() -> None:
+    beam = ParallelModel((1000, 600), 1e-3, (0.5, 1.5), beam_radius=0.4)
+    at = np.array([[0.39, 0.0, 1.0], [0.35, 0.25, 1.0], [0.0, 0.31, 1.0], [0, 0, -1]])
+    assert beam.in_field(at).tolist() == [True, False, False, True]
+    np.testing.assert_array_equal(beam.ray_starts(at), at * [1, 1, 0])
+    assert beam.pixel_m(5.0) == 1e-3
+    image = pinhole(DISTORTION)
+    assert image.in_field(image.middle_ray * [[0.1], [2.0]]).tolist() == [True, True]
+    assert not image.in_field(-image.middle_ray)
+    assert not np.any(image.ray_starts(at))
+    assert image.pixel_m(2.0) == pytest.approx(2.0 / np.sqrt(1200.0 * 1180.0))

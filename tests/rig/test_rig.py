@@ -214,11 +214,11 @@ def test_beam_radius_bounds_the_outer_ring(write):
 
 def test_centre_ray_meets_the_image_centre():
     rig = load_rig()
-    ray = rig.projector_centre_ray()
+    ray = rig.projector_device().middle_ray
     assert np.linalg.norm(ray) == pytest.approx(1.0)
     assert ray[1] < -0.2, "the lens is below the image, so the centre is above the axis"
     assert rig.projector_device().project(ray).tolist() == pytest.approx([511.5, 383.5])
-    assert load_rig(light="parallel").projector_centre_ray().tolist() == [0, 0, 1]
+    assert load_rig(light="parallel").projector_device().middle_ray[2] == 1.0
 
 
 # ---- rig files

@@ -28,7 +28,6 @@ from planning.rig.rig import load_rig
 from planning.scene.lighting import LIT
 from planning.scene.lit import lit_margins, lit_stages
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards
-from planning.scene.workspace.field import half_rectangle, middle_ray, overflows
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
 from planning.verify.audit.devices.device_claims import outside_by
 
@@ -226,16 +225,16 @@ def test_one_image_too_few_is_wide_enough_from_as_far_as_it_is_sharp():
 def test_what_fits_stays_as_it_was_and_is_named_by_no_key():
     """The threshold is that of the ball: R = 307 mm for the panel, sin for an image."""
     beam = ParallelModel((1024, 768), 8e-4, (0.4, 2.5))
-    assert not overflows(beam, 0.307, 1.0)
-    assert overflows(beam, 0.3073, 1.0)
-    assert overflows(replace(beam, beam_radius=0.1), 0.11, 1.0)
+    assert beam.holds_ball(0.307, 1.0 + 0.307)
+    assert not beam.holds_ball(0.3073, 1.0 + 0.3073)
+    assert not replace(beam, beam_radius=0.1).holds_ball(0.11, 1.11)
     centred = replace(
         SHIFTED, camera_matrix=np.array([[1500, 0, 511.5], [0, 1500, 383.5], [0, 0, 1]])
     )
     sine = np.sin(np.arctan(384.0 / 1500.0))
     largest = sine / (1.0 - sine)
-    assert not overflows(centred, largest - 1e-6, 1.0)
-    assert overflows(centred, largest + 1e-6, 1.0)
+    assert centred.holds_ball(largest - 1e-6, 1.0 + largest - 1e-6)
+    assert not centred.holds_ball(largest + 1e-6, 1.0 + largest + 1e-6)
     fitting, *_ = readied(box((0.2, 0.2, 0.1)), "parallel", 60.0)
     written = fitting.requirements.to_document()["workspace"]
     assert not [key for key in written if "standoff" in key]
@@ -254,9 +253,9 @@ def test_what_fits_stays_as_it_was_and_is_named_by_no_key():
 
 @pytest.mark.parametrize("distance", [1.0, 1.7])
 def test_the_rectangle_lies_in_an_image_whose_lens_is_shifted(distance):
-    half = half_rectangle(SHIFTED, distance)
+    half = SHIFTED.half_rectangle(distance)
     signs = np.array([[a, b] for a in (-1, 1) for b in (-1, 1)])
-    middle = middle_ray(SHIFTED)
+    middle = SHIFTED.middle_ray
     y = np.cross(middle, [1.0, 0.0, 0.0])
     x = np.cross(y, middle)
     flat = signs * half
@@ -271,7 +270,7 @@ def test_the_rectangle_lies_in_an_image_whose_lens_is_shifted(distance):
 @pytest.mark.parametrize("beam", [0.2, 0.35, 0.45, 0.6])
 def test_the_rectangle_in_a_round_beam_is_in_the_panel_too(beam):
     device = ParallelModel((1024, 768), 8e-4, (0.4, 2.5), beam)
-    half = half_rectangle(device, 1.0)
+    half = device.half_rectangle(1.0)
     assert np.hypot(*half) == pytest.approx(min(beam, 0.512))
     assert np.all(half <= device.half_panel + 1e-12)
 
@@ -363,7 +362,7 @@ def test_poses_around_one_keep_its_aim_or_its_direction(light):
     scene, template, _ = readied(grid(2.0, 0.5, divisions=(6, 4)), light, 50.0)
     site = scene.site("projector", template.device)
     pose = tiled_poses(site, np.array([[0.0, 0.0, 1.0]]), (0.0,))[0][0]
-    middle = middle_ray(template.device)
+    middle = template.device.middle_ray
     aim = pose[:3, 3] + pose[:3, :3] @ middle
     found = poses_beside(site, pose[None], 30, reach=0.1)
     kept = np.array([np.allclose(p[:3, :3], pose[:3, :3], atol=1e-12) for p in found])
@@ -374,7 +373,7 @@ def test_poses_around_one_keep_its_aim_or_its_direction(light):
         turn = other[:3, :3] @ middle @ (pose[:3, :3] @ middle)
         assert np.arccos(min(turn, 1.0)) <= 0.1 + 1e-9
     aside = found[kept][:, :2, 3] - pose[:2, 3]
-    reach = 0.3 * half_rectangle(template.device, 1.0).min()
+    reach = 0.3 * template.device.half_rectangle(1.0).min()
     assert 0.5 * reach < np.hypot(*aside.T).max() <= reach
 
 

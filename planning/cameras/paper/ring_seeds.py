@@ -17,7 +17,6 @@ from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap
 from planning.cameras.baselines.coverage_triangle import RingLimit, round_body_limit
 from planning.model.requirements import Workspace
-from planning.scene.workspace.field import half_rectangle
 
 _Array = NDArray[np.float64]
 
@@ -63,7 +62,7 @@ def ring_seeds(
     """
     offsets = points - np.array(workspace.centre)
     # The image's shorter side, as if it were 1 m away.
-    alpha = float(np.arctan(half_rectangle(device, 1.0).min()))
+    alpha = float(np.arctan(device.half_rectangle(1.0).min()))
     for axis, e1 in _axes(workspace):
         along = offsets @ axis
         rho = float(np.sqrt(np.max((offsets**2).sum(axis=1) - along**2)))

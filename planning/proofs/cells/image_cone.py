@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.scene.workspace.field import middle_ray
 
 _ROUNDING = 1e-9
 # Roots of the polynomials are exact to this, with much to spare.
@@ -52,7 +51,7 @@ def image_cone(device: PinholeModel) -> ImageCone:
     """Return the bounds for a camera's image."""
     if any(device.distortion):
         return _distorted_cone(device)
-    axis, corners = middle_ray(device), device.rays(_corners(device))
+    axis, corners = device.middle_ray, device.rays(_corners(device))
     if not np.all(corners @ axis > 0.0):
         axis = np.array([0.0, 0.0, 1.0])
     # The image is a convex polygon of rays in one half space of the axis: none of them

@@ -10,14 +10,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel, PinholeModel
+from geometry.devices import ParallelModel, PinholeModel, turned_to
 from geometry.poses import fibonacci_cap, look_at
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.ring_frame import ring_frame
 
-from .field import holds_ball, middle_ray, turned_to
 from .view_tiles import Site, poses_beside, tiled_poses
 from .zone_conflicts import no_position
 from .zone_positions import along_rays, filled, is_zoned
@@ -83,7 +82,9 @@ def aimed_poses(
     turned against its line of sight by that angle.
     """
     world_from_aim = look_at(positions, aim, up, roll=roll)
-    return world_from_aim @ _aim_from_device(device)
+    aim_from_device = np.eye(4)
+    aim_from_device[:3, :3] = turned_to(device.middle_ray)
+    return world_from_aim @ aim_from_device
 
 
 def rolls_for(
@@ -101,7 +102,7 @@ def rolls_for(
     if isinstance(device, ParallelModel):
         half = float(device.half_panel.min())
         return (0.0,) if object_radius <= half else (0.0, _QUARTER)
-    fits = holds_ball(device, object_radius, distance)
+    fits = device.holds_ball(object_radius, distance)
     return (0.0,) if fits else (0.0, _QUARTER)
 
 
@@ -361,11 +362,3 @@ def _aimed(
     return np.concatenate(
         [aimed_poses(positions, centre, up, device, roll=roll) for roll in rolls]
     )
-
-
-def _aim_from_device(device: PinholeModel | ParallelModel) -> NDArray[np.float64]:
-    pose = np.eye(4)
-    if isinstance(device, ParallelModel):
-        return pose
-    pose[:3, :3] = turned_to(middle_ray(device))
-    return pose

@@ -14,12 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel
+from geometry.devices import DeviceModel, ParallelModel, turned_to
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import fibonacci_cap, look_at
 from planning.model.requirements import Workspace
 
-from .field import Device, half_rectangle, middle_ray, turned_to
 from .zone_positions import admissible, is_zoned
 
 _Array = NDArray[np.float64]
@@ -47,7 +46,7 @@ class Site:
         max_incidence: Largest angle at which a sample is of use [rad].
     """
 
-    device: Device
+    device: DeviceModel
     workspace: Workspace
     radius_m: tuple[float, float]
     standoff_m: float
@@ -87,7 +86,7 @@ def tiled_poses(
         return np.empty((0, 4, 4)), np.empty(0, dtype=np.int64)
     poses = np.array(frames)
     offsets, kept = _placed(site, np.array(anchors), -poses[:, :3, 2], np.array(depths))
-    poses[:, :3, :3] = poses[:, :3, :3] @ turned_to(middle_ray(site.device))
+    poses[:, :3, :3] = poses[:, :3, :3] @ turned_to(site.device.middle_ray)
     poses[:, :3, 3] = np.array(site.workspace.centre) + offsets
     return poses[kept], np.array(owner)[kept]
 
@@ -103,11 +102,11 @@ def poses_beside(site: Site, poses: _Array, n: int, *, reach: float) -> _Array:
             the field as this is of a radian's third.
     """
     near = site.standoff_m
-    aside = min(1.0, 3.0 * reach) * float(half_rectangle(site.device, near).min())
+    aside = min(1.0, 3.0 * reach) * float(site.device.half_rectangle(near).min())
     centre = np.array(site.workspace.centre)
     found: list[_Array] = [np.empty((0, 4, 4))]
     for pose in poses:
-        outwards = -pose[:3, :3] @ middle_ray(site.device)
+        outwards = -pose[:3, :3] @ site.device.middle_ray
         aim = pose[:3, 3] - centre - near * outwards
         turned = fibonacci_cap(n, outwards, reach, start=pose[:3, 0])
         across = aside * _disc(n, pose[:3, 0], outwards)
@@ -156,7 +155,7 @@ def _tiles(site: Site, points: _Array, frame: _Array) -> Iterator[tuple[_Array, 
     flat, height = points @ np.column_stack([x, y]), points @ outwards
     low, high = flat.min(axis=0), flat.max(axis=0)
     for distance, more in _distances(site):
-        half = half_rectangle(site.device, distance)
+        half = site.device.half_rectangle(distance)
         count = np.maximum(np.ceil((high - low) / (2.0 * half) - 1e-9), 1.0)
         count += more * (count > 1)
         if more and count.max() == 1:
@@ -178,7 +177,7 @@ def _distances(site: Site) -> Iterator[tuple[float, int]]:
     yield site.standoff_m, 1
     if isinstance(site.device, ParallelModel):
         return
-    slant = float(np.hypot(1.0, np.hypot(*half_rectangle(site.device, 1.0))))
+    slant = float(np.hypot(1.0, np.hypot(*site.device.half_rectangle(1.0))))
     far = min(
         site.standoff_m + site.workspace.object_radius_m,
         site.device.range_m[1] / slant,
