@@ -15,8 +15,8 @@ from geometry.curvature.curvature import principal_curvatures
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.regions.regions import dominant_regions
-from planning.report.drawing.draw_colours import region_colours
-from planning.report.drawing.draw_views import draw_mesh
+from planning.report.drawing.face_colours import region_colours
+from planning.report.drawing.shader import draw_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZE = (400, 500)

@@ -17,7 +17,7 @@ from planning.model.plan import RigPlan
 from planning.model.plan_errors import InterruptedPlanError, RequirementError
 from planning.model.progress import Report
 from planning.pipeline import plan_rig
-from planning.report.drawing.draw import save_rig_picture
+from planning.report.drawing.rig_picture import save_rig_picture
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.face_status import face_status
 from planning.report.summary.summary import summary

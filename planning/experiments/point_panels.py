@@ -8,15 +8,15 @@ from PIL import Image, ImageDraw
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.report.drawing.draw_marks import INK, PALE, Panel, font
-from planning.report.drawing.draw_views import (
+from planning.report.drawing.panel import INK, PALE, Panel, font
+from planning.report.drawing.picture_view import (
     BACKGROUND,
     SUPERSAMPLING,
     Colour,
     PictureView,
-    Shader,
     fitted,
 )
+from planning.report.drawing.shader import Shader
 
 from .paper_devices import UP, bearing
 

@@ -5,7 +5,12 @@ from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.plan import RigPlan
-from planning.report.drawing.draw import MEASURED, NOT_LIT, NOT_MEASURED, OUTSIDE_TARGET
+from planning.report.drawing.face_colours import (
+    MEASURED,
+    NOT_LIT,
+    NOT_MEASURED,
+    OUTSIDE_TARGET,
+)
 from planning.scene import lighting
 from planning.scene.lit import lit_stages
 from planning.scene.measured import lit_samples, measured_by
@@ -14,7 +19,7 @@ from planning.scene.scene import Scene
 
 
 def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
-    """Return a status of `planning.report.drawing.draw` for each face, shape (n_f,).
+    """Return a status of `face_colours` for each face, shape (n_f,).
 
     A face is measured if its centroid is; faces outside the target that aren't
     measured count as such.

@@ -33,7 +33,7 @@ from planning.proofs.conflicts import (
     resolve_others,
 )
 from planning.proofs.selection import marginals, select_fewest
-from planning.report.drawing.draw_devices import device_figures
+from planning.report.drawing.figures import device_figures
 from planning.scene import lighting, measurability
 from planning.scene.camera_views import camera_views
 from planning.scene.clearance import (

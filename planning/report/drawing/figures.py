@@ -1,6 +1,7 @@
-"""Projectors and cameras as polylines in the world, ready to be drawn."""
+"""Devices and zones as polylines in the world, ready to be drawn."""
 
 from dataclasses import dataclass
+from itertools import combinations, product
 from typing import Literal
 
 import numpy as np
@@ -8,15 +9,22 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import transform
-from planning.model.bodies import Body
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.zones import Box
 
-from .draw_views import facing
+from .picture_view import Colour, facing
 
+# Kinds of zones as the legend names them, in the order in which they are drawn.
+ZONES: dict[str, Colour] = {
+    "room": (128, 128, 136),
+    "mounting plane": (46, 132, 74),
+    "keep out": (178, 34, 52),
+}
+# Zones may reach far beyond the devices; the picture follows them no farther.
+_REACH = 1.03
 # Seen along a device's axis, that many points make a beam's circle.
 _CIRCLE = 48
-
 # Turns of a three-quarter view in degrees: none runs along a world axis.
 _TURNS = (30, 45, 60, 120, 135, 150, 210, 225, 240, 300, 315, 330)
 
@@ -73,7 +81,8 @@ def _figure(
     else:
         local_body, local_beam = _pinhole(model, body_m, depth)
     if device.body is not None:
-        local_body = [*local_body, *_housing(device.body)]
+        corners = _corners(np.array(device.body.centre_m), device.body.half_m)
+        local_body = [*local_body, *_edges(corners)]
     return DeviceFigure(
         device.id,
         "projector" if isinstance(device, PlannedProjector) else "camera",
@@ -134,18 +143,57 @@ def _parallel(
     return [_closed(panel), tick], [*beam, _closed(outline), _closed(end)]
 
 
-def _housing(body: Body) -> list[NDArray[np.float64]]:
-    """The twelve edges of a body: its back, its front, and what joins them."""
-    x, y, z = body.half_m
-    back = np.array([[-x, -y, -z], [x, -y, -z], [x, y, -z], [-x, y, -z]])
-    back = back + np.array(body.centre_m)
-    front = back + np.array([0.0, 0.0, 2.0 * z])
-    sides = [np.array([a, b]) for a, b in zip(back, front, strict=True)]
-    return [_closed(back), _closed(front), *sides]
-
-
 def _closed(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([points, points[:1]])
+
+
+@dataclass(frozen=True, eq=False)
+class ZoneFigure:
+    """What is drawn of one zone.
+
+    Attributes:
+        kind: A key of `ZONES`.
+        name: As in the rig file.
+        corners: In the world [m], shape (8, 3).
+        edges: Pairs of corners, shape (12, 2, 3).
+        near: Corners drawn in to where devices may stand [m], shape (8, 3).
+    """
+
+    kind: str
+    name: str
+    corners: NDArray[np.float64]
+    edges: NDArray[np.float64]
+    near: NDArray[np.float64]
+
+
+def zone_figures(plan: RigPlan) -> list[ZoneFigure]:
+    """Return the zones of a plan's workspace, room first."""
+    space = plan.requirements.workspace
+    room = () if space.box is None else (space.box,)
+    zones = zip(ZONES, (room, space.mounting, space.keep_out), strict=True)
+    centre = np.array(space.centre)
+    reach = _REACH * max(*space.projector_radius_m, *space.camera_radius_m)
+    return [_zone(kind, box, centre, reach) for kind, boxes in zones for box in boxes]
+
+
+def _zone(kind: str, box: Box, centre: NDArray[np.float64], reach: float) -> ZoneFigure:
+    offsets = box.centre_m + _corners(np.zeros(3), box.half_m) @ np.array(box.axes)
+    corners = centre + offsets
+    near = centre + np.clip(offsets, -reach, reach)
+    return ZoneFigure(kind, box.name, corners, _edges(corners), near)
+
+
+def _corners(
+    centre: NDArray[np.float64], half: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """The eight corners of a box, (8, 3), the last axis changing first."""
+    return centre + np.array(list(product((-1.0, 1.0), repeat=3))) * half
+
+
+def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The twelve edges of a box: pairs of `_corners` that differ in one sign."""
+    pairs = [(a, b) for a, b in combinations(range(8), 2) if a ^ b in (1, 2, 4)]
+    return corners[np.array(pairs)]
 
 
 def best_direction(

@@ -12,28 +12,27 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 
-from .draw_colours import MEASURED as MEASURED
-from .draw_colours import NOT_LIT as NOT_LIT
-from .draw_colours import NOT_MEASURED as NOT_MEASURED
-from .draw_colours import OUTSIDE_TARGET as OUTSIDE_TARGET
-from .draw_colours import face_colours
-from .draw_colours import region_colours as region_colours
-from .draw_colours import status_colours as status_colours
-from .draw_devices import DeviceFigure, best_direction, close_directions, device_figures
-from .draw_marks import Panel
-from .draw_text import draw_heading, draw_legend, draw_title
-from .draw_views import BACKGROUND, SUPERSAMPLING, Colour, Shader, fitted
-from .draw_views import draw_mesh as draw_mesh
-from .draw_zones import ZONES, draw_zones, seen_corners, zone_figures
+from .face_colours import face_colours
+from .figures import (
+    ZONES,
+    DeviceFigure,
+    ZoneFigure,
+    best_direction,
+    close_directions,
+    device_figures,
+    zone_figures,
+)
+from .panel import INK, PALE, Panel, font
+from .picture_view import BACKGROUND, SUPERSAMPLING, Colour, fitted
+from .shader import Shader
 
 _DEVICES: dict[str, Colour] = {"projector": (200, 80, 0), "camera": (0, 90, 160)}
 _MIN_SIZE = (800, 500)
-_LONGEST = 20
+_LONGEST = 24
 
 
 def save_rig_picture(
@@ -108,18 +107,17 @@ def draw_rig(
         [(split, middle), (fine[0], middle)],
     ):
         draw.line(ends, fill=(205, 205, 210), width=SUPERSAMPLING)
-    draw_title(draw, plan, (fine[0], head))
+    _draw_title(draw, plan, (fine[0], head))
     return picture.resize(size, Image.Resampling.BOX)
 
 
 def _overview(
     plan: RigPlan, shader: Shader, up: NDArray[np.float64], size: tuple[int, int]
 ) -> Image.Image:
-    figures, mesh = _figures(plan), plan.surface.mesh
-    positions = np.array([figure.position for figure in figures])
-    direction = best_direction(positions, mesh.centre, up)
+    figures, centre = _figures(plan), plan.surface.mesh.centre
+    direction = best_direction(np.array([f.position for f in figures]), centre, up)
     panel = _scene(plan, figures, shader, direction, up, size)
-    draw_heading(panel, "All devices, to scale; x, y, z are the axes of the mesh file")
+    panel.heading("All devices, to scale; x, y, z are the axes of the mesh file")
     _mark_devices(panel, figures, shader.caster, type_size=17.0, distances=False)
     return panel.image
 
@@ -129,7 +127,7 @@ def _from_above(
 ) -> Image.Image:
     figures = _figures(plan)
     panel = _scene(plan, figures, shader, up, up, size)
-    draw_heading(panel, "From above; distances to the object's centre")
+    panel.heading("From above; distances to the object's centre")
     _mark_devices(panel, figures, shader.caster, type_size=14.0, distances=True)
     return panel.image
 
@@ -147,15 +145,23 @@ def _scene(
     up: NDArray[np.float64],
     size: tuple[int, int],
 ) -> Panel:
-    corners = _box_corners(shader.caster.mesh)
-    bodies = [line for figure in figures for line in figure.body]
+    """The object and the zones, in a view that holds all devices."""
+    vertices = shader.caster.mesh.corners.reshape(-1, 3)
     zones = zone_figures(plan)
-    everything = np.concatenate([corners, *bodies, *seen_corners(plan, zones)])
+    bodies = [line for figure in figures for line in figure.body]
+    everything = np.concatenate([vertices, *bodies, *(zone.near for zone in zones)])
     view = fitted(everything, direction, up, size, margin_px=0.085 * min(size))
     panel = Panel(shader.shade(view), view)
-    panel.keep_clear(corners)
+    panel.keep_clear(vertices)
     draw_zones(panel, zones, shader.caster)
     return panel
+
+
+def draw_zones(panel: Panel, zones: Sequence[ZoneFigure], caster: RayCaster) -> None:
+    """Draw the edges of zones, faint where the object hides them."""
+    for zone in zones:
+        for edge in zone.edges:
+            panel.polyline(edge, ZONES[zone.kind], width=1.0, caster=caster, alpha=150)
 
 
 def _mark_devices(
@@ -200,8 +206,7 @@ def _close_up(
     rows = [*legend, *((f"{kind}s", colour) for kind, colour in _DEVICES.items())]
     kinds = {figure.kind for figure in zone_figures(plan)}
     rows += [(kind, colour) for kind, colour in ZONES.items() if kind in kinds]
-    columns, line = 2, 21 * SUPERSAMPLING
-    foot = -(-len(rows) // columns) * line + 8 * SUPERSAMPLING
+    foot = (-(-len(rows) // 2) * 21 + 8) * SUPERSAMPLING
     half = (size[0] // 2, size[1] - foot)
     corners = shader.caster.mesh.corners.reshape(-1, 3)
     positions = np.array([figure.position for figure in _figures(plan)])
@@ -213,16 +218,50 @@ def _close_up(
         panel.axes(size=12.0)
         if k == 0:
             panel.scale_bar(size=13.0)
-            draw_heading(panel, "The object, close up")
+            panel.heading("The object, close up")
         picture.paste(panel.image, (k * half[0], 0))
-    draw_legend(ImageDraw.Draw(picture), rows, (size[0], size[1] - foot), columns, line)
+    _draw_legend(ImageDraw.Draw(picture), rows, (size[0], size[1] - foot))
     return picture
+
+
+def _draw_legend(
+    draw: ImageDraw.ImageDraw,
+    rows: Sequence[tuple[str, Colour]],
+    origin: tuple[int, int],
+) -> None:
+    """Write text beside a square of its colour, in two columns from a top [fine px]."""
+    width, top = origin
+    unit = SUPERSAMPLING
+    for k, (text, colour) in enumerate(rows):
+        x, y = 16 * unit + (k % 2) * (width // 2), top + (k // 2) * 21 * unit
+        draw.rectangle((x, y + 3 * unit, x + 14 * unit, y + 17 * unit), fill=colour)
+        spot = (x + 22 * unit, y + 10 * unit)
+        draw.text(spot, text, INK, font=font(14.0), anchor="lm")
+
+
+def _draw_title(
+    draw: ImageDraw.ImageDraw, plan: RigPlan, size: tuple[int, int]
+) -> None:
+    """Write how many devices, what object and what is measured into a band."""
+    counts = (
+        f"{len(devices)} {noun}{'' if len(devices) == 1 else 's'}"
+        for devices, noun in ((plan.projectors, "projector"), (plan.cameras, "camera"))
+    )
+    pad, middle, headline = 16 * SUPERSAMPLING, size[1] // 2, ", ".join(counts)
+    draw.text((pad, middle), headline, INK, font=font(24.0), anchor="lm")
+    extent = 1e3 * np.ptp(plan.surface.mesh.bounds, axis=0)
+    name = _shortened(Path(plan.document["meshes"][0]["path"]).name)
+    detail = f"{name}, {' x '.join(f'{side:.0f}' for side in extent)} mm (x, y, z)"
+    left = pad + draw.textlength(headline, font=font(24.0)) + 1.5 * pad
+    draw.text((left, middle), detail, PALE, font=font(16.0), anchor="lm")
+    areas = plan.coverage["target"]
+    claim = (
+        f"measured {1e4 * areas['measured_m2']:.0f} of "
+        f"{1e4 * areas['reachable_by_cameras_m2']:.0f} reachable, "
+        f"{1e4 * areas['area_m2']:.0f} cm² target"
+    )
+    draw.text((size[0] - pad, middle), claim, INK, font=font(16.0), anchor="rm")
 
 
 def _shortened(name: str) -> str:
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 3]}..."
-
-
-def _box_corners(mesh: TriangleMesh) -> NDArray[np.float64]:
-    pick = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1]), axis=-1).reshape(-1, 3)
-    return mesh.bounds[pick, np.arange(3)]

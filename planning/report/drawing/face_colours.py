@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from planning.model.surface import Surface
 
-from .draw_views import CLAY, Colour
+from .picture_view import CLAY, Colour
 
 # Values of `face_status`.
 OUTSIDE_TARGET, MEASURED, NOT_MEASURED, NOT_LIT = 0, 1, 2, 3

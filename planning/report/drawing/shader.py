@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,103 +11,10 @@ from PIL import Image
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 
-Colour: TypeAlias = tuple[int, int, int]
-
-# Everything is drawn so many times finer and then reduced, which smooths its edges.
-SUPERSAMPLING = 2
-BACKGROUND: Colour = (255, 255, 255)
-CLAY: Colour = (214, 205, 196)
+from .picture_view import BACKGROUND, CLAY, SUPERSAMPLING, PictureView, fitted
 
 # A corner whose mean normal is turned by more than this lies on a crease.
 _CREASE = np.cos(np.deg2rad(40.0))
-
-
-@dataclass(frozen=True, eq=False)
-class PictureView:
-    """An orthographic view of the world, +x right and +y down in the picture.
-
-    Attributes:
-        focus: World point at the centre of the picture [m], shape (3,).
-        right: World direction of +x in the picture, unit, shape (3,).
-        up: World direction of -y in the picture, unit, shape (3,).
-        size: Width and height in [px].
-        m_per_px: Metres that a pixel spans.
-    """
-
-    focus: NDArray[np.float64]
-    right: NDArray[np.float64]
-    up: NDArray[np.float64]
-    size: tuple[int, int]
-    m_per_px: float
-
-    @property
-    def to_viewer(self) -> NDArray[np.float64]:
-        """World direction from the scene to the viewer, unit, shape (3,)."""
-        return np.cross(self.right, self.up)
-
-    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return picture coordinates of world points; (..., 3) to (..., 2)."""
-        centre = 0.5 * np.array(self.size)
-        plane = (points - self.focus) @ np.stack([self.right, -self.up], axis=1)
-        return centre + plane / self.m_per_px
-
-
-def facing(
-    direction: Sequence[float] | NDArray[np.float64],
-    up: Sequence[float] | NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the right and up directions of a view from somewhere.
-
-    Seen straight along `up`, the world axis that follows up's own in the order
-    x, y, z, x points right: x where z is up, as on a map.
-
-    Args:
-        direction: From the scene to the viewer, shape (3,).
-        up: What is up in the picture, as far as it can be, shape (3,).
-
-    Raises:
-        ValueError: If a direction has no length or isn't finite.
-    """
-    back, upward = np.array(direction, dtype=float), np.array(up, dtype=float)
-    for name, vector in (("direction", back), ("up", upward)):
-        length = np.linalg.norm(vector)
-        if not (length > 0 and np.isfinite(length)):
-            raise ValueError(f"{name} must have a length, got {vector.tolist()}")
-    back, upward = back / np.linalg.norm(back), upward / np.linalg.norm(upward)
-    right = np.cross(upward, back)
-    if np.linalg.norm(right) < 1e-6:
-        right = np.eye(3)[(int(np.argmax(np.abs(upward))) + 1) % 3]
-        right = right - (right @ back) * back
-    right /= np.linalg.norm(right)
-    return right, np.cross(back, right)
-
-
-def fitted(
-    points: NDArray[np.float64],
-    direction: Sequence[float] | NDArray[np.float64],
-    up: Sequence[float] | NDArray[np.float64],
-    size: tuple[int, int],
-    *,
-    margin_px: float,
-) -> PictureView:
-    """Return the view from a direction that holds all points, as large as can be.
-
-    Args:
-        points: What must be in the picture [m], shape (n, 3).
-        direction: From the scene to the viewer, shape (3,).
-        up: What is up in the picture, shape (3,).
-        size: Width and height in [px].
-        margin_px: Free border in [px].
-    """
-    right, upward = facing(direction, up)
-    plane = points @ np.stack([right, upward], axis=1)
-    low, high = plane.min(axis=0), plane.max(axis=0)
-    room = np.maximum(np.array(size) - 2.0 * margin_px, 1.0)
-    m_per_px = float(np.max((high - low) / room))
-    back = np.cross(right, upward)
-    middle = 0.5 * (low + high)
-    focus = middle[0] * right + middle[1] * upward + points.mean(axis=0) @ back * back
-    return PictureView(focus, right, upward, size, m_per_px or 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +34,13 @@ class Shader:
         mesh, (width, height) = self.caster.mesh, view.size
         picture = np.empty((height, width, 3), dtype=np.uint8)
         picture[:] = BACKGROUND
-        window = _window(view, mesh.vertices[np.unique(mesh.faces)])
-        columns, rows = np.meshgrid(np.arange(*window[0]), np.arange(*window[1]))
+        pixels = view.project(mesh.corners.reshape(-1, 3))
+        low = np.clip(np.floor(pixels.min(axis=0)), 0, view.size).astype(int)
+        high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, view.size).astype(int)
+        columns, rows = np.meshgrid(*map(np.arange, low, high))
         columns, rows = columns.ravel(), rows.ravel()
-        if len(rows):
-            colours, hit = self._rays(view, columns, rows)
-            picture[rows[hit], columns[hit]] = colours
+        colours, hit = self._rays(view, columns, rows)
+        picture[rows[hit], columns[hit]] = colours
         return Image.fromarray(picture)
 
     def _rays(
@@ -241,14 +148,6 @@ def checked_colours(
     if colours.shape != expected or not np.all((colours >= 0) & (colours <= 255)):
         raise ValueError(f"face_colours must be {expected} in 0..255: {colours.shape}")
     return colours
-
-
-def _window(view: PictureView, points: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Columns and rows of the picture that the points fall into."""
-    pixels = view.project(points)
-    low = np.clip(np.floor(pixels.min(axis=0)), 0, view.size).astype(int)
-    high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, view.size).astype(int)
-    return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
