@@ -4,22 +4,27 @@ Given a graph, colour its vertices so that the ends of each edge differ::
 
     minimise k  s.t.  colour_i in {0 .. k-1},   colour_i != colour_j for every edge ij
 
-A clique of k vertices proves that k colours are needed. Where the largest clique is
-smaller than the best colouring, branch and bound on one colour fewer decides: it either
-finds one or has tried every colouring (DSATUR: the vertex with the fewest colours left
-is coloured next; of the colours not used yet, only the first is tried).
+A clique of k vertices proves that k colours are needed. One colour more than that is
+tried until a colouring exists. Up to eight vertices all cliques and colourings are
+listed; above, HiGHS decides, up to a number of nodes::
+
+    clique:     maximise sum_i x_i,  x_i + x_j <= 1 where i and j don't conflict
+    colouring:  sum_c x_ic = 1 for each i,  x_ic + x_jc <= 1 for each edge ij and c
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .status import SolveStatus
 
-# Vertices placed: a second or two.
-_BUDGET = 300_000
+_LISTED = 8
+_MAX_NODES = 20_000
+# Of `scipy.optimize.milp`.
+_INFEASIBLE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,142 +58,120 @@ class Colouring:
         )
 
 
-def fewest_colours(conflicts: NDArray[np.bool_], *, budget: int = _BUDGET) -> Colouring:
+def fewest_colours(
+    conflicts: NDArray[np.bool_], *, max_nodes: int = _MAX_NODES
+) -> Colouring:
     """Colour a graph with the fewest colours.
 
     Args:
         conflicts: Whether two vertices conflict: symmetric, no vertex with itself,
             shape (n, n).
-        budget: Vertices that each of the two searches may place.
+        max_nodes: Nodes that each run of HiGHS may take.
 
     Raises:
         ValueError: If the table isn't square, boolean, symmetric and free of loops.
     """
     _check(conflicts)
-    n = len(conflicts)
-    near = [sum(1 << int(j) for j in np.flatnonzero(row)) for row in conflicts]
-    clique = _largest_clique(near, budget)
-    # The vertices of the clique differ anyway: their colours are given.
-    given = {vertex: k for k, vertex in enumerate(clique)}
-    colours = _greedy(near, given)
-    least, work = len(clique), budget
-    while max(colours, default=-1) >= least:
-        k = max(colours)
-        found, work = _coloured(near, given, k, work)
-        if found is None:
-            least = k + 1 if work > 0 else least
+    n, listed = len(conflicts), len(conflicts) <= _LISTED
+    clique = _largest_clique(conflicts) if listed else _clique(conflicts, max_nodes)
+    least, count, proved = len(clique), len(clique), True
+    while True:
+        if count == n:
+            colours, refuted = np.arange(n), True
+        elif listed:
+            colours, refuted = _listed_colouring(conflicts, clique, count), True
+        else:
+            colours, refuted = _colouring(conflicts, clique, count, max_nodes)
+        if colours is not None:
             break
-        colours = found
-    count = max(colours, default=-1) + 1
-    proof = "clique" if count == len(clique) else "exhaustion"
-    proof = proof if count == least else "none"
+        proved = proved and refuted
+        count += 1
+        least = count if proved else least
+    count = int(np.unique(colours).size)
+    proof = "clique" if count == len(clique) else "exhaustion" if proved else "none"
     status = SolveStatus.OPTIMAL if count == least else SolveStatus.FEASIBLE
-    return Colouring(_named(colours, n), count, least, clique, proof, status)
+    _, first, same = np.unique(colours, return_index=True, return_inverse=True)
+    named = np.argsort(np.argsort(first))[same.reshape(n)]
+    return Colouring(named.astype(np.int64), count, least, clique, proof, status)
 
 
-def _largest_clique(near: Sequence[int], budget: int) -> tuple[int, ...]:
-    """Return a largest clique, or the largest that the work allows.
-
-    Tomita's bound: a clique in a set has no more members than a greedy colouring of
-    the set has colours.
-    """
-    best: list[int] = []
-    work = budget
-
-    def grow(taken: list[int], rest: int) -> None:
-        nonlocal best, work
-        order = _by_colour(near, rest)
-        for vertex, bound in reversed(order):
-            if len(taken) + bound <= len(best) or work <= 0:
-                return
-            work -= 1
-            taken.append(vertex)
-            inner = rest & near[vertex]
-            if inner:
-                grow(taken, inner)
-            elif len(taken) > len(best):
-                best = taken.copy()
-            taken.pop()
-            rest &= ~(1 << vertex)
-
-    grow([], (1 << len(near)) - 1)
-    return tuple(sorted(best))
-
-
-def _by_colour(near: Sequence[int], rest: int) -> list[tuple[int, int]]:
-    """Return the vertices of a set with the number of their greedy colour, rising."""
-    order: list[tuple[int, int]] = []
-    colour = 0
-    while rest:
-        colour += 1
-        free = rest
-        while free:
-            vertex = (free & -free).bit_length() - 1
-            order.append((vertex, colour))
-            rest &= ~(1 << vertex)
-            free &= ~(near[vertex] | 1 << vertex)
-    return order
-
-
-def _greedy(near: Sequence[int], given: dict[int, int]) -> list[int]:
-    """Return the colouring that DSATUR makes without ever going back."""
-    colours = [given.get(vertex, -1) for vertex in range(len(near))]
-    while (vertex := _next(near, colours)) is not None:
-        taken = _taken(near, colours, vertex)
-        colours[vertex] = next(c for c in range(len(near)) if not taken >> c & 1)
-    return colours
-
-
-def _coloured(
-    near: Sequence[int], given: dict[int, int], k: int, work: int
-) -> tuple[list[int] | None, int]:
-    """Return a colouring with k colours, or None, and the work that is left."""
-    colours = [given.get(vertex, -1) for vertex in range(len(near))]
-
-    def place(used: int) -> bool:
-        nonlocal work
-        vertex = _next(near, colours)
-        if vertex is None:
-            return True
-        taken = _taken(near, colours, vertex)
-        for colour in range(min(used + 1, k)):
-            if taken >> colour & 1:
-                continue
-            if work <= 0:
-                return False
-            work -= 1
-            colours[vertex] = colour
-            if place(max(used, colour + 1)):
-                return True
-            colours[vertex] = -1
-        return False
-
-    return (colours if place(len(given)) else None), work
-
-
-def _next(near: Sequence[int], colours: list[int]) -> int | None:
-    """Return the vertex next to most colours, then to most vertices, then the first."""
-    left = [vertex for vertex, colour in enumerate(colours) if colour < 0]
-    if not left:
-        return None
-    return max(
-        left,
-        key=lambda v: (_taken(near, colours, v).bit_count(), near[v].bit_count(), -v),
+def _largest_clique(conflicts: NDArray[np.bool_]) -> tuple[int, ...]:
+    """Return the last of the largest cliques, trying all."""
+    n = len(conflicts)
+    cliques = (
+        chosen
+        for size in range(n, -1, -1)
+        for chosen in reversed(list(combinations(range(n), size)))
+        if all(conflicts[i, j] for i, j in combinations(chosen, 2))
     )
+    return next(cliques)
 
 
-def _taken(near: Sequence[int], colours: list[int], vertex: int) -> int:
-    """Return the colours around a vertex, as bits."""
-    taken = 0
-    for other, colour in enumerate(colours):
-        if colour >= 0 and near[vertex] >> other & 1:
-            taken |= 1 << colour
-    return taken
+def _listed_colouring(
+    conflicts: NDArray[np.bool_], clique: tuple[int, ...], count: int
+) -> NDArray[np.int64] | None:
+    """Return the first colouring of all in which the clique has the first colours."""
+    colours = np.zeros(len(conflicts), dtype=np.int64)
+    colours[list(clique)] = np.arange(len(clique))
+    others = np.setdiff1d(np.arange(len(conflicts)), clique)
+    one, other = np.nonzero(np.triu(conflicts))
+    for choice in product(range(count), repeat=others.size):
+        colours[others] = choice
+        if not np.any(colours[one] == colours[other]):
+            return colours
+    return None
 
 
-def _named(colours: list[int], n: int) -> NDArray[np.int64]:
-    first = list(dict.fromkeys(colours))
-    return np.array([first.index(colours[v]) for v in range(n)], dtype=np.int64)
+def _clique(conflicts: NDArray[np.bool_], max_nodes: int) -> tuple[int, ...]:
+    """Return the largest clique that HiGHS finds."""
+    n = len(conflicts)
+    pairs = np.argwhere(np.triu(~conflicts, 1))
+    x, _ = _binaries(np.ones(n), pairs, np.ones(n), max_nodes)
+    # A run that was cut may have found none: a vertex is one.
+    return (0,) if x is None else tuple(np.flatnonzero(x > 0.5).tolist())
+
+
+def _colouring(
+    conflicts: NDArray[np.bool_], clique: tuple[int, ...], count: int, max_nodes: int
+) -> tuple[NDArray[np.int64] | None, bool]:
+    """Return a colouring or None, and whether that is proved."""
+    n = len(conflicts)
+    edges = np.argwhere(np.triu(conflicts))
+    pairs = np.concatenate([edges + n * c for c in range(count)])
+    once = sparse.csr_array(np.tile(np.eye(n), count))
+    upper = np.ones((count, n))
+    upper[:, list(clique)] = np.eye(count, len(clique))
+    x, refuted = _binaries(np.zeros(n * count), pairs, upper.ravel(), max_nodes, once)
+    return (None if x is None else np.argmax(x.reshape(count, n), axis=0)), refuted
+
+
+def _binaries(
+    gains: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    upper: NDArray[np.float64],
+    max_nodes: int,
+    once: sparse.csr_array | None = None,
+) -> tuple[NDArray[np.float64] | None, bool]:
+    """Maximise gains of binaries, no pair of which is taken; rows of `once` take one.
+
+    Returns the solution or None, and whether it is proved that there is none.
+    """
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
+    rows = np.repeat(np.arange(len(pairs)), 2)
+    table = (np.ones(pairs.size), (rows, pairs.ravel()))
+    shape = (len(pairs), gains.size)
+    limits = [LinearConstraint(sparse.csr_array(table, shape=shape), ub=1.0)]
+    if once is not None:
+        limits.append(LinearConstraint(once, 1.0, 1.0))
+    answer = milp(
+        -gains,
+        integrality=np.ones(gains.size),
+        bounds=Bounds(0.0, upper),
+        constraints=limits,
+        options={"node_limit": max_nodes},
+    )
+    return answer.x, answer.status == _INFEASIBLE
 
 
 def _check(conflicts: NDArray[np.bool_]) -> None:

@@ -9,7 +9,7 @@ import enum
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from solvers.bit_rows import BitSum, pack_rows
 from solvers.given_numbers import whole_number
@@ -54,7 +54,6 @@ class CellBound:
         most_weight: Weight that ``count`` - 1 poses can serve at most, by the
             multipliers, in the problem's unit.
         cells_used: Cells that the tree was asked for.
-        finest_level: Splits between a root and the finest of them.
         tuples_met: Multisets of cells that were weighed.
     """
 
@@ -70,63 +69,7 @@ class CellBound:
     by_multipliers: float
     most_weight: float
     cells_used: int
-    finest_level: int
     tuples_met: int
-
-    def rederived(self) -> tuple[float, float]:
-        """Return ``by_multipliers`` and ``most_weight``, from problem and tree again.
-
-        Walks the tree from its roots and splits what costs more than ``dearest``;
-        nothing else of the answer enters.
-        """
-        return multiplier_bound(
-            self.problem,
-            self.tree,
-            self.multipliers,
-            n_poses=self.count - 1,
-            dearest=self.dearest,
-        )
-
-
-def multiplier_bound(
-    problem: CellProblem,
-    tree: CellTree,
-    multipliers: ArrayLike,
-    *,
-    n_poses: int,
-    dearest: int = 0,
-) -> tuple[float, float]:
-    """Return what multipliers prove, whatever made them.
-
-    Args:
-        problem: What must be served.
-        tree: Cells that hold every pose.
-        multipliers: Any numbers, shape (n_rows,); what isn't positive counts as 0.
-        n_poses: K of the weight.
-        dearest: Cells are split while they cost more; 0 goes down to the leaves.
-
-    Returns:
-        The number of poses that is needed at least, inf if no cell serves anything that
-        counts; and the weight that K poses serve at most, in the problem's unit.
-
-    Raises:
-        ValueError: If K isn't a whole number of at least 0.
-    """
-    n_poses = whole_number("n_poses", n_poses, least=0)
-    whole = whole_rows(problem)
-    given = whole.multipliers(multipliers)
-    price = BitSum(given)
-    top, batch = 0, tree.roots()
-    while batch.cells.size:
-        prices = price(batch.rows)
-        dear = prices > dearest
-        top = max(top, int(prices[~dear].max(initial=0)))
-        cells, prices = batch.cells[dear], prices[dear]
-        batch = tree.children(cells)
-        whole_cells = np.bincount(batch.parents, minlength=cells.size) == 0
-        top = max(top, int(prices[whole_cells].max(initial=0)))
-    most = whole.in_unit(whole.most(given, n_poses * top))
-    return whole.count_bound(given, top), min(most, float(problem.weights.sum()))
 
 
 @on_one_thread
@@ -236,7 +179,6 @@ class _Proof:
             by_multipliers=search.bound,
             most_weight=min(self.whole.in_unit(most), total),
             cells_used=self.store.size,
-            finest_level=int(self.store.levels.max(initial=0)),
             tuples_met=self.met,
         )
 

@@ -121,39 +121,6 @@ class ArrayTree:
             value.flags.writeable = False
             object.__setattr__(self, name, value)
 
-    @classmethod
-    def from_leaves(
-        cls, parents: NDArray[np.int64], leaf_rows: NDArray[np.uint64], n_rows: int
-    ) -> "ArrayTree":
-        """Return a tree whose parents are exactly the union of their children.
-
-        Args:
-            parents: Each cell's parent, which comes before it, or -1.
-            leaf_rows: Bit rows of the cells that are no one's parent, in their order.
-            n_rows: Number of rows.
-        """
-        parents = _parents(parents)
-        check_size(parents.size, n_rows)
-        leaf = np.ones(parents.size, dtype=bool)
-        leaf[parents[parents >= 0]] = False
-        n_leaves = int(np.count_nonzero(leaf))
-        if leaf_rows.shape != (n_leaves, words_for(n_rows)):
-            raise ValueError(
-                f"leaf_rows must be {(n_leaves, words_for(n_rows))}, got "
-                f"{leaf_rows.shape}"
-            )
-        rows = np.zeros((parents.size, words_for(n_rows)), dtype=np.uint64)
-        rows[leaf] = leaf_rows
-        for cell in range(parents.size - 1, -1, -1):
-            if parents[cell] >= 0:
-                rows[parents[cell]] |= rows[cell]
-        return cls(parents, rows, n_rows)
-
-    @property
-    def leaves(self) -> NDArray[np.int64]:
-        """Cells that can't be split."""
-        return np.flatnonzero(np.diff(self._starts)[1:] == 0)
-
     def roots(self) -> CellBatch:
         """Return the cells without a parent."""
         cells = self._order[: self._starts[1]]

@@ -147,12 +147,6 @@ class CoverProblem:
         """Return the weight that a selection covers, all row sets together."""
         return float(self.covered_weights(selected).sum())
 
-    @property
-    def best_weight(self) -> float:
-        """Weight covered when every set is taken."""
-        served = np.diff(self.covers.indptr) >= self.needs
-        return float(self.weights[served].sum())
-
 
 def _sums(
     values: NDArray[np.float64], row_sets: NDArray[np.int64], n: int = 0

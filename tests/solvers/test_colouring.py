@@ -107,9 +107,10 @@ def test_groups_begin_with_their_first_members_and_are_the_same_each_time():
 
 def test_work_that_runs_out_claims_no_proof():
     conflicts = mycielski(mycielski(cycle(5)))
-    found = fewest_colours(conflicts, budget=60)
+    found = fewest_colours(conflicts, max_nodes=1)
     assert found.status is SolveStatus.FEASIBLE
-    assert (found.proof, found.lower_bound) == ("none", len(found.clique))
+    assert found.proof == "none"
+    assert len(found.clique) <= found.lower_bound < found.n_colours
     assert found.n_colours >= 5
     for group in found.groups:
         assert not conflicts[np.ix_(group, group)].any()

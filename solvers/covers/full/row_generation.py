@@ -47,17 +47,7 @@ class LinearCover:
     primal: NDArray[np.float64]
 
 
-def least_count(covers: NDArray[np.bool_], multipliers: NDArray[np.float64]) -> int:
-    """Return a lower bound on the sets that cover every row.
-
-    Args:
-        covers: Whether set s covers row e, shape (n_e, n_s).
-        multipliers: Any numbers, shape (n_e,); negative ones count as 0.
-    """
-    return _rounded_up(_priced(covers, multipliers)[0])
-
-
-def _priced(
+def by_multipliers(
     covers: NDArray[np.bool_], multipliers: NDArray[np.float64]
 ) -> tuple[float, NDArray[np.float64]]:
     """Return the bound by multipliers, not rounded up, and the reduced costs."""
@@ -106,7 +96,7 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
         primal = np.asarray(solution.col_value, dtype=np.float64)
         if dual.size != rows.size or primal.size != n_sets:
             break
-        bound, costs = _priced(covers[rows], dual)
+        bound, costs = by_multipliers(covers[rows], dual)
         if bound > needed:
             needed, reduced = bound, costs
         support = np.flatnonzero(primal > 0)

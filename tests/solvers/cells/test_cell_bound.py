@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import linprog
 
 from solvers.bit_rows import pack_rows, unpack_rows
-from solvers.cells.cell_bound import CellStatus, bound_count, multiplier_bound
+from solvers.cells.cell_bound import CellStatus, bound_count
 from solvers.cells.cell_multipliers import MultiplierSearch
 from solvers.cells.cell_problem import CellProblem, whole_rows
 from solvers.cells.cell_store import CellStore
@@ -20,6 +20,12 @@ from solvers.cells.cell_subtrees import Subtrees
 from solvers.cells.cell_tree import ArrayTree
 from solvers.cells.cell_tuples import _split, refute_tuples
 from solvers.status import WorkBudget
+from tests.support.leaf_trees import (
+    leaves_of,
+    multiplier_bound,
+    rederived,
+    tree_of_leaves,
+)
 
 DEG = np.pi / 180.0
 PLENTY = 1e12
@@ -56,7 +62,7 @@ def random_tree(rng, n_rows, *, density=None):
     n_leaves = parents.size - np.unique(parents[parents >= 0]).size
     density = rng.uniform(0.15, 0.6) if density is None else density
     leaves = rng.random((n_leaves, n_rows)) < density
-    tree = ArrayTree.from_leaves(parents, pack_rows(leaves), n_rows)
+    tree = tree_of_leaves(parents, pack_rows(leaves), n_rows)
     if rng.random() < 0.3:
         loose = unpack_rows(tree.rows, n_rows)
         loose[0] = True
@@ -110,7 +116,7 @@ def test_what_is_complete_equals_brute_force(block):
             cells = unpack_rows(tree.rows[answer.survivor], tree.n_rows)
             assert len(cells) == truth < count
             assert serves_enough(problem, cells)
-            assert np.all(np.isin(answer.survivor, tree.leaves))
+            assert np.all(np.isin(answer.survivor, leaves_of(tree.parents)))
     assert {CellStatus.PROVED, CellStatus.SURVIVED} <= statuses
 
 
@@ -145,7 +151,7 @@ def test_the_tuple_search_equals_brute_force(n_poses, multipliers):
         if enough:
             names = store.names[found.survivor]
             assert names.size == n_poses
-            assert np.all(np.isin(names, tree.leaves))
+            assert np.all(np.isin(names, leaves_of(tree.parents)))
             assert serves_enough(problem, unpack_rows(tree.rows[names], tree.n_rows))
     assert 8 < sum(outcomes) < 56
 
@@ -154,7 +160,7 @@ def test_two_poses_in_one_cell_are_two_poses():
     # One root, two halves: each half serves one of two rows, so that both poses stand
     # in the root, one in each half.
     parents = np.array([-1, 0, 0])
-    halves = ArrayTree.from_leaves(parents, pack_rows(np.eye(2, dtype=bool)), 2)
+    halves = tree_of_leaves(parents, pack_rows(np.eye(2, dtype=bool)), 2)
     answer = bound_count(CellProblem(np.ones(2), 2.0), halves, 3)
     assert answer.lower_bound == 2
     assert answer.survivor.tolist() == [1, 2]
@@ -189,7 +195,7 @@ def test_every_multiset_of_leaves_is_met_once(n_poses):
             else:
                 ends.append(tuple(sorted(twigs.cell(int(t)) for t in ended)))
         names = np.sort(store.names[np.unique(ends)])
-        np.testing.assert_array_equal(names, tree.leaves)
+        np.testing.assert_array_equal(names, leaves_of(tree.parents))
         assert len(set(ends)) == len(ends)
         assert len(ends) == math.comb(len(leaves) + n_poses - 1, n_poses)
 
@@ -288,7 +294,7 @@ def test_the_answer_derives_its_own_bound_again():
         answer = bound_count(problem, tree, 3, budget=PLENTY)
         if answer.status is CellStatus.INFEASIBLE:
             continue
-        bound, most = answer.rederived()
+        bound, most = rederived(answer)
         assert (bound, most) == (answer.by_multipliers, answer.most_weight)
         assert most >= most_of(problem, leaves, 2) * (1 - 1e-15)
         assert min(bound, 3) <= answer.lower_bound
@@ -310,7 +316,7 @@ def test_a_spoiled_answer_is_caught():
             dataclasses.replace(good, dearest=good.dearest // 2),
             dataclasses.replace(good, by_multipliers=good.by_multipliers + 1),
         ):
-            bound, most = spoiled.rederived()
+            bound, most = rederived(spoiled)
             assert bound <= good.by_multipliers
             assert most >= good.most_weight or spoiled.dearest == good.dearest
             caught += (bound, most) != (spoiled.by_multipliers, spoiled.most_weight)

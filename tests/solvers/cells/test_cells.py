@@ -12,13 +12,14 @@ from solvers import bit_rows
 from solvers.bit_rows import BitSum, pack_rows, unpack_rows
 from solvers.cells import cell_store
 from solvers.cells import cell_tree as cells
-from solvers.cells.cell_bound import CellStatus, bound_count, multiplier_bound
+from solvers.cells.cell_bound import CellStatus, bound_count
 from solvers.cells.cell_multipliers import MultiplierSearch
 from solvers.cells.cell_problem import CellProblem, whole_rows
 from solvers.cells.cell_store import CellStore
 from solvers.cells.cell_tree import ArrayTree, CellBatch
 from solvers.cells.cell_tuples import refute_tuples
 from solvers.status import WorkBudget
+from tests.support.leaf_trees import leaves_of, tree_of_leaves
 
 PARENTS = np.array([-1, -1, 0, 0, 1, 1, 2, 2])
 
@@ -26,7 +27,7 @@ PARENTS = np.array([-1, -1, 0, 0, 1, 1, 2, 2])
 def small_tree(seed=0, n_rows=70):
     rng = np.random.default_rng(seed)
     leaves = rng.random((5, n_rows)) < 0.4
-    return ArrayTree.from_leaves(PARENTS, pack_rows(leaves), n_rows)
+    return tree_of_leaves(PARENTS, pack_rows(leaves), n_rows)
 
 
 @pytest.mark.parametrize("n", [1, 8, 63, 64, 65, 200])
@@ -52,7 +53,7 @@ def test_parents_of_leaves_hold_exactly_the_union():
     for cell in (0, 1, 2):
         below = np.flatnonzero(tree.parents == cell)
         np.testing.assert_array_equal(dense[cell], dense[below].any(axis=0))
-    assert tree.leaves.tolist() == [3, 4, 5, 6, 7]
+    assert leaves_of(tree.parents).tolist() == [3, 4, 5, 6, 7]
     assert tree.roots().cells.tolist() == [0, 1]
     batch = tree.children(np.array([2, 3, 0]))
     assert batch.cells.tolist() == [6, 7, 2, 3]
@@ -176,15 +177,13 @@ def test_bad_questions_are_refused():
         bound_count(problem, tree, 0)
     with pytest.raises(ValueError, match=r"count must be a whole number, got 2\.5"):
         bound_count(problem, tree, 2.5)
-    with pytest.raises(ValueError, match="n_poses must be at least 0, got -1"):
-        multiplier_bound(problem, tree, np.ones(70), n_poses=-1)
     with pytest.raises(ValueError, match="cells have 70 rows, the problem has 3"):
         bound_count(CellProblem(np.ones(3), 1.0), tree, 2)
     with pytest.raises(ValueError, match=r"multipliers must be \(70,\)"):
         whole_rows(problem).multipliers(np.ones(3))
     for given in (np.full(70, 1j), [10**400] * 70, [[1], [1, 2]]):
         with pytest.raises(ValueError, match="multipliers must be real numbers"):
-            multiplier_bound(problem, tree, given, n_poses=2)
+            whole_rows(problem).multipliers(given)
 
 
 class Unordered(Lying):

@@ -2,24 +2,20 @@
 
 import dataclasses
 
-import cvxpy as cp
 import highspy
 import numpy as np
 import pytest
-from scipy import sparse
 
 from solvers import CoverProblem
 from solvers.covers.bounds.mixed_integer import linear_multipliers
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.bounds.relaxation import cost_bound, coverage_bounds
-from solvers.covers.cover_statements import (
-    MAX_STATED_ENTRIES,
-    StatementError,
+from solvers.status import SolveStatus, WorkBudget
+from tests.support.cover_statements import (
     solve_statement,
     state_cover_relaxation,
     state_max_coverage,
 )
-from solvers.status import SolveStatus, WorkBudget
 
 TIGHT = 1e-6
 
@@ -347,90 +343,3 @@ def test_highspy_still_runs_with_one_thread_afterwards():
     solver.setOptionValue("threads", 1)
     solver.addVar(1.0, 2.0)
     assert solver.run() == highspy.HighsStatus.kOk
-
-
-def test_what_the_solver_refuses_is_our_error():
-    stated = state_cover_relaxation(np.eye(2), 2.0)
-    z = cp.Variable()
-    for program in (cp.Problem(cp.Maximize(z**2)), cp.Problem(cp.Minimize(cp.exp(z)))):
-        spoiled = dataclasses.replace(stated, program=program)
-        with pytest.raises(StatementError, match="use solve_cover"):
-            solve_statement(spoiled)
-
-
-@pytest.mark.parametrize(
-    ("covers", "message"),
-    [
-        (np.ones(3), r"isn't empty, got shape \(3,\)"),
-        (np.ones((0, 3)), r"isn't empty, got shape \(0, 3\)"),
-        (np.ones((3, 0)), r"isn't empty, got shape \(3, 0\)"),
-        (np.array([[2]]), "boolean or hold only 0 and 1"),
-        (np.array([[np.nan]]), "boolean or hold only 0 and 1"),
-        (sparse.csr_array((MAX_STATED_ENTRIES, 1)), "500001 .* use solve_cover or"),
-        (np.ones((1000, 499), bool), "500499 entries.* use solve_cover or"),
-    ],
-)
-def test_bad_matrices_are_refused(covers, message):
-    for state in (state_cover_relaxation, state_max_coverage):
-        with pytest.raises(ValueError, match=message):
-            state(covers, 1)
-
-
-def test_an_entry_given_twice_is_no_second_set_and_stays():
-    twice = np.array([0, 0, 1])
-    spoiled = sparse.csr_array((np.ones(3), twice, [0, 2, 3]), shape=(2, 2))
-    with pytest.raises(ValueError, match="boolean or hold only 0 and 1"):
-        state_cover_relaxation(spoiled, 2.0, needs=[2, 1])
-    assert spoiled.nnz == 3
-    marked = sparse.csr_array((np.ones(3, bool), twice, [0, 2, 3]), shape=(2, 2))
-    found = solve_statement(state_cover_relaxation(marked, 2.0))
-    assert found.multipliers == pytest.approx([1.0, 1.0])
-    assert marked.nnz == 3
-
-
-def test_the_largest_statement_is_taken():
-    covers = sparse.csr_array((MAX_STATED_ENTRIES - 1, 1))
-    assert state_max_coverage(covers, 1).elements.size == MAX_STATED_ENTRIES - 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"weights": np.ones(2)}, r"weights must be \(3,\), got \(2,\)"),
-        ({"weights": [1.0, np.nan, 1.0]}, "weights must be at least 0"),
-        ({"weights": [1.0, -1.0, 1.0]}, "weights must be at least 0"),
-        ({"weights": np.full(3, 1e308)}, "weights .* finite sum"),
-        ({"costs": np.ones(3)}, r"costs must be \(2,\), got \(3,\)"),
-        ({"costs": [1.0, np.nan]}, "costs must be at least 0"),
-        ({"needs": [1, 0, 1]}, "needs must be at least 1, got 0"),
-        ({"needs": [1, 1]}, "needs must be 3 integers"),
-        ({"needs": np.ones(3)}, "needs must be 3 integers, got float64"),
-        ({"row_sets": [0, 0, 1]}, r"row_sets must lie in \[0, 1\)"),
-        ({"row_sets": [0, -1, 0]}, r"row_sets must lie in \[0, 1\)"),
-        ({"row_sets": [0, 0]}, "row_sets must be 3 integers"),
-        ({"required": -1.0}, "required must be numbers, at least 0"),
-        ({"required": np.nan}, "required must be numbers, at least 0"),
-        ({"required": np.inf}, "required must be numbers, at least 0"),
-        ({"required": [[1.0]]}, "required must be numbers, at least 0"),
-        ({"fixed": [2]}, r"fixed must name sets in \[0, 2\)"),
-        ({"fixed": [-1]}, r"fixed must name sets in \[0, 2\)"),
-        ({"fixed": [0.5]}, r"fixed must name sets in \[0, 2\)"),
-    ],
-)
-def test_bad_numbers_are_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        state_cover_relaxation(np.ones((3, 2)), **{"required": 1.0, **arguments})
-
-
-@pytest.mark.parametrize("n_sets", [-1, np.nan])
-def test_bad_counts_are_refused(n_sets):
-    with pytest.raises(ValueError, match="n_sets must be at least 0"):
-        state_max_coverage(np.eye(2), n_sets)
-
-
-def test_answers_are_frozen():
-    found = solve_statement(state_cover_relaxation(np.eye(2), 2.0))
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        found.value = 0.0
-    with pytest.raises(ValueError, match="read-only"):
-        found.x[0] = 2.0
