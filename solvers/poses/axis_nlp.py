@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from solvers.status import interruptible
 
 from .axis_problem import INSET, PITCH_POWER, AxisProgram
-from .ipopt import slots_for, strict_solver
+from .ipopt import strict_solver
 from .light import Light
+from .slots import slots_for
 
 _COLUMNS = 16
 _SLOTS = (64, 128, 256, 512, 1024)

@@ -1,6 +1,5 @@
 """IPOPT as the smooth programs run it: exact derivatives, strict limits, silent."""
 
-from collections.abc import Sequence
 from typing import Any, Protocol
 
 import casadi as ca
@@ -52,8 +51,3 @@ def strict_solver(name: str, nlp: Nlp, max_iterations: int) -> Any:  # noqa: ANN
     }
     parts = {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}
     return ca.nlpsol(name, "ipopt", parts, options)
-
-
-def slots_for(n: int, sizes: Sequence[int]) -> int:
-    """Return the smallest size that holds n, so that few programs are built."""
-    return n if n == 0 else next((m for m in sizes if m >= n), n)

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from solvers.status import interruptible
 
-from .ipopt import slots_for, strict_solver
+from .ipopt import strict_solver
 from .light import Light
 from .pose_problem import INSET, PoseProgram, pose_margins
+from .slots import slots_for
 
 RIDGE = 1e-6
 _N_SCALARS = 44

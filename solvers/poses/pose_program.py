@@ -13,12 +13,18 @@ X = R^T (P - Q), light L = (P - Q)/|P - Q| (diverging) or R e_z (parallel)::
 over Q, R and t: smooth and not convex, so an optimum is local. ``pose_nlp`` states it
 in CasADi; this module solves it over an active set and checks the answer in numpy, with
 its own formulas. Occlusion isn't part of it: rays decide after every move.
+
+Under parallel light the margin depends on L alone, and without the limits on T and Q
+the best L is known by a cone program (``cone``). The start is turned to it about the
+centre of the workspace; where every limit holds there, no pose has a larger margin over
+these samples: the optimum is GLOBAL, for the samples that the projector was assigned.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from solvers.status import SolveStatus
 
@@ -34,12 +40,14 @@ class PoseSolution:
 
     Attributes:
         program: The program this answers.
-        status: ``LOCALLY_OPTIMAL`` from IPOPT, ``FEASIBLE`` if it stopped early or the
-            start couldn't be improved, ``UNKNOWN`` if no pose held every limit.
+        status: ``OPTIMAL`` from the cone program: no pose has a larger margin over
+            these samples. ``LOCALLY_OPTIMAL`` from IPOPT, ``FEASIBLE`` if it stopped
+            early or the start couldn't be improved, ``UNKNOWN`` if no pose held every
+            limit.
         world_from_device: The pose, shape (4, 4); the start unless a better was found.
         margin_rad: Least margin of any sample, see :func:`pose_margins`.
         slack: Least slack of the other limits, see :func:`pose_slack`.
-        n_active: Samples that IPOPT saw in the last round.
+        n_active: Samples that the solver saw in the last round.
     """
 
     program: PoseProgram
@@ -128,7 +136,7 @@ def _workspace_slack(program: PoseProgram, position: NDArray[np.float64]) -> flo
 def solve_pose(
     program: PoseProgram, *, max_points: int = 60, max_iterations: int = 200
 ) -> PoseSolution:
-    """Move a projector to the largest margin near its start.
+    """Move a projector to the largest margin: of all poses, or near its start.
 
     Args:
         program: What to serve, from where to start.
@@ -138,6 +146,8 @@ def solve_pose(
     Returns:
         A pose that is never worse than the start; the status says which it is.
     """
+    if program.light == "parallel" and (proved := _globally_best(program)):
+        return proved
     from .pose_nlp import run_ipopt
 
     start = np.array(program.world_from_device, dtype=np.float64)
@@ -165,6 +175,28 @@ def solve_pose(
     else:
         status = SolveStatus.FEASIBLE
     return PoseSolution(program, status, best, best_margin, best_slack, active.size)
+
+
+def _globally_best(program: PoseProgram) -> PoseSolution | None:
+    """Return the pose of the best direction; None where it breaks another limit."""
+    from .cone import max_margin_direction
+
+    best = max_margin_direction(program.normals)
+    if best.light is None:
+        return None
+    start = np.array(program.world_from_device, dtype=np.float64)
+    turn = Rotation.align_vectors(best.light[None], start[:3, 2][None])[0]
+    pose = np.eye(4)
+    pose[:3, :3] = turn.as_matrix() @ start[:3, :3]
+    pose[:3, 3] = program.centre + turn.apply(start[:3, 3] - program.centre)
+    least = program.max_incidence - best.max_incidence - _SETTLED_RAD
+    # A start that is as good stays.
+    for offered in (start, pose):
+        margin, slack = _figures(program, offered)
+        if margin >= least and slack >= 0.0:
+            n = len(program.points)
+            return PoseSolution(program, SolveStatus.OPTIMAL, offered, margin, slack, n)
+    return None
 
 
 def _figures(program: PoseProgram, pose: NDArray[np.float64]) -> tuple[float, float]:

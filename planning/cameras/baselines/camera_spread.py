@@ -17,7 +17,6 @@ from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.zone_limits import stands
 from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
-from solvers.poses.baseline_program import solve_baseline
 
 from .seams import adjacency, neighbouring_pairs, overlap_components
 from .spread_problem import (
@@ -176,6 +175,9 @@ class _Search:
 
     def _improve(self, reach: float) -> tuple[bool, float]:
         """Whether a proposal within reach was taken, whole or in part; its reach."""
+        # CasADi is imported where it is used.
+        from solvers.poses.baseline_program import solve_baseline
+
         demanded = np.zeros((0, 2), dtype=np.int64)
         proposals: list[_Array] = []
         for _ in range(_REPEATS):

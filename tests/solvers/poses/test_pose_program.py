@@ -16,6 +16,11 @@ from solvers.poses.pose_problem import PoseProgram, light_directions, pose_margi
 from solvers.poses.pose_program import pose_slack, solve_pose
 from solvers.status import SolveStatus
 
+# Parallel light has a global optimum where only incidence binds.
+REACHED = {
+    "diverging": SolveStatus.LOCALLY_OPTIMAL,
+    "parallel": SolveStatus.OPTIMAL,
+}
 K = np.array([[1400.0, 0.0, 639.5], [0.0, 1400.0, 399.5], [0.0, 0.0, 1.0]])
 
 
@@ -73,7 +78,7 @@ def test_one_planar_patch_is_lit_along_its_normal(light):
         points, [0.0, 0.0, 1.0], light=light, at=[0.3, -0.4, 0.85], up=np.eye(3)[2]
     )
     solution = solve_pose(program)
-    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    assert solution.status is REACHED[light]
     if light == "parallel":
         assert -solution.world_from_device[2, 2] == pytest.approx(1.0, abs=1e-5)
         assert solution.margin_rad == pytest.approx(np.deg2rad(60), abs=2e-3)
@@ -200,8 +205,9 @@ def test_active_set_reaches_the_optimum_of_all_samples(light):
     program = program_of(points, normals, light=light, at=[-0.1, -1.0, 0.1])
     few = solve_pose(program, max_points=24)
     everything = solve_pose(program, max_points=1600)
-    assert few.status is SolveStatus.LOCALLY_OPTIMAL
-    assert few.n_active < 200
+    assert few.status is REACHED[light]
+    if light == "diverging":
+        assert few.n_active < 200
     assert few.margin_rad == pytest.approx(everything.margin_rad, abs=1e-5)
     assert few.margin_rad > pose_margins(program, program.world_from_device).min()
 
