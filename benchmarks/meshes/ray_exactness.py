@@ -18,11 +18,12 @@ from pathlib import Path
 
 import igl
 import numpy as np
+from support.plain_shapes import box, grid
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.visibility import Visibility
-from geometry.shapes.primitives import box, grid, sphere
+from geometry.shapes.primitives import sphere
 
 ROOT = Path(__file__).resolve().parents[2]
 BANDS = (1e-4, 1e-3, 1e-2, 1.0)

@@ -16,13 +16,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from support import reconstruction_rigs
+from support.plain_shapes import box
 from support.white_frames import balanced_accuracy, best_threshold, render_whites
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
 from geometry.rays.rays import RayCaster
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,

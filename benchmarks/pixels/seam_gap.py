@@ -10,10 +10,10 @@ is the widest stretch across the seam without a point.
 import numpy as np
 from numpy.typing import NDArray
 from support import reconstruction_rigs
+from support.plain_shapes import grid
 
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
-from geometry.shapes.primitives import grid
 from planning.cameras.baselines.baseline_rows import half_field
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan

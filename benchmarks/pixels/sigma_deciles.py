@@ -16,12 +16,13 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 from support import reconstruction_rigs
 from support.edge_noise import EdgeNoise
+from support.plain_shapes import grid
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.rays.proximity import closest_points
-from geometry.shapes.primitives import grid, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability

@@ -90,18 +90,6 @@ class BitMatrix:
         """Return how many bits are set in each row, shape (n_rows,)."""
         return np.bitwise_count(self.packed).sum(axis=1, dtype=np.int64)
 
-    def column_counts(self) -> NDArray[np.int64]:
-        """Return how many bits are set in each column, shape (n_columns,)."""
-        total = np.zeros(self.n_columns, dtype=np.int64)
-        for block in self._blocks():
-            total += self.rows(block).sum(axis=0)
-        return total
-
-    def any_row(self, chosen: NDArray[np.int64] | slice) -> NDArray[np.bool_]:
-        """Return which columns some of the rows set, shape (n_columns,)."""
-        joined = np.bitwise_or.reduce(self.packed[chosen], axis=0)
-        return np.unpackbits(joined, count=self.n_columns).view(np.bool_)
-
     def dense(self) -> NDArray[np.bool_]:
         """Return the matrix as booleans, a byte each."""
         return self.rows(slice(None))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import adjacent_faces, components
@@ -123,30 +122,6 @@ def lies_inside(
         points: In [m], shape (n, 3).
     """
     return _sight(caster, spots_at(caster.mesh, faces, points)).inside
-
-
-def faces_inside(caster: RayCaster) -> NDArray[np.bool_]:
-    """Return whether each face lies inside, by most of its spots, shape (n_f,).
-
-    A face without a spot takes the verdict of the spot that is nearest, among those
-    that face the same way; so that both sides of a thin wall are kept apart.
-    """
-    mesh = caster.mesh
-    spots = spots_on(mesh, _SPOTS, group=_bodies(mesh), least=1)
-    inside = _sight(caster, spots).inside
-    n = len(mesh.faces)
-    votes = np.bincount(spots.faces, np.where(inside, 1.0, -1.0), n)
-    result = votes > 0
-    bare = np.flatnonzero(np.bincount(spots.faces, minlength=n) == 0)
-    if len(bare):
-        # Opposite normals are as far apart as spots are over the whole object.
-        spread = 2.0 * mesh.radius
-        tree = KDTree(np.hstack([spots.points, spread * spots.normals]))
-        places = np.hstack(
-            [mesh.face_centroids[bare], spread * mesh.face_normals[bare]]
-        )
-        result[bare] = inside[tree.query(places, workers=caster.threads)[1]]
-    return result
 
 
 def _kind(share: float, wall_m: float | None, thin_m: float) -> str:

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.closed_forms import flat_limit
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
@@ -22,7 +23,6 @@ from planning.cameras.baselines.seams import (
     overlap_components,
 )
 from planning.model.planned import PlannedCamera
-from tests.support.closed_forms import flat_limit
 
 K = np.array([[800.0, 0.0, 319.5], [0.0, 800.0, 239.5], [0.0, 0.0, 1.0]])
 RESOLUTION = (640, 480)

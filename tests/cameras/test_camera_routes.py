@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning import RigPlan
 from planning.cameras.baselines.camera_spread import CameraSpread
 from planning.cameras.camera_cover import camera_stage, offered_cameras

@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.closed_forms import (
+    bent_limit,
+    cylinder_limit,
+    flat_limit,
+    sphere_band_limit,
+)
 
 from planning.cameras.baselines.coverage_triangle import (
     baseline_parts,
     largest_baseline,
     round_body_limit,
     seam_angles,
-)
-from tests.support.closed_forms import (
-    bent_limit,
-    cylinder_limit,
-    flat_limit,
-    sphere_band_limit,
 )
 
 

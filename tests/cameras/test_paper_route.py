@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.closed_forms import cylinder_limit, sphere_band_limit
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
@@ -21,7 +22,6 @@ from planning.cameras.paper.route_problem import CameraSet, RouteProblem
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
-from tests.support.closed_forms import cylinder_limit, sphere_band_limit
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

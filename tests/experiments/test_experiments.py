@@ -11,10 +11,10 @@ from support.paper_equations import (
     projected,
     projection_matrix,
 )
+from support.plain_shapes import box, grid, joined
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from geometry.shapes.primitives import box, grid, joined
 from planning.experiments.one_image import Prior, judged_labels, true_labels
 from planning.experiments.paper_devices import (
     CAMERA_PX,

@@ -9,6 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from support.closed_forms import (
+    bent_limit,
+    cylinder_limit,
+    flat_limit,
+    sphere_band_limit,
+)
 
 from geometry.devices import PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
@@ -22,12 +28,6 @@ from planning.model.requirements import CameraLimits
 from planning.scene.measurability import SEEN, view
 from planning.scene.samples import Target
 from solvers import CoverProblem, solve_cover
-from tests.support.closed_forms import (
-    bent_limit,
-    cylinder_limit,
-    flat_limit,
-    sphere_band_limit,
-)
 
 UP = np.array([0.0, 0.0, 1.0])
 RING = 1.0

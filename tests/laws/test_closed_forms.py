@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, cylinder, grid, joined
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.progress import Stopwatch
 from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins

@@ -10,11 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
 from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays import visibility
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning import pipeline
 from planning.report import claims
 from planning.report.assemble import write_plan

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
-from geometry.shapes.primitives import box
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import RigPlan, load_rig, plan_rig, verify_plan
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError

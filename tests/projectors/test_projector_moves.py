@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.projectors.projector_poses import _between, widen_margins

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, cylinder, grid, joined
 
 from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
+from geometry.shapes.primitives import sphere
 from planning.cameras.baselines.coverage_triangle import round_body_limit
 from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
 from planning.cameras.proved_cameras import bound_stage

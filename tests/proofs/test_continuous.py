@@ -5,10 +5,11 @@ from dataclasses import replace
 import igl
 import numpy as np
 import pytest
+from support.plain_shapes import box, cylinder, grid, joined, torus
 
 from geometry.directions.cube_map import CubeMap
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
+from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.zones import Box
 from planning.proofs import projector_bound as continuous

@@ -8,10 +8,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.plain_shapes import grid
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.shapes.primitives import grid, sphere
+from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import CameraStage
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector

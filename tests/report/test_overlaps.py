@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, grid, joined
 
 from geometry.devices import ParallelModel
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import box, grid, joined, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import ring_frame

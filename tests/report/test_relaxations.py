@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import grid
 
-from geometry.shapes.primitives import grid, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors

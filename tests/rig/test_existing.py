@@ -6,8 +6,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan

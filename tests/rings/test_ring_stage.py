@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
 from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig

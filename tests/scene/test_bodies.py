@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
+from support.plain_shapes import grid
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
@@ -16,7 +17,6 @@ from geometry.shapes.boxes import (
     lines_cross,
     triangles_touch,
 )
-from geometry.shapes.primitives import grid
 from planning import load_rig
 from planning.cameras.camera_bodies import CameraInterference, resolved_cover
 from planning.cameras.camera_cover import CameraCover

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
 from geometry.curvature.curvature import principal_curvatures
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.selected_regions import regions_of_faces
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning import RigPlan, load_rig, plan_rig, verify_plan
 from planning.cli.main import main
 from planning.model.errors import InputError

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import grid
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
 from geometry.rays.visibility import Visibility
-from geometry.shapes.primitives import grid, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting

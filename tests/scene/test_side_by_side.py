@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, grid
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
-from geometry.shapes.primitives import box, grid, sphere
+from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import offered_cameras
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch

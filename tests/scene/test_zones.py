@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import box as plate_of
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
-from geometry.shapes.primitives import box as plate_of
 from planning import load_rig, plan_rig
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan

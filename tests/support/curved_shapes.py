@@ -7,7 +7,8 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import cylinder, sphere, torus
+from geometry.shapes.primitives import sphere
+from support.plain_shapes import cylinder, torus
 
 R, TUBE = 0.1, 0.04
 WIDE, TALL = 0.05, 0.3

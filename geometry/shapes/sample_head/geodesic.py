@@ -1,10 +1,11 @@
 """A geodesic grid: the faces of an icosahedron, each divided into n² triangles."""
 
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from geometry.shapes.primitives import icosahedron_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +128,5 @@ def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         + [(a, b * golden, 0.0) for a, b in signs]
         + [(b * golden, 0.0, a) for a, b in signs]
     )
-    triangles: list[tuple[int, int, int]] = []
-    for a, b, c in combinations(range(12), 3):
-        sides = corners[[a, b, c]] - corners[[b, c, a]]
-        if np.all(np.sum(sides**2, axis=1) < 4.5):
-            outward = np.linalg.det(corners[[a, b, c]]) > 0.0
-            triangles.append((a, b, c) if outward else (a, c, b))
-    return corners, np.array(triangles)
+    faces, outward = icosahedron_faces(corners)
+    return corners, np.where(outward[:, None], faces, faces[:, [0, 2, 1]])

@@ -3,6 +3,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.plain_shapes import box, cylinder, grid, torus
 
 from geometry.curvature.curvature import (
     CurvatureField,
@@ -10,7 +11,7 @@ from geometry.curvature.curvature import (
     principal_curvatures,
 )
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import box, cylinder, grid, sphere, torus
+from geometry.shapes.primitives import sphere
 
 R, TUBE = 0.1, 0.04
 

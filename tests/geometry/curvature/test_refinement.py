@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, torus
 
 from geometry.curvature.refinement import cut_for_curvature, cut_long_edges
 from geometry.mesh.mesh import MeshSource, TriangleMesh
 from geometry.mesh.topology import mesh_edges
-from geometry.shapes.primitives import box, sphere, torus
+from geometry.shapes.primitives import sphere
 
 
 def edge_lengths(mesh: TriangleMesh) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, grid, joined, torus
 
 from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits, OpenDirections
@@ -9,7 +10,7 @@ from geometry.directions.silhouettes import POINTS, Silhouettes
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.rays.visibility import Visibility
-from geometry.shapes.primitives import box, grid, joined, sphere, torus
+from geometry.shapes.primitives import sphere
 
 FREE = DirectionLimits(np.deg2rad(80.0), 0.0)
 

@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, grid, joined
 
 from geometry.directions.silhouettes import Silhouettes
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import box, grid, joined
 
 
 def turned(mesh, angle, by):

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 import trimesh
+from support.plain_shapes import box, torus
 
 from geometry.files.interchange import from_trimesh, to_trimesh
 from geometry.mesh.mesh import MeshError
-from geometry.shapes.primitives import box, sphere, torus
+from geometry.shapes.primitives import sphere
 
 
 def test_a_mesh_comes_back_from_trimesh_as_it_went() -> None:

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from support.plain_shapes import box
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import MeshError, TriangleMesh
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 needs_shared = pytest.mark.skipif(

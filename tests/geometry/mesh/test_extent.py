@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
+from support.plain_shapes import box, joined, torus
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.bearing import bearing
 from geometry.mesh.extent import enclosing_ball, main_bodies
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.primitives import box, joined, sphere, torus
+from geometry.shapes.primitives import sphere
 
 Z = np.array([0.0, 0.0, 1.0])
 

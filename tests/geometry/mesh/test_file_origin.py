@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from support.plain_shapes import box
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.file_origin import FileOrigin
 from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.repair.orientation import orient
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 
 CELL_MM = 10.0
 # Outlines in a cell of side 1, counter-clockwise: a triangle, a square, a pentagon,

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from support.plain_shapes import box, grid
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
-from geometry.shapes.primitives import box, grid, sphere
+from geometry.shapes.primitives import sphere
 
 
 def test_every_sample_stands_for_the_same_area_and_lies_in_its_face() -> None:

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from support.plain_shapes import box, grid
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import closest_points
-from geometry.shapes.primitives import box, grid, sphere
+from geometry.shapes.primitives import sphere
 
 
 def directions(n: int, seed: int = 0) -> np.ndarray:

@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.plain_shapes import box, cylinder, grid, joined, torus
 
 from geometry.curvature.curvature import CurvatureField, principal_curvatures
 from geometry.curvature.face_curvature import face_curvature, steep_directions
@@ -13,7 +14,7 @@ from geometry.mesh.topology import adjacent_faces, components, mesh_edges
 from geometry.regions.cones import averaged_normals, normal_cone
 from geometry.regions.dominance import dominant_faces, face_curvedness
 from geometry.regions.regions import DominantRegions, dominant_regions
-from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
+from geometry.shapes.primitives import sphere
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, cylinder, grid
 
 from geometry.curvature.curvature import principal_curvatures
 from geometry.mesh.mesh import TriangleMesh
@@ -13,7 +14,7 @@ from geometry.regions.selected_regions import (
     lightest_corner,
     regions_of_faces,
 )
-from geometry.shapes.primitives import box, cylinder, grid, sphere
+from geometry.shapes.primitives import sphere
 
 
 def regions_of(mesh: TriangleMesh, chosen: np.ndarray, **options) -> DominantRegions:

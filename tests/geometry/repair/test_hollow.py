@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from support.plain_shapes import box, cylinder, joined, torus
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
@@ -17,11 +18,10 @@ from geometry.repair.hollow import (
     OPEN,
     SOLID,
     MeshShell,
-    faces_inside,
     lies_inside,
     measure_shell,
 )
-from geometry.shapes.primitives import box, cylinder, joined, sphere, torus
+from geometry.shapes.primitives import sphere
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(
@@ -154,6 +154,11 @@ def test_hollow_shells_are_told_from_solids(kind: str, name: str) -> None:
     if kind in (SOLID, OPEN):
         assert shell.inside_m2 == 0.0
         assert shell.wall_m is None
+
+
+def faces_inside(caster: RayCaster) -> np.ndarray:
+    mesh = caster.mesh
+    return lies_inside(caster, np.arange(len(mesh.faces)), mesh.face_centroids)
 
 
 # A sphere's inside sees its mouth alike from everywhere: (1 - cos mouth)/2, which is

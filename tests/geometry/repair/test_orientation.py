@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.plain_shapes import box, cylinder, grid, joined, torus
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
@@ -12,7 +13,7 @@ from geometry.repair.nesting import containers
 from geometry.repair.openness import look_out, spots_on
 from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
-from geometry.shapes.primitives import box, cylinder, grid, joined, sphere, torus
+from geometry.shapes.primitives import sphere
 
 TURNED = "faces turned outwards"
 REWOUND = "faces rewound like their neighbours"

@@ -2,13 +2,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, cylinder, grid, joined
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.mesh.topology import adjacent_faces, components, mesh_edges
 from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
-from geometry.shapes.primitives import box, cylinder, grid, joined, sphere
+from geometry.shapes.primitives import sphere
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data" / "meshes"
 needs_shared = pytest.mark.skipif(

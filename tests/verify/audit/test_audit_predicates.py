@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.plain_shapes import box, grid, joined
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from geometry.shapes.primitives import box, grid, joined
 from planning.model.requirements import ProjectorLimits
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
 from planning.verify.audit.predicates.audit_optics import (

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from support.plain_shapes import grid
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from geometry.shapes.primitives import grid
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.calibration import (
     calibrate_camera,

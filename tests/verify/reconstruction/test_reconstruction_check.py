@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.plain_shapes import box
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
-from geometry.shapes.primitives import box, sphere
+from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.check.accuracy import nearest_distance
 from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan

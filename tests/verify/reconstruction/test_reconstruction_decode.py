@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import grid
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from geometry.shapes.primitives import grid
 from planning.verify.reconstruction.calibration import (
     PairCalibration,
     calibrate_camera,
