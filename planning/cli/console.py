@@ -1,6 +1,9 @@
-"""What the commands share: progress on stderr, and how many threads to use."""
+"""What the commands share: progress on stderr, JSON on stdout, how many threads."""
 
+import json
 import os
+from collections.abc import Mapping
+from typing import Any
 
 import click
 
@@ -15,3 +18,8 @@ def reporter(*, quiet: bool) -> Report | None:
 def cores() -> int:
     """Return the number of cores that this process may use; 2 where it isn't told."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
+
+
+def print_json(document: Mapping[str, Any]) -> None:
+    """Write one JSON object to stdout."""
+    click.echo(json.dumps(document, indent=1, allow_nan=False))

@@ -146,7 +146,7 @@ def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(
     )
     # What is false shows without the pixels, which the good plan was held against.
     audit_alone = partial(verify_plan, check_pixels=False)
-    monkeypatch.setattr("planning.cli.commands.verify_plan", audit_alone)
+    monkeypatch.setattr("planning.cli.verify_command.verify_plan", audit_alone)
     code, out, err = in_process(monkeypatch, capsys, "verify", spoiled, "--quiet")
     assert (code, err) == (1, "")
     assert "measured_m2" in out
@@ -165,7 +165,7 @@ def test_json_is_one_object_and_nothing_else(runs):
 
 def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path):
     code = (
-        "import planning.cli.commands as c, sys\n"
+        "import planning.cli.plan_command as c, sys\n"
         "def stop(*a, **k): raise KeyboardInterrupt\n"
         "c.plan_rig = stop\n"
         f"sys.argv = ['plan', '--mesh', {str(face)!r}, '--max-projectors', '3']\n"
@@ -276,6 +276,16 @@ def test_an_empty_mesh_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     assert (code, out) == (3, "")
     assert len(err.splitlines()) == 1
     assert "empty.obj" in err
+
+
+def test_help_prints_its_examples_as_lines(tmp_path):
+    lines = [line.strip() for line in run("--help", cwd=tmp_path).stdout.splitlines()]
+    for command in (
+        "plan --mesh face.obj",
+        "plan verify face-plan",
+        "plan reconstruct",
+    ):
+        assert sum(line.startswith(command) for line in lines) == 1
 
 
 def test_help_imports_nothing_heavy():

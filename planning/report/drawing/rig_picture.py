@@ -258,7 +258,7 @@ def _draw_title(
     claim = (
         f"measured {1e4 * areas['measured_m2']:.0f} of "
         f"{1e4 * areas['reachable_by_cameras_m2']:.0f} reachable, "
-        f"{1e4 * areas['area_m2']:.0f} cm² target"
+        f"{1e4 * areas['area_m2']:.0f} sq cm target"
     )
     draw.text((size[0] - pad, middle), claim, INK, font=font(16.0), anchor="rm")
 

@@ -1,6 +1,5 @@
-"""What each subcommand does; everything heavy is imported from here on."""
+"""What `plan --mesh` and `plan --ranges` do."""
 
-import json
 import signal
 import time
 from collections.abc import Mapping, Sequence
@@ -8,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
-from geometry.files.readers import UNITS, load_mesh
+from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
-from geometry.shapes.sample_head.sample_head import HeadShape
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import InterruptedPlanError, RequirementError
 from planning.model.progress import Report
@@ -21,17 +18,15 @@ from planning.report.drawing.rig_picture import save_rig_picture
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.face_status import face_status
 from planning.report.summary.summary import summary
-from planning.rig.rig import list_presets, load_rig
+from planning.rig.rig import load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import read_ranges
 from planning.verify.reconstruction.patterns.pattern_files import (
     remove_patterns,
     write_patterns,
 )
-from planning.verify.verification import verify_plan
 
-from .console import cores, reporter
-from .sample import write_sample
+from .console import cores, print_json, reporter
 from .writable import writable
 
 
@@ -86,7 +81,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         files = _save(plan, folder, report, patterns=not options["no_patterns"])
     if options["as_json"]:
-        _print_json(plan.document | {"files": files, "missed": list(missed)})
+        print_json(plan.document | {"files": files, "missed": list(missed)})
     else:
         click.echo(summary(plan, files, missed))
     return code
@@ -118,60 +113,6 @@ def _left(limit: float | None, begin: float) -> float | None:
     if limit is None:
         return None
     return max(limit - (time.monotonic() - begin), 1e-9)
-
-
-def verify_command(options: Mapping[str, Any]) -> int:
-    """Audit and check a plan; return 0 if every claim holds, 1 if not."""
-    report = reporter(quiet=options["quiet"])
-    plan = RigPlan.load(options["plan_file"])
-    mesh = None
-    if options["mesh"] is not None:
-        mesh = _same_scale(options["mesh"], plan)
-    truth = None if options["truth"] is None else RigPlan.load(options["truth"])
-    seed = {} if options["seed"] is None else {"seed": options["seed"]}
-    found = verify_plan(
-        plan,
-        mesh,
-        truth=truth,
-        threads=options["threads"] or cores(),
-        progress=report,
-        **seed,
-    )
-    if options["as_json"]:
-        _print_json(found.to_document())
-    else:
-        click.echo(found.summary())
-    return 0 if found.passed else 1
-
-
-def _same_scale(path: Path, plan: RigPlan) -> TriangleMesh:
-    """Read a mesh in the unit of the plan's, or at its size where a size was given."""
-    unit = plan.document["meshes"][0]["unit"]
-    if unit in UNITS:
-        return load_mesh(path, unit=unit)
-    size = np.ptp(plan.surface.mesh.bounds, axis=0).max()
-    return load_mesh(path, size_mm=1e3 * float(size))
-
-
-def rigs_command() -> int:
-    """Print the presets with the source of every number."""
-    for preset in list_presets():
-        click.echo(f"{preset.name}: {preset.description}")
-        for role, device in preset.devices.items():
-            click.echo(f"  {role}: {device}")
-            for figure in preset.figures:
-                if figure.device == role:
-                    click.echo(f"    {figure.key} = {figure.value}")
-                    click.echo(f"        {figure.source}")
-    return 0
-
-
-def sample_command(output: Path, faces: int, variant: int | None) -> int:
-    """Write the sample head."""
-    shape = HeadShape() if variant is None else HeadShape.random(variant)
-    write_sample(output, shape=shape, n_faces=faces)
-    click.echo(f"wrote {output}: a head in millimetres, face along -y, up z")
-    return 0
 
 
 def _say_size(report: Report | None, mesh: Any) -> None:  # noqa: ANN401
@@ -207,7 +148,3 @@ def _save(
         # Those of an earlier plan in this folder aren't of this one.
         remove_patterns(folder)
     return [str(name) for name in names]
-
-
-def _print_json(document: Mapping[str, Any]) -> None:
-    click.echo(json.dumps(document, indent=1, allow_nan=False))

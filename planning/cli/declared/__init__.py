@@ -1,0 +1,1 @@
+"""The commands as click sees them; what they do is imported when one runs."""

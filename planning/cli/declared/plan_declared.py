@@ -1,0 +1,224 @@
+"""`plan --mesh FILE --max-projectors N`: its options, and which exclude each other."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from planning.cli.options import Positive, output_options, threads_option
+from planning.cli.running import run
+
+
+class DefaultCommand(click.Command):
+    """The command that runs when no subcommand is named; it shows as plain `plan`."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,  # noqa: ANN401
+    ) -> click.Context:
+        """Return a context whose usage line says `plan`, not `plan rig`."""
+        return super().make_context("", args, parent, **extra)
+
+
+@click.command("rig", cls=DefaultCommand)
+@click.option(
+    "--mesh",
+    "meshes",
+    multiple=True,
+    metavar="FILE",
+    help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.",
+)
+@click.option(
+    "--ranges",
+    metavar="FILE.csv",
+    help="Instead of --mesh: a few points of the object, as seen or measured from "
+    "trial views; plans for the least-squares body.",
+)
+@click.option(
+    "--max-projectors",
+    type=click.IntRange(1),
+    required=True,
+    metavar="N",
+    help="Projectors at most.",
+)
+@click.option(
+    "--max-cameras",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Cameras at most [default: as many as needed].",
+)
+@click.option(
+    "--unit",
+    type=click.Choice(["mm", "cm", "m", "in", "um"]),
+    help="Unit of a file that states none [default: mm].",
+)
+@click.option(
+    "--size-mm",
+    type=Positive(),
+    metavar="S",
+    help="Instead of --unit: longest side of the bounding box.",
+)
+@click.option(
+    "--up",
+    type=click.Choice(["x", "y", "z", "-x", "-y", "-z"]),
+    help="Axis that points up [default: z].",
+)
+@click.option(
+    "--rig",
+    "rig_name",
+    default="default",
+    show_default=True,
+    metavar="NAME|rig.toml",
+    help="Devices and limits.",
+)
+@click.option(
+    "--light",
+    type=click.Choice(["diverging", "parallel"]),
+    help="A real projector, or the paper's collimated light [default: the rig's].",
+)
+@click.option(
+    "--pattern",
+    type=click.Choice(["rings", "dense", "none"]),
+    default="rings",
+    show_default=True,
+    help="What is projected.",
+)
+@click.option(
+    "--target",
+    type=click.Choice(["dominant", "surface"]),
+    help="What must be covered [default: dominant; with --ranges surface].",
+)
+@click.option(
+    "--select",
+    metavar="FILE|ply:NAME",
+    help="Cover these faces instead: indices from 0, or a PLY property that isn't 0.",
+)
+@click.option(
+    "--weight",
+    metavar="FILE|ply:NAME",
+    help="Cover the fifth of the area of highest weight: a number for each vertex.",
+)
+@click.option(
+    "--dominant-coverage",
+    type=Positive(1.0),
+    metavar="F",
+    help="Lit share of the reachable target [default: 0.90].",
+)
+@click.option(
+    "--coverage",
+    type=Positive(1.0),
+    metavar="F",
+    help="Measured share of the reachable target [default: 0.95].",
+)
+@click.option(
+    "--min-reachable",
+    type=Positive(1.0),
+    metavar="F",
+    help="Share of the target that must be reachable [default: 0.90].",
+)
+@click.option(
+    "--accuracy",
+    "accuracy_mm",
+    type=Positive(),
+    metavar="MM",
+    help="Largest standard deviation along the normal [default: 0.3].",
+)
+@click.option(
+    "--cameras-by",
+    type=click.Choice(["cover", "paper", "both"]),
+    default="both",
+    show_default=True,
+    help="Fewest of the candidates, the paper's largest baselines, or what is better.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Output folder [default: ./NAME-plan].",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Of every random draw.",
+)
+@click.option(
+    "--time-limit",
+    type=Positive(),
+    metavar="S",
+    help="Cut the run after S seconds; the plan is marked truncated.",
+)
+@threads_option
+@click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
+@click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
+@click.option("--no-patterns", is_flag=True, help="Write no pattern images.")
+@output_options
+def rig_command(**options: Any) -> None:  # noqa: ANN401
+    """Plan a rig for a mesh, or for ranges (the default command)."""
+    from planning.cli.plan_command import plan_command
+
+    _check_source(options)
+    if options["unit"] and options["size_mm"] is not None:
+        raise click.UsageError("give --unit or --size-mm, not both")
+    _check_target(options)
+    if options["pattern"] != "rings":
+        raise click.UsageError(
+            f"--pattern {options['pattern']} isn't built yet: use rings"
+        )
+    run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
+
+
+def _check_source(options: dict[str, Any]) -> None:
+    meshes, ranges = options["meshes"], options["ranges"]
+    if ranges is None and not meshes:
+        raise click.UsageError("give --mesh FILE, or --ranges FILE.csv without a mesh")
+    if ranges is not None:
+        _check_ranges(options)
+        return
+    if not meshes[0]:
+        raise click.UsageError("--mesh '' names no file")
+    # os.path answers for names that the system refuses; Path raises.
+    if len(meshes) > 1 or os.path.isdir(meshes[0]):
+        raise click.UsageError(
+            "several meshes on one rig aren't built yet: give one file"
+        )
+
+
+def _check_ranges(options: dict[str, Any]) -> None:
+    if not options["ranges"]:
+        raise click.UsageError("--ranges '' names no file")
+    if options["meshes"]:
+        raise click.UsageError(
+            "give --mesh or --ranges, not both: a mesh says where the object is, and "
+            "placing a mesh by observations isn't built"
+        )
+    for name, why in (
+        ("unit", "the file is in millimetres"),
+        ("size_mm", "the file is in millimetres"),
+        ("select", "the body of ranges has no faces to select"),
+        ("weight", "the body of ranges has no vertices to weigh"),
+    ):
+        if options[name] is not None:
+            raise click.UsageError(f"--{name.replace('_', '-')} with --ranges: {why}")
+    if options["target"] == "dominant":
+        raise click.UsageError(
+            "--target dominant with --ranges: a sphere has no dominant region; the "
+            "target is its whole surface"
+        )
+
+
+def _check_target(options: dict[str, Any]) -> None:
+    chosen = [name for name in ("select", "weight") if options[name] is not None]
+    if len(chosen) == 2:
+        raise click.UsageError("give --select or --weight, not both")
+    if chosen and options["target"] == "surface":
+        raise click.UsageError(f"give --target surface or --{chosen[0]}, not both")
+    if chosen and not options[chosen[0]]:
+        raise click.UsageError(f"--{chosen[0]} '' names no file")

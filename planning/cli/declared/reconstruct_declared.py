@@ -1,0 +1,139 @@
+"""`plan reconstruct`: its options, and which exclude each other."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from planning.cli.options import Positive, output_options, threads_option
+from planning.cli.running import run
+
+
+@click.command()
+@click.argument(
+    "plan_file",
+    type=click.Path(path_type=Path),
+    metavar="[DIR/plan.json]",
+    required=False,
+)
+@click.option(
+    "--experiment",
+    type=click.Choice(["box", "face"]),
+    help="Instead of a plan: an experiment of the paper's section VII, with its truth.",
+)
+@click.option(
+    "--light",
+    type=click.Choice(["diverging", "parallel"]),
+    help="Of the experiment [default: parallel, as the paper assumes].",
+)
+@click.option(
+    "--variant",
+    type=click.Choice(["printed", "fits"]),
+    help="Of the experiment: the paper's focal length and image centre, or a lens that "
+    "sees all rings [default: printed].",
+)
+@click.option(
+    "--ambient",
+    type=click.FloatRange(0.0, 10.0),
+    metavar="A",
+    help="Of the experiment: room light as a share of the projector's [default: 0].",
+)
+@click.option(
+    "--distortion",
+    type=click.FloatRange(-0.5, 0.5),
+    metavar="K1",
+    help="Of the experiment: k1 of the cameras' lenses [default: 0].",
+)
+@click.option(
+    "--second-sequence",
+    is_flag=True,
+    help="Of the experiment: measure again with rings midway between the first ones.",
+)
+@click.option(
+    "--single-shot",
+    is_flag=True,
+    help="Simulate one image of each camera under each projector; rings are told apart "
+    "by a prior mesh: the plan's, or one that is off.",
+)
+@click.option(
+    "--prior-mm",
+    type=Positive(),
+    metavar="MM",
+    help="With --single-shot: how near the object lies to the prior [default: 1; of an "
+    "experiment 6, its prior 5 mm off].",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Where cloud.ply goes [default: the plan's folder].",
+)
+@click.option(
+    "--captures",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Read images that cameras took, FOLDER/C1/P1/00-white.png and so on, instead "
+    "of simulating them.",
+)
+@click.option(
+    "--save-captures",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Write the simulated images there, as --captures reads them.",
+)
+@click.option(
+    "--calibration",
+    type=click.Path(path_type=Path),
+    metavar="FILE.json",
+    help="Poses and optics as measured after mounting [default: the plan's].",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), help="Of samples and noise [default: the plan's]."
+)
+@threads_option
+@output_options
+def reconstruct(**options: Any) -> None:  # noqa: ANN401
+    """Measure the object from images, rendered or captured; write cloud.ply."""
+    _check_reconstruct(options)
+    if options["experiment"] is not None:
+        from planning.cli.experiment_command import experiment_command
+
+        run(lambda: experiment_command(options), debug=options["debug"])
+    from planning.cli.reconstruct_command import reconstruct_command
+
+    if options["captures"] is not None and options["save_captures"] is not None:
+        raise click.UsageError(
+            "give --captures or --save-captures, not both: the one reads images, the "
+            "other writes simulated ones"
+        )
+    run(lambda: reconstruct_command(options), debug=options["debug"])
+
+
+def _is_set(options: dict[str, Any], name: str) -> bool:
+    # A number that is 0 is given, and equal to False.
+    return options[name] is not None and options[name] is not False
+
+
+def _check_reconstruct(options: dict[str, Any]) -> None:
+    experiment = options["experiment"] is not None
+    if experiment == (options["plan_file"] is not None):
+        raise click.UsageError("give DIR/plan.json, or --experiment box or face")
+    if not options["single_shot"] and options["prior_mm"] is not None:
+        raise click.UsageError("--prior-mm goes with --single-shot")
+    plan_only = ("captures", "save_captures", "calibration")
+    experiment_only = ("light", "variant", "ambient", "distortion", "second_sequence")
+    for name in plan_only if experiment else experiment_only:
+        if _is_set(options, name):
+            kind = "an experiment" if experiment else "a plan"
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} doesn't go with {kind}: it is of "
+                f"{'plans' if experiment else 'experiments'}"
+            )
+    if options["single_shot"]:
+        for name in ("captures", "save_captures", "calibration", "second_sequence"):
+            if _is_set(options, name):
+                raise click.UsageError(
+                    f"give --single-shot or --{name.replace('_', '-')}, not both: "
+                    f"it is of coded sequences"
+                )

@@ -1,0 +1,49 @@
+"""`plan rigs` and `plan sample`: their options."""
+
+from pathlib import Path
+
+import click
+
+from planning.cli.options import debug_option
+from planning.cli.running import run
+
+
+@click.command()
+@debug_option
+def rigs(debug: bool) -> None:
+    """List the rigs that need no file, with the source of every number."""
+    from planning.cli.small_commands import rigs_command
+
+    run(rigs_command, debug=debug)
+
+
+@click.command()
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default="face.obj",
+    show_default=True,
+    metavar="FILE",
+    help="Where it goes.",
+)
+@click.option(
+    "--faces",
+    type=click.IntRange(500, 2_000_000),
+    default=40_000,
+    show_default=True,
+    metavar="N",
+    help="Triangles of the closed head, about; the neck is then cut open.",
+)
+@click.option(
+    "--variant",
+    type=click.IntRange(0),
+    metavar="SEED",
+    help="Another head of the population [default: the mean head].",
+)
+@debug_option
+def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
+    """Write the sample head, an OBJ file in millimetres."""
+    from planning.cli.small_commands import sample_command
+
+    run(lambda: sample_command(output, faces, variant), debug=debug)
