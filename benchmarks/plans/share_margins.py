@@ -41,7 +41,7 @@ from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
-from planning.proofs.selection import required_rows
+from planning.proofs.selection import required_samples
 from planning.rings.axis_moves import AxisJudge
 from planning.scene import lighting
 from planning.scene.lit import lit_margins, lit_stages
@@ -130,7 +130,7 @@ def _margins(
     seconds = time.perf_counter() - begin
     rows = stage.rows
     reached = np.any(stage.stages == lighting.LIT, axis=1)
-    required = required_rows(reached, scene.requirements.dominant_coverage)
+    required = required_samples(reached, scene.requirements.dominant_coverage)
 
     def margin(projectors: tuple[PlannedProjector, ...]) -> float:
         lit = lit_stages(scene, projectors, rows) == lighting.LIT

@@ -18,7 +18,7 @@ from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
 
-from .camera_cover import CameraCover
+from .camera_cover import CameraCover, candidate_cover
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,17 +133,11 @@ def resolved_cover(
     Raises:
         InfeasibleLimitsError: If the body of every camera is in the way.
     """
-    required = scene.requirements
     crowd = CameraInterference(
         scene, projectors, cover.offered.cameras, cover.rows, cover.measured
     )
     selection = resolve_conflicts(
-        crowd,
-        cover.measured,
-        cover.selection,
-        max_count=required.max_cameras,
-        seed=scene.seed,
-        given=len(required.existing_of("camera")),
+        crowd, candidate_cover(scene, cover.measured), cover.selection
     )
     if not len(selection.chosen):
         raise InfeasibleLimitsError(

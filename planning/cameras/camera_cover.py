@@ -13,6 +13,7 @@ from planning.model.words import area_words
 from planning.proofs.conflicts import Interference, resolve_others
 from planning.proofs.selection import (
     BODIES_LEFT_OUT,
+    CandidateCover,
     Selection,
     certificate,
     marginals,
@@ -152,14 +153,7 @@ def plan_cameras(
     attempt = 0
     while True:
         attempt += 1
-        selection = select_fewest(
-            measured,
-            required.coverage,
-            max_count=required.max_cameras,
-            seed=scene.seed,
-            known=known,
-            given=n_fixed(scene),
-        )
+        selection = select_fewest(candidate_cover(scene, measured), known=known)
         fresh = fresh_target(scene, attempt)
         _, seen = rows_for(scene, projectors, offered, fresh)
         if (
@@ -236,19 +230,14 @@ def confirms(seen: NDArray[np.bool_], chosen: NDArray[np.int64], share: float) -
 def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
     """Return what the stage found, with the best cameras for every other count."""
     given = n_fixed(scene)
-    others = marginals(cover.measured, cover.selection, seed=scene.seed, given=given)
+    candidate = candidate_cover(scene, cover.measured)
+    others = marginals(candidate, cover.selection)
     if cover.by_count is not None:
-        others = others_instead(others, cover.by_count, cover.measured)
+        others = others_instead(others, cover.by_count, candidate)
     bodied = cover.crowd is not None and cover.crowd.bodied
     if cover.crowd is not None:
-        others = resolve_others(
-            cover.crowd,
-            cover.measured,
-            others,
-            len(cover.selection.chosen),
-            seed=scene.seed,
-            given=given,
-        )
+        n = len(cover.selection.chosen)
+        others = resolve_others(cover.crowd, candidate, others, n)
     target, candidates = cover.rows.target, cover.offered.cameras
     return CameraStage(
         cover.cameras,
@@ -268,6 +257,23 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
             given=given,
         )
         | ({"bounds_leave_out": BODIES_LEFT_OUT} if bodied else {}),
+    )
+
+
+def candidate_cover(scene: Scene, measured: NDArray[np.bool_]) -> CandidateCover:
+    """Return what candidates measure, with what is required of cameras.
+
+    Args:
+        scene: Requirements and seed.
+        measured: Which candidate measures which sample, shape (n, m).
+    """
+    required = scene.requirements
+    return CandidateCover(
+        measured,
+        required.coverage,
+        seed=scene.seed,
+        max_count=required.max_cameras,
+        n_existing=n_fixed(scene),
     )
 
 

@@ -31,7 +31,13 @@ from planning.scene.measured import measured_by, taken
 from planning.scene.scene import Scene
 
 from .camera_bodies import resolved_cover
-from .camera_cover import CameraCover, CameraStage, n_fixed, plan_cameras
+from .camera_cover import (
+    CameraCover,
+    CameraStage,
+    candidate_cover,
+    n_fixed,
+    plan_cameras,
+)
 from .camera_slides import (
     reached_by_candidates,
     rows_to_slide_on,
@@ -107,7 +113,7 @@ def better_route(
     if by == "paper":
         cover = _once_more(scene, projectors, cover)
         needed = cover.selection.needed
-        met = cover.selection.best_rows >= cover.selection.required
+        met = cover.selection.n_covered >= cover.selection.required
         count = needed if met or needed > len(cover.cameras) else None
         return cover, Routes(
             by, None, count, "paper", "the paper's route was asked for"
@@ -227,13 +233,7 @@ def _with_more(
     if routed is not None and (routed.needed or needed) < needed:
         known = routed.by_count[routed.needed or 0]
     if known is None:
-        count = fewest_count(
-            measured,
-            scene.requirements.coverage,
-            seed=scene.seed,
-            given=n_fixed(scene),
-        )
-        if count >= needed:
+        if fewest_count(candidate_cover(scene, measured)) >= needed:
             return cover
     again = cover_by_cover(scene, projectors, offered, known)
     if again.selection.needed < needed:

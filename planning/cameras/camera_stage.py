@@ -137,11 +137,11 @@ def with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
         each = chosen.tolist()
         measured = cover.crowd.covers(each, each)
     rows = int(measured.any(axis=1).sum())
-    least = min(selection.required, selection.best_rows)
-    least = max(least, int(np.ceil((1.0 - _SPARE) * selection.best_rows)))
+    least = min(selection.required, selection.n_covered)
+    least = max(least, int(np.ceil((1.0 - _SPARE) * selection.n_covered)))
     if len(chosen) != len(selection.chosen) or rows < least:
         return None
-    return replace(cover, selection=replace(selection, chosen=chosen, best_rows=rows))
+    return replace(cover, selection=replace(selection, chosen=chosen, n_covered=rows))
 
 
 def follow_cameras(
@@ -200,7 +200,7 @@ def _better(new: CameraCover, old: CameraCover) -> bool:
     if new.selection.needed != old.selection.needed:
         return new.selection.needed < old.selection.needed
     a, b = (
-        cover.selection.best_rows * cover.rows.target.samples.weight
+        cover.selection.n_covered * cover.rows.target.samples.weight
         for cover in (new, old)
     )
     return a > b

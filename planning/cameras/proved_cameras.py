@@ -8,7 +8,7 @@ from geometry.devices import PinholeModel
 from planning.proofs.all_poses import joined
 from planning.proofs.camera_bound import CameraEffort, bound_cameras
 from planning.proofs.existing_bound import enough
-from planning.proofs.selection import required_rows
+from planning.proofs.selection import required_samples
 from planning.scene.measured import taken
 from planning.scene.scene import Scene
 
@@ -35,7 +35,7 @@ def bound_stage(
     if proof["needed"]["count"] <= given or not rest.size:
         entry = enough(proof, np.any(stage.measured, axis=1))
         return replace(stage, certificate=proof | {"continuous": entry})
-    required = required_rows(reached, scene.requirements.coverage)
+    required = required_samples(reached, scene.requirements.coverage)
     bound = bound_cameras(
         scene,
         device,

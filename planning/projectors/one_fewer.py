@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
-from planning.proofs.selection import cover_problem, required_rows
+from planning.proofs.selection import cover_problem, required_samples
 from planning.scene import lighting
 from planning.scene.clearance import with_clearance
 from planning.scene.scene import Scene
@@ -168,5 +168,5 @@ def _most_lit(
         budget=_BUDGET,
     ).selected
     own = lit[:, best].any(axis=1)
-    required = required_rows(reached | own, scene.requirements.dominant_coverage)
+    required = required_samples(reached | own, scene.requirements.dominant_coverage)
     return best, required - int(own.sum()), required

@@ -11,7 +11,7 @@ from geometry.poses import inverse
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.ring_frame import moved_to
-from planning.proofs.selection import required_rows
+from planning.proofs.selection import required_samples
 from planning.scene import lighting
 from planning.scene.clearance import lacks_clearance
 from planning.scene.lit import lit_margins, lit_stages
@@ -60,7 +60,7 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     reached = np.any(stage.stages == lighting.LIT, axis=1)
     state = _Lit(scene, rows, list(stage.projectors), reached)
     lit = int(np.isfinite(state.margin).any(axis=1).sum())
-    required = required_rows(reached, scene.requirements.dominant_coverage)
+    required = required_samples(reached, scene.requirements.dominant_coverage)
     # With too few devices, what they light is what counts.
     required = min(required, lit)
     if required == 0:

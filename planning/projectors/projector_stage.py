@@ -17,12 +17,11 @@ from planning.proofs.conflicts import (
 )
 from planning.proofs.selection import (
     BODIES_LEFT_OUT,
+    CandidateCover,
     Selection,
     certificate,
-    cover_problem,
     fewest_count,
     marginals,
-    required_rows,
     select_fewest,
 )
 from planning.scene import lighting
@@ -33,7 +32,6 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates, projectors_around
 from solvers import solve_cover
-from solvers.covers.cover import DEFAULT_BUDGET
 
 from .one_fewer import Offer, one_fewer
 from .share_margin import widest_selection
@@ -224,7 +222,7 @@ def _fewer(
     Near misses are pursued on the first rows only: where fresh ones have joined them,
     a cover so tight has failed already.
     """
-    selection = _fewest(scene, offer.stages)
+    selection = select_fewest(_cover(scene, offer.stages))
     lattice = offer.take(np.arange(n_lattice))
     given = _n_given(scene)
     more = cache(lambda: finer(rows))
@@ -246,14 +244,14 @@ def _fewer(
         n_candidates, n_moved = len(offer.projectors), len(moved.projectors)
         known = np.arange(n_candidates - n_moved, n_candidates)
         known = np.concatenate([np.arange(given), known])
-        again = _fewest(scene, offer.stages, known)
+        again = select_fewest(_cover(scene, offer.stages), known=known)
         if again.needed >= selection.needed:
             break
         selection = again
     if selection.lower_bound < selection.needed:
         # Only a count that is kept is worth a longer proof.
-        selection = _fewest(
-            scene, offer.stages, selection.smallest, budget=_PROOF_BUDGET
+        selection = select_fewest(
+            _cover(scene, offer.stages), known=selection.smallest, budget=_PROOF_BUDGET
         )
     return offer, selection
 
@@ -269,15 +267,9 @@ def with_more(
     stages = np.concatenate([stage.stages, lit], axis=1)
     before = stage.certificate["needed"]["count"]
     # Mostly they save none, and nothing is spent on which cover most.
-    count = fewest_count(
-        stages == lighting.LIT,
-        scene.requirements.dominant_coverage,
-        seed=scene.seed,
-        given=_n_given(scene),
-    )
-    if count >= before:
+    if fewest_count(_cover(scene, stages)) >= before:
         return stage
-    selection = _fewest(scene, stages)
+    selection = select_fewest(_cover(scene, stages))
     every = stage.reference + more
     found = _stage(scene, every, stage.rows, stages, selection, selection.chosen)
     # Bodies in each other's way may cost what fewer would have saved.
@@ -286,28 +278,18 @@ def with_more(
 
 def _good_cover(scene: Scene, stages: NDArray[np.int8]) -> NDArray[np.int64]:
     """Return candidates that light what is required, no proof asked."""
-    lit = stages == lighting.LIT
-    share = scene.requirements.dominant_coverage
-    problem = cover_problem(lit, required_rows(lit.any(axis=1), share), _n_given(scene))
-    return solve_cover(problem, seed=scene.seed, budget=_SEEDS_BUDGET).selected
+    cover = _cover(scene, stages)
+    return solve_cover(cover.problem, seed=scene.seed, budget=_SEEDS_BUDGET).selected
 
 
-def _fewest(
-    scene: Scene,
-    stages: NDArray[np.int8],
-    known: NDArray[np.int64] | None = None,
-    *,
-    budget: float = DEFAULT_BUDGET,
-) -> Selection:
+def _cover(scene: Scene, stages: NDArray[np.int8]) -> CandidateCover:
     required = scene.requirements
-    return select_fewest(
+    return CandidateCover(
         stages == lighting.LIT,
         required.dominant_coverage,
-        max_count=required.max_projectors,
         seed=scene.seed,
-        known=known,
-        given=_n_given(scene),
-        budget=budget,
+        max_count=required.max_projectors,
+        n_existing=_n_given(scene),
     )
 
 
@@ -323,22 +305,13 @@ def _stage(
     selection: Selection,
     most_area: NDArray[np.int64],
 ) -> ProjectorStage:
-    lit, given = stages == lighting.LIT, _n_given(scene)
-    crowd, as_before = ProjectorInterference(candidates, rows, lit), selection
-    selection = resolve_conflicts(
-        crowd,
-        lit,
-        selection,
-        max_count=scene.requirements.max_projectors,
-        seed=scene.seed,
-        given=given,
-    )
+    cover, given = _cover(scene, stages), _n_given(scene)
+    crowd, as_before = ProjectorInterference(candidates, rows, cover.covers), selection
+    selection = resolve_conflicts(crowd, cover, selection)
     if selection is not as_before:
         most_area = selection.chosen
-    others = marginals(lit, selection, seed=scene.seed, given=given)
-    others = resolve_others(
-        crowd, lit, others, len(selection.chosen), seed=scene.seed, given=given
-    )
+    others = marginals(cover, selection)
+    others = resolve_others(crowd, cover, others, len(selection.chosen))
     proof = certificate(
         selection,
         others,

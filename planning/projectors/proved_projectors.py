@@ -8,7 +8,7 @@ from planning.model.planned import PlannedProjector
 from planning.proofs.all_poses import ContinuousBound, joined
 from planning.proofs.existing_bound import enough, given_on
 from planning.proofs.projector_bound import Effort, bound_projectors
-from planning.proofs.selection import required_rows
+from planning.proofs.selection import required_samples
 from planning.scene.clearance import with_clearance
 from planning.scene.lighting import LIT
 from planning.scene.scene import Scene
@@ -64,7 +64,7 @@ def _bound_of(
     reached = np.any(stage.stages[:n] == LIT, axis=1)
     given = given_on(scene, template, stage.rows.take(np.arange(n)))
     free = reached & given.lit
-    required = required_rows(reached, scene.requirements.dominant_coverage)
+    required = required_samples(reached, scene.requirements.dominant_coverage)
     found = bound_projectors(
         scene,
         template,

@@ -19,11 +19,11 @@ from planning.scene.samples import Target
 from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
 from solvers.covers.cover import solve_max_coverage
 
-from .selection import MORE, Marginals, Selection, cover_problem
+from .selection import MORE, CandidateCover, Marginals, Selection, cover_problem
 
 # Counted work of each completion, of which no proof is asked.
 _BUDGET = 1e8
-# What a row of the marginal table may lose to bodies before others are looked for.
+# Share of what a count covers that it must keep among bodies, else others are tried.
 _HELD = 0.99
 
 
@@ -32,13 +32,13 @@ class Interference(Protocol):
 
     @property
     def bodied(self) -> bool:
-        """Whether any candidate that isn't given has a body."""
+        """Whether any candidate that isn't existing has a body."""
         ...
 
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]
     ) -> NDArray[np.bool_]:
-        """Return which rows candidates cover among the bodies of others.
+        """Return which samples candidates cover among the bodies of others.
 
         Args:
             standing: Candidates whose bodies stand.
@@ -61,23 +61,23 @@ class ProjectorInterference:
 
     Attributes:
         devices: The candidates.
-        rows: The samples.
+        samples: What they light.
         lit: Which candidate lights which, but for bodies of others, shape (n, m).
     """
 
     devices: Sequence[PlannedProjector]
-    rows: Target
+    samples: Target
     lit: NDArray[np.bool_]
 
     @property
     def bodied(self) -> bool:
-        """Whether any candidate that isn't given has a body."""
+        """Whether any candidate that isn't existing has a body."""
         return moves_bodies(self.devices)
 
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]
     ) -> NDArray[np.bool_]:
-        """Return which rows candidates light among the bodies of others."""
+        """Return which samples candidates light among the bodies of others."""
         chosen = [self.devices[i] for i in standing]
         bodies = bodies_of(device for device in chosen if not device.existing)
         lit = self.lit[:, columns]
@@ -86,7 +86,7 @@ class ProjectorInterference:
             if collide(device, bodies):
                 lit[:, k] = False
                 continue
-            points = self.rows.samples.points[own]
+            points = self.samples.samples.points[own]
             lit[own[blocked_by(bodies, device, points).any(axis=1)], k] = False
         return lit
 
@@ -98,147 +98,127 @@ class ProjectorInterference:
 
 
 def resolve_conflicts(
-    crowd: Interference,
-    covers: NDArray[np.bool_],
-    selection: Selection,
-    *,
-    max_count: int | None,
-    seed: int,
-    given: int = 0,
+    crowd: Interference, cover: CandidateCover, selection: Selection
 ) -> Selection:
-    """Return a selection whose members bear each other's bodies.
+    """Return a selection of compatible candidates.
 
     It is the selection as it was where it covers what is required with all bodies in
     place. Its lower bound stays: bodies only take away.
 
     Args:
         crowd: The candidates.
-        covers: What each covers, but for bodies of other candidates, shape (n, m).
+        cover: What they cover, but for bodies of other candidates.
         selection: Chosen without regard to bodies.
-        max_count: Candidates allowed; None for no limit.
-        seed: Of the heuristics.
-        given: First candidates that are taken whatever they cover.
     """
     if not crowd.bodied:
         return selection
-    chosen, required = selection.chosen, min(selection.required, selection.best_rows)
+    chosen, required = selection.chosen, min(selection.required, selection.n_covered)
+    most = cover.max_count
     more = max(len(chosen), selection.needed) + MORE
-    most = more if max_count is None else max_count
-    spare = max(selection.best_rows - required, int((1.0 - _HELD) * required))
-    wanted = _Wanted(required, spare, most, given, seed)
-    settled, rows = _settled(crowd, covers.shape[1], chosen, wanted)
-    if np.array_equal(settled, np.sort(chosen)) and rows == selection.best_rows:
+    spare = max(selection.n_covered - required, int((1.0 - _HELD) * required))
+    demand = _Demand(required, spare, more if most is None else most)
+    resolved, covered = _compatible(crowd, cover, chosen, demand)
+    if np.array_equal(resolved, np.sort(chosen)) and covered == selection.n_covered:
         return selection
-    smallest, met = settled, rows >= selection.required
+    smallest, met = resolved, covered >= selection.required
     but_for_bodies = None
-    if len(settled) > selection.needed:
+    if len(resolved) > selection.needed:
         but_for_bodies = selection.needed
     if not met:
         # How many would do it, were more allowed.
-        wanted = replace(wanted, required=selection.required, most=more)
-        enough, there = _settled(crowd, covers.shape[1], selection.smallest, wanted)
+        demand = replace(demand, required=selection.required, most=more)
+        enough, there = _compatible(crowd, cover, selection.smallest, demand)
         found = enough if there >= selection.required else selection.smallest
-        smallest = max((found, settled), key=len)
+        smallest = max((found, resolved), key=len)
         if found is not enough or len(enough) > selection.needed:
             but_for_bodies = selection.needed
-    bound = selection.best_rows_bound
-    if len(settled) != len(chosen):
-        problem = cover_problem(covers, required, given)
-        best = solve_max_coverage(problem, len(settled), seed=seed, budget=_BUDGET)
-        bound = int(np.floor(best.upper_bound + 1e-6))
-    proved = selection.lower_bound >= len(settled)
+    bound = selection.n_covered_bound
+    if len(resolved) != len(chosen):
+        _, bound = cover.most_covering(len(resolved), None, _BUDGET)
+    proved = selection.lower_bound >= len(resolved)
     status = ("optimal" if proved else "feasible") if met else "infeasible"
     return replace(
         selection,
-        chosen=settled,
+        chosen=resolved,
         smallest=smallest,
         status=status,
-        best_rows=rows,
-        best_rows_bound=bound,
+        n_covered=covered,
+        n_covered_bound=bound,
         but_for_bodies=but_for_bodies,
     )
 
 
 def resolve_others(
-    crowd: Interference,
-    covers: NDArray[np.bool_],
-    others: Marginals,
-    taken: int,
-    *,
-    seed: int,
-    given: int = 0,
+    crowd: Interference, cover: CandidateCover, others: Marginals, taken: int
 ) -> Marginals:
-    """Return the best candidates of every other count, bearing each other's bodies.
+    """Return the best candidates of every other count that are compatible.
 
     Args:
         crowd: The candidates.
-        covers: As for `resolve_conflicts`.
+        cover: As for `resolve_conflicts`.
         others: Chosen without regard to bodies.
-        taken: The count that is settled already.
-        seed: Of the heuristics.
-        given: As for `resolve_conflicts`.
+        taken: The count whose conflicts are resolved already.
     """
     if not crowd.bodied:
         return others
-    by_count, most_rows = dict(others.by_count), dict(others.most_rows)
+    by_count, n_covered = dict(others.by_count), dict(others.n_covered)
     for count, chosen in others.by_count.items():
         if count != taken:
-            rows = int(covers[:, chosen].any(axis=1).sum())
-            held = int(_HELD * rows)
-            wanted = _Wanted(held, rows - held, count, given, seed)
-            by_count[count], rows = _settled(crowd, covers.shape[1], chosen, wanted)
-            most_rows[count] = rows, most_rows[count][1]
-    return replace(others, by_count=by_count, most_rows=most_rows)
+            before = cover.n_covered(chosen)
+            held = int(_HELD * before)
+            demand = _Demand(held, before - held, count)
+            by_count[count], after = _compatible(crowd, cover, chosen, demand)
+            n_covered[count] = after, n_covered[count][1]
+    return replace(others, by_count=by_count, n_covered=n_covered)
 
 
 @dataclass(frozen=True)
-class _Wanted:
-    """What is asked of candidates that bear each other.
+class _Demand:
+    """What compatible candidates must do.
 
     Attributes:
-        required: Rows to be covered.
-        spare: Rows that one of them may take from those that stood before it.
+        required: Samples to be covered.
+        spare: Samples that one of them may take from those that stood before it.
         most: Candidates allowed.
-        given: First candidates that are taken whatever they cover.
-        seed: Of the heuristics.
     """
 
     required: int
     spare: int
     most: int
-    given: int
-    seed: int
 
 
-def _settled(
-    crowd: Interference, n_candidates: int, chosen: NDArray[np.int64], wanted: _Wanted
+def _compatible(
+    crowd: Interference,
+    cover: CandidateCover,
+    chosen: NDArray[np.int64],
+    demand: _Demand,
 ) -> tuple[NDArray[np.int64], int]:
-    """Return candidates that bear each other, and the rows that they cover."""
-    standing = list(range(wanted.given))
-    every = list(range(n_candidates))
+    """Return compatible candidates, and how many samples they cover."""
+    standing = list(range(cover.n_existing))
+    every = list(range(cover.covers.shape[1]))
     tried = [int(i) for i in chosen]
-    best, best_rows = standing, -1
+    best, n_best = standing, -1
     while True:
-        rows = int(crowd.covers(tried, tried).any(axis=1).sum())
+        n_covered = int(crowd.covers(tried, tried).any(axis=1).sum())
         if crowd.stand_together(tried):
-            if rows > best_rows:
-                best, best_rows = tried, rows
-            if rows >= wanted.required:
+            if n_covered > n_best:
+                best, n_best = tried, n_covered
+            if n_covered >= demand.required:
                 break
-        left = [i for i in tried if i not in standing]
-        if left:
-            alone = crowd.covers(standing, left).sum(axis=0)
-            standing = [*standing, left[int(np.argmax(alone))]]
-        elif len(tried) >= wanted.most:
+        waiting = [i for i in tried if i not in standing]
+        if waiting:
+            alone = crowd.covers(standing, waiting).sum(axis=0)
+            standing = [*standing, waiting[int(np.argmax(alone))]]
+        elif len(tried) >= demand.most:
             break
-        covers = _harmless(crowd, standing, every, wanted.spare)
-        completed = _completed(covers, standing, tried, wanted)
-        if not left and completed == tried:
+        covers = _harmless(crowd, standing, every, demand.spare)
+        completed = _completed(covers, standing, tried, demand, cover.seed)
+        if not waiting and completed == tried:
             break
         tried = completed
-    if best_rows < 0:
-        best_rows = int(crowd.covers(best, best).any(axis=1).sum())
-    return np.array(sorted(best), dtype=np.int64), best_rows
+    if n_best < 0:
+        n_best = int(crowd.covers(best, best).any(axis=1).sum())
+    return np.array(sorted(best), dtype=np.int64), n_best
 
 
 def _harmless(
@@ -246,7 +226,8 @@ def _harmless(
 ) -> NDArray[np.bool_]:
     """What candidates cover; nothing where they cost those that stand more than spare.
 
-    A cover can't count rows that a member takes away, so who takes many isn't offered.
+    A cover can't count samples that a member takes away, so who takes many isn't
+    offered.
     """
     covers = crowd.covers(standing, every)
     before = int(covers[:, standing].any(axis=1).sum())
@@ -264,17 +245,16 @@ def _completed(
     covers: NDArray[np.bool_],
     standing: list[int],
     tried: list[int],
-    wanted: _Wanted,
+    demand: _Demand,
+    seed: int,
 ) -> list[int]:
     """Return the candidates that stand, with others to cover what is required."""
     problem = replace(cover_problem(covers, 0), fixed=np.array(standing, np.int64))
     found = np.array(standing, dtype=np.int64)
-    least = min(max(len(standing), len(tried)), wanted.most)
-    for count in range(least, wanted.most + 1):
-        found = solve_max_coverage(
-            problem, count, seed=wanted.seed, budget=_BUDGET
-        ).selected
-        if covers[:, found].any(axis=1).sum() >= wanted.required:
+    least = min(max(len(standing), len(tried)), demand.most)
+    for count in range(least, demand.most + 1):
+        found = solve_max_coverage(problem, count, seed=seed, budget=_BUDGET).selected
+        if covers[:, found].any(axis=1).sum() >= demand.required:
             break
-    serves = np.asarray(covers.any(axis=0))
-    return sorted(i for i in map(int, found) if serves[i] or i in standing)
+    useful = np.asarray(covers.any(axis=0))
+    return sorted(i for i in map(int, found) if useful[i] or i in standing)

@@ -1,17 +1,19 @@
-"""Fewest candidates that reach a share of the samples, and what was proved about it.
+"""Fewest candidates that cover a share of the samples, and what was proved about it.
 
-Both stages pose the same program: rows are area-true samples, all of equal weight, so
+Both stages pose the same program: samples are area-true, all of equal weight, so
 weights are counts and every comparison is exact.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers import CoverProblem, SolveStatus, solve_cover
+from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
 from solvers.dense_rows import sparse_rows
 
@@ -29,12 +31,12 @@ class Selection:
     Attributes:
         chosen: Candidates taken, at most the number allowed, shape (k,).
         smallest: The smallest cover found, allowed or not, shape (needed,).
-        lower_bound: Proven least number of candidates for these rows.
+        lower_bound: Proven least number of candidates for these samples.
         status: `optimal`, `feasible` or `infeasible`.
         proof: What proves the bound.
-        required: Rows that must be covered.
-        best_rows: Most rows that k candidates were found to cover.
-        best_rows_bound: Proven upper bound on that.
+        required: Samples that must be covered.
+        n_covered: Most samples that k candidates were found to cover.
+        n_covered_bound: Proven upper bound on that.
         but_for_bodies: How many would do if bodies didn't collide or stand in each
             other's way, where that costs more or leaves too little; else None.
     """
@@ -45,8 +47,8 @@ class Selection:
     status: str
     proof: str
     required: int
-    best_rows: int
-    best_rows_bound: int
+    n_covered: int
+    n_covered_bound: int
     but_for_bodies: int | None = None
 
     @property
@@ -61,186 +63,208 @@ class Marginals:
 
     Attributes:
         by_count: Best candidates found for 1, 2, ... k + `more` devices.
-        most_rows: Rows that these cover, and the proven most that as many candidates
-            cover.
+        n_covered: Samples that these cover, and the proven most that as many
+            candidates cover.
         greedy: Candidates that the greedy cover takes.
     """
 
     by_count: dict[int, NDArray[np.int64]]
-    most_rows: dict[int, tuple[int, int]]
+    n_covered: dict[int, tuple[int, int]]
     greedy: int
 
 
+@dataclass(frozen=True, eq=False)
+class CandidateCover:
+    """What candidates cover, and how much of it devices must cover together.
+
+    Attributes:
+        covers: Whether a candidate (column) covers a sample (row), shape (n, m).
+        share: Required, of the samples that any candidate covers, in (0, 1].
+        seed: Of the heuristics.
+        max_count: Candidates allowed; None for no limit.
+        n_existing: First candidates that are taken whatever they cover.
+    """
+
+    covers: NDArray[np.bool_]
+    share: float
+    seed: int = 0
+    max_count: int | None = None
+    n_existing: int = 0
+
+    @property
+    def required(self) -> int:
+        """Samples that must be covered."""
+        return required_samples(np.any(self.covers, axis=1), self.share)
+
+    @cached_property
+    def problem(self) -> CoverProblem:
+        """The cover over the samples that some candidate covers."""
+        return cover_problem(self.covers, self.required, self.n_existing)
+
+    @cached_property
+    def reduced(self) -> ReducedCover:
+        """The same, reduced once for every count that is looked at."""
+        return reduced_problem(self.problem)
+
+    def n_covered(self, chosen: NDArray[np.int64]) -> int:
+        """Return how many samples candidates cover together."""
+        return int(self.covers[:, chosen].any(axis=1).sum())
+
+    def most_covering(
+        self,
+        count: int,
+        warm_start: NDArray[np.int64] | None,
+        budget: float = DEFAULT_BUDGET,
+    ) -> tuple[NDArray[np.int64], int]:
+        """Return the candidates that cover most, and the proven most of so many.
+
+        Args:
+            count: Candidates taken.
+            warm_start: Candidates to begin from.
+            budget: Counted work.
+        """
+        best = solve_max_coverage(
+            self.problem,
+            count,
+            warm_start=warm_start,
+            seed=self.seed,
+            budget=budget,
+            reduced=self.reduced,
+        )
+        return best.selected, int(np.floor(best.upper_bound + 1e-6))
+
+
 def select_fewest(
-    covers: NDArray[np.bool_],
-    share: float,
+    cover: CandidateCover,
     *,
-    max_count: int | None,
-    seed: int,
     known: NDArray[np.int64] | None = None,
-    given: int = 0,
     budget: float = DEFAULT_BUDGET,
 ) -> Selection:
-    """Return the fewest candidates that cover a share of what all of them cover.
+    """Return the fewest candidates that cover the required share.
 
     After the count is known, the selection that covers most at that count is taken.
 
     Args:
-        covers: Whether a candidate (column) serves a sample (row), shape (n, m).
-        share: Of the rows that any candidate serves, in (0, 1].
-        max_count: Candidates allowed; None for no limit.
-        seed: Of the heuristics.
+        cover: What candidates cover.
         known: Candidates that may cover as much with fewer than the search finds.
-        given: First candidates that are taken whatever they cover.
         budget: Counted work of the search for the fewest.
     """
-    required = required_rows(np.any(covers, axis=1), share)
-    problem = cover_problem(covers, required, given)
-    reduced = reduced_problem(problem)
     solution = solve_cover(
-        problem, seed=seed, budget=budget, heaviest=False, reduced=reduced
+        cover.problem,
+        seed=cover.seed,
+        budget=budget,
+        heaviest=False,
+        reduced=cover.reduced,
     )
-    smallest = solution.selected
+    smallest, required = solution.selected, cover.required
     if known is not None and len(known) < len(smallest):
-        smallest = known if _rows(covers, known) >= required else smallest
+        smallest = known if cover.n_covered(known) >= required else smallest
     needed = len(smallest)
     lower_bound = int(np.ceil(solution.lower_bound - 1e-9))
-    allowed = needed if max_count is None else min(needed, max_count)
-    best = solve_max_coverage(
-        problem,
-        allowed,
-        warm_start=smallest if allowed == needed else None,
-        seed=seed,
-        reduced=reduced,
+    allowed = needed if cover.max_count is None else min(needed, cover.max_count)
+    chosen, bound = cover.most_covering(
+        allowed, smallest if allowed == needed else None
     )
-    rows = _rows(covers, best.selected)
-    met = needed <= allowed and rows >= required
+    n_covered = cover.n_covered(chosen)
+    met = needed <= allowed and n_covered >= required
     status = SolveStatus.OPTIMAL if lower_bound >= needed else SolveStatus.FEASIBLE
     return Selection(
-        best.selected,
+        chosen,
         smallest,
         min(lower_bound, needed),
         status.name.lower() if met else "infeasible",
         solution.proof,
         required,
-        rows,
-        int(np.floor(best.upper_bound + 1e-6)),
+        n_covered,
+        bound,
     )
 
 
-def fewest_count(
-    covers: NDArray[np.bool_], share: float, *, seed: int, given: int = 0
-) -> int:
-    """Return how many candidates `select_fewest` takes, and spend nothing on which.
-
-    Args:
-        covers: As there.
-        share: As there.
-        seed: As there.
-        given: As there.
-    """
-    required = required_rows(np.any(covers, axis=1), share)
-    problem = cover_problem(covers, required, given)
-    return len(solve_cover(problem, seed=seed, heaviest=False).selected)
+def fewest_count(cover: CandidateCover) -> int:
+    """Return how many candidates `select_fewest` takes, and spend nothing on which."""
+    return len(solve_cover(cover.problem, seed=cover.seed, heaviest=False).selected)
 
 
-def required_rows(reached: NDArray[np.bool_], share: float) -> int:
-    """Return how many rows a share of those that any candidate serves is."""
+def required_samples(reached: NDArray[np.bool_], share: float) -> int:
+    """Return how many samples a share of those that any candidate covers is."""
     return int(np.ceil(share * int(reached.sum()) - 1e-9))
 
 
 def marginals(
-    covers: NDArray[np.bool_],
-    selection: Selection,
-    *,
-    seed: int,
-    more: int = MORE,
-    given: int = 0,
+    cover: CandidateCover, selection: Selection, *, more: int = MORE
 ) -> Marginals:
     """Return the best candidates for every other count, for the table in the plan.
 
     Args:
-        covers: As the selection was made from.
+        cover: As the selection was made from.
         selection: As it is kept.
-        seed: Of the heuristics.
         more: Counts beyond the one taken for which the best is wanted.
-        given: As in `select_fewest`; fewer than these aren't looked at.
     """
-    problem = cover_problem(covers, selection.required, given)
-    reduced = reduced_problem(problem)
     taken = len(selection.chosen)
     by_count: dict[int, NDArray[np.int64]] = {}
-    most_rows: dict[int, tuple[int, int]] = {}
+    n_covered: dict[int, tuple[int, int]] = {}
     best = np.empty(0, dtype=np.int64)
-    for count in range(max(1, given), min(taken + more, covers.shape[1]) + 1):
+    most = min(taken + more, cover.covers.shape[1])
+    for count in range(max(1, cover.n_existing), most + 1):
         if count == taken:
             best = selection.chosen
-            most_rows[count] = selection.best_rows, selection.best_rows_bound
+            n_covered[count] = selection.n_covered, selection.n_covered_bound
         else:
-            found = solve_max_coverage(
-                problem,
+            best, bound = cover.most_covering(
                 count,
-                warm_start=selection.smallest if count == selection.needed else best,
-                seed=seed,
-                budget=DEFAULT_BUDGET if count == taken - 1 else _MARGINAL_BUDGET,
-                reduced=reduced,
+                selection.smallest if count == selection.needed else best,
+                DEFAULT_BUDGET if count == taken - 1 else _MARGINAL_BUDGET,
             )
-            best = found.selected
-            bound = int(np.floor(found.upper_bound + 1e-6))
             if count < selection.lower_bound:
                 # Where so many are proved too few, they fall short of the requirement.
                 bound = min(bound, selection.required - 1)
-            most_rows[count] = _rows(covers, best), bound
+            n_covered[count] = cover.n_covered(best), bound
         by_count[count] = best
-    greedy = _greedy_count(covers, selection.required, given)
-    return Marginals(by_count, most_rows, greedy)
+    return Marginals(by_count, n_covered, _greedy_count(cover))
 
 
 def others_instead(
-    others: Marginals,
-    by_count: Mapping[int, NDArray[np.int64]],
-    covers: NDArray[np.bool_],
+    others: Marginals, by_count: Mapping[int, NDArray[np.int64]], cover: CandidateCover
 ) -> Marginals:
     """Return marginals with other candidates for each count, and the same bounds.
 
     Args:
         others: The best for each count, as found.
-        by_count: Candidates to tell of instead; counts without any are left out.
-        covers: As for `marginals`.
+        by_count: Candidates to report instead; counts without any are left out.
+        cover: As for `marginals`.
     """
-    kept = {n: by_count[n] for n in others.by_count if n in by_count}
-    rows = {n: (_rows(covers, kept[n]), others.most_rows[n][1]) for n in kept}
-    return replace(others, by_count=kept, most_rows=rows)
+    reported = {n: by_count[n] for n in others.by_count if n in by_count}
+    covered = {
+        n: (cover.n_covered(c), others.n_covered[n][1]) for n, c in reported.items()
+    }
+    return replace(others, by_count=reported, n_covered=covered)
 
 
 def cover_problem(
-    covers: NDArray[np.bool_], required: int, given: int = 0
+    covers: NDArray[np.bool_], required: int, n_existing: int = 0
 ) -> CoverProblem:
-    """State the cover over the rows that some candidate serves.
+    """State the cover over the samples that some candidate covers.
 
     Args:
-        covers: Whether a candidate (column) serves a sample (row), shape (n, m).
-        required: Rows that must be covered.
-        given: First candidates that are taken whatever they cover.
+        covers: Whether a candidate (column) covers a sample (row), shape (n, m).
+        required: Samples that must be covered.
+        n_existing: First candidates that are taken whatever they cover.
     """
     reachable = covers[covers.any(axis=1)]
     return CoverProblem(
         sparse_rows(reachable),
         required_weight=np.array([required]),
-        fixed=np.arange(given),
+        fixed=np.arange(n_existing),
     )
 
 
-def _rows(covers: NDArray[np.bool_], chosen: NDArray[np.int64]) -> int:
-    return int(covers[:, chosen].any(axis=1).sum())
-
-
-def _greedy_count(covers: NDArray[np.bool_], required: int, given: int) -> int:
-    """How many candidates it takes when each adds the most rows, lower index first."""
-    left = ~covers[:, :given].any(axis=1)
-    count = given
-    while len(covers) - left.sum() < required:
-        left &= ~covers[:, int(np.argmax(covers[left].sum(axis=0)))]
+def _greedy_count(cover: CandidateCover) -> int:
+    """How many candidates it takes when each adds most samples, lower index first."""
+    covers, count = cover.covers, cover.n_existing
+    uncovered = ~covers[:, :count].any(axis=1)
+    while len(covers) - uncovered.sum() < cover.required:
+        best = int(np.argmax(covers[uncovered].sum(axis=0)))
+        uncovered &= ~covers[:, best]
         count += 1
     return count
 
@@ -266,7 +290,7 @@ def certificate(
             "value_m2": rows * row_area_m2,
             "upper_bound_m2": bound * row_area_m2,
         }
-        for n, (rows, bound) in sorted(others.most_rows.items())
+        for n, (rows, bound) in sorted(others.n_covered.items())
     ]
     return {
         "count": count,

@@ -30,7 +30,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.projector_bound import Effort
-from planning.proofs.selection import required_rows
+from planning.proofs.selection import required_samples
 from planning.report.summary.summary import _routes
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
@@ -139,9 +139,9 @@ def test_the_route_alone_is_bounded_over_candidates_and_itself(ball):
     found = cover.selection
     assert found.needed == 3
     assert found.lower_bound <= 3
-    assert found.best_rows <= found.best_rows_bound
-    assert found.best_rows >= found.required
-    assert found.required == required_rows(cover.measured.any(axis=1), 0.95)
+    assert found.n_covered <= found.n_covered_bound
+    assert found.n_covered >= found.required
+    assert found.required == required_samples(cover.measured.any(axis=1), 0.95)
     assert np.all(found.chosen >= 40)
     stage = camera_stage(scene, cover)
     assert stage.cameras == stage.by_count[3]

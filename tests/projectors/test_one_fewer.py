@@ -15,7 +15,7 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.margin_search import widest_between
 from planning.projectors.one_fewer import Offer, one_fewer
 from planning.projectors.share_margin import margin_at_share
-from planning.proofs.selection import select_fewest
+from planning.proofs.selection import CandidateCover, select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
@@ -74,7 +74,7 @@ def moved(lattice, n_projectors, given=0):
 
 def test_six_caps_are_found_where_the_lattice_needs_seven(lattice):
     lit = lattice[1].stages == lighting.LIT
-    alone = select_fewest(lit, 0.875, max_count=None, seed=0)
+    alone = select_fewest(CandidateCover(lit, 0.875))
     assert alone.needed == alone.lower_bound == 7
     found = moved(lattice, 6)
     assert found is not None

@@ -5,7 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from planning.proofs.selection import certificate, marginals, select_fewest
+from planning.proofs.selection import (
+    CandidateCover,
+    certificate,
+    marginals,
+    select_fewest,
+)
 
 
 def brute(covers, required, count):
@@ -25,15 +30,16 @@ def test_count_bound_and_areas_against_brute_force(seed, share):
     required = int(np.ceil(share * reachable - 1e-9))
     best = {k: brute(covers, required, k) for k in range(1, 10)}
     fewest = min(k for k in best if best[k] >= required)
-    found = select_fewest(covers, share, max_count=None, seed=0)
+    cover = CandidateCover(covers, share)
+    found = select_fewest(cover)
     assert found.required == required
     assert found.needed == len(found.chosen) == fewest
     assert found.lower_bound <= fewest
     assert found.status == ("optimal" if found.lower_bound == fewest else "feasible")
     assert found.status == "optimal"
-    assert found.best_rows == best[fewest] <= found.best_rows_bound
-    others = marginals(covers, found, seed=0)
-    for count, (rows, bound) in others.most_rows.items():
+    assert found.n_covered == best[fewest] <= found.n_covered_bound
+    others = marginals(cover, found)
+    for count, (rows, bound) in others.n_covered.items():
         assert rows == best[count] <= bound
         assert count >= fewest or bound < required
     assert list(others.by_count) == list(range(1, min(fewest + 2, 9) + 1))
@@ -46,13 +52,14 @@ def test_count_bound_and_areas_against_brute_force(seed, share):
 
 def test_too_few_allowed_gives_the_best_of_them_and_what_would_be_needed():
     covers = np.kron(np.eye(4, dtype=bool), np.ones((5, 1), dtype=bool))
-    found = select_fewest(covers, 1.0, max_count=2, seed=0)
+    cover = CandidateCover(covers, 1.0, max_count=2)
+    found = select_fewest(cover)
     assert found.status == "infeasible"
     assert len(found.chosen) == 2
-    assert found.best_rows == found.best_rows_bound == 10
+    assert found.n_covered == found.n_covered_bound == 10
     assert (found.needed, found.lower_bound) == (4, 4)
-    others = marginals(covers, found, seed=0)
-    assert others.most_rows == {1: (5, 5), 2: (10, 10), 3: (15, 15), 4: (20, 20)}
+    others = marginals(cover, found)
+    assert others.n_covered == {1: (5, 5), 2: (10, 10), 3: (15, 15), 4: (20, 20)}
     assert covers[:, others.by_count[4]].any(axis=1).all()
     proof = certificate(found, others, n_rows=20, row_area_m2=0.5, n_candidates=4)
     assert proof["one_fewer"] == {"upper_bound_m2": 2.5, "scope": "candidates"}
@@ -70,14 +77,14 @@ def test_too_few_allowed_gives_the_best_of_them_and_what_would_be_needed():
 def test_rows_out_of_reach_are_left_out_of_the_requirement():
     covers = np.zeros((10, 2), dtype=bool)
     covers[:4, 0] = covers[4:6, 1] = True
-    found = select_fewest(covers, 0.6, max_count=None, seed=0)
+    found = select_fewest(CandidateCover(covers, 0.6))
     assert found.required == 4
     assert found.chosen.tolist() == [0]
 
 
 def test_the_same_question_gets_the_same_answer():
     covers = np.random.default_rng(5).random((120, 30)) < 0.3
-    first = select_fewest(covers, 0.95, max_count=None, seed=3)
-    again = select_fewest(covers, 0.95, max_count=None, seed=3)
+    first = select_fewest(CandidateCover(covers, 0.95, seed=3))
+    again = select_fewest(CandidateCover(covers, 0.95, seed=3))
     assert first.chosen.tolist() == again.chosen.tolist()
     assert first.lower_bound == again.lower_bound

@@ -19,7 +19,7 @@ from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import Effort
-from planning.proofs.selection import marginals, select_fewest
+from planning.proofs.selection import CandidateCover, marginals, select_fewest
 from planning.report.claims import Devices, make_claims
 from planning.report.summary.summary import summary
 from planning.scene.scene import Scene
@@ -115,7 +115,8 @@ def test_more_devices_than_are_allowed_serve_nothing(required_of):
 def test_covers_hold_what_is_given_and_are_the_fewest_that_do(seed, given):
     covers = np.random.default_rng(seed).random((40, 9)) < 0.3
     covers[:, 0] &= np.arange(40) < 3  # so bad that no free cover would take it
-    found = select_fewest(covers, 0.85, max_count=None, seed=0, given=given)
+    cover = CandidateCover(covers, 0.85, n_existing=given)
+    found = select_fewest(cover)
     fewest = next(
         k
         for k in range(given, 10)
@@ -124,11 +125,11 @@ def test_covers_hold_what_is_given_and_are_the_fewest_that_do(seed, given):
     )
     assert set(range(given)) <= set(found.chosen.tolist())
     assert len(found.chosen) == found.lower_bound == fewest
-    others = marginals(covers, found, seed=0, given=given)
+    others = marginals(cover, found)
     assert min(others.by_count) == given
     assert all(set(range(given)) <= set(c.tolist()) for c in others.by_count.values())
     assert others.greedy >= fewest
-    assert all(others.most_rows[n][1] < found.required for n in range(given, fewest))
+    assert all(others.n_covered[n][1] < found.required for n in range(given, fewest))
 
 
 def test_two_at_one_place_are_refused_with_their_names(required_of):

@@ -297,7 +297,7 @@ def test_cameras_stay_with_the_axes_that_were_moved_for_them(ball, moved):
     axes, again = move_axes(scene, projectors, cover)
     assert len(again.cameras) <= len(cover.cameras)
     rows = int(again.measured[:, again.selection.chosen].any(axis=1).sum())
-    assert again.selection.best_rows == rows
+    assert again.selection.n_covered == rows
     assert rows >= again.selection.required
     if np.array_equal(again.selection.chosen, cover.selection.chosen):
         assert all(
@@ -305,7 +305,7 @@ def test_cameras_stay_with_the_axes_that_were_moved_for_them(ball, moved):
             for a, m in zip(axes, moved, strict=True)
         )
     # Under axes that had measured more, nothing changes.
-    more = replace(cover, selection=replace(cover.selection, best_rows=10**6))
+    more = replace(cover, selection=replace(cover.selection, n_covered=10**6))
     axes, again = move_axes(scene, projectors, more)
     assert again is more
     assert all(a is b for a, b in zip(axes, projectors, strict=True))
@@ -321,11 +321,11 @@ def test_cameras_stay_if_others_measure_hardly_more(ball, chosen, required, rows
     measured[:600, 0] = measured[590:, 1] = measured[601:, 2] = True
     _, _, cover = ball
     selection = replace(
-        cover.selection, chosen=np.array([0, 1]), required=required, best_rows=1000
+        cover.selection, chosen=np.array([0, 1]), required=required, n_covered=1000
     )
     best = replace(cover, measured=measured, selection=selection)
     before = replace(best, selection=replace(selection, chosen=np.array(chosen)))
     found = with_cameras(best, before)
-    assert (found and found.selection.best_rows) == rows
+    assert (found and found.selection.n_covered) == rows
     if found:
         assert np.array_equal(found.selection.chosen, chosen)

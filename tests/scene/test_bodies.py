@@ -32,7 +32,7 @@ from planning.proofs.conflicts import (
     resolve_conflicts,
     resolve_others,
 )
-from planning.proofs.selection import marginals, select_fewest
+from planning.proofs.selection import CandidateCover, marginals, select_fewest
 from planning.report.drawing.figures import device_figures
 from planning.scene import lighting, measurability
 from planning.scene.camera_views import camera_views
@@ -360,9 +360,10 @@ def shares(*parts):
 
 
 def settled(devices, lit, share, max_count=None):
-    found = select_fewest(lit, share, max_count=max_count, seed=0)
+    cover = CandidateCover(lit, share, max_count=max_count)
+    found = select_fewest(cover)
     crowd = crowd_of(devices, lit)
-    selection = resolve_conflicts(crowd, lit, found, max_count=max_count, seed=0)
+    selection = resolve_conflicts(crowd, cover, found)
     return found, selection, crowd
 
 
@@ -379,10 +380,10 @@ def test_two_that_would_collide_are_kept_apart(scene):
     found, kept, crowd = settled(SIDE_BY_SIDE, PARTS, 0.95)
     assert found.chosen.tolist() == [0, 1]
     assert kept.chosen.tolist() == [0, 2]
-    assert (kept.best_rows, kept.status, kept.but_for_bodies) == (96, "optimal", None)
+    assert (kept.n_covered, kept.status, kept.but_for_bodies) == (96, "optimal", None)
     assert not crowd.stand_together([0, 1])
-    others = marginals(PARTS, kept, seed=0)
-    others = resolve_others(crowd, PARTS, others, 2, seed=0)
+    cover = CandidateCover(PARTS, 0.95)
+    others = resolve_others(crowd, cover, marginals(cover, kept), 2)
     assert all(crowd.stand_together(c) for c in others.by_count.values())
     assert crowd.covers([0], [0, 1, 2]).sum(axis=0).tolist() == [50, 0, 46]
 
@@ -391,15 +392,15 @@ def test_bodies_may_cost_a_device_more_than_is_proved_or_the_requirement():
     _, kept, _ = settled(SIDE_BY_SIDE, PARTS, 0.98)
     assert kept.chosen.tolist() == [0, 2, 3]
     assert (kept.lower_bound, kept.needed, kept.status) == (2, 3, "feasible")
-    assert kept.best_rows == 100 <= kept.best_rows_bound
+    assert kept.n_covered == 100 <= kept.n_covered_bound
     assert kept.but_for_bodies == 2
     _, short, _ = settled(SIDE_BY_SIDE, PARTS, 0.98, max_count=2)
     assert short.chosen.tolist() == [0, 2]
-    assert (short.best_rows, short.status, short.needed) == (96, "infeasible", 3)
+    assert (short.n_covered, short.status, short.needed) == (96, "infeasible", 3)
     # Without the third there is no way at all: two would do, but for their bodies.
     lit = PARTS & [True, True, False, False]
     _, none, _ = settled(SIDE_BY_SIDE, lit, 0.98)
-    assert (none.best_rows, none.status) == (50, "infeasible")
+    assert (none.n_covered, none.status) == (50, "infeasible")
     assert none.but_for_bodies == none.needed == 2
 
 
@@ -416,7 +417,7 @@ def test_one_that_stands_in_anothers_light_is_replaced():
     assert found.chosen.tolist() == [0, 1]
     assert crowd.covers([0, 1], [0, 1]).sum(axis=0).tolist() == [0, 40]
     assert kept.chosen.tolist() == [0, 2]
-    assert kept.best_rows == 96
+    assert kept.n_covered == 96
 
 
 def test_without_bodies_nothing_is_looked_at():
@@ -569,7 +570,7 @@ def test_where_every_camera_keeps_something_dark_the_bodies_are_blamed(scene):
     lamp, eyes = projector(), [camera(0.02, 0.01, 0.6), camera(-0.02, 0.0, 0.6)]
     rows = lit_samples(scene, [lamp], scene.target_samples(500, 9))
     measured = np.ones((len(rows.target), len(eyes)), dtype=bool)
-    selection = select_fewest(measured, 0.95, max_count=None, seed=0)
+    selection = select_fewest(CandidateCover(measured, 0.95))
     offered = SimpleNamespace(cameras=eyes)
     cover = CameraCover(offered, rows, measured, selection)  # type: ignore[arg-type]
     with pytest.raises(InfeasibleLimitsError, match="each of 2 camera bodies"):

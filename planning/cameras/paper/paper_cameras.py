@@ -14,6 +14,7 @@ from planning.cameras.camera_bodies import CameraInterference, lit_among
 from planning.cameras.camera_cover import (
     ROUNDS,
     CameraCover,
+    candidate_cover,
     confirms,
     first_target,
     fresh_target,
@@ -24,7 +25,7 @@ from planning.cameras.camera_cover import (
 from planning.cameras.camera_slides import measured_among, slide_cameras, spread_limits
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.proofs.selection import Selection, cover_problem, required_rows
+from planning.proofs.selection import Selection, required_samples
 from planning.scene.camera_views import CandidateViews
 from planning.scene.clearance import with_clearance
 from planning.scene.existing import movable
@@ -33,7 +34,6 @@ from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import cameras_towards, middle_radius_m
 from solvers import solve_cover
-from solvers.covers.cover import solve_max_coverage
 
 from .paper_route import PaperRoute, paper_route
 from .route_problem import Cameras, RouteProblem
@@ -142,7 +142,7 @@ def route_among(
     some = np.arange(0, len(rows.target), -(-len(rows.target) // _ROWS))
     few = taken(rows, some, rows.lit)
     share = scene.requirements.coverage
-    required = required_rows(np.any(measured[some], axis=1), share)
+    required = required_samples(np.any(measured[some], axis=1), share)
     route = paper_route(_ground(scene, projectors, offered, few, required))
     if not route.by_count:
         raise InfeasibleLimitsError(
@@ -168,7 +168,7 @@ def _judged(
     without: float,
 ) -> Routed:
     """Say with how many of its cameras, at least so many, the route is enough."""
-    required = required_rows(np.any(measured, axis=1), scene.requirements.coverage)
+    required = required_samples(np.any(measured, axis=1), scene.requirements.coverage)
     enough = [
         n
         for n, chosen in sorted(by_count.items())
@@ -275,16 +275,13 @@ def cover_of(
 
 
 def _selection(scene: Scene, found: Routed) -> Selection:
-    asked, measured = scene.requirements, found.measured
-    given = n_fixed(scene)
-    required = required_rows(np.any(measured, axis=1), asked.coverage)
-    problem = cover_problem(measured, required, given)
-    bound = solve_cover(problem, seed=scene.seed, heaviest=False)
+    cover = candidate_cover(scene, found.measured)
+    bound = solve_cover(cover.problem, seed=scene.seed, heaviest=False)
     needed = found.needed or max(found.by_count)
     least = min(int(np.ceil(bound.lower_bound - 1e-9)), needed)
-    allowed = min(needed, asked.max_cameras or needed)
+    allowed = min(needed, cover.max_count or needed)
     chosen = found.by_count[allowed]
-    most = solve_max_coverage(problem, allowed, seed=scene.seed)
+    _, most = cover.most_covering(allowed, None)
     met = found.needed is not None and allowed == needed
     proved = "optimal" if least >= needed else "feasible"
     return Selection(
@@ -293,7 +290,7 @@ def _selection(scene: Scene, found: Routed) -> Selection:
         least,
         proved if met else "infeasible",
         bound.proof,
-        required,
-        int(measured[:, chosen].any(axis=1).sum()),
-        int(np.floor(most.upper_bound + 1e-6)),
+        cover.required,
+        cover.n_covered(chosen),
+        most,
     )

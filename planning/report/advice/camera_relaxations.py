@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import CameraStage, NothingMeasuredError, n_fixed
 from planning.model.planned import PlannedCamera
-from planning.proofs.selection import cover_problem, required_rows
+from planning.proofs.selection import cover_problem, required_samples
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
 from planning.scene import lighting
@@ -228,7 +228,7 @@ class _Covers:
         """Whether they cover the required share of what is reachable then."""
         measured = self.asked <= value
         share = min(self.scene.requirements.coverage + _SPARE, 1.0)
-        required = required_rows(np.any(measured, axis=1), share)
+        required = required_samples(np.any(measured, axis=1), share)
         best = solve_max_coverage(
             cover_problem(measured, required, n_fixed(self.scene)),
             self.count,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
-from planning.proofs.selection import cover_problem, required_rows
+from planning.proofs.selection import cover_problem, required_samples
 from planning.scene.lighting import LIT
 from planning.scene.lit import lit_stages
 from planning.scene.scene import Scene
@@ -88,7 +88,7 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
         own = np.flatnonzero(lit[:, column])
         asked[own, column] = field.asks(pose, rows.take(own))
     reached = np.any(stage.stages[:n] == LIT, axis=1)
-    required = required_rows(reached, scene.requirements.dominant_coverage)
+    required = required_samples(reached, scene.requirements.dominant_coverage)
     given = len(scene.requirements.existing_of("projector"))
     fields = _Fields(asked, required, count, given, scene.seed)
     low, high = 0, int(np.ceil(asked[np.isfinite(asked)].max(initial=0.0)))
