@@ -26,6 +26,8 @@ from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
+from planning.scene.limits import camera_limits
+from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
 from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.cloud import Cloud
@@ -152,11 +154,11 @@ def _of_camera(
     target = Target(samples, np.zeros(normals.shape))
     seen = measurability.view(camera, target, _LIMITS, None)
     light = lighting.light_on(source, target)
-    rings = measurability.rings_at(source, cloud.points)
+    rings = code_surfaces(source, cloud.points)
     asked = TriangulationLimits(0.1, 1.0)
     quality = measurability.pair_quality(normals, light, rings, seen, asked)
     cosine = seen.rays @ camera.world_from_device[:3, 2]
-    kept = (seen.stage == measurability.SEEN) & (light.incidence_cos > _LEAST_LIGHT)
+    kept = (seen.stage == camera_limits.SEEN) & (light.incidence_cos > _LEAST_LIGHT)
     columns = (
         near.distances,
         quality.sigma * light.incidence_cos,

@@ -43,8 +43,8 @@ from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import required_samples
 from planning.rings.axis_moves import AxisJudge
-from planning.scene import lighting
-from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.limits import projector_limits
 from planning.scene.measured import lit_samples
 from planning.scene.scene import Scene
 
@@ -129,11 +129,11 @@ def _margins(
     posed = widen_margins(scene, stage)
     seconds = time.perf_counter() - begin
     rows = stage.rows
-    reached = np.any(stage.stages == lighting.LIT, axis=1)
+    reached = np.any(stage.stages == projector_limits.LIT, axis=1)
     required = required_samples(reached, scene.requirements.dominant_coverage)
 
     def margin(projectors: tuple[PlannedProjector, ...]) -> float:
-        lit = lit_stages(scene, projectors, rows) == lighting.LIT
+        lit = lit_stages(scene, projectors, rows) == projector_limits.LIT
         own = lit_margins(scene, projectors, rows, lit)
         return float(np.degrees(margin_at_share(own, required)))
 

@@ -20,18 +20,17 @@ from planning.proofs.selection import (
     others_instead,
     select_fewest,
 )
-from planning.scene import measurability
 from planning.scene.camera_views import CandidateViews
 from planning.scene.clearance import candidates_with_clearance
 from planning.scene.existing import existing_cameras
-from planning.scene.lit import merged
+from planning.scene.limits import pair_limits
 from planning.scene.measured import (
     LitSamples,
     furthest_failure,
     lit_samples,
     measured_by,
 )
-from planning.scene.samples import Target
+from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import camera_candidates
 
@@ -291,11 +290,11 @@ def _nothing_measured(
             "the projectors that were chosen light none of the target's fresh samples, "
             "so no camera measures any; the object may be too small for this rig"
         )
-    counts = np.bincount(causes, minlength=measurability.MEASURED)
+    counts = np.bincount(causes, minlength=pair_limits.MEASURED)
     order = np.argsort(-counts, kind="stable")
     weight = rows.target.samples.weight
     named = ", ".join(
-        f"{measurability.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} % "
+        f"{pair_limits.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} % "
         f"({area_words(float(weight * counts[i]))})"
         for i in order
         if counts[i] >= 0.01 * len(causes)

@@ -25,6 +25,7 @@ class PlannedProjector:
             edges, increasing, shape (n_rings,).
         existing: Name of the device that stands already; empty: it is planned.
         body: Its housing; None: it takes no room.
+        pattern: What it shows, as in `Requirements`.
     """
 
     id: str
@@ -35,6 +36,7 @@ class PlannedProjector:
     ring_radii: NDArray[np.float64]
     existing: str = ""
     body: Body | None = None
+    pattern: Literal["rings", "dense", "none"] = "rings"
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
 from planning.proofs.selection import cover_problem, required_samples
-from planning.scene import lighting
 from planning.scene.clearance import with_clearance
+from planning.scene.limits import projector_limits
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projectors_around
 from solvers import solve_max_coverage
@@ -139,7 +139,7 @@ def _without_idle(
     offer: Offer, best: NDArray[np.int64], given: int
 ) -> tuple[Offer, NDArray[np.int64]]:
     """Leave out poses that light least in the place of any one of the best."""
-    lit = (offer.stages == lighting.LIT).astype(np.float32)
+    lit = (offer.stages == projector_limits.LIT).astype(np.float32)
     alone = lit[:, best] * (lit[:, best].sum(axis=1, keepdims=True) == 1.0)
     dark = ~lit[:, best].any(axis=1, keepdims=True)
     # What opens where one of the best goes, and what is dark already.
@@ -159,7 +159,7 @@ def _most_lit(
     seed: int,
 ) -> tuple[NDArray[np.int64], int, int]:
     """Return the poses that light most, what they miss, and what is required."""
-    lit = offer.stages == lighting.LIT
+    lit = offer.stages == projector_limits.LIT
     best = solve_max_coverage(
         cover_problem(lit, 0, given),
         n_projectors,

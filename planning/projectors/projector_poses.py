@@ -12,9 +12,9 @@ from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.ring_frame import moved_to
 from planning.proofs.selection import required_samples
-from planning.scene import lighting
 from planning.scene.clearance import lacks_clearance
-from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.limits import projector_limits
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.standing import moves_bodies
@@ -57,7 +57,7 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
         stage: Projectors from the cover, and its rows.
     """
     rows = stage.rows
-    reached = np.any(stage.stages == lighting.LIT, axis=1)
+    reached = np.any(stage.stages == projector_limits.LIT, axis=1)
     state = _Lit(scene, rows, list(stage.projectors), reached)
     lit = int(np.isfinite(state.margin).any(axis=1).sum())
     required = required_samples(reached, scene.requirements.dominant_coverage)
@@ -133,7 +133,7 @@ class _Lit:
 
     def _margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
         scene = self.scene.among(projectors)
-        lit = lit_stages(scene, projectors, self.rows) == lighting.LIT
+        lit = lit_stages(scene, projectors, self.rows) == projector_limits.LIT
         return lit_margins(scene, projectors, self.rows, lit)
 
     def with_moved(

@@ -24,11 +24,11 @@ from planning.proofs.selection import (
     marginals,
     select_fewest,
 )
-from planning.scene import lighting
 from planning.scene.clearance import candidates_with_clearance, with_clearance
 from planning.scene.existing import existing_projectors, movable
-from planning.scene.lit import lit_margins, lit_stages, merged
-from planning.scene.samples import Target
+from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.limits import projector_limits
+from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates, projectors_around
 from solvers import solve_cover
@@ -64,12 +64,14 @@ class NothingLitError(InfeasibleLimitsError):
         rows: Target,
         stages: NDArray[np.int8],
     ) -> None:
-        counts = np.bincount(stages.ravel(), minlength=lighting.LIT)[: lighting.LIT]
+        n_causes = len(projector_limits.CAUSES)
+        counts = np.bincount(stages.ravel(), minlength=n_causes)[:n_causes]
         share = 100.0 * counts / counts.sum()
         named = ", ".join(
             f"{cause} {part:.0f} %"
             for cause, part in sorted(
-                zip(lighting.CAUSES, share, strict=True), key=lambda pair: -pair[1]
+                zip(projector_limits.CAUSES, share, strict=True),
+                key=lambda pair: -pair[1],
             )
             if part >= 1.0
         )
@@ -141,7 +143,7 @@ def plan_projectors(
     candidates += candidates_with_clearance(scene, n_candidates, lattice)
     rows = scene.target_samples(_ROWS, _STREAM)
     stages = lit_stages(scene, candidates, rows)
-    if not np.any(stages == lighting.LIT):
+    if not np.any(stages == projector_limits.LIT):
         raise NothingLitError(candidates, rows, stages)
     # The best of a lattice lies beside the best there is.
     n_lattice = len(candidates)
@@ -172,7 +174,7 @@ def plan_projectors(
         candidates, stages = offer.projectors, offer.stages
         fresh = scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
         fresh_stages = lit_stages(scene, candidates, fresh)
-        lit = fresh_stages == lighting.LIT
+        lit = fresh_stages == projector_limits.LIT
         covered = lit[:, selection.chosen].any(axis=1).sum()
         confirmed = covered >= required.dominant_coverage * lit.any(axis=1).sum()
         if confirmed or selection.status == "infeasible" or attempt == rounds:
@@ -196,7 +198,7 @@ def _with_widest_margin(
     selection: Selection,
 ) -> Selection:
     """Return the selection with as many candidates of larger margin, if there are."""
-    margin = lit_margins(scene, candidates, rows, stages == lighting.LIT)
+    margin = lit_margins(scene, candidates, rows, stages == projector_limits.LIT)
     chosen = widest_selection(
         margin,
         selection.chosen,
@@ -232,7 +234,7 @@ def _fewer(
             lattice,
             selection.needed - 1,
             finer=more,
-            reached=np.any(offer.stages == lighting.LIT, axis=1),
+            reached=np.any(offer.stages == projector_limits.LIT, axis=1),
             stages_of=lambda projectors: lit_stages(scene, projectors, rows),
             given=given,
             ring_offset=ring_offset,
@@ -285,7 +287,7 @@ def _good_cover(scene: Scene, stages: NDArray[np.int8]) -> NDArray[np.int64]:
 def _cover(scene: Scene, stages: NDArray[np.int8]) -> CandidateCover:
     required = scene.requirements
     return CandidateCover(
-        stages == lighting.LIT,
+        stages == projector_limits.LIT,
         required.dominant_coverage,
         seed=scene.seed,
         max_count=required.max_projectors,
@@ -324,8 +326,8 @@ def _stage(
         proof["bounds_leave_out"] = BODIES_LEFT_OUT
     proof["excluded_pairs"] = {
         cause: int((stages == index).sum())
-        for index, cause in enumerate(lighting.CAUSES)
-        if index != lighting.BLOCKED or scene.standing
+        for index, cause in enumerate(projector_limits.CAUSES)
+        if index != projector_limits.BLOCKED or scene.standing
     }
     proof["n_regions"] = int(scene.region.max()) + 1
     return ProjectorStage(

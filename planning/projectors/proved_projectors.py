@@ -10,7 +10,7 @@ from planning.proofs.existing_bound import enough, given_on
 from planning.proofs.projector_bound import Effort, bound_projectors
 from planning.proofs.selection import required_samples
 from planning.scene.clearance import with_clearance
-from planning.scene.lighting import LIT
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projectors_towards
 

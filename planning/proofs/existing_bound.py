@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
 from planning.scene.existing import existing_projectors
-from planning.scene.lighting import LIT
-from planning.scene.lit import lit_stages
+from planning.scene.lighting import lit_stages
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

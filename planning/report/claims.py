@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.camera_views import view_of
-from planning.scene.lit import lit_stages, margins_of
+from planning.scene.lighting import lit_stages, margins_of
+from planning.scene.limits import camera_limits, pair_limits, projector_limits
+from planning.scene.limits.projector_limits import INCIDENCE, LIT
 from planning.scene.measured import (
     LitSamples,
     furthest_failure,
@@ -94,7 +96,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
     target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
     weight = target.samples.weight
     stages = lit_stages(planned, devices.projectors, target)
-    lit = stages == lighting.LIT
+    lit = stages == LIT
     seen = _measured_by(planned, devices, target, lit)
     measured = _any(seen)
     reachable, furthest = _reachable_by_projectors(scene, devices, target, _any(lit))
@@ -106,7 +108,9 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
         _surface_areas(scene, devices),
         areas,
         _by_cause(_uncovered(planned, devices, target, stages, measured), weight),
-        _by_cause([lighting.CAUSES[stage] for stage in furthest[~reachable]], weight),
+        _by_cause(
+            [projector_limits.CAUSES[stage] for stage in furthest[~reachable]], weight
+        ),
         weight * _n_inside(scene, target.take(~reachable)),
         tuple(weight * lit.sum(axis=0)),
         _least_margins(scene, devices, target, served),
@@ -156,7 +160,7 @@ def _union(
 def _surface_areas(scene: Scene, devices: Devices) -> Areas:
     surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
     planned = scene.among((*devices.projectors, *devices.cameras))
-    lit = lit_stages(planned, devices.projectors, surface) == lighting.LIT
+    lit = lit_stages(planned, devices.projectors, surface) == LIT
     measured = _any(_measured_by(planned, devices, surface, lit))
     reachable, _ = _reachable_by_projectors(scene, devices, surface, _any(lit))
     return _areas(scene, devices, surface, reachable, lit, measured)
@@ -178,7 +182,7 @@ def _areas(
         left = np.flatnonzero(_any(lit) & ~by_cameras)
         if not len(left):
             break
-        rows = _lit_rows(devices.projectors, target.take(left), lit[left])
+        rows = LitSamples.of(devices.projectors, target.take(left), lit[left])
         by_cameras[left] = measured_by(among, [camera], rows)[:, 0]
     counts = (
         len(target),
@@ -193,26 +197,14 @@ def _areas(
 def _lit(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.bool_]:
-    return _any(lit_stages(scene, projectors, target) == lighting.LIT)
-
-
-def _lit_rows(
-    projectors: Sequence[PlannedProjector], target: Target, lit: NDArray[np.bool_]
-) -> LitSamples:
-    points = target.samples.points
-    return LitSamples(
-        target,
-        lit,
-        tuple(lighting.light_on(p, target) for p in projectors),
-        tuple(measurability.rings_at(p, points) for p in projectors),
-    )
+    return _any(lit_stages(scene, projectors, target) == LIT)
 
 
 def _measured_by(
     scene: Scene, devices: Devices, target: Target, lit: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     return measured_by(
-        scene, devices.cameras, _lit_rows(devices.projectors, target, lit)
+        scene, devices.cameras, LitSamples.of(devices.projectors, target, lit)
     )
 
 
@@ -228,8 +220,8 @@ def _reachable_by_projectors(
             break
         rest = target.take(left)
         # What shows its back comes no further than it did before.
-        idle = furthest[left] >= lighting.INCIDENCE
-        idle &= lighting.faces_away(projector, rest)
+        idle = furthest[left] >= INCIDENCE
+        idle &= lighting.shows_back(projector, rest)
         left, rest = left[~idle], rest.take(~idle)
         stage = lighting.first_failure(
             projector,
@@ -238,7 +230,7 @@ def _reachable_by_projectors(
             scene.visibility,
             bodies=scene.standing,
         )
-        reachable[left] = stage == lighting.LIT
+        reachable[left] = stage == LIT
         furthest[left] = np.maximum(furthest[left], stage)
     return reachable, furthest
 
@@ -261,13 +253,13 @@ def _uncovered(
     measured: NDArray[np.bool_],
 ) -> list[str]:
     """The cause of each sample that isn't measured."""
-    lit = stages == lighting.LIT
+    lit = stages == LIT
     dark = ~_any(lit)
-    causes = [lighting.CAUSES[stage] for stage in stages[dark].max(axis=1)]
+    causes = [projector_limits.CAUSES[stage] for stage in stages[dark].max(axis=1)]
     left = np.flatnonzero(_any(lit) & ~measured)
-    rows = _lit_rows(devices.projectors, target.take(left), lit[left])
+    rows = LitSamples.of(devices.projectors, target.take(left), lit[left])
     furthest = furthest_failure(scene, devices.cameras, rows)
-    return causes + [measurability.CAUSES[stage] for stage in furthest]
+    return causes + [pair_limits.CAUSES[stage] for stage in furthest]
 
 
 def _blocked_by_body(
@@ -287,11 +279,12 @@ def _blocked_by_body(
         stopped[rows] |= blocked_by(scene.standing, device, points)
 
     for p, projector in enumerate(devices.projectors):
-        note(projector, np.flatnonzero(~measured & (stages[:, p] == lighting.BLOCKED)))
-    left = np.flatnonzero(~measured & _any(stages == lighting.LIT))
+        dark = stages[:, p] == projector_limits.BLOCKED
+        note(projector, np.flatnonzero(~measured & dark))
+    left = np.flatnonzero(~measured & _any(stages == LIT))
     for camera in devices.cameras:
         stage = view_of(scene, camera, target.take(left)).stage
-        note(camera, left[stage == measurability.BLOCKED])
+        note(camera, left[stage == camera_limits.BLOCKED])
     areas = target.samples.weight * stopped.sum(axis=0)
     every = (*devices.projectors, *devices.cameras)
     return {
@@ -315,7 +308,7 @@ def _any(table: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _by_cause(causes: list[str], weight: float) -> dict[str, float]:
-    order = lighting.CAUSES + measurability.CAUSES
+    order = projector_limits.CAUSES + pair_limits.CAUSES
     return {c: weight * causes.count(c) for c in order if c in causes}
 
 

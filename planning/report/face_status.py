@@ -11,8 +11,8 @@ from planning.report.drawing.face_colours import (
     NOT_MEASURED,
     OUTSIDE_TARGET,
 )
-from planning.scene import lighting
-from planning.scene.lit import lit_stages
+from planning.scene.lighting import lit_stages
+from planning.scene.limits import projector_limits
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -35,7 +35,7 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
     centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)
     target = Target(centroids, plan.surface.steep)
     stages = lit_stages(scene, plan.projectors, target)
-    lit = (stages == lighting.LIT).any(axis=1)
+    lit = (stages == projector_limits.LIT).any(axis=1)
     measured = np.zeros(len(faces), dtype=bool)
     if lit.any():
         rows = lit_samples(scene, plan.projectors, target)

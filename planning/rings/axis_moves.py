@@ -16,9 +16,12 @@ from planning.model.requirements import TriangulationLimits
 from planning.model.ring_frame import ring_frame
 from planning.scene import measurability
 from planning.scene.camera_views import view_of
-from planning.scene.lighting import ring_coordinate
-from planning.scene.measurability import PairQuality, ViewedSamples
-from planning.scene.measured import LitSamples, lit_samples
+from planning.scene.limits import camera_limits
+from planning.scene.limits.camera_limits import ViewedSamples
+from planning.scene.limits.pair_limits import PairQuality
+from planning.scene.measured import LitSamples, lit_samples, pairs_of
+from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns.ring_pattern import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
 from solvers.poses.axis_program import best_start, solve_axis
@@ -90,23 +93,14 @@ class AxisJudge:
     def sigma_with(self, projector: PlannedProjector, p: int) -> NDArray[np.float64]:
         """Least s_N of projector p over the cameras in [m]; inf if not measured."""
         limits = self.scene.requirements.triangulation
-        samples = self.rows.target.samples
-        rings = measurability.rings_at(projector, samples.points)
-        least = np.full(len(self.rows.target), np.inf)
+        points = self.rows.target.samples.points
+        rows = self.rows.with_surfaces(p, code_surfaces(projector, points))
+        least = np.full(len(rows.target), np.inf)
         for seen in self.views:
-            pairs = np.flatnonzero(
-                (seen.stage == measurability.SEEN) & self.rows.lit[:, p]
-            )
-            quality = measurability.pair_quality(
-                samples.normals[pairs],
-                self.rows.lights[p].take(pairs),
-                rings.take(pairs),
-                seen.take(pairs),
-                limits,
-            )
-            stage = measurability.first_pair_failure(quality, limits)
-            good = stage == measurability.MEASURED
-            least[pairs[good]] = np.minimum(least[pairs[good]], quality.sigma[good])
+            for pair in pairs_of(limits, rows, seen, projectors=[p]):
+                good = pair.samples[pair.measured]
+                found = pair.quality.sigma[pair.measured]
+                least[good] = np.minimum(least[good], found)
         return least
 
     def with_axis(self, projector: PlannedProjector, p: int) -> NDArray[np.float64]:
@@ -117,12 +111,9 @@ class AxisJudge:
 
     def holds(self, projector: PlannedProjector, p: int) -> bool:
         """Whether what a projector lights is inside its largest ring."""
-        return inside(projector, self.rows.target.samples.points[self.rows.lit[:, p]])
-
-
-def inside(projector: PlannedProjector, points: NDArray[np.float64]) -> bool:
-    """Return whether all points are inside the largest ring."""
-    return bool(np.all(ring_coordinate(projector, points) <= projector.ring_radii[-1]))
+        return inside_rings(
+            projector, self.rows.target.samples.points[self.rows.lit[:, p]]
+        )
 
 
 def _move(
@@ -140,7 +131,7 @@ def _move(
         frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
         offered = replace(projector, world_from_ring=frame)
         lit = all(judge.holds(offered, p) for judge in judges)
-        if not (lit and inside(offered, held)):
+        if not (lit and inside_rings(offered, held)):
             continue
         trials = [judge.with_axis(offered, p) for judge in judges]
         if better(trials, [judge.sigma for judge in judges]):
@@ -224,7 +215,7 @@ def axis_program(
         points=transform(into, points[chosen]),
         rays=rays @ turn,
         slopes=slopes @ turn,
-        seen=np.stack([view.stage == measurability.SEEN for view in seen], axis=1),
+        seen=np.stack([view.stage == camera_limits.SEEN for view in seen], axis=1),
         noise=noise[:, None] * distances,
         placement_m=(limits.ring_sigma_m or 0.0) * np.abs(facing),
         facing=np.abs(facing) / distances,
@@ -252,14 +243,14 @@ def _scores_of(
     samples = rows.target.samples.take(chosen)
     score = np.zeros(len(chosen))
     for p in which:
-        rings = measurability.rings_at(projectors[p], samples.points)
+        rings = code_surfaces(projectors[p], samples.points)
         light = rows.lights[p].take(chosen)
         for view in seen:
             quality = measurability.pair_quality(
                 samples.normals, light, rings, view, limits
             )
             own = smooth_count(quality, limits)
-            pair = rows.lit[chosen, p] & (view.stage == measurability.SEEN)
+            pair = rows.lit[chosen, p] & (view.stage == camera_limits.SEEN)
             score = np.maximum(score, np.where(pair, own, 0.0))
     return score
 

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.planned import PlannedProjector
 from planning.scene import lighting
+from planning.scene.lights import light_of
+from planning.scene.limits import projector_limits
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -79,17 +81,16 @@ def cast_beam(
     found, faces, points = found[inside], faces[inside], points[inside]
     normals = scene.mesh.face_normals[faces]
     met = Target(SurfaceSamples(points, normals, faces, 0.0), scene.steep[faces])
-    stage = lighting.first_failure_ignoring_occlusion(
-        projector, met, scene.requirements.projector
-    )
-    lighting.mark_blocked(stage, projector, points, scene.standing)
+    # What the ray meets first, no part of the surface hides.
+    limits, bodies = scene.requirements.projector, scene.standing
+    stage = lighting.first_failure(projector, met, limits, None, bodies=bodies)
     ring = points - projector.world_from_ring[:3, 3]
     heights = ring @ projector.world_from_ring[:3, 2]
     return BeamProfile(
         coordinates,
         azimuths,
         _spread(heights, found, np.nan, shape),
-        _spread(stage == lighting.LIT, found, False, shape),
+        _spread(stage == projector_limits.LIT, found, False, shape),
         _spread(scene.target_faces[faces], found, False, shape),
         _spread(faces, found, -1, shape),
         _spread(points, found, np.nan, shape),
@@ -118,12 +119,7 @@ def beam_rays(
             np.outer(coordinates, np.sin(azimuths)).ravel(),
         ]
     )
-    if projector.light == "parallel":
-        origins = frame[:3, 3] + flat @ frame[:3, :2].T
-        return origins, np.tile(frame[:3, 2], (len(flat), 1))
-    local = np.column_stack([flat, np.ones(len(flat))])
-    local /= np.linalg.norm(local, axis=1, keepdims=True)
-    return frame[:3, 3], local @ frame[:3, :3].T
+    return light_of(projector.device).ring_rays(frame, flat)
 
 
 def _near(

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
-from planning.scene import measurability
 from planning.scene.camera_views import view_of
-from planning.scene.lighting import ring_coordinate
-from planning.scene.measurability import Rings, ViewedSamples
-from planning.scene.measured import LitSamples, lit_samples, rings_of
+from planning.scene.limits.camera_limits import ViewedSamples
+from planning.scene.measured import LitSamples, lit_samples, pairs_of
+from planning.scene.patterns.code_surfaces import CodeSurfaces
+from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns.ring_pattern import inside_rings
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -53,10 +54,10 @@ def turn_ring_axes(
             best = _value(scores)
             for azimuth in np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS):
                 offered = _with_axis(turned[p], tilt, float(azimuth))
-                if not _inside_rings(offered, points[rows.lit[:, p]]):
+                if not inside_rings(offered, points[rows.lit[:, p]]):
                     continue
                 trial = scores.copy()
-                rings = measurability.rings_at(offered, points)
+                rings = code_surfaces(offered, points)
                 trial[p] = _scores(scene, rows, p, views, rings)
                 value = _value(trial)
                 if value > best:
@@ -76,7 +77,7 @@ def widest_gap(
     """
     rows = lit_samples(scene, projectors, target)
     if not len(rows.target):
-        rings = rings_of(projectors, target)
+        rings = [code_surfaces(p, target.samples.points) for p in projectors]
         return float(max(ring.spacing.max() for ring in rings))
     return float(
         max(
@@ -93,30 +94,21 @@ def _with_axis(
     return replace(projector, world_from_ring=frame)
 
 
-def _inside_rings(projector: PlannedProjector, points: NDArray[np.float64]) -> bool:
-    coordinate = ring_coordinate(projector, points)
-    return bool(np.all(coordinate <= projector.ring_radii[-1]))
-
-
 def _scores(
-    scene: Scene, rows: LitSamples, p: int, views: Sequence[ViewedSamples], rings: Rings
+    scene: Scene,
+    rows: LitSamples,
+    p: int,
+    views: Sequence[ViewedSamples],
+    rings: CodeSurfaces,
 ) -> NDArray[np.float64]:
     """Best |r.m| of projector p at each sample over the cameras; 0 if not measured."""
-    limits = scene.requirements.triangulation
-    score = np.zeros(len(rows.target))
+    limits, score = scene.requirements.triangulation, np.zeros(len(rows.target))
+    offered = rows.with_surfaces(p, rings)
     for seen in views:
-        pairs = np.flatnonzero((seen.stage == measurability.SEEN) & rows.lit[:, p])
-        quality = measurability.pair_quality(
-            rows.target.samples.normals[pairs],
-            rows.lights[p].take(pairs),
-            rings.take(pairs),
-            seen.take(pairs),
-            limits,
-        )
-        stage = measurability.first_pair_failure(quality, limits)
-        good = stage == measurability.MEASURED
-        kept = pairs[good]
-        score[kept] = np.maximum(score[kept], quality.conditioning[good])
+        for pair in pairs_of(limits, offered, seen, projectors=[p]):
+            good = pair.samples[pair.measured]
+            found = pair.quality.conditioning[pair.measured]
+            score[good] = np.maximum(score[good], found)
     return score
 
 

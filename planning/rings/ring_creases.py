@@ -9,8 +9,10 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.mesh.topology import face_pairs
 from planning.model.planned import PlannedProjector
-from planning.scene import measurability
-from planning.scene.lighting import LIT, first_failure, light_on
+from planning.scene.lighting import first_failure
+from planning.scene.lights import light_on
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -73,7 +75,7 @@ def crease_errors(
         Lit on both sides; J; J h / 4 in [m], (n,) each.
     """
     mesh = scene.mesh
-    rings = measurability.rings_at(projector, creases.points)
+    rings = code_surfaces(projector, creases.points)
     lit = np.ones(len(creases), dtype=bool)
     slopes: list[NDArray[np.float64]] = []
     for side in (0, 1):

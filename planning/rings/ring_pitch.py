@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
 from planning.model.planned import PlannedProjector
-from planning.scene import measurability
-from planning.scene.lighting import assigned_projectors
-from planning.scene.lit import margins_of
-from planning.scene.measurability import ViewedSamples
-from planning.scene.measured import LitSamples
+from planning.scene.lighting import assigned_projectors, margins_of
+from planning.scene.limits.camera_limits import ViewedSamples
+from planning.scene.measured import LitSamples, pairs_of
+from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.scene import Scene
 
 MIN_PROJECTOR_PX = 3.0
@@ -38,22 +37,15 @@ def best_pitch(
     Returns:
         In [px], 0 where no pair of this projector measures, shape (n, n_projectors).
     """
-    required, samples = scene.requirements, rows.target.samples
-    rings = [measurability.rings_at(p, samples.points) for p in projectors]
+    for p, projector in enumerate(projectors):
+        points = rows.target.samples.points
+        rows = rows.with_surfaces(p, code_surfaces(projector, points))
     best = np.zeros((len(rows.target), len(projectors)))
     for seen in views:
-        for p, light in enumerate(rows.lights):
-            pairs = np.flatnonzero((seen.stage == measurability.SEEN) & rows.lit[:, p])
-            quality = measurability.pair_quality(
-                samples.normals[pairs],
-                light.take(pairs),
-                rings[p].take(pairs),
-                seen.take(pairs),
-                required.triangulation,
-            )
-            stage = measurability.first_pair_failure(quality, required.triangulation)
-            pitch = np.where(stage == measurability.MEASURED, quality.pitch, 0.0)
-            best[pairs, p] = np.maximum(best[pairs, p], pitch)
+        for pair in pairs_of(scene.requirements.triangulation, rows, seen):
+            pitch = np.where(pair.measured, pair.quality.pitch, 0.0)
+            table = best[:, pair.projector]
+            table[pair.samples] = np.maximum(table[pair.samples], pitch)
     return best
 
 

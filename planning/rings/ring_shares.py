@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.measured import LitSamples, measured_by
+from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -87,7 +88,7 @@ def _measured(
         target,
         np.ones((len(target), 1), dtype=bool),
         (lighting.light_on(projector, target),),
-        (measurability.rings_at(projector, points),),
+        (code_surfaces(projector, points),),
     )
     measured[profile.lit] = measured_by(scene, cameras, rows).any(axis=1)
     return measured

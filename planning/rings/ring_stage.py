@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene import measurability
 from planning.scene.camera_views import view_of
-from planning.scene.lighting import ring_coordinate
-from planning.scene.lit import merged
-from planning.scene.measurability import ViewedSamples
+from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples
+from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns.ring_pattern import ring_coordinate
+from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
 from .ring_creases import Creases, crease_errors, find_creases
@@ -170,14 +170,15 @@ def _binding(
 ) -> list[NDArray[np.float64]]:
     """Ring coordinates and pitches of chosen samples, by their user, (2, n) each."""
     user = np.where(chosen, users(scene, even, draw.rows, draw.pitch), -1)
+    points = draw.rows.target.samples.points
     return [
         np.stack(
             [
-                draw.rows.lights[p].ring_coordinate[user == p],
+                ring_coordinate(projector, points[user == p]),
                 draw.pitch[user == p, p],
             ]
         )
-        for p in range(len(even))
+        for p, projector in enumerate(even)
     ]
 
 
@@ -200,7 +201,7 @@ def _report(
     lit, jump, error = crease_errors(scene, final, creases)
     tolerance = tolerance_m(scene)
     shone = beam.profile.points[beam.profile.lit]
-    spacing = measurability.rings_at(final, shone).spacing
+    spacing = code_surfaces(final, shone).spacing
     own, even = beam.errors_under(final), beam.errors_under(beam.projector)
     over = _share(own > tolerance)
     # Where rings are as fine as may be anyway, their places alone tell the two apart.

@@ -13,7 +13,7 @@ from geometry.rays.visibility_matrix import visibility_matrix
 from planning.model.planned import PlannedCamera
 
 from . import measurability
-from .measurability import ViewedSamples
+from .limits.camera_limits import SEEN, ViewedSamples
 from .samples import Target
 from .scene import Scene
 from .standing import Standing, blocked_by
@@ -137,9 +137,7 @@ def _in_the_open(
     """Return which of some samples a camera would see, were nothing in between."""
     limits = scene.requirements.camera
     seen = measurability.view(camera, target.take(some), limits, None)
-    return _taken(
-        CameraView(some, seen), np.flatnonzero(seen.stage == measurability.SEEN)
-    )
+    return _taken(CameraView(some, seen), np.flatnonzero(seen.stage == SEEN))
 
 
 def _taken(sight: CameraView, chosen: NDArray[np.int64]) -> CameraView:

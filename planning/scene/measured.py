@@ -1,23 +1,28 @@
 """Which cameras measure which of the samples that projectors light."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.requirements import TriangulationLimits
 
-from . import lighting, measurability
 from .camera_views import CameraView, camera_views, joined_view, view_of
-from .lighting import LightOnSamples
-from .lit import lit_stages
-from .measurability import Rings
+from .lighting import lit_stages
+from .lights import LightOnSamples, light_on
+from .limits.camera_limits import SEEN, ViewedSamples
+from .limits.pair_limits import MEASURED, PairQuality
+from .limits.projector_limits import LIT
+from .measurability import first_pair_failure, pair_quality
+from .patterns.code_surfaces import CodeSurfaces
+from .patterns.pattern import code_surfaces
 from .samples import Target
 from .scene import Scene
 
-# Seen by several cameras and worked on together: many calls on few rows are slow, and
-# much more leaves the cache.
+# Seen by several cameras and worked on together: many calls on few samples are slow,
+# and much more leaves the cache.
 _PAIRS = 8192
 
 
@@ -29,36 +34,115 @@ class LitSamples:
         target: The samples that at least one projector lights.
         lit: Which projector lights which, shape (n, n_projectors).
         lights: Light of each projector.
-        rings: Ring surfaces of each projector.
+        rings: Surfaces of equal code of each projector.
     """
 
     target: Target
     lit: NDArray[np.bool_]
     lights: tuple[LightOnSamples, ...]
-    rings: tuple[Rings, ...]
+    rings: tuple[CodeSurfaces, ...]
+
+    @classmethod
+    def of(
+        cls,
+        projectors: Sequence[PlannedProjector],
+        target: Target,
+        lit: NDArray[np.bool_],
+    ) -> "LitSamples":
+        """Return samples, lit as stated, with light and code of every projector."""
+        points = target.samples.points
+        return cls(
+            target,
+            lit,
+            tuple(light_on(projector, target) for projector in projectors),
+            tuple(code_surfaces(projector, points) for projector in projectors),
+        )
+
+    def with_surfaces(self, p: int, surfaces: CodeSurfaces) -> "LitSamples":
+        """Return the samples with other surfaces of equal code of one projector."""
+        return replace(self, rings=(*self.rings[:p], surfaces, *self.rings[p + 1 :]))
 
 
 def lit_samples(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> LitSamples:
     """Return the samples that the projectors light, with their light and rings."""
-    lit = lit_stages(scene, projectors, target) == lighting.LIT
-    some = np.flatnonzero(lit.any(axis=1))
-    kept = target.take(some)
+    lit = lit_stages(scene, projectors, target) == LIT
+    chosen = np.flatnonzero(lit.any(axis=1))
+    return LitSamples.of(projectors, target.take(chosen), lit[chosen])
+
+
+def taken(
+    rows: LitSamples, chosen: NDArray[np.int64], lit: NDArray[np.bool_]
+) -> LitSamples:
+    """Return some of the samples, lit as stated for all."""
     return LitSamples(
-        kept,
-        lit[some],
-        tuple(lighting.light_on(projector, kept) for projector in projectors),
-        rings_of(projectors, kept),
+        rows.target.take(chosen),
+        lit[chosen],
+        tuple(light.take(chosen) for light in rows.lights),
+        tuple(surfaces.take(chosen) for surfaces in rows.rings),
     )
 
 
-def rings_of(
-    projectors: Sequence[PlannedProjector], target: Target
-) -> tuple[Rings, ...]:
-    """Return the ring surfaces of every projector at samples."""
-    points = target.samples.points
-    return tuple(measurability.rings_at(projector, points) for projector in projectors)
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A projector and a camera, on samples that one lights and the other sees.
+
+    Attributes:
+        projector: Its index.
+        places: Where the samples stand in the camera's view, shape (k,).
+        samples: Which of the lit samples they are, shape (k,).
+        quality: How well they are triangulated.
+        stage: Index in `CAUSES` of the first limit that fails, or `MEASURED`, (k,).
+    """
+
+    projector: int
+    places: NDArray[np.int64]
+    samples: NDArray[np.int64]
+    quality: PairQuality
+    stage: NDArray[np.int8]
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Whether no limit fails, shape (k,)."""
+        return self.stage == MEASURED
+
+
+def pairs_of(
+    limits: TriangulationLimits,
+    rows: LitSamples,
+    view: ViewedSamples,
+    *,
+    samples: NDArray[np.int64] | None = None,
+    wanted: NDArray[np.bool_] | None = None,
+    projectors: Sequence[int] | None = None,
+) -> Iterator[Pair]:
+    """Yield a camera's pair with each projector, on the samples that it sees.
+
+    Args:
+        limits: Of pairs.
+        rows: Lit samples.
+        view: How the camera sees them, or `samples` of them.
+        samples: Which of the lit samples are in view; None: all.
+        wanted: Which places of the view to look at; it is read anew for each projector
+            and may change in between. None: those that are seen.
+        projectors: Their indices; None: all.
+    """
+    if samples is None:
+        samples = np.arange(len(rows.target))
+    if wanted is None:
+        wanted = view.stage == SEEN
+    for p in range(len(rows.lights)) if projectors is None else projectors:
+        places = np.flatnonzero(rows.lit[samples, p] & wanted)
+        chosen = samples[places]
+        quality = pair_quality(
+            rows.target.samples.normals[chosen],
+            rows.lights[p].take(chosen),
+            rows.rings[p].take(chosen),
+            view.take(places),
+            limits,
+        )
+        yield Pair(p, places, chosen, quality, first_pair_failure(quality, limits))
 
 
 def measured_by(
@@ -77,6 +161,7 @@ def measured_by(
     """
     if sights is None:
         sights = camera_views(scene, cameras, rows.target)
+    limits = scene.requirements.triangulation
     measured = np.zeros((len(rows.target), len(cameras)), dtype=bool)
     for first, last in _chunks(sights):
         scene.check_cancelled()
@@ -84,7 +169,12 @@ def measured_by(
             np.arange(first, last), [len(s.rows) for s in sights[first:last]]
         )
         seen = joined_view(sights[first:last])
-        measured[seen.rows, column] = _measured(scene, seen, rows)
+        open_places = np.ones(len(seen.rows), dtype=bool)
+        for pair in pairs_of(
+            limits, rows, seen.view, samples=seen.rows, wanted=open_places
+        ):
+            open_places[pair.places[pair.measured]] = False
+        measured[seen.rows, column] = ~open_places
     return measured
 
 
@@ -100,26 +190,6 @@ def _chunks(sights: Sequence[CameraView]) -> Iterator[tuple[int, int]]:
         first = last
 
 
-def _measured(scene: Scene, sight: CameraView, rows: LitSamples) -> NDArray[np.bool_]:
-    """Return which of the samples that are seen, by whatever cameras, are measured."""
-    limits = scene.requirements.triangulation
-    normals = rows.target.samples.normals
-    measured = np.zeros(len(sight.rows), dtype=bool)
-    for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
-        pairs = np.flatnonzero(rows.lit[sight.rows, p] & ~measured)
-        own = sight.rows[pairs]
-        quality = measurability.pair_quality(
-            normals[own],
-            light.take(own),
-            rings.take(own),
-            sight.view.take(pairs),
-            limits,
-        )
-        stage = measurability.first_pair_failure(quality, limits)
-        measured[pairs[stage == measurability.MEASURED]] = True
-    return measured
-
-
 def furthest_failure(
     scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
 ) -> NDArray[np.int8]:
@@ -128,33 +198,11 @@ def furthest_failure(
     It is `MEASURED` where some pair measures the sample.
     """
     furthest = np.zeros(len(rows.target), dtype=np.int8)
-    required = scene.requirements
     for camera in cameras:
         scene.check_cancelled()
         seen = view_of(scene, camera, rows.target)
         furthest = np.maximum(furthest, seen.stage)
-        clear = np.flatnonzero(seen.stage == measurability.SEEN)
-        for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
-            pairs = clear[rows.lit[clear, p]]
-            quality = measurability.pair_quality(
-                rows.target.samples.normals[pairs],
-                light.take(pairs),
-                rings.take(pairs),
-                seen.take(pairs),
-                required.triangulation,
-            )
-            stage = measurability.first_pair_failure(quality, required.triangulation)
-            furthest[pairs] = np.maximum(furthest[pairs], stage)
+        for pair in pairs_of(scene.requirements.triangulation, rows, seen):
+            chosen = pair.samples
+            furthest[chosen] = np.maximum(furthest[chosen], pair.stage)
     return furthest
-
-
-def taken(
-    rows: LitSamples, chosen: NDArray[np.int64], lit: NDArray[np.bool_]
-) -> LitSamples:
-    """Return some of the samples, lit as stated for all."""
-    return LitSamples(
-        rows.target.take(chosen),
-        lit[chosen],
-        tuple(light.take(chosen) for light in rows.lights),
-        tuple(rings.take(chosen) for rings in rows.rings),
-    )

@@ -1,6 +1,6 @@
 """Samples of the surface with what the limits ask of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,62 @@ class Target:
     Attributes:
         samples: Where, with normals.
         steep: Unit T1, zero where arbitrary, shape (n, 3).
+        member: Index of the mesh that each lies on, shape (n,); one mesh: 0.
     """
 
     samples: SurfaceSamples
     steep: NDArray[np.float64]
+    member: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        if not len(self.member):
+            zeros = np.zeros(len(self.samples), dtype=np.int64)
+            object.__setattr__(self, "member", zeros)
 
     def __len__(self) -> int:
         return len(self.samples)
 
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "Target":
         """Return some of the samples."""
-        return Target(self.samples.take(chosen), self.steep[chosen])
+        return Target(
+            self.samples.take(chosen), self.steep[chosen], self.member[chosen]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SampleColumns:
+    """Samples, a coordinate at a time: rows of three are too short for numpy's loops.
+
+    Attributes:
+        points: In [m], shape (3, n).
+        normals: Unit normals, same shape.
+        steep: Unit T1, zero where arbitrary, same shape.
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    steep: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, target: Target) -> "SampleColumns":
+        """Return the columns of samples."""
+        samples = target.samples
+        tables = samples.points, samples.normals, target.steep
+        return cls(*(np.ascontiguousarray(table.T) for table in tables))
+
+
+def merged(first: Target, second: Target) -> Target:
+    """Return both sets of samples as one; every sample stands for the same area."""
+    a, b = first.samples, second.samples
+    total = len(a) * a.weight
+    samples = type(a)(
+        np.concatenate([a.points, b.points]),
+        np.concatenate([a.normals, b.normals]),
+        np.concatenate([a.faces, b.faces]),
+        total / (len(a) + len(b)),
+    )
+    return Target(
+        samples,
+        np.concatenate([first.steep, second.steep]),
+        np.concatenate([first.member, second.member]),
+    )

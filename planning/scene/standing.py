@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.poses import inverse, transform
 from geometry.shapes.boxes import OrientedBox, boxes_overlap, lines_cross
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -98,7 +99,9 @@ def blocked_by(
     Returns:
         Shape (n, n_bodies).
     """
-    starts = _starts(device, points)
+    pose = device.world_from_device
+    local = transform(inverse(pose), points)
+    starts = transform(pose, device.device.ray_starts(local))
     blocked = np.zeros((len(points), len(bodies)), dtype=bool)
     for column, body in enumerate(bodies):
         if not body.is_of(device):
@@ -116,11 +119,3 @@ def collide(device: Device, bodies: Sequence[Standing]) -> list[Standing]:
         for body in bodies
         if not body.is_of(device) and boxes_overlap(own, body.box)
     ]
-
-
-def _starts(device: Device, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    pose = device.world_from_device
-    if isinstance(device, PlannedProjector) and device.light == "parallel":
-        depth = (points - pose[:3, 3]) @ pose[:3, 2]
-        return points - depth[:, None] * pose[:3, 2]
-    return pose[:3, 3]

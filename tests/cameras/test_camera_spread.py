@@ -21,13 +21,10 @@ from planning.cameras.baselines.spread_problem import (
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import TriangulationLimits, Workspace
 from planning.model.zones import Box
-from planning.scene.measurability import (
-    MEASURED,
-    Rings,
-    ViewedSamples,
-    first_pair_failure,
-    pair_quality,
-)
+from planning.scene.limits.camera_limits import ViewedSamples
+from planning.scene.limits.pair_limits import MEASURED
+from planning.scene.measurability import first_pair_failure, pair_quality
+from planning.scene.patterns.code_surfaces import CodeSurfaces
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0
@@ -332,7 +329,7 @@ def test_what_rings_ask_is_what_measurability_says():
     measured = np.zeros((len(rows), 2), dtype=bool)
     for k in range(2):
         incidence = SimpleNamespace(incidence_cos=light[k, rows])
-        drawn = Rings(ring[k, rows], spacing[k, rows])
+        drawn = CodeSurfaces(ring[k, rows], spacing[k, rows])
         quality = pair_quality(normal, incidence, drawn, view, asked)
         measured[:, k] = first_pair_failure(quality, asked) == MEASURED
         measured[:, k] &= lit[rows, k]

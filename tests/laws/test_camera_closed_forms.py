@@ -25,7 +25,8 @@ from planning.cameras.baselines.coverage_triangle import (
 )
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
-from planning.scene.measurability import SEEN, view
+from planning.scene.limits.camera_limits import SEEN
+from planning.scene.measurability import view
 from planning.scene.samples import Target
 from solvers import CoverProblem, solve_cover
 

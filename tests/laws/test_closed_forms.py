@@ -21,8 +21,8 @@ from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import Effort
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
-from planning.scene.lighting import LIT, assigned_projectors
-from planning.scene.lit import lit_stages, margins_of
+from planning.scene.lighting import assigned_projectors, lit_stages, margins_of
+from planning.scene.limits.projector_limits import LIT
 from solvers.poses.cone import max_margin_direction
 
 EFFORT = Effort(finest=5, budget=3e8, shadows=0.0, most_samples=2000)

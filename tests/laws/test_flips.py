@@ -20,8 +20,9 @@ from planning import pipeline
 from planning.report import claims
 from planning.report.assemble import write_plan
 from planning.rig.rig import load_rig
-from planning.scene import measurability
 from planning.scene.measured import lit_samples, measured_by
+from planning.scene.patterns.code_surfaces import CodeSurfaces
+from planning.scene.patterns.ring_pattern import RingPattern
 from planning.verify.audit.audit import audit_plan
 
 RIG = """
@@ -147,13 +148,13 @@ def test_a_sign_flipped_in_the_ring_normal_is_seen(made, monkeypatch):
     plan, (draft, clock) = made
     samples = draft.scene.target_samples(500, 5)
     offered = draft.camera_stage.reference
-    right = measurability.rings_at
+    right = RingPattern.surfaces
 
-    def flipped(projector, points):
-        rings = right(projector, points)
-        turn = projector.world_from_ring[:3, :3]
+    def flipped(pattern, points):
+        rings = right(pattern, points)
+        turn = pattern.projector.world_from_ring[:3, :3]
         normals = (rings.normals @ turn * [1.0, 1.0, -1.0]) @ turn.T
-        return measurability.Rings(normals, rings.spacing)
+        return CodeSurfaces(normals, rings.spacing)
 
     def measured():
         lit = lit_samples(draft.scene, plan.projectors, samples)
@@ -161,12 +162,12 @@ def test_a_sign_flipped_in_the_ring_normal_is_seen(made, monkeypatch):
 
     true = measured()
     with monkeypatch.context() as patch:
-        patch.setattr(measurability, "rings_at", flipped)
+        patch.setattr(RingPattern, "surfaces", flipped)
         differs = np.abs(measured() - true)
     changed = replace(draft, cameras=(offered[np.argmax(differs)],))
     sentence = "coverage.target.measured_m2: claimed"
     found = audited(write_plan(changed, clock)).failures
     assert not any(sentence in line for line in found)
-    monkeypatch.setattr(measurability, "rings_at", flipped)
+    monkeypatch.setattr(RingPattern, "surfaces", flipped)
     found = audited(write_plan(changed, clock)).failures
     assert any(sentence in line for line in found)

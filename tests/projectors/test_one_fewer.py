@@ -18,8 +18,8 @@ from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import CandidateCover, select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
-from planning.scene import lighting
-from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.limits import projector_limits
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 
@@ -65,7 +65,7 @@ def moved(lattice, n_projectors, given=0):
         offer,
         n_projectors,
         finer=lambda: offer,
-        reached=(offer.stages == lighting.LIT).any(axis=1),
+        reached=(offer.stages == projector_limits.LIT).any(axis=1),
         stages_of=stages_of,
         given=given,
         ring_offset=OFFSET,
@@ -73,12 +73,12 @@ def moved(lattice, n_projectors, given=0):
 
 
 def test_six_caps_are_found_where_the_lattice_needs_seven(lattice):
-    lit = lattice[1].stages == lighting.LIT
+    lit = lattice[1].stages == projector_limits.LIT
     alone = select_fewest(CandidateCover(lit, 0.875))
     assert alone.needed == alone.lower_bound == 7
     found = moved(lattice, 6)
     assert found is not None
-    assert (found.stages == lighting.LIT).any(axis=1).sum() >= 1750
+    assert (found.stages == projector_limits.LIT).any(axis=1).sum() >= 1750
     axes = np.array([p.world_from_device[:3, 2] for p in found.projectors])
     apart = np.degrees(np.arccos(np.clip(axes @ axes.T, -1.0, 1.0)))
     assert np.min(apart + 360 * np.eye(6)) > 80.0
@@ -91,7 +91,7 @@ def test_what_stands_already_counts_and_is_not_offered_again(lattice):
     assert len(found.projectors) == 5
     assert all(p is not offer.projectors[0] for p in found.projectors)
     both = np.concatenate([offer.stages[:, :1], found.stages], axis=1)
-    assert (both == lighting.LIT).any(axis=1).sum() >= 1750
+    assert (both == projector_limits.LIT).any(axis=1).sum() >= 1750
 
 
 def test_what_no_poses_can_do_is_given_up(lattice):
@@ -105,7 +105,7 @@ def test_a_finer_lattice_is_asked_for_where_it_comes_near(
     # So coarse a lattice begins farther off than those that are planned with.
     monkeypatch.setattr("planning.projectors.one_fewer._SHORT", 0.1)
     scene, offer, stages_of = lattice
-    reached = (offer.stages == lighting.LIT).any(axis=1)
+    reached = (offer.stages == projector_limits.LIT).any(axis=1)
     # Six caps light 0.879 of the ball, about 1,800 of these; five light far less.
     share = 1815 / int(reached.sum())
     beyond = replace(scene.requirements, dominant_coverage=share)
@@ -128,7 +128,7 @@ def test_what_any_known_pose_reaches_is_asked_for(lattice):
     scene, offer, stages_of = lattice
     # One pose reaches what it lights, and 0.875 of that is lit by it alone.
     one = offer.take(np.arange(1))
-    lit = (one.stages == lighting.LIT).any(axis=1)
+    lit = (one.stages == projector_limits.LIT).any(axis=1)
     for reached, enough in ((lit, True), (np.ones_like(lit), False)):
         found = one_fewer(
             scene,
@@ -148,7 +148,7 @@ def test_margins_grow_between_the_poses_of_a_lattice(lattice):
     rows = scene.target_samples(2000, 100)
 
     def margins(projectors):
-        lit = lit_stages(scene, projectors, rows) == lighting.LIT
+        lit = lit_stages(scene, projectors, rows) == projector_limits.LIT
         return lit_margins(scene, projectors, rows, lit)
 
     start = offer.projectors[:3]

@@ -15,8 +15,8 @@ from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
-from planning.scene import lighting
-from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.limits import projector_limits
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 
@@ -61,7 +61,7 @@ def shaded():
 
 
 def margins(scene, stage, projectors):
-    lit = lit_stages(scene, projectors, stage.rows) == lighting.LIT
+    lit = lit_stages(scene, projectors, stage.rows) == projector_limits.LIT
     return lit_margins(scene, projectors, stage.rows, lit)
 
 
@@ -100,7 +100,7 @@ def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     moved = widen_margins(scene, stage)
     before = margins(scene, stage, stage.projectors)
     after = margins(scene, stage, moved)
-    reached = (stage.stages == lighting.LIT).any(axis=1)
+    reached = (stage.stages == projector_limits.LIT).any(axis=1)
     beyond = np.isfinite(after[~reached]).sum(axis=0)
     assert np.all(beyond <= 0.002 * reached.sum())
     share = int(np.ceil(0.85 * reached.sum()))

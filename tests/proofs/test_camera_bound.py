@@ -28,9 +28,10 @@ from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
-from planning.scene.lighting import LightOnSamples
-from planning.scene.measurability import Rings
+from planning.scene.lights import LightOnSamples
+from planning.scene.limits import camera_limits, pair_limits
 from planning.scene.measured import LitSamples, lit_samples
+from planning.scene.patterns.code_surfaces import CodeSurfaces
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
@@ -92,9 +93,9 @@ def everything_lit(scene, n):
     normals, one = target.samples.normals, np.ones(n)
     across = np.cross(normals, [0.3, 0.5, 0.8])
     across /= np.linalg.norm(across, axis=1)[:, None]
-    light = LightOnSamples(-normals, one, one, 0.0 * one, 0.1 * one)
+    light = LightOnSamples(-normals, one, one, 0.0 * one)
     lit = np.ones((n, 1), dtype=bool)
-    return LitSamples(target, lit, (light,), (Rings(across, 0.01 * one),))
+    return LitSamples(target, lit, (light,), (CodeSurfaces(across, 0.01 * one),))
 
 
 FREE = {"min_conditioning": 0.0, "max_sigma_m": None, "min_ring_pitch_px": None}
@@ -268,7 +269,7 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, name):
     m /= np.linalg.norm(m, axis=1)[:, None]
     spacing, cosine = rng.uniform(1e-3, 6e-3, n), rng.uniform(0.5, 1.0, n)
     light = replace(rows.lights[0], incidence_cos=cosine)
-    rows = replace(rows, lights=(light,), rings=(Rings(m, spacing),))
+    rows = replace(rows, lights=(light,), rings=(CodeSurfaces(m, spacing),))
     required = scene_of(sphere(0.1), limits=FREE | {limit: value}).requirements
     normals = rows.target.samples.normals
     towards = _turned_by(normals, np.radians(rng.uniform(0, 85, n)), rng)
@@ -319,8 +320,8 @@ def _exact(rows, position, device, required):
             rows.target.samples.normals, light, rings, seen, required.triangulation
         )
         passed = measurability.first_pair_failure(quality, required.triangulation)
-        every |= rows.lit[:, p] & (passed == measurability.MEASURED)
-    return every & (seen.stage == measurability.SEEN)
+        every |= rows.lit[:, p] & (passed == pair_limits.MEASURED)
+    return every & (seen.stage == camera_limits.SEEN)
 
 
 # ---- what holds for a whole image

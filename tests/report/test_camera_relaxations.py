@@ -32,7 +32,7 @@ from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
 from planning.rig.rig import load_rig
 from planning.scene.camera_views import CandidateViews
-from planning.scene.measurability import CAUSES, MEASURED
+from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import furthest_failure, lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses

@@ -13,7 +13,7 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.rig import load_rig
-from planning.scene.lighting import LIT
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.scene import Scene
 
 

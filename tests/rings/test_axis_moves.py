@@ -25,8 +25,10 @@ from planning.rings.axis_moves import (
 )
 from planning.rings.ring_radii import ring_axis, ring_frame_of_axis, uniform_radii
 from planning.scene import measurability
-from planning.scene.lighting import ring_coordinate
+from planning.scene.limits import camera_limits
 from planning.scene.measured import lit_samples, measured_by
+from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns.ring_pattern import ring_coordinate
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores
@@ -223,7 +225,7 @@ def test_the_program_scores_pairs_as_the_exact_predicate_does(ball):
     scores = pair_scores(program, program.start)
     lit = np.flatnonzero(rows.lit[:, 1])
     chosen = lit[:: -(-len(lit) // len(program.points))]
-    seen = np.stack([v.stage[chosen] == measurability.SEEN for v in views], axis=1)
+    seen = np.stack([v.stage[chosen] == camera_limits.SEEN for v in views], axis=1)
     assert np.array_equal(scores > 0.0, seen)
     assert 100 < seen.sum() < seen.size
     samples = rows.target.samples.take(chosen)
@@ -231,7 +233,7 @@ def test_the_program_scores_pairs_as_the_exact_predicate_does(ball):
         quality = measurability.pair_quality(
             samples.normals,
             rows.lights[1].take(chosen),
-            measurability.rings_at(fine[1], samples.points),
+            code_surfaces(fine[1], samples.points),
             view.take(chosen),
             limits,
         )
@@ -265,7 +267,7 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
         assert np.array_equal(new.world_from_ring, expected.world_from_ring)
     points = followed.stage.rows.target.samples.points
     for p, rings in zip(followed.projectors, followed.stage.rows.rings, strict=True):
-        own = measurability.rings_at(p, points)
+        own = code_surfaces(p, points)
         assert np.array_equal(own.normals, rings.normals)
     count = len(cover.cameras)
     assert followed.stage.certificate["count"] == count

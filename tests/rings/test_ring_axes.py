@@ -16,8 +16,9 @@ from planning.report.claims import Devices, make_claims
 from planning.rig.rig import load_rig
 from planning.rings.ring_axes import turn_ring_axes, widest_gap
 from planning.rings.ring_radii import uniform_radii
-from planning.scene.lit import lit_stages, margins_of, merged
+from planning.scene.lighting import lit_stages, margins_of
 from planning.scene.measured import lit_samples, measured_by
+from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
 RADIUS = 0.1

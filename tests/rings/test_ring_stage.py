@@ -22,8 +22,8 @@ from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
-from planning.scene.measurability import rings_at
 from planning.scene.measured import lit_samples, measured_by
+from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.scene import Scene
 
 RADIUS = 0.1
@@ -125,7 +125,7 @@ def test_gaps_on_lit_samples_lie_between_their_limits(bench, spaced):
     final = spaced.projectors[0]
     rows = lit_samples(scene, [even], scene.target_samples(4000, 78))
     points = rows.target.samples.points
-    gap, before = (rings_at(p, points).spacing for p in (final, even))
+    gap, before = (code_surfaces(p, points).spacing for p in (final, even))
     assert np.all(gap <= before * (1.0 + 1e-9))
     assert gap.min() < 0.8 * before.min()
     target = scene.target_samples(4000, 79)

@@ -41,7 +41,8 @@ from planning.scene.clearance import (
     check_existing_clearance,
     lacks_clearance,
 )
-from planning.scene.lit import lit_stages
+from planning.scene.lighting import lit_stages
+from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.scene.standing import bodies_of
@@ -197,9 +198,9 @@ def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
     dark = np.all((points[:, :2] > low) & (points[:, :2] < high), axis=1)
     area = np.prod(high - low)
     assert target.samples.weight * dark.sum() == pytest.approx(area, rel=0.15)
-    assert np.all(lit_stages(scene, [lamp], target)[:, 0] == lighting.LIT)
+    assert np.all(lit_stages(scene, [lamp], target)[:, 0] == projector_limits.LIT)
     among = scene.among([lamp, eye])
-    expected = np.where(dark, lighting.BLOCKED, lighting.LIT)
+    expected = np.where(dark, projector_limits.BLOCKED, projector_limits.LIT)
     assert np.array_equal(lit_stages(among, [lamp], target)[:, 0], expected)
     single = lighting.first_failure(
         lamp,
@@ -243,7 +244,7 @@ def test_a_body_before_a_camera_hides_the_same_rectangle_but_never_its_own(scene
         blind, target, limits, scene.visibility, among.standing
     ).stage
     assert np.array_equal(
-        stage, np.where(dark, measurability.BLOCKED, measurability.SEEN)
+        stage, np.where(dark, camera_limits.BLOCKED, camera_limits.SEEN)
     )
     over, own = camera_views(among, [blind, eye], target)
     assert np.array_equal(over.rows, np.flatnonzero(~dark))

@@ -15,7 +15,7 @@ from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
-from planning.scene.lighting import CAUSES, LIT
+from planning.scene.limits.projector_limits import CAUSES, LIT
 from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])

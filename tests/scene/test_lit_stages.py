@@ -16,8 +16,11 @@ from planning.report.claims import Devices, _reachable_by_projectors
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
-from planning.scene.lit import lit_stages
-from planning.scene.open_stages import SampleColumns, open_stages
+from planning.scene.lighting import lit_stages
+from planning.scene.lights import light_on
+from planning.scene.limits import projector_limits
+from planning.scene.patterns.ring_pattern import ring_coordinate
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 
@@ -50,23 +53,23 @@ def test_candidates_together_light_what_each_lights_alone(light):
     ]
     together = lit_stages(scene, offered, rows)
     np.testing.assert_array_equal(together, np.column_stack(alone))
-    assert (together == lighting.OCCLUDED).sum() > 300
-    assert (together == lighting.LIT).sum() > 300
-    away = np.column_stack([lighting.faces_away(one, rows) for one in offered])
-    assert together[away].max() == lighting.INCIDENCE
+    assert (together == projector_limits.OCCLUDED).sum() > 300
+    assert (together == projector_limits.LIT).sum() > 300
+    away = np.column_stack([lighting.shows_back(one, rows) for one in offered])
+    assert together[away].max() == projector_limits.INCIDENCE
     assert away.mean() > 0.4
     # Of few poses, so that some samples stay dark for each reason.
     few = together[:, 20:26]
     nothing = np.zeros(len(rows), dtype=bool)
     devices = Devices((), (), tuple(offered[20:26]), ())
     reachable, furthest = _reachable_by_projectors(scene, devices, rows, nothing)
-    np.testing.assert_array_equal(reachable, (few == lighting.LIT).any(axis=1))
+    np.testing.assert_array_equal(reachable, (few == projector_limits.LIT).any(axis=1))
     np.testing.assert_array_equal(furthest, few.max(axis=1))
     assert len(np.unique(furthest)) >= 3
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])
-def test_the_quick_way_says_what_one_projector_alone_is_told(light):
+def test_the_first_limit_that_fails_follows_from_the_rays(light):
     """Turned rings, a round beam, a lens that distorts, steep directions: all limits.
 
     Points lie on all sides of the device and beyond its range.
@@ -100,10 +103,20 @@ def test_the_quick_way_says_what_one_projector_alone_is_told(light):
         one = PlannedProjector("", light, pose, pose @ turn, device, radii)
         points = transform(pose, local)
         samples = SurfaceSamples(points, normals, np.arange(n), 1.0 / n)
-        target = lighting.Target(samples, steep)
-        found = open_stages(one, SampleColumns.of(target), limits)
-        expected = lighting.first_failure_ignoring_occlusion(one, target, limits)
+        target = Target(samples, steep)
+        found = lighting.first_failure(one, target, limits, None)
+        ray = light_on(one, target)
+        inside = ring_coordinate(one, points) <= radii[-1]
+        holds = (
+            inside & lighting.in_panel(one, points),
+            (ray.distances >= 0.05) & (ray.distances <= 0.3),
+            ray.incidence_cos >= np.cos(limits.max_incidence),
+            ray.tangent_cos <= np.cos(limits.min_tangent_angle),
+            np.zeros(n, dtype=bool),
+        )
+        expected = np.argmin(holds, axis=0)
+        expected[np.all(holds[:4], axis=0)] = projector_limits.LIT
         np.testing.assert_array_equal(found, expected)
         seen.append(found)
-    kinds = np.bincount(np.concatenate(seen), minlength=lighting.LIT + 1)
-    assert (kinds[[0, 1, 2, 3, lighting.LIT]] > 50).all()
+    kinds = np.bincount(np.concatenate(seen), minlength=projector_limits.LIT + 1)
+    assert (kinds[[0, 1, 2, 3, projector_limits.LIT]] > 50).all()

@@ -10,6 +10,8 @@ from geometry.poses import inverse, look_at, transform
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
+from planning.scene.limits import camera_limits, pair_limits
+from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -63,7 +65,7 @@ def ring_value(source, point):
 
 def pair(source, camera, target):
     light = lighting.light_on(source, target)
-    rings = measurability.rings_at(source, target.samples.points)
+    rings = code_surfaces(source, target.samples.points)
     seen = measurability.view(camera, target, CameraLimits(np.radians(80)), None)
     return (
         measurability.pair_quality(target.samples.normals, light, rings, seen, LIMITS),
@@ -144,7 +146,7 @@ def test_pitch_is_the_distance_of_the_next_ring_in_the_image(
 def test_ring_normal_is_the_gradient_and_spacing_the_gap_over_its_length(light):
     source = projector(light, [0.05, -1.1, 0.1])
     point = np.array([0.11, 0.02, -0.07])
-    rings = measurability.rings_at(source, point[None])
+    rings = code_surfaces(source, point[None])
     step = 1e-6
     gradient = np.array(
         [
@@ -178,18 +180,20 @@ def test_a_camera_on_the_thales_circle_is_blind():
     quality, _, _ = pair(source, camera, one_sample(on_circle, [0.0, -1.0, 0.0]))
     assert quality.conditioning[0] < 1e-12
     stage = measurability.first_pair_failure(quality, LIMITS)
-    assert measurability.CAUSES[stage[0]] == "conditioning"
+    assert pair_limits.CAUSES[stage[0]] == "conditioning"
 
 
 def test_the_first_limit_that_fails_is_named_in_order():
-    quality = measurability.PairQuality(
+    quality = pair_limits.PairQuality(
         np.array([0.05, 0.5, 0.5, 0.5, np.nan]),
         np.array([9.0, 9.0, 1e-4, 1e-4, 1e-4]),
         np.array([0.1, 0.1, 0.1, 9.0, 9.0]),
+        None,
+        None,
     )
     limits = TriangulationLimits(0.1, 0.1, max_sigma_m=1e-3, min_ring_pitch_px=6.0)
     stage = measurability.first_pair_failure(quality, limits)
-    names = [*measurability.CAUSES, "measured"]
+    names = [*pair_limits.CAUSES, "measured"]
     assert [names[i] for i in stage] == [
         "conditioning",
         "sigma",
@@ -208,7 +212,7 @@ def test_view_names_the_first_limit_that_fails():
     target = Target(samples, np.zeros((5, 3)))
     limits = CameraLimits(np.radians(70), max_sample_distance_m=0.0005)
     stage = measurability.view(camera, target, limits, None).stage
-    names = [*measurability.SEEN_CAUSES, "seen"]
+    names = [*camera_limits.SEEN_CAUSES, "seen"]
     assert [names[i] for i in stage] == [
         "camera_field",
         "camera_range",

@@ -26,8 +26,8 @@ from planning.proofs.projector_bound import Effort
 from planning.report.advice.wider_field import wider_field
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
-from planning.scene.lighting import LIT
-from planning.scene.lit import lit_margins, lit_stages
+from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
 from planning.verify.audit.devices.device_claims import outside_by

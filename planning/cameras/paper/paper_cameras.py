@@ -29,8 +29,8 @@ from planning.proofs.selection import Selection, required_samples
 from planning.scene.camera_views import CandidateViews
 from planning.scene.clearance import with_clearance
 from planning.scene.existing import movable
-from planning.scene.lit import merged
 from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
+from planning.scene.samples import merged
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import cameras_towards, middle_radius_m
 from solvers import solve_cover

@@ -14,7 +14,9 @@ from geometry.poses import inverse, transform
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import measurability
-from planning.scene.measurability import CAUSES, SEEN, ViewedSamples
+from planning.scene.limits import camera_limits, pair_limits
+from planning.scene.limits.camera_limits import SEEN, ViewedSamples
+from planning.scene.limits.pair_limits import CAUSES
 from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
 
@@ -102,9 +104,7 @@ class _Sight:
     off_axis: NDArray[np.float64]
     sample_distance: NDArray[np.float64]
 
-    def pairs(
-        self, own: NDArray[np.int64], quality: measurability.PairQuality
-    ) -> Pairs:
+    def pairs(self, own: NDArray[np.int64], quality: pair_limits.PairQuality) -> Pairs:
         """Return a pair on some samples, of which the quality is given."""
         return Pairs(
             self.view.distances[own],
@@ -133,7 +133,7 @@ def _sight(scene: Scene, camera: PlannedCamera, rows: LitSamples) -> _Sight:
         ]
     )
     stage = np.where(failed[3], np.int8(_COARSE), np.int8(SEEN))
-    between = np.isin(view.stage, (_OCCLUDED, measurability.BLOCKED))
+    between = np.isin(view.stage, (_OCCLUDED, camera_limits.BLOCKED))
     np.copyto(stage, view.stage, where=between)
     for index in (2, 1, 0):
         stage[failed[index]] = index
@@ -144,7 +144,7 @@ def _sight(scene: Scene, camera: PlannedCamera, rows: LitSamples) -> _Sight:
 
 
 def _failed(
-    quality: measurability.PairQuality, limits: TriangulationLimits
+    quality: pair_limits.PairQuality, limits: TriangulationLimits
 ) -> NDArray[np.bool_]:
     """Whether |r.m|, s_N and pitch fail, each by itself, shape (3, n)."""
     largest, least = limits.max_sigma_m, limits.min_ring_pitch_px

@@ -17,7 +17,7 @@ from planning.rig import optics
 from planning.rig.rig import Rig
 from planning.rig.rig_tables import PinholeTable
 from planning.rings.ring_radii import ring_gap
-from planning.scene.measurability import CAUSES
+from planning.scene.limits.pair_limits import CAUSES
 
 _Array = NDArray[np.float64]
 

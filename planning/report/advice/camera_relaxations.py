@@ -19,9 +19,9 @@ from planning.model.planned import PlannedCamera
 from planning.proofs.selection import cover_problem, required_samples
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
-from planning.scene import lighting
-from planning.scene.lit import lit_stages
-from planning.scene.measurability import CAUSES, MEASURED
+from planning.scene.lighting import lit_stages
+from planning.scene.limits import projector_limits
+from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import camera_candidates
@@ -66,7 +66,9 @@ def out_of_reach(
     among = scene.among(devices.projectors)
     target = claims.target_samples
     planned = scene.among((*devices.projectors, *devices.cameras))
-    lit = np.any(lit_stages(planned, devices.projectors, target) == lighting.LIT, 1)
+    lit = np.any(
+        lit_stages(planned, devices.projectors, target) == projector_limits.LIT, 1
+    )
     missed = target.take(lit & ~claims.measured_by.any(axis=1))
     rows = lit_samples(planned, devices.projectors, missed)
     table = _Least(knobs(rig, scene.requirements), len(rows.target))

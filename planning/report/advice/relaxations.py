@@ -18,7 +18,7 @@ from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.projectors.projector_stage import NothingLitError
 from planning.scene import lighting
-from planning.scene.lighting import LIT
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates

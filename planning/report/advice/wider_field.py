@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.selection import cover_problem, required_samples
-from planning.scene.lighting import LIT
-from planning.scene.lit import lit_stages
+from planning.scene.lighting import lit_stages
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 from planning.scene.workspace.view_tiles import Site

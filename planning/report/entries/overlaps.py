@@ -25,7 +25,8 @@ from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.claims import N_SAMPLES
 from planning.scene import lighting
-from planning.scene.lighting import LIT
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.patterns.pattern import pattern_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -79,12 +80,10 @@ def light_falls(
 ) -> NDArray[np.bool_]:
     """Return on which samples any light of a projector falls, shape (n,)."""
     anywhere = replace(projector.device, range_m=(0.0, np.inf))
-    radii = projector.ring_radii
-    drawn = np.append(radii, radii[-1] + np.diff(radii, prepend=0.0)[-1])
     # No steep direction: along it, light is poor, but it is light.
     plain = replace(target, steep=np.zeros_like(target.steep))
     stages = lighting.first_failure(
-        replace(projector, device=anywhere, ring_radii=drawn),
+        replace(pattern_of(projector).with_border(), device=anywhere),
         plain,
         _ANY_LIGHT,
         scene.visibility,

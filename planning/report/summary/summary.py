@@ -190,19 +190,7 @@ def aim_angles(
 
 
 def _middle(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
-    pose = device.world_from_device
-    if isinstance(device, PlannedProjector) and device.light == "parallel":
-        return pose[:3, 2]
-    width, height = device.device.resolution
-    k = device.device.camera_matrix  # type: ignore[union-attr]
-    ray = np.array(
-        [
-            ((width - 1) / 2 - k[0, 2]) / k[0, 0],
-            ((height - 1) / 2 - k[1, 2]) / k[1, 1],
-            1.0,
-        ]
-    )
-    return pose[:3, :3] @ (ray / np.linalg.norm(ray))
+    return device.world_from_device[:3, :3] @ device.device.middle_ray
 
 
 def _proofs(plan: RigPlan) -> str:

@@ -1,0 +1,263 @@
+"""The two kinds of light, and all that differs between them for the planner.
+
+Diverging light starts at the optical centre; its rings are cones R = tan(angle to the
+ring axis). Parallel light starts all over the panel and runs along the device's +z; its
+rings are cylinders of radius R in [m]. A light belongs to a projector's optics and
+holds no pose.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import DeviceModel, ParallelModel, PinholeModel
+from geometry.lengths import lengths
+from planning.model.planned import PlannedProjector
+
+from .samples import Target
+
+_Array = NDArray[np.float64]
+_Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class RingSurface:
+    """Ring surfaces through n points of the ring frame.
+
+    Attributes:
+        coordinate: R, tangent (diverging) or radius in [m] (parallel), shape (n,).
+        normals: m, unit normals in the ring frame, shape (n, 3).
+        stretch: Spacing along m for a gap of 1 in R, shape (n,).
+    """
+
+    coordinate: _Array
+    normals: _Array
+    stretch: _Array
+
+
+class Light(Protocol):
+    """What a projector sends out: one class for each kind of light."""
+
+    def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
+        """Return unit directions L, (n, 3), and how far points (n, 3) are, (n,) [m].
+
+        That is |P - Q| in diverging light, z in parallel light.
+        """
+        ...
+
+    def cosines(
+        self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
+    ) -> tuple[_Array, _Array, _Array]:
+        """Return what `rays` says of distances, then -N.L and |T1.L|, shape (n,) each.
+
+        Offsets P - Q, N and T1 are columns, (3, n): as rows they are slow to handle.
+        """
+        ...
+
+    def common_direction(self, poses: _Array) -> _Array | None:
+        """Return L where it doesn't depend on the point, (..., 3); else None."""
+        ...
+
+    def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
+        """Return which samples surely show the light their back, shape (n,).
+
+        N.(Q - P) < 0, or N.L > 0 in parallel light, by more than rounding.
+        """
+        ...
+
+    def within_ring(self, local: _Array, ring: float) -> _Mask:
+        """Return which columns of the ring frame, (3, n), lie in a ring, shape (n,)."""
+        ...
+
+    def ring_coordinate(self, local: _Array) -> _Array:
+        """Return R at points (n, 3) of the ring frame, (n,); inf behind the light."""
+        ...
+
+    def ring_surface(self, local: _Array) -> RingSurface:
+        """Return the ring surfaces through points of the ring frame, (n, 3)."""
+        ...
+
+    def ring_rays(self, frame: _Array, flat: _Array) -> tuple[_Array, _Array]:
+        """Return the rays at ring coordinates (n, 2), in the world.
+
+        Origins in [m], (3,) in diverging light, else (n, 3); unit directions, (n, 3).
+        """
+        ...
+
+    def off_axis(self, local: _Array) -> _Array:
+        """Return how far off the middle points (n, 3) of the device frame are, (n,).
+
+        In degrees, or in parallel light in [mm].
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class DivergingLight:
+    """Light from one point, through a lens."""
+
+    device: PinholeModel
+
+    def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
+        """Return (P - Q) / |P - Q| and |P - Q|."""
+        offsets = points - pose[:3, 3]
+        distances = lengths(offsets)
+        return offsets / np.where(distances > 0, distances, 1.0)[:, None], distances
+
+    def cosines(
+        self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
+    ) -> tuple[_Array, _Array, _Array]:
+        """Return |P - Q|, -N.L and |T1.L|, as `Light.cosines` says."""
+        distances = np.sqrt(_dots(offsets, offsets))
+        apart = np.where(distances > 0.0, distances, 1.0)
+        incidence = _dots(normals, offsets) / -apart
+        return distances, incidence, np.abs(_dots(steep, offsets)) / apart
+
+    def common_direction(self, poses: _Array) -> None:
+        """Return None: each point has a direction of its own."""
+
+    def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
+        """Return where N.(P - Q) > 0 by more than rounding."""
+        offsets = points - pose[:3, 3]
+        behind = np.einsum("ij,ij->i", normals, offsets)
+        return behind > 1e-9 * np.abs(offsets).max(axis=0, initial=0.0).sum()
+
+    def within_ring(self, local: _Array, ring: float) -> _Mask:
+        """Return which points lie in the cone R <= ring."""
+        x, y, z = local
+        return (x * x + y * y <= (ring * z) ** 2) & (z > 0.0)
+
+    def ring_coordinate(self, local: _Array) -> _Array:
+        """Return R = rho / z; inf behind the light."""
+        rho, z = np.hypot(local[:, 0], local[:, 1]), local[:, 2]
+        return np.divide(rho, z, out=np.full_like(rho, np.inf), where=z > 0)
+
+    def ring_surface(self, local: _Array) -> RingSurface:
+        """Return cones: m = (x/rho, y/rho, -R)/sqrt(1 + R^2), h = z gap/sqrt(1+R^2)."""
+        rho, radial = _radial(local)
+        depth = np.maximum(local[:, 2], 1e-12)
+        slope = rho / depth
+        scale = np.sqrt(1.0 + slope**2)
+        normals = np.column_stack([radial, -slope]) / scale[:, None]
+        return RingSurface(slope, normals, depth / scale)
+
+    def ring_rays(self, frame: _Array, flat: _Array) -> tuple[_Array, _Array]:
+        """Return the apex, and rays through the plane at depth one."""
+        local = np.column_stack([flat, np.ones(len(flat))])
+        local /= np.linalg.norm(local, axis=1, keepdims=True)
+        return frame[:3, 3], local @ frame[:3, :3].T
+
+    def off_axis(self, local: _Array) -> _Array:
+        """Return the angle to the ray of the image's middle [deg]."""
+        along = local @ self.device.middle_ray / np.linalg.norm(local, axis=1)
+        return np.degrees(np.arccos(np.clip(along, -1.0, 1.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class ParallelLight:
+    """The paper's ideal beam, along the device's +z."""
+
+    device: ParallelModel
+
+    def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
+        """Return +z of the device, and depths z."""
+        directions = np.broadcast_to(pose[:3, 2], points.shape)
+        return directions, (points - pose[:3, 3]) @ pose[:3, 2]
+
+    def cosines(
+        self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
+    ) -> tuple[_Array, _Array, _Array]:
+        """Return z, -N.L and |T1.L|, as `Light.cosines` says."""
+        along = pose[:3, 2]
+        return along @ offsets, -(along @ normals), np.abs(along @ steep)
+
+    def common_direction(self, poses: _Array) -> _Array:
+        """Return +z of the devices."""
+        return poses[..., :3, 2]
+
+    def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
+        """Return where N.L > 0 by more than rounding."""
+        return normals @ pose[:3, 2] > 1e-9
+
+    def within_ring(self, local: _Array, ring: float) -> _Mask:
+        """Return which points lie in the cylinder R <= ring."""
+        x, y, _ = local
+        return x * x + y * y <= ring * ring
+
+    def ring_coordinate(self, local: _Array) -> _Array:
+        """Return R = rho."""
+        return np.hypot(local[:, 0], local[:, 1])
+
+    def ring_surface(self, local: _Array) -> RingSurface:
+        """Return cylinders: m = (x/rho, y/rho, 0), h = gap."""
+        rho, radial = _radial(local)
+        flat = np.column_stack([radial, np.zeros_like(rho)])
+        return RingSurface(rho, flat, np.ones_like(rho))
+
+    def ring_rays(self, frame: _Array, flat: _Array) -> tuple[_Array, _Array]:
+        """Return places on the panel's plane, and the beam's direction."""
+        origins = frame[:3, 3] + flat @ frame[:3, :2].T
+        return origins, np.tile(frame[:3, 2], (len(flat), 1))
+
+    def off_axis(self, local: _Array) -> _Array:
+        """Return the distance from the beam's axis [mm]."""
+        return 1e3 * np.hypot(local[:, 0], local[:, 1])
+
+
+def light_of(device: DeviceModel) -> Light:
+    """Return the light of a projector's optics."""
+    if isinstance(device, ParallelModel):
+        return ParallelLight(device)
+    return DivergingLight(device)
+
+
+@dataclass(frozen=True, eq=False)
+class LightOnSamples:
+    """One projector's light on n samples, before occlusion.
+
+    Attributes:
+        directions: Unit L(P), shape (n, 3).
+        distances: |P - Q| (diverging) or z (parallel) in [m], shape (n,).
+        incidence_cos: -N.L, shape (n,).
+        tangent_cos: |T1.L|, 0 where T1 is arbitrary, shape (n,).
+    """
+
+    directions: _Array
+    distances: _Array
+    incidence_cos: _Array
+    tangent_cos: _Array
+
+    def take(self, chosen: NDArray[np.int64]) -> "LightOnSamples":
+        """Return the light on some of the samples."""
+        return LightOnSamples(
+            self.directions[chosen],
+            self.distances[chosen],
+            self.incidence_cos[chosen],
+            self.tangent_cos[chosen],
+        )
+
+
+def light_on(projector: PlannedProjector, target: Target) -> LightOnSamples:
+    """Return the light of a projector at samples, wherever they are."""
+    points, normals = target.samples.points, target.samples.normals
+    light = light_of(projector.device)
+    directions, distances = light.rays(projector.world_from_device, points)
+    return LightOnSamples(
+        directions,
+        distances,
+        -np.einsum("ij,ij->i", normals, directions),
+        np.abs(np.einsum("ij,ij->i", target.steep, directions)),
+    )
+
+
+def _radial(local: _Array) -> tuple[_Array, _Array]:
+    """Return rho and the unit vector across the ring axis, (n,) and (n, 2)."""
+    rho = np.hypot(local[:, 0], local[:, 1])
+    return rho, local[:, :2] / np.maximum(rho, 1e-12)[:, None]
+
+
+def _dots(a: _Array, b: _Array) -> _Array:
+    """Return the scalar products of columns (3, n), shape (n,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

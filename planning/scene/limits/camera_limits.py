@@ -1,0 +1,294 @@
+"""When a camera sees a sample."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
+from geometry.lengths import lengths
+from geometry.poses import inverse, transform
+from planning.model.planned import PlannedCamera
+from planning.model.requirements import CameraLimits
+from planning.scene.samples import Target
+
+from .limit import (
+    STEEPEST,
+    Array,
+    InBetween,
+    Limit,
+    Mask,
+    Relaxation,
+    RigFacts,
+    causes,
+    degrees,
+    range_ends,
+    to_digits,
+    to_step,
+    widened,
+)
+
+# Products of a few cosines and lengths are exact to this.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CameraRays:
+    """How a camera stands to n samples.
+
+    Attributes:
+        device: Its optics.
+        local: Samples in its frame [m], shape (n, 3).
+        rays: Unit viewing rays r in the world, shape (n, 3).
+        distances: t in [m], shape (n,).
+        facing: -N.r, shape (n,).
+    """
+
+    device: PinholeModel
+    local: Array
+    rays: Array
+    distances: Array
+    facing: Array
+
+    @classmethod
+    def of(cls, camera: PlannedCamera, target: Target) -> "CameraRays":
+        """Return how a camera stands to samples."""
+        points, normals = target.samples.points, target.samples.normals
+        pose = camera.world_from_device
+        offsets = points - pose[:3, 3]
+        distances = lengths(offsets)
+        rays = offsets / np.where(distances > 0, distances, 1.0)[:, None]
+        facing = -np.einsum("ij,ij->i", normals, rays)
+        local = transform(inverse(pose), points)
+        return cls(camera.device, local, rays, distances, facing)
+
+    def take(self, chosen: NDArray[np.int64]) -> "CameraRays":
+        """Return some of the samples."""
+        return CameraRays(
+            self.device,
+            self.local[chosen],
+            self.rays[chosen],
+            self.distances[chosen],
+            self.facing[chosen],
+        )
+
+    @property
+    def sample_distance(self) -> Array:
+        """Z / (f cos(incidence)), what a pixel covers of the surface [m], (n,)."""
+        depth, focal = self.local[:, 2], self.device.focal_px
+        return depth / (focal * np.maximum(self.facing, 1e-9))
+
+
+@dataclass(frozen=True, eq=False)
+class ViewedSamples:
+    """One camera's view of n samples.
+
+    Attributes:
+        stage: Index in `SEEN_CAUSES` of the first limit that fails, `SEEN` if none.
+        rays: Unit viewing rays r, shape (n, 3).
+        distances: t in [m], shape (n,).
+        facing: -N.r, shape (n,).
+        jacobian: J_r in the world in [1/px], shape (n, 3, 2); 0 where a limit fails.
+    """
+
+    stage: NDArray[np.int8]
+    rays: Array
+    distances: Array
+    facing: Array
+    jacobian: Array
+
+    def take(self, chosen: NDArray[np.int64]) -> "ViewedSamples":
+        """Return the view of some of the samples."""
+        return ViewedSamples(
+            self.stage[chosen],
+            self.rays[chosen],
+            self.distances[chosen],
+            self.facing[chosen],
+            self.jacobian[chosen],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CellView:
+    """The best a camera anywhere in a cell of poses may have of k samples.
+
+    Attributes:
+        facing: -N.r at most, shape (k,).
+        least_depth: z at least, wherever in the image a sample appears [m], (k,).
+        focal_px: f.
+    """
+
+    facing: Array
+    least_depth: Array
+    focal_px: float
+
+
+class CameraLimit(Limit[CameraRays, CellView, CameraLimits]):
+    """A limit of cameras; its cells are `CellView`."""
+
+
+class CameraField(CameraLimit):
+    """Within the image."""
+
+    name = "camera_field"
+    words = "outside the image of every camera"
+
+    def holds(self, view: CameraRays, rules: CameraLimits) -> Mask:
+        """Return which samples appear in the image."""
+        return view.device.in_field(view.local)
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return an image that reaches farther, up to three times as wide."""
+        return (
+            Relaxation(
+                self.name,
+                _off_axis,
+                to_step(1.0),
+                lambda value: (
+                    f"a camera image that reaches {value:.0f} degrees off its middle "
+                    f"on every side"
+                ),
+            ),
+        )
+
+
+class CameraRange(CameraLimit):
+    """Within the depth of field."""
+
+    name = "camera_range"
+    words = "out of the cameras' depth of field"
+
+    def holds(self, view: CameraRays, rules: CameraLimits) -> Mask:
+        """Return which samples are sharp."""
+        low, high = view.device.range_m
+        return (view.distances >= low) & (view.distances <= high)
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return the blur that is let pass where it sets the range; else its ends."""
+        sharp, focus = facts.device.range_m, facts.focus
+        if focus is None:
+            return range_ends(self.name, "camera", sharp, sharp)
+        allowed = focus.allowed_m
+
+        def ask(view: CameraRays) -> Array:
+            away = view.distances
+            inside = (away >= allowed[0]) & (away <= allowed[1])
+            return np.where(inside, focus.circle_px(away), np.inf)
+
+        def say(value: float) -> str:
+            stopped = focus.f_number * value / focus.blur_px
+            return (
+                f"camera.focus.blur_px = {value:.3g} (now {focus.blur_px:g}) or "
+                f"camera.focus.f_number = {to_digits(3)(np.array(stopped)):.3g} "
+                f"(now {focus.f_number:g})"
+            )
+
+        blur = Relaxation(self.name, ask, to_digits(3), say)
+        # Ends that the focus sets move only with it.
+        return (blur, *range_ends(self.name, "camera", allowed, sharp))
+
+
+class CameraIncidence(CameraLimit):
+    """-N.r >= cos(max_incidence)."""
+
+    name = "camera_incidence"
+    words = "seen at too large an angle"
+
+    def holds(self, view: CameraRays, rules: CameraLimits) -> Mask:
+        """Return which samples face the camera."""
+        return view.facing >= np.cos(rules.max_incidence)
+
+    def may_hold(self, cell: CellView, rules: CameraLimits) -> Mask:
+        """Return which may face a camera in the cell."""
+        return cell.facing >= np.cos(rules.max_incidence) - ROUNDING
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return a larger angle."""
+        limit = facts.required.camera.max_incidence
+        least = np.cos(max(limit, STEEPEST))
+        return (
+            Relaxation(
+                self.name,
+                lambda view: np.where(
+                    view.facing >= least, degrees(view.facing), np.inf
+                ),
+                to_step(1.0),
+                lambda value: (
+                    f"limits.camera_max_incidence_deg = {value:.0f} "
+                    f"(now {np.degrees(limit):g})"
+                ),
+            ),
+        )
+
+
+class SampleDistance(CameraLimit):
+    """z / (f cos(incidence)) <= max_sample_distance."""
+
+    name = "sample_distance"
+    words = "sampled too coarsely"
+
+    def holds(self, view: CameraRays, rules: CameraLimits) -> Mask | None:
+        """Return where a pixel covers little enough of the surface."""
+        limit = rules.max_sample_distance_m
+        return None if limit is None else view.sample_distance <= limit
+
+    def may_hold(self, cell: CellView, rules: CameraLimits) -> Mask | None:
+        """Return where it may, from the least depth."""
+        limit = rules.max_sample_distance_m
+        if limit is None:
+            return None
+        widest = limit * cell.focal_px * np.maximum(cell.facing, 1e-9)
+        return cell.least_depth * (1.0 - ROUNDING) <= widest
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return a larger distance."""
+        limit = facts.required.camera.max_sample_distance_m
+        if limit is None:
+            return ()
+        return (
+            Relaxation(
+                self.name,
+                lambda view: 1e3 * view.sample_distance,
+                to_digits(3),
+                lambda value: (
+                    f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
+                ),
+            ),
+        )
+
+
+class CameraOcclusion(InBetween):
+    """Not behind the surface."""
+
+    name = "camera_occlusion"
+    words = "hidden from every camera that faces it"
+
+
+class CameraBody(InBetween):
+    """No body of another device in between."""
+
+    name = "camera_body"
+    words = "hidden by a device's body"
+
+
+CAMERA_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
+    CameraField(),
+    CameraRange(),
+    CameraIncidence(),
+    CameraOcclusion(),
+    CameraBody(),
+    SampleDistance(),
+)
+SEEN_CAUSES = causes(CAMERA_LIMITS)
+SEEN = len(SEEN_CAUSES)
+OCCLUDED = SEEN_CAUSES.index("camera_occlusion")
+BLOCKED = SEEN_CAUSES.index("camera_body")
+
+
+def _off_axis(view: CameraRays) -> Array:
+    """How far samples are off the middle [deg], inf beyond the widest image, (n,)."""
+    middle = view.device.middle_ray
+    along = view.local @ middle / np.maximum(view.distances, 1e-12)
+    wide = widened(view.device).in_field(view.local)
+    return np.where(wide, degrees(along), np.inf)

@@ -1,0 +1,231 @@
+"""What all limits have in common, and the first that a sample violates."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import DeviceModel, ParallelModel, PinholeModel
+from planning.model.requirements import Requirements
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_Device = TypeVar("_Device", PinholeModel, ParallelModel, DeviceModel)
+View = TypeVar("View")
+Cell = TypeVar("Cell")
+Rules = TypeVar("Rules")
+
+# Beyond this no limit of incidence is worth relaxing.
+STEEPEST = float(np.radians(85.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Focus:
+    """How the range of a camera follows from its lens.
+
+    Attributes:
+        blur_px: What counts as sharp.
+        f_number: Of the lens.
+        allowed_m: Range that the rig file allows beside it.
+        circle_px: Blur at distances in [m].
+    """
+
+    blur_px: float
+    f_number: float
+    allowed_m: tuple[float, float]
+    circle_px: Callable[[Array], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class RigFacts:
+    """What relaxations are told of the rig file.
+
+    Attributes:
+        required: The limits.
+        device: DeviceModel of the projectors, or of the cameras.
+        focus: Of a camera whose range follows from it; else None.
+        ring_gap_m: Distance of neighbouring rings at the standoff [m].
+        ring_gap_chosen: Whether the planner chose it.
+    """
+
+    required: Requirements
+    device: DeviceModel
+    focus: Focus | None = None
+    ring_gap_m: float = 0.0
+    ring_gap_chosen: bool = False
+
+
+class _HasDistances(Protocol):
+    @property
+    def distances(self) -> Array: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxation:
+    """How one limit may give way, all others as they are.
+
+    Attributes:
+        cause: Name of the limit.
+        ask: What samples of a view ask of it, (n,): more where it must give way
+            farther; inf where it is not worth it.
+        rounded: Rounds what is asked outwards, to what people write.
+        say: The limit with a rounded value, as a rig file names it.
+    """
+
+    cause: str
+    ask: Callable[[Any], Array]
+    rounded: Callable[[Array], Array]
+    say: Callable[[float], str]
+
+
+class Limit(Generic[View, Cell, Rules]):
+    """One limit; a view holds samples as a device or a pair of them meets them.
+
+    A cell holds the best that any pose in a cell of poses may have of them.
+
+    Attributes:
+        name: Cause in plan and summary.
+        words: The same as a phrase, of samples that it forbids.
+    """
+
+    name: ClassVar[str]
+    words: ClassVar[str]
+
+    def holds(self, view: View, rules: Rules) -> Mask | None:
+        """Return on which samples it holds, shape (n,); None: it doesn't bind."""
+        raise NotImplementedError
+
+    def may_hold(self, cell: Cell, rules: Rules) -> Mask | None:
+        """Return a superset of where it holds from poses of a cell; None: of all."""
+        return None
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return how it may give way; empty: nothing is advised."""
+        return ()
+
+
+class InBetween(Limit[object, object, object]):
+    """A limit that rays or bodies decide, on samples that pass the others."""
+
+    def holds(self, view: object, rules: object) -> None:
+        """Return None: what stands between isn't looked at."""
+
+
+def causes(limits: Sequence[Limit[Any, Any, Any]]) -> tuple[str, ...]:
+    """Return the names of limits."""
+    return tuple(limit.name for limit in limits)
+
+
+def first_violated(
+    limits: Sequence[Limit[View, Any, Rules]], view: View, rules: Rules, n: int
+) -> NDArray[np.int8]:
+    """Return the index of the first limit that fails, their number where none does.
+
+    Args:
+        limits: In their order.
+        view: Of n samples.
+        rules: Values of the limits.
+        n: Samples.
+    """
+    first = np.full(n, len(limits), dtype=np.int8)
+    for index in range(len(limits) - 1, -1, -1):
+        holds = limits[index].holds(view, rules)
+        if holds is not None:
+            np.copyto(first, np.int8(index), where=~holds)
+    return first
+
+
+def violated(
+    limits: Sequence[Limit[View, Any, Rules]], view: View, rules: Rules, n: int
+) -> Mask:
+    """Return whether each limit fails, shape (n_limits, n)."""
+    table = np.zeros((len(limits), n), dtype=bool)
+    for index, limit in enumerate(limits):
+        holds = limit.holds(view, rules)
+        if holds is not None:
+            table[index] = ~holds
+    return table
+
+
+def range_ends(
+    cause: str, device: str, ends: tuple[float, float], sharp: tuple[float, float]
+) -> tuple[Relaxation, ...]:
+    """Return relaxations of a range's near end, its far end, and both at once.
+
+    Each is left out where that end isn't what binds. Views have `distances` in [m].
+
+    Args:
+        cause: Name of the limit.
+        device: `camera` or `projector`.
+        ends: The range, where a rig file may change it [m].
+        sharp: The range that holds [m].
+    """
+    near, far = ends
+    low, high = 1e3 * sharp[0], 1e3 * sharp[1]
+
+    def away(view: _HasDistances) -> Array:
+        return 1e3 * view.distances
+
+    nearer = Relaxation(
+        cause,
+        lambda view: np.where(
+            (view.distances >= 0.0) & (view.distances <= sharp[1]), -away(view), np.inf
+        ),
+        to_step(1.0),
+        lambda value: f"a {device} sharp from {-value:.0f} mm (now {low:.0f})",
+    )
+    farther = Relaxation(
+        cause,
+        lambda view: np.where(view.distances >= sharp[0], away(view), np.inf),
+        to_step(1.0),
+        lambda value: f"a {device} sharp to {value:.0f} mm (now {high:.0f})",
+    )
+    both = Relaxation(
+        cause,
+        lambda view: np.maximum(low - away(view), away(view) - high),
+        to_step(1.0),
+        lambda value: (
+            f"a {device} sharp from {max(low - value, 0.0):.0f} to "
+            f"{high + value:.0f} mm (now {low:.0f} to {high:.0f})"
+        ),
+    )
+    binds = (near > 0.0 and near >= sharp[0], far < np.inf and far <= sharp[1])
+    offered = zip((*binds, all(binds)), (nearer, farther, both), strict=True)
+    return tuple(relaxation for offer, relaxation in offered if offer)
+
+
+def degrees(cosines: Array) -> Array:
+    """Return angles of cosines in degrees."""
+    return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+
+
+def to_step(step: float) -> Callable[[Array], Array]:
+    """Return what rounds up to multiples of a step."""
+    return lambda values: np.ceil(values / step - 1e-9) * step
+
+
+def to_digits(digits: int) -> Callable[[Array], Array]:
+    """Return what rounds positive values up to so many significant digits."""
+
+    def rounded(values: Array) -> Array:
+        step = 10.0 ** (np.floor(np.log10(np.maximum(values, 1e-30))) - digits + 1)
+        return np.ceil(values / step - 1e-9) * step
+
+    return rounded
+
+
+def widened(device: _Device, times: int = 3) -> _Device:
+    """Return optics so many times as wide and high, and in no round beam.
+
+    Three times as wide is as much as is worth asking for.
+    """
+    width, height = device.resolution
+    size = (times * width, times * height)
+    if isinstance(device, ParallelModel):
+        return replace(device, resolution=size, beam_radius=None)
+    matrix = device.camera_matrix.copy()
+    matrix[:2, 2] += 0.5 * (times - 1) * np.array([width, height])
+    return replace(device, camera_matrix=matrix, resolution=size)

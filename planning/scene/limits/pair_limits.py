@@ -1,0 +1,179 @@
+"""When a pair of projector and camera measures a sample well enough.
+
+With m the unit normal of the surface of equal code, h their spacing along it and r the
+viewing ray, |r.m|, s_N and the pitch are those of `measurability`.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planning.model.requirements import TriangulationLimits
+from planning.scene.lights import LightOnSamples
+
+from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES, ViewedSamples
+from .limit import (
+    Array,
+    Limit,
+    Mask,
+    Relaxation,
+    RigFacts,
+    causes,
+    to_digits,
+    to_step,
+)
+
+# Beyond these no limit is worth relaxing: first-order errors hold no longer.
+_LEAST_CONDITIONING = 0.03
+_LEAST_PITCH_PX = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class PairQuality:
+    """How well a pair triangulates n samples.
+
+    Attributes:
+        conditioning: |r.m|, shape (n,).
+        sigma: s_N in [m], shape (n,).
+        pitch: Distance of neighbouring rings in the image in [px], shape (n,).
+        view: How the camera sees them; seen from a sample, it is at -t r.
+        light: That falls on them; seen from a sample, it starts at -d L.
+    """
+
+    conditioning: Array
+    sigma: Array
+    pitch: Array
+    view: ViewedSamples
+    light: LightOnSamples
+
+
+@dataclass(frozen=True, eq=False)
+class PairCell:
+    """The best of one projector with a camera anywhere in a cell of poses.
+
+    Attributes:
+        conditioning: |r.m| at most, shape (k,).
+        facing: |N.r| at most, shape (k,).
+        shift: t |g| at least, shape (k,).
+        noise: s_px in [px], shape (k,).
+        spacing: h in [m], shape (k,).
+    """
+
+    conditioning: Array
+    facing: Array
+    shift: Array
+    noise: Array
+    spacing: Array
+
+
+class PairLimit(Limit[PairQuality, PairCell, TriangulationLimits]):
+    """A limit of pairs; its cells are `PairCell`."""
+
+
+class Conditioning(PairLimit):
+    """|r.m| >= min_conditioning."""
+
+    name = "conditioning"
+    words = "on a blind curve (|r.m| too small)"
+
+    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask:
+        """Return which samples are off the blind curve."""
+        return view.conditioning >= rules.min_conditioning
+
+    def may_hold(self, cell: PairCell, rules: TriangulationLimits) -> Mask:
+        """Return which may be, from the largest |r.m|."""
+        return cell.conditioning >= rules.min_conditioning - ROUNDING
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return a smaller |r.m|."""
+        limit = facts.required.triangulation.min_conditioning
+        return (
+            Relaxation(
+                self.name,
+                lambda pair: np.where(
+                    pair.conditioning >= _LEAST_CONDITIONING, -pair.conditioning, np.inf
+                ),
+                to_step(0.01),
+                lambda value: f"limits.min_conditioning = {-value:.2f} (now {limit:g})",
+            ),
+        )
+
+
+class Sigma(PairLimit):
+    """s_N <= max_sigma."""
+
+    name = "sigma"
+    words = "measured with too large a deviation"
+
+    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
+        """Return which samples are measured exactly enough."""
+        limit = rules.max_sigma_m
+        return None if limit is None else view.sigma <= limit
+
+    def may_hold(self, cell: PairCell, rules: TriangulationLimits) -> Mask | None:
+        """Return which may be, from the edge noise alone."""
+        limit = rules.max_sigma_m
+        if limit is None:
+            return None
+        edge = cell.noise * cell.shift * (1.0 - ROUNDING)
+        return edge <= limit * np.maximum(cell.conditioning, 1e-12)
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return a larger deviation."""
+        limit = facts.required.triangulation.max_sigma_m
+        if limit is None:
+            return ()
+        return (
+            Relaxation(
+                self.name,
+                lambda pair: 1e3 * pair.sigma,
+                to_digits(3),
+                lambda value: f"--accuracy {value:.3g} (now {1e3 * limit:g} mm)",
+            ),
+        )
+
+
+class Pitch(PairLimit):
+    """Neighbouring rings at least min_ring_pitch apart in the image."""
+
+    name = "pitch"
+    words = "with rings too close in the image"
+
+    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
+        """Return where rings can be told apart."""
+        least = rules.min_ring_pitch_px
+        return None if least is None else view.pitch >= least
+
+    def may_hold(self, cell: PairCell, rules: TriangulationLimits) -> Mask | None:
+        """Return where they may be."""
+        least = rules.min_ring_pitch_px
+        if least is None:
+            return None
+        return cell.spacing * cell.facing * (1.0 + ROUNDING) >= least * cell.shift
+
+    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+        """Return a wider gap; a smaller limit too where the gap doesn't follow it."""
+        least, gap = facts.required.triangulation.min_ring_pitch_px, facts.ring_gap_m
+        if least is None:
+            return ()
+        chosen = ", chosen" if facts.ring_gap_chosen else ""
+        wider = Relaxation(
+            self.name,
+            lambda pair: 1e3 * gap * least / np.maximum(pair.pitch, 1e-12),
+            to_digits(3),
+            lambda value: f"rings.gap_mm = {value:.3g} (now {1e3 * gap:.3g}{chosen})",
+        )
+        closer = Relaxation(
+            self.name,
+            lambda pair: np.where(pair.pitch >= _LEAST_PITCH_PX, -pair.pitch, np.inf),
+            to_step(0.1),
+            lambda value: f"limits.min_ring_pitch_px = {-value:.1f} (now {least:g})",
+        )
+        return (wider,) if facts.ring_gap_chosen else (wider, closer)
+
+
+PAIR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (Conditioning(), Sigma(), Pitch())
+MEASURED_LIMITS = CAMERA_LIMITS + PAIR_LIMITS
+CAUSES = SEEN_CAUSES + causes(PAIR_LIMITS)
+MEASURED = len(CAUSES)

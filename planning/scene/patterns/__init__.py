@@ -1,0 +1,1 @@
+"""What projectors show: which of their light carries a code, and its surfaces."""
