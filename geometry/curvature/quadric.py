@@ -1,12 +1,11 @@
 """Curvature tensors from libigl's quadrics, fitted to two rings about each vertex."""
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.tensors import cross, packed
 from geometry.mesh.topology import numbered
-
-from .two_processes import principal_curvature
 
 # A quadric has six coefficients: one ring is too few. More rings would reach farther on
 # coarse meshes than on fine ones; the scale is kept by diffusion instead.
@@ -68,9 +67,14 @@ def _fit(
     used, local = numbered(_with_normals(vertices, faces), n)
     if len(used) == 0:
         return k, ways, fitted
-    k[:, used], ways[:, used], fitted[used] = principal_curvature(
-        vertices[used], local, RINGS
+    first, second, k_first, k_second, bad = igl.principal_curvature(
+        np.ascontiguousarray(vertices[used]), local, radius=RINGS, useKring=True
     )
+    k[:, used] = np.stack([k_first, k_second])
+    ways[:, used] = np.stack([first, second])
+    fitted[used] = True
+    fitted[used[np.array(bad, dtype=np.int64)]] = False
+    fitted &= np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
     k[:, ~fitted], ways[:, ~fitted] = 0.0, 0.0
     return k, ways, fitted
 

@@ -7,18 +7,21 @@ compressed or sparse data as zeros, mixed lists by the length of the first.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import PurePosixPath, PureWindowsPath
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.file_origin import FileOrigin, Properties
 
+from .file_numbers import FormatError
 from .gltf_format import read_glb, read_gltf
 from .ply_format import ply_surface, read_ply
-from .polygons import PolygonError, cut_polygons
+from .polygons import cut_polygons
 from .stl_format import read_stl
-from .text_formats import FormatError, read_obj, read_off
+from .text_formats import read_obj, read_off
 from .three_mf_format import read_three_mf
 
 SUPPORTED = ("obj", "ply", "stl", "off", "glb", "gltf", "3mf")
@@ -65,52 +68,57 @@ def read_format(
     Raises:
         FormatError: If it isn't whole, or holds no triangles.
     """
-    raw = _READERS[kind](data, fetch)
+    raw = _raw(kind, data, fetch)
     if len(raw.vertices) == 0:
         raise FormatError("it is empty: no vertices")
     if len(raw.faces) == 0:
         raise FormatError(
             f"it holds {len(raw.vertices)} points and no faces; a surface is needed"
         )
-    if not (raw.faces.min() >= 0 and raw.faces.max() < len(raw.vertices)):
-        raise FormatError(
-            f"faces name vertices {raw.faces.min()}..{raw.faces.max()}, "
-            f"there are {len(raw.vertices)}"
-        )
+    _check_range(raw.faces, len(raw.vertices))
     return raw
 
 
-_Fetch = Callable[[str], bytes] | None
+def _raw(kind: str, data: bytes, fetch: Callable[[str], bytes] | None) -> RawMesh:
+    if kind in ("obj", "off"):
+        return _of_polygons(*(read_obj if kind == "obj" else read_off)(data))
+    if kind == "stl":
+        return RawMesh(*read_stl(data), None)
+    if kind == "ply":
+        return _ply(data)
+    if kind == "glb":
+        vertices, faces, unit = read_glb(data)
+    elif kind == "gltf":
+        vertices, faces, unit = read_gltf(data, partial(_beside, fetch))
+    else:
+        vertices, faces, unit = read_three_mf(data)
+    return RawMesh(vertices, faces, _UNIT_NAMES.get(unit.lower(), unit))
 
 
-def _obj(data: bytes, fetch: _Fetch) -> RawMesh:
-    return _of_polygons(*read_obj(data))
+def _beside(fetch: Callable[[str], bytes] | None, name: str) -> bytes:
+    """Return a file that a .gltf names, if it lies in its folder."""
+    rooted = PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive
+    missing = FormatError(f"it needs the file '{name}', which isn't beside it")
+    if fetch is None or rooted or ".." in name:
+        raise missing
+    try:
+        return fetch(name)
+    except (FileNotFoundError, KeyError):
+        raise missing from None
 
 
-def _off(data: bytes, fetch: _Fetch) -> RawMesh:
-    return _of_polygons(*read_off(data))
-
-
-def _stl(data: bytes, fetch: _Fetch) -> RawMesh:
-    return RawMesh(*read_stl(data), None)
-
-
-def _ply(data: bytes, fetch: _Fetch) -> RawMesh:
+def _ply(data: bytes) -> RawMesh:
     elements = read_ply(data)
     points, polygons = ply_surface(elements)
     corners = np.asarray(polygons.values, np.int64)
     _check_range(corners, len(points))
-    face = elements.get("face")
+    of_vertices = elements["vertex"].scalars.items()
     return _of_polygons(
         points,
         polygons.lengths,
         corners,
-        vertex_properties={
-            name: values
-            for name, values in elements["vertex"].scalars.items()
-            if name not in ("x", "y", "z")
-        },
-        face_properties={} if face is None else face.scalars,
+        {name: values for name, values in of_vertices if name not in ("x", "y", "z")},
+        elements["face"].scalars if "face" in elements else {},
     )
 
 
@@ -118,67 +126,17 @@ def _of_polygons(
     points: NDArray[np.float64],
     sizes: NDArray[np.int64],
     corners: NDArray[np.int64],
-    *,
-    vertex_properties: Properties | None = None,
-    face_properties: Properties | None = None,
+    of_vertices: Properties = MappingProxyType({}),
+    of_faces: Properties = MappingProxyType({}),
 ) -> RawMesh:
-    try:
-        faces, polygon = cut_polygons(points, sizes, corners)
-    except PolygonError as error:
-        raise FormatError(str(error)) from None
-    origin = FileOrigin(
-        polygon,
-        faces,
-        len(sizes),
-        len(points),
-        face_properties or {},
-        vertex_properties or {},
-    )
+    faces, polygon = cut_polygons(points, sizes, corners)
+    origin = FileOrigin(polygon, faces, len(sizes), len(points), of_faces, of_vertices)
     return RawMesh(points, faces, None, origin)
 
 
-def _glb(data: bytes, fetch: _Fetch) -> RawMesh:
-    return _in_stated_unit(*read_glb(data))
-
-
-def _gltf(data: bytes, fetch: _Fetch) -> RawMesh:
-    def beside(name: str) -> bytes:
-        rooted = PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive
-        missing = FormatError(f"it needs the file '{name}', which isn't beside it")
-        if fetch is None or rooted or ".." in name:
-            raise missing
-        try:
-            return fetch(name)
-        except (FileNotFoundError, KeyError):
-            raise missing from None
-
-    return _in_stated_unit(*read_gltf(data, beside))
-
-
-def _three_mf(data: bytes, fetch: _Fetch) -> RawMesh:
-    return _in_stated_unit(*read_three_mf(data))
-
-
-def _in_stated_unit(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], unit: str
-) -> RawMesh:
-    return RawMesh(vertices, faces, _UNIT_NAMES.get(unit.lower(), unit))
-
-
 def _check_range(corners: NDArray[np.int64], n_vertices: int) -> None:
-    if len(corners) and not (corners.min() >= 0 and corners.max() < n_vertices):
+    if corners.size and not (corners.min() >= 0 and corners.max() < n_vertices):
         raise FormatError(
             f"faces name vertices {corners.min()}..{corners.max()}, "
             f"there are {n_vertices}"
         )
-
-
-_READERS: dict[str, Callable[[bytes, _Fetch], RawMesh]] = {
-    "obj": _obj,
-    "off": _off,
-    "stl": _stl,
-    "ply": _ply,
-    "glb": _glb,
-    "gltf": _gltf,
-    "3mf": _three_mf,
-}

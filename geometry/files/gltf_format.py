@@ -10,9 +10,10 @@ from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from .file_numbers import FormatError
 from .scene_parts import ScenePart, joined
-from .text_formats import FormatError
 
 Fetch = Callable[[str], bytes]
 _Tree = Mapping[str, Any]
@@ -169,20 +170,9 @@ def _transform(index: int, node: _Tree) -> NDArray[np.float64]:
     if not (whole and np.any(turn) and np.all(matrix[3] == (0, 0, 0, 1))):
         raise FormatError(f"its node {index} has no usable transform")
     local = np.eye(4)
-    local[:3, :3] = _rotation(turn) * scale
+    local[:3, :3] = Rotation.from_quat(turn).as_matrix() * scale
     local[:3, 3] = shift
     return matrix @ local
-
-
-def _rotation(xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
-    x, y, z, w = xyzw / np.linalg.norm(xyzw)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _check_rigid(node: _Tree, mesh: _Tree) -> None:
@@ -250,10 +240,9 @@ class _Buffers:
         if set(_PACKED) & set(view.get("extensions", ())):
             raise FormatError("its buffers are compressed; export it uncompressed")
         dtype = np.dtype(_COMPONENTS[component])
-        rows = self._rows(accessor, view, dtype.itemsize * _WIDTH[kind])
-        values = rows.view(dtype)
+        values = self._strided(accessor, view, dtype, _WIDTH[kind])
         if accessor.get("normalized") and component != _FLOAT:
-            return np.maximum(values / np.iinfo(dtype).max, -1.0)
+            return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
         return values
 
     def _allowed(self, kind: str) -> Sequence[int]:
@@ -262,9 +251,12 @@ class _Buffers:
         quantized = _QUANTIZED in self._tree.get("extensionsUsed", ())
         return tuple(c for c in _COMPONENTS if c != 5125) if quantized else (_FLOAT,)
 
-    def _rows(self, accessor: _Tree, view: _Tree, width: int) -> NDArray[np.uint8]:
-        """Return the bytes of each row, shape (count, width)."""
+    def _strided(
+        self, accessor: _Tree, view: _Tree, dtype: np.dtype, columns: int
+    ) -> NDArray[np.generic]:
+        """Return the rows, shape (count, columns), each a stride after the last."""
         data = self._buffer(view.get("buffer"))
+        width = dtype.itemsize * columns
         count = _natural(accessor, "count")
         stride = _natural(view, "byteStride", width)
         begin, size = _natural(view, "byteOffset", 0), _natural(view, "byteLength")
@@ -274,13 +266,11 @@ class _Buffers:
                 f"it names {begin + size} bytes of a {len(data)} byte buffer"
             )
         if count == 0:
-            return np.empty((0, width), np.uint8)
-        span = (count - 1) * stride + width
-        if stride < width or offset + span > size:
+            return np.empty((0, columns), dtype)
+        if stride < width or offset + (count - 1) * stride + width > size:
             raise FormatError(f"{count} rows don't fit into a view of {size} bytes")
-        flat = np.frombuffer(data, np.uint8, span, begin + offset)
-        rows = np.lib.stride_tricks.as_strided(flat, (count, width), (stride, 1))
-        return np.ascontiguousarray(rows)
+        strides = (stride, dtype.itemsize)
+        return np.ndarray((count, columns), dtype, data, begin + offset, strides)
 
     def _buffer(self, index: object) -> bytes:
         entry = _item(self._tree, "buffers", index)

@@ -6,14 +6,12 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from .file_numbers import FormatError
+
 # Corners closer than this share of the outline's width are one place.
 _SAME = 1e-12
 # Ear clipping takes time that grows with the square of the corners.
 _MOST_CORNERS = 3000
-
-
-class PolygonError(ValueError):
-    """A polygon can't be cut into triangles."""
 
 
 def end_to_end(
@@ -43,7 +41,7 @@ def cut_polygons(
         Vertex indices, shape (m, 3), and the polygon each was cut from, shape (m,).
 
     Raises:
-        PolygonError: If a concave one has more than 3,000 corners.
+        FormatError: If a concave one has more than 3,000 corners.
     """
     starts = np.cumsum(sizes) - sizes
     cut: list[NDArray[np.int64]] = []
@@ -63,7 +61,7 @@ def cut_polygons(
         if size > 3:
             concave = np.flatnonzero(_concave(points, fans))
             if len(concave) and size > _MOST_CORNERS:
-                raise PolygonError(
+                raise FormatError(
                     f"polygon {which[concave[0]] + 1} is concave and has {size} "
                     f"corners, at most {_MOST_CORNERS} can be cut; export triangles"
                 )

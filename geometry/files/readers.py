@@ -21,8 +21,8 @@ from geometry.mesh.topology import numbered
 from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
 
+from .file_numbers import FormatError
 from .formats import SUPPORTED, RawMesh, read_format
-from .text_formats import FormatError
 
 METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 UNITS = ("mm", "cm", "m", "in", "um")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .text_formats import FormatError
+from .file_numbers import FormatError
 
 # A few nested references can ask for more instances than any machine holds.
 _MAX_FACES = 50_000_000

@@ -6,7 +6,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-from .text_formats import FormatError, decode, numbers
+from .file_numbers import FormatError, decode, numbers
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 # A facet in words; None stands for a number.

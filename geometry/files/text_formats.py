@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from .file_numbers import FormatError, decode, numbers
 from .polygons import end_to_end
 
 # Free-form geometry that has no triangles to give.
@@ -26,50 +27,7 @@ _ELSEWHERE = frozenset({"call", "csh"})
 _NAMES = frozenset({"mtllib", "usemtl", "maplib", "usemap", "g", "o"})
 # "v" and x y z, with a weight, a colour, or both.
 _VERTEX_COLUMNS = (4, 5, 7, 8)
-# Up to here every whole number has a float64 of its own.
-_LARGEST = 2.0**53
 _OFF_HEADER = re.compile(r"(ST|C|N|4|n)*OFF", re.ASCII)
-
-
-class FormatError(Exception):
-    """A file's content breaks the rules of its format; the reader names the file."""
-
-
-def decode(data: bytes) -> str:
-    """Return the text of a UTF-8, UTF-16 or Latin-1 file; its numbers are ASCII."""
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return data.decode("utf-16", errors="replace")
-    return data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
-
-
-def numbers(words: Sequence[str]) -> NDArray[np.float64]:
-    """Return words as numbers, shape (n,).
-
-    Python also takes digit groups (1_000) and digits of other scripts; no mesh format
-    does, so there they are damage.
-
-    Raises:
-        FormatError: If a word isn't a decimal number, "nan" or "inf".
-    """
-    try:
-        values = np.array(words, dtype=np.float64).reshape(-1)
-    except ValueError as error:
-        raise FormatError(f"a number can't be read ({error})") from None
-    text = "".join(words)
-    if not text.isascii() or "_" in text:
-        raise FormatError("a number is written with other signs than digits")
-    return values
-
-
-def whole(values: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return vertex numbers as integers.
-
-    Raises:
-        FormatError: If one isn't whole, or too large to count anything.
-    """
-    if not np.all((values == np.floor(values)) & (np.abs(values) < _LARGEST)):
-        raise FormatError("a face names a vertex by a number that isn't whole")
-    return values.astype(np.int64)
 
 
 def _whole(word: str) -> int:
@@ -99,31 +57,28 @@ def read_obj(data: bytes) -> _PointsAndPolygons:
     polygons: list[list[int]] = []
     for number, words in _obj_lines(decode(data)):
         if words[0] == "v":
-            if len(words) < 4:
-                raise FormatError(f"line {number}: a vertex needs three numbers")
             if len(words) not in _VERTEX_COLUMNS:
-                raise FormatError(
-                    f"line {number}: a vertex has {len(words) - 1} numbers"
-                )
+                least = "needs three" if len(words) < 4 else f"has {len(words) - 1}"
+                raise FormatError(f"line {number}: a vertex {least} numbers")
             numbers(words[4:])
             vertices.append(words[1:4])
         elif words[0] == "f":
             polygons.append(_obj_polygon(number, words[1:], len(vertices)))
-        elif words[0] in _FREE_FORM:
-            raise FormatError(
-                f"line {number}: free-form geometry ('{words[0]}') isn't triangles"
-            )
-        elif words[0] in _ELSEWHERE:
-            raise FormatError(
-                f"line {number}: '{words[0]}' brings in another file or program's "
-                "output; export the mesh as one file"
-            )
         elif words[0] not in _NO_GEOMETRY:
-            raise FormatError(
-                f"line {number}: '{ascii(words[0][:20])[1:-1]}' isn't known in OBJ"
-            )
+            raise FormatError(f"line {number}: {_refusal(words[0])}")
     points = _points(vertices)
     return points, *end_to_end(_in_range(polygons, len(points)))
+
+
+def _refusal(word: str) -> str:
+    if word in _FREE_FORM:
+        return f"free-form geometry ('{word}') isn't triangles"
+    if word in _ELSEWHERE:
+        return (
+            f"'{word}' brings in another file or program's output; export the mesh "
+            "as one file"
+        )
+    return f"'{ascii(word[:20])[1:-1]}' isn't known in OBJ"
 
 
 def _obj_lines(text: str) -> Iterator[tuple[int, list[str]]]:
@@ -182,51 +137,49 @@ def read_off(data: bytes) -> _PointsAndPolygons:
             raise ValueError
     except (IndexError, ValueError):
         raise FormatError("no line with the numbers of vertices and faces") from None
-    found = _off_by_line(lines[1:], n_vertices, n_faces)
-    if found is None:
-        words = [word for line in lines for word in line]
-        words = words[2 if len(lines[0]) == 2 else 3 :]
-        found = _off_by_word(words, n_vertices, n_faces)
-    if found is None:
-        raise FormatError(
-            f"the header promises {n_vertices} vertices and {n_faces} faces, "
-            "the content holds something else"
-        )
-    points = _points(found[0])
-    return points, *end_to_end(_in_range(found[1], len(points)))
+    header_words = lines[0][2 if len(lines[0]) == 2 else 3 :]
+    whole_text = [word for line in [header_words, *lines[1:]] for word in line]
+    by_line = _without_extras(lines[1:], n_vertices, n_faces)
+    for stream in (by_line, whole_text):
+        found = None if stream is None else _off_stream(stream, n_vertices, n_faces)
+        if found is not None:
+            points = _points(found[0])
+            return points, *end_to_end(_in_range(found[1], len(points)))
+    raise FormatError(
+        f"the header promises {n_vertices} vertices and {n_faces} faces, "
+        "the content holds something else"
+    )
 
 
-_Parts = tuple[list[list[str]], list[list[int]]]
-
-
-def _off_by_line(
+def _without_extras(
     lines: list[list[str]], n_vertices: int, n_faces: int
-) -> _Parts | None:
-    """One vertex or face a line, extra columns ignored; None if the lines don't fit."""
-    if len(lines) != n_vertices + n_faces:
-        return None
-    rows = lines[:n_vertices]
+) -> list[str] | None:
+    """Words of one vertex or face a line; None if the lines don't fit."""
+    vertices, faces = lines[:n_vertices], lines[n_vertices:]
     # Colours and normals stand behind every vertex or behind none.
-    if len({len(row) for row in rows}) > 1 or any(len(row) < 3 for row in rows):
+    widths = {len(line) for line in vertices}
+    if (
+        len(lines) != n_vertices + n_faces
+        or len(widths) > 1
+        or min(widths, default=3) < 3
+    ):
         return None
-    polygons: list[list[int]] = []
-    for words in lines[n_vertices : n_vertices + n_faces]:
-        try:
-            count = _whole(words[0])
-            corners = [_whole(word) for word in words[1 : count + 1]]
-        except ValueError:
+    words = [word for line in vertices for word in line[:3]]
+    for line in faces:
+        end = 1 + int(line[0]) if line[0].lstrip("+").isdecimal() else 0
+        if not 3 < end <= len(line):
             return None
-        if not (count >= 3 and len(corners) == count):
-            return None
-        polygons.append(corners)
-    return [row[:3] for row in rows], polygons
+        words += line[:end]
+    return words
 
 
-def _off_by_word(words: list[str], n_vertices: int, n_faces: int) -> _Parts | None:
-    """Read as one stream of words that must be used up exactly; else None."""
+def _off_stream(
+    words: list[str], n_vertices: int, n_faces: int
+) -> tuple[list[list[str]], list[list[int]]] | None:
+    """Points and polygons of words that must be used up exactly; else None."""
     if 3 * n_vertices + 4 * n_faces > len(words):
         return None
-    rows = [words[i : i + 3] for i in range(0, 3 * n_vertices, 3)]
+    points = [words[i : i + 3] for i in range(0, 3 * n_vertices, 3)]
     at = 3 * n_vertices
     polygons: list[list[int]] = []
     try:
@@ -239,7 +192,7 @@ def _off_by_word(words: list[str], n_vertices: int, n_faces: int) -> _Parts | No
             at += 1 + count
     except (ValueError, IndexError):
         return None
-    return (rows, polygons) if at == len(words) else None
+    return (points, polygons) if at == len(words) else None
 
 
 def _points(rows: list[list[str]]) -> NDArray[np.float64]:

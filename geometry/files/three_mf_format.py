@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from .file_numbers import FormatError, numbers, whole
 from .scene_parts import ScenePart, joined
-from .text_formats import FormatError, numbers, whole
 
 _NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/"
 _CORE = f"{{{_NAMESPACE}core/2015/02}}"

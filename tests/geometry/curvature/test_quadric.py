@@ -1,12 +1,9 @@
 """Quadrics fitted to two rings, and that cores change no digit of what is made."""
 
-import sys
-
 import numpy as np
 import pytest
 
 from geometry import parallel
-from geometry.curvature import two_processes
 from geometry.curvature.curvature import principal_curvatures
 from geometry.curvature.quadric import fit_quadrics
 from geometry.mesh.diffusion import diffused, surface_laplacian, vertex_areas
@@ -76,25 +73,3 @@ def test_a_failure_in_a_thread_is_raised(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(parallel, "n_threads", lambda: 2)
     with pytest.raises(ZeroDivisionError):
         parallel.mapped(lambda i: 1 // i, [1, 0, 2])
-
-
-@pytest.mark.parametrize("program", [sys.executable, "/bin/false", "/nowhere"])
-def test_two_processes_give_what_one_gives(
-    program: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rng = np.random.default_rng(5)
-    ball = sphere(1.0, subdivisions=4)
-    vertices = ball.vertices / ball.mean_edge + rng.normal(
-        scale=0.2, size=ball.vertices.shape
-    )
-    faces = np.array(ball.faces)
-    alone = two_processes.principal_curvature(vertices, faces, 2)
-    assert alone[2].all()
-    monkeypatch.setattr(two_processes, "_LARGE", 100)
-    monkeypatch.setattr(two_processes, "n_threads", lambda: 2)
-    # Where there can be no other process, this one does it all.
-    monkeypatch.setattr(sys, "executable", program)
-    for one, two in zip(
-        alone, two_processes.principal_curvature(vertices, faces, 2), strict=True
-    ):
-        np.testing.assert_array_equal(one, two)
