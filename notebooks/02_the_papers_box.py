@@ -40,10 +40,6 @@ from planning.experiments.run import run_experiment
 from planning.experiments.second_sequence import double_density
 from planning.experiments.setups import box_experiment
 from planning.experiments.table import cloud_lines, ring_lines, setup_lines
-from planning.verify.reconstruction.calibration import (
-    calibrate_camera,
-    calibrate_projector,
-)
 
 printed = box_experiment()
 print("\n".join(setup_lines(printed)))
@@ -83,7 +79,7 @@ draw_viewpoints(outcome, stage)
 
 # %%
 cloud = outcome.union.cloud
-camera = calibrate_camera(outcome.experiment.plan.cameras[0])
+camera = outcome.experiment.scanner.cameras[0]
 own = cloud.take(cloud.camera == 0)
 turn = camera.world_from_device[:3, :3].T
 matrix = camera.matrix @ np.column_stack([turn, -turn @ camera.centre])
@@ -101,7 +97,7 @@ print(f"{np.abs(np.column_stack([u / w, v / w]) - own.pixels).max():.1e} px")
 # exactly.
 
 # %%
-first, second = (calibrate_projector(p) for p in outcome.experiment.plan.projectors)
+first, second = outcome.experiment.scanner.projectors
 print(np.round(np.linalg.inv(first.world_from_ring) @ second.world_from_ring, 4))
 draw_redundancy(outcome, stage)
 

@@ -34,9 +34,9 @@ from planning.model.plan_errors import RequirementError
 from planning.pipeline import plan_rig
 from planning.rig.rig import load_rig
 from planning.verify.reconstruction.check.accuracy import measure_accuracy
-from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.single_shot.single_shot_rig import shoot_rig
+from planning.verify.reconstruction.single_shot.single_shot import shoot_rig
 
 _MM = 1e3
 MAKERS = (box_experiment, face_experiment)
@@ -105,19 +105,19 @@ def rings(outcomes: dict[tuple[str, str], Outcome]) -> None:
     rows: list[list[str]] = []
     for (name, variant), outcome in outcomes.items():
         union = outcome.union
-        for fate in outcome.fates:
-            if fate.projector != "P1":
+        for ring in outcome.outcomes:
+            if ring.projector != "P1":
                 continue
-            own = (union.cloud.projector == 0) & (union.cloud.ring == fate.ring)
+            own = (union.cloud.projector == 0) & (union.cloud.ring == ring.ring)
             rows.append(
                 [
                     name,
                     variant,
-                    f"{_MM * outcome.experiment.radii_m[fate.ring]:.1f}",
-                    f"{fate.on_object:.3f}",
-                    *(f"{share:.3f}" for share in fate.seen.values()),
-                    *(f"{share:.3f}" for share in fate.measured.values()),
-                    f"{fate.measured_by_any:.3f}",
+                    f"{_MM * outcome.experiment.radii_m[ring.ring]:.1f}",
+                    f"{ring.on_object:.3f}",
+                    *(f"{share:.3f}" for share in ring.seen.values()),
+                    *(f"{share:.3f}" for share in ring.measured.values()),
+                    f"{ring.measured_by_any:.3f}",
                     *numbers(Errors.of(union.distances[own])),
                 ]
             )
@@ -196,8 +196,8 @@ def nuisances() -> None:
     straight = box_experiment(variant="fits")
     for k1 in (-0.02, -0.2):
         bent = box_experiment(variant="fits", distortion=k1)
-        found = reconstruct_plan(
-            straight.plan, seed=0, threads=1, photometry=DARK, truth=bent.plan
+        found = reconstruct(
+            straight.scanner, seed=0, threads=1, photometry=DARK, truth=bent.scanner
         )
         far = measure_accuracy(found.everything, straight.mesh, threads=1).distances
         rows.append([f"k1 = {k1:g}, taken for 0", *numbers(Errors.of(far)), "", ""])

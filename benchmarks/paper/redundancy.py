@@ -41,12 +41,9 @@ from planning.verify.reconstruction.check.image_overlap import (
 )
 from planning.verify.reconstruction.faults.overlapping_light import (
     light_falls,
-    outer_radius,
 )
-from planning.verify.reconstruction.faults.supposed import incidence_cosine
-from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.render.render import Shown
+from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
 
 RIGS = reconstruction_rigs
@@ -101,7 +98,7 @@ def overlap(plan: RigPlan, photometry: Photometry) -> Overlap:
         seen = view(camera, mesh, caster, photometry)
         assert seen is not None
         shown = tuple(
-            Shown(device, device, ring_patterns(device, p.ring_radii, camera), caster)
+            Shown(device, device, device.pattern_for(camera), caster)
             for p in plan.projectors
             for device in (calibrate_projector(p),)
         )
@@ -135,8 +132,8 @@ def lit_by(
     normals = plan.surface.mesh.face_normals[faces[hit]]
     lit = np.zeros(len(pixels), dtype=np.int64)
     for p in plan.projectors:
-        device, outer = calibrate_projector(p), outer_radius(p.ring_radii)
-        lit[hit] += light_falls(device, outer, caster, points, normals)
+        device = calibrate_projector(p)
+        lit[hit] += light_falls(device, caster, points, normals)
     return lit.reshape(shape)
 
 
@@ -163,9 +160,9 @@ def served(plan: RigPlan) -> SurfaceSamples:
     points, normals = samples.points, samples.normals
     lit = np.zeros(len(samples), dtype=bool)
     for p in plan.projectors:
-        device, outer = calibrate_projector(p), outer_radius(p.ring_radii)
-        falls = light_falls(device, outer, caster, points, normals)
-        lit |= falls & (incidence_cosine(device, points, normals) >= _MAX_LIT)
+        device = calibrate_projector(p)
+        falls = light_falls(device, caster, points, normals)
+        lit |= falls & (device.incidence_cosine(points, normals) >= _MAX_LIT)
     seen = np.zeros(len(samples), dtype=bool)
     for planned in plan.cameras:
         centre = planned.world_from_device[:3, 3]

@@ -19,10 +19,7 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    ring_patterns,
-    ring_plane,
-)
+from planning.verify.reconstruction.light import LIGHTS, LightName
 
 MIN_CONDITIONING = 0.1
 _POINTS_A_POSE = 2000
@@ -51,7 +48,7 @@ class Outcome:
     n_inside: int
 
 
-def run(light: str, n_rays: int, seed: int = 0) -> Outcome:
+def run(light: LightName, n_rays: int, seed: int = 0) -> Outcome:
     """Triangulate until so many rays were tried."""
     rng = np.random.default_rng(seed)
     poses = tried = wrong = inside = 0
@@ -67,10 +64,10 @@ def run(light: str, n_rays: int, seed: int = 0) -> Outcome:
         drawn, depth = projector.panel(points)
         seen &= projector.in_panel(drawn) & (depth > 0.0)
         points, pixels, drawn = points[seen], pixels[seen], drawn[seen]
-        plane = ring_plane(projector, drawn)
+        plane = projector.ring_plane(drawn)
         radii = np.hypot(plane[:, 0], plane[:, 1])
         # The root bit is what the projector draws at the pixel that lights the point.
-        patterns = ring_patterns(projector, np.array([0.1, 0.2]), camera)
+        patterns = projector.pattern_for(camera)
         roots = np.where(patterns.root_side(plane) > 0.0, 1, -1).astype(np.int8)
         rays = camera.rays(pixels)
         settled = np.all(np.isfinite(rays), axis=1)
@@ -96,14 +93,14 @@ def true_conditioning(
     local = projector.to_ring(points)
     x, y, z = local.T
     across = np.hypot(x, y)
-    tilt = across / z if projector.light == "diverging" else np.zeros(len(points))
+    tilt = across / z if projector.light.name == "diverging" else np.zeros(len(points))
     normals = np.column_stack([x / across, y / across, -tilt])
     normals /= np.sqrt(1.0 + tilt * tilt)[:, None]
     return np.einsum("ij,ij->i", rays @ projector.world_from_ring[:3, :3], normals)
 
 
 def _projector(
-    rng: np.random.Generator, light: str
+    rng: np.random.Generator, light: LightName
 ) -> tuple[ProjectorCalibration, float]:
     """Return a projector anywhere, and how far its ring axis is off its own."""
     pose = np.eye(4)
@@ -122,7 +119,7 @@ def _projector(
         matrix = np.array([[1800.0, 0.0, 639.5], [0.0, 1800.0, 399.5], [0.0, 0.0, 1.0]])
         resolution, beam = (1280, 800), None
     calibration = ProjectorCalibration(
-        "P1", light, pose, pose @ shift, matrix, resolution, beam
+        "P1", LIGHTS[light], pose, pose @ shift, matrix, resolution, beam
     )
     return calibration, off
 
@@ -158,7 +155,7 @@ def _within(
 ) -> NDArray[np.bool_]:
     """Whether the camera stands inside the ring surface of each ray, shape (n,)."""
     x, y, z = projector.to_ring(camera.centre[None])[0]
-    reach = radii if projector.light == "parallel" else radii * z
+    reach = radii if projector.light.name == "parallel" else radii * z
     return np.hypot(x, y) < reach
 
 

@@ -25,6 +25,7 @@ from planning.verify.reconstruction.patterns.pattern_files import (
     remove_patterns,
     write_patterns,
 )
+from planning.verify.reconstruction.scanner import Scanner
 
 from .console import cores, print_json, reporter
 from .writable import writable
@@ -143,7 +144,7 @@ def _save(
         report("drawing")
     save_rig_picture(plan, names[2], face_status=face_status(plan))
     if patterns:
-        names.append(write_patterns(plan, folder))
+        names.append(write_patterns(Scanner.of(plan), folder))
     else:
         # Those of an earlier plan in this folder aren't of this one.
         remove_patterns(folder)

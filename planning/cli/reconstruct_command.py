@@ -17,7 +17,7 @@ from planning.model.errors import CapturesError
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
 from planning.verify.audit.coverage.prediction import predict_measured
-from planning.verify.reconstruction.captures.calibration_file import calibrated_plan
+from planning.verify.reconstruction.captures.calibration_file import calibrated
 from planning.verify.reconstruction.captures.captured import (
     Expected,
     reconstruct_captured,
@@ -30,7 +30,8 @@ from planning.verify.reconstruction.cloud_file import (
     LengthUnit,
     remove_cloud,
 )
-from planning.verify.reconstruction.single_shot.single_shot_check import (
+from planning.verify.reconstruction.scanner import Scanner
+from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
 )
 
@@ -48,15 +49,16 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
     path = Path(options["plan_file"])
     report = reporter(quiet=options["quiet"])
     plan = RigPlan.load(path)
+    scanner = Scanner.of(plan)
     folder = Path(options["output"] or path.parent)
     if options["captures"] is not None:
-        CaptureFolder(options["captures"], plan).require()
+        CaptureFolder(options["captures"], scanner).require()
     with ExitStack() as kept:
         for needed in (folder, options["save_captures"]):
             if needed is not None:
                 kept.enter_context(writable(needed))
         try:
-            found = _reconstruct(plan, options, report)
+            found = _reconstruct(plan, scanner, options, report)
         except CapturesError:
             remove_cloud(folder / CLOUD)
             raise
@@ -66,13 +68,16 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
 
 
 def _reconstruct(
-    plan: RigPlan, options: Mapping[str, Any], report: Report | None
+    plan: RigPlan,
+    scanner: Scanner,
+    options: Mapping[str, Any],
+    report: Report | None,
 ) -> Reconstruction:
     seed = options["seed"]
     seed = int(plan.document["seed"]) if seed is None else seed
     threads = options["threads"] or cores()
     mounted = options["calibration"]
-    mounted = None if mounted is None else calibrated_plan(plan, mounted)
+    mounted = None if mounted is None else calibrated(scanner, mounted)
     _say(report, "predicting what the plan's poses measure")
     expected = _expected(plan, seed, threads)
 
@@ -81,7 +86,7 @@ def _reconstruct(
 
     if options["single_shot"]:
         return reconstruct_single_shot(
-            plan,
+            scanner,
             expected.samples,
             expected.measured,
             tolerance_m=1e-3 * (options["prior_mm"] or _PRIOR_MM),
@@ -90,19 +95,19 @@ def _reconstruct(
             progress=progress,
         )
     if options["captures"] is not None:
-        folder = CaptureFolder(options["captures"], plan)
+        folder = CaptureFolder(options["captures"], scanner)
         return reconstruct_captured(
             folder, expected, believed=mounted, threads=threads, progress=progress
         )
     place = options["save_captures"]
     return reconstruct_rendered(
-        plan,
+        scanner,
         expected,
         seed=seed,
         threads=threads,
         truth=mounted,
         believed=mounted,
-        save=None if place is None else CaptureFolder(place, plan),
+        save=None if place is None else CaptureFolder(place, scanner),
         progress=progress,
     )
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.plan import RigPlan
 from planning.verify.reconstruction.calibration import PairCalibration
-from planning.verify.reconstruction.single_shot.single_shot_rig import Shot
+from planning.verify.reconstruction.scanner import Scanner
+from planning.verify.reconstruction.single_shot.single_shot import Shot
 
 
 @dataclass(frozen=True)
@@ -63,19 +63,18 @@ class Prior:
         return cls(TriangleMesh(mesh.vertices + move, mesh.faces), tolerance_m)
 
 
-def judged_labels(plan: RigPlan, shots: Sequence[Shot]) -> LabelCount:
+def judged_labels(scanner: Scanner, shots: Sequence[Shot]) -> LabelCount:
     """Hold the labels of single images to the truth.
 
     Args:
-        plan: Devices and the object that was rendered.
+        scanner: Devices and the object that was rendered.
         shots: What the images gave.
     """
-    caster = RayCaster(plan.surface.mesh, threads=1)
+    caster = RayCaster(scanner.mesh, threads=1)
     count = LabelCount(0, 0, 0)
     for shot in shots:
         rings, roots = shot.labels.rings, shot.labels.roots
-        radii = plan.projectors[shot.projector].ring_radii
-        true = true_labels(shot.lines.pixels, radii, shot.pair, caster, shot.width)
+        true = true_labels(shot.lines.pixels, shot.pair, caster, shot.width)
         labelled = rings >= 0
         right = labelled & (rings == true[0]) & (roots == true[1])
         count += LabelCount(
@@ -91,7 +90,6 @@ def judged_labels(plan: RigPlan, shots: Sequence[Shot]) -> LabelCount:
 
 def true_labels(
     pixels: NDArray[np.float64],
-    radii: NDArray[np.float64],
     pair: PairCalibration,
     caster: RayCaster,
     width: float,
@@ -100,7 +98,6 @@ def true_labels(
 
     Args:
         pixels: In the camera's image, shape (n, 2).
-        radii: Of the rings, shape (n_rings,).
         pair: Calibration of both devices.
         caster: Over the object.
         width: Of a line; what lies farther than that from a ring isn't on it.
@@ -109,14 +106,12 @@ def true_labels(
     rays = camera.rays(pixels)
     faces, away = caster.first_hits(camera.centre, rays)
     points = camera.centre + np.where(faces >= 0, away, 0.0)[:, None] * rays
-    local = projector.to_ring(points)
-    tilt = np.zeros(len(local))
-    rho = np.hypot(local[:, 0], local[:, 1])
-    if projector.light == "diverging":
-        tilt = rho = rho / local[:, 2]
+    local, radii = projector.to_ring(points), projector.radii
+    rho = projector.ring_coordinate(points)
     ring = np.argmin(np.abs(rho[:, None] - radii), axis=1)
     on_ring = (faces >= 0) & (np.abs(rho - radii[ring]) <= width)
     flat = local[:, :2] / np.hypot(local[:, 0], local[:, 1])[:, None]
-    outward = np.column_stack([flat, -tilt]) @ projector.world_from_ring[:3, :3].T
+    normals = projector.light.ring_normals(flat, rho)
+    outward = normals @ projector.world_from_ring[:3, :3].T
     root = np.where(np.einsum("ij,ij->i", outward, rays) > 0.0, 1, -1)
     return np.where(on_ring, ring, -1), root.astype(np.int8)

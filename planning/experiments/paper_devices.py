@@ -1,14 +1,16 @@
-"""The devices of section VII, placed by hand: what a plan says of each."""
+"""The devices of section VII, placed by hand."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
-
-Light = Literal["diverging", "parallel"]
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+from planning.verify.reconstruction.light import LIGHTS, LightName
 
 UP = np.array([0.0, 0.0, 1.0])
 # Both projectors of the paper have 1024 x 768 px, the cameras 1280 x 720 px.
@@ -19,7 +21,6 @@ STANDOFF_M = 1.0
 # the ring of 4 inches fits; the diverging one throws 1 m wide at 2 m.
 PIXEL_PITCH_M = 0.3e-3
 THROW_RATIO = 2.0
-_RANGE_M = (0.5, 1.6)
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,13 @@ def bearing(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
     return np.array([np.cos(e) * np.sin(a), -np.cos(e) * np.cos(a), np.sin(e)])
 
 
-def projector_entry(
+def placed_projector(
     name: str,
-    light: Light,
+    light: LightName,
     direction: NDArray[np.float64],
     target: NDArray[np.float64],
     radii_m: NDArray[np.float64],
-) -> dict[str, Any]:
+) -> ProjectorCalibration:
     """Return a projector whose rings are centred on a point of the object.
 
     In parallel light its radii are those on the object; in diverging light those at
@@ -81,35 +82,22 @@ def projector_entry(
     """
     width, height = PROJECTOR_PX
     pose = look_at(target + STANDOFF_M * direction, target, UP)
-    focal = THROW_RATIO * width
-    matrix = [
-        [focal, 0.0, 0.5 * (width - 1)],
-        [0.0, focal, 0.5 * (height - 1)],
-        [0.0, 0.0, 1.0],
-    ]
     diverging = light == "diverging"
-    return {
-        "id": name,
-        "light": light,
-        "world_from_device": pose.tolist(),
-        "world_from_ring": pose.tolist(),
-        "K": matrix if diverging else None,
-        "resolution": list(PROJECTOR_PX),
-        "pixel_pitch_m": None if diverging else PIXEL_PITCH_M,
-        "range_m": list(_RANGE_M),
-        "ring_radii": (radii_m / STANDOFF_M if diverging else radii_m).tolist(),
-        "beam_radius": None,
-        "min_margin_rad": 0.0,
-        "lit_area_m2": 0.0,
-    }
+    scale = THROW_RATIO * width if diverging else 1.0 / PIXEL_PITCH_M
+    matrix = np.diag([scale, scale, 1.0])
+    matrix[:2, 2] = 0.5 * (width - 1), 0.5 * (height - 1)
+    radii = radii_m / STANDOFF_M if diverging else radii_m
+    return ProjectorCalibration(
+        name, LIGHTS[light], pose, pose, matrix, PROJECTOR_PX, None, radii
+    )
 
 
-def camera_entry(
+def placed_camera(
     name: str,
     optics: Optics,
     direction: NDArray[np.float64],
     target: NDArray[np.float64],
-) -> dict[str, Any]:
+) -> CameraCalibration:
     """Return a camera with the target in the middle of its image.
 
     A principal point off the middle turns the optical axis past the target.
@@ -125,16 +113,9 @@ def camera_entry(
     middle = np.array([0.5 * (width - 1) - cx, 0.5 * (height - 1) - cy, f])
     # Device axes such that the ray of the middle pixel is where look_at's +z is.
     pose[:3, :3] = pose[:3, :3] @ _turned_to_z(middle / np.linalg.norm(middle))
-    return {
-        "id": name,
-        "world_from_device": pose.tolist(),
-        "K": [[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]],
-        "distortion": [optics.distortion, 0.0, 0.0, 0.0, 0.0],
-        "resolution": list(CAMERA_PX),
-        "range_m": list(_RANGE_M),
-        "seen_area_m2": 0.0,
-        "sole_area_m2": 0.0,
-    }
+    matrix = np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+    lens = (optics.distortion, 0.0, 0.0, 0.0, 0.0)
+    return CameraCalibration(name, pose, matrix, lens, CAMERA_PX)
 
 
 def _turned_to_z(ray: NDArray[np.float64]) -> NDArray[np.float64]:

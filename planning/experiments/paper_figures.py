@@ -6,16 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from geometry.rays.rays import RayCaster
-from planning.verify.reconstruction.calibration import (
-    calibrate_camera,
-    calibrate_projector,
-)
-from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.render.render import Shown, render_lines
-from planning.verify.reconstruction.render.view import view
-from planning.verify.reconstruction.single_shot.single_shot_rig import drawn_lines
+from planning.verify.reconstruction.render.render import render_lines
+from planning.verify.reconstruction.render.rendered import RenderedScene
+from planning.verify.reconstruction.single_shot.single_shot import drawn_lines
 
 from .paper_devices import CAMERA_PX
 from .point_errors import MeasuredErrors
@@ -53,21 +47,20 @@ def camera_images(
         photometry: Light and sensor.
         seed: Of the pixel noise.
     """
-    mesh, plan = experiment.mesh, experiment.plan
-    caster = RayCaster(mesh, threads=1)
+    scanner = experiment.scanner
+    scene = RenderedScene(scanner, scanner, photometry)
     images: list[NDArray[np.uint8]] = []
-    for c, planned in enumerate(plan.cameras):
-        camera = calibrate_camera(planned)
+    for c, camera in enumerate(scanner.cameras):
         whole = np.zeros(CAMERA_PX[::-1], dtype=np.uint8)
-        seen = view(camera, mesh, caster, photometry)
+        seen = scene.seen(c)
         if seen is not None:
-            shown: list[Shown] = []
-            for source in plan.projectors:
-                projector = calibrate_projector(source)
-                patterns = ring_patterns(projector, source.ring_radii, camera)
-                _, lines = drawn_lines(source, patterns, mesh)
-                shown.append(Shown(projector, projector, lines, caster))
-            frames = render_lines(seen, shown, photometry, (seed, 9, c))
+            lines = [
+                drawn_lines(one, one.pattern_for(camera), scanner.mesh)[1]
+                for one in scanner.projectors
+            ]
+            shown = [scene.shown(p, drawn) for p, drawn in enumerate(lines)]
+            every = [one for one in shown if one is not None]
+            frames = render_lines(seen, every, photometry, (seed, 9, c))
             part = np.clip(np.rint(frames.stack[0]), 0, 255).astype(np.uint8)
             left, top = frames.corner
             whole[top : top + part.shape[0], left : left + part.shape[1]] = part
@@ -80,7 +73,7 @@ def draw_camera_images(outcome: Outcome) -> Image.Image:
     experiment = outcome.experiment
     ambient = max(outcome.photometry.ambient, _ROOM_LIGHT)
     images = camera_images(experiment, replace(outcome.photometry, ambient=ambient))
-    names = [camera.id for camera in experiment.plan.cameras]
+    names = [camera.id for camera in experiment.scanner.cameras]
     added = ambient > outcome.photometry.ambient
     seen_by = f"; {ambient:.0%} room light added for the eye" if added else ""
     field = " x ".join(f"{_MM * side:.0f}" for side in experiment.optics.field_m)
@@ -118,7 +111,7 @@ def draw_redundancy(outcome: Outcome, stage: PanelStage) -> Image.Image:
     everything, merged = outcome.union.cloud, outcome.merged.cloud
     stays = outcome.stays
     colours = np.where(stays[:, None], np.array(KEPT), np.array(REMOVED))
-    ids = [projector.id for projector in outcome.experiment.plan.projectors]
+    ids = [projector.id for projector in outcome.experiment.scanner.projectors]
     panels = [
         stage.panel(
             f"Removed as redundant: {int(np.sum(~stays))} of {len(stays)}",

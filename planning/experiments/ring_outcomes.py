@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from geometry.rays.rays import RayCaster
-from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
-    calibrate_camera,
-    calibrate_projector,
 )
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.scanner import Scanner
 
 # Places on a ring, and how near a measured point makes one measured [m].
 _PLACES = 1440
@@ -48,28 +45,27 @@ class RingOutcome:
     measured_by_any: float
 
 
-def ring_outcomes(plan: RigPlan, cloud: Cloud) -> tuple[RingOutcome, ...]:
+def ring_outcomes(scanner: Scanner, cloud: Cloud) -> tuple[RingOutcome, ...]:
     """Return what became of every ring of every projector.
 
     Args:
-        plan: Devices and the object.
-        cloud: What was measured, with the plan's indices.
+        scanner: Devices and the object.
+        cloud: What was measured, with the scanner's indices.
     """
-    caster = RayCaster(plan.surface.mesh, threads=1)
-    cameras = [calibrate_camera(camera) for camera in plan.cameras]
-    fates: list[RingOutcome] = []
-    for p, planned in enumerate(plan.projectors):
-        projector = calibrate_projector(planned)
-        for k, radius in enumerate(planned.ring_radii):
+    caster = RayCaster(scanner.mesh, threads=1)
+    cameras = scanner.cameras
+    outcomes: list[RingOutcome] = []
+    for p, projector in enumerate(scanner.projectors):
+        for k, radius in enumerate(projector.radii):
             points, normals = _landed(projector, float(radius), caster)
             seen = [_shows(camera, points, normals, caster) for camera in cameras]
             own = [
                 _measured(cloud, (p, c, k), points) & seen[c]
                 for c in range(len(cameras))
             ]
-            fates.append(
+            outcomes.append(
                 RingOutcome(
-                    planned.id,
+                    projector.id,
                     k,
                     len(points) / _PLACES,
                     {one.id: _share(s) for one, s in zip(cameras, seen, strict=True)},
@@ -77,11 +73,11 @@ def ring_outcomes(plan: RigPlan, cloud: Cloud) -> tuple[RingOutcome, ...]:
                     _share(np.any(own, axis=0)),
                 )
             )
-    return tuple(fates)
+    return tuple(outcomes)
 
 
 def lit_and_seen(
-    plan: RigPlan, points: NDArray[np.float64], normals: NDArray[np.float64]
+    scanner: Scanner, points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Return which points some ring pattern lights and some camera shows, (n,).
 
@@ -89,16 +85,16 @@ def lit_and_seen(
     and a camera, neither hidden.
 
     Args:
-        plan: Devices and the object.
+        scanner: Devices and the object.
         points: On the surface [m], shape (n, 3).
         normals: Outward, shape (n, 3).
     """
-    caster = RayCaster(plan.surface.mesh, threads=1)
+    caster = RayCaster(scanner.mesh, threads=1)
     lit, seen = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-    for planned in plan.projectors:
-        lit |= _lights(planned, points, normals, caster)
-    for planned in plan.cameras:
-        seen |= _shows(calibrate_camera(planned), points, normals, caster)
+    for projector in scanner.projectors:
+        lit |= _lights(projector, points, normals, caster)
+    for camera in scanner.cameras:
+        seen |= _shows(camera, points, normals, caster)
     return lit & seen
 
 
@@ -108,14 +104,7 @@ def _landed(
     """Points and normals of the object that a ring falls on, (n, 3) each."""
     turn = np.arange(_PLACES) * (2.0 * np.pi / _PLACES)
     flat = radius * np.column_stack([np.cos(turn), np.sin(turn)])
-    ring = projector.world_from_ring
-    if projector.light == "parallel":
-        starts = ring[:3, 3] + flat @ ring[:3, :2].T
-        beams = np.broadcast_to(projector.axis, starts.shape)
-    else:
-        beams = flat @ ring[:3, :2].T + ring[:3, 2]
-        beams /= np.linalg.norm(beams, axis=1, keepdims=True)
-        starts = np.broadcast_to(projector.centre, beams.shape)
+    starts, beams = projector.light.rays(flat, projector.world_from_ring)
     faces, away = caster.first_hits(starts, beams)
     points = starts + np.where(faces >= 0, away, 1.0)[:, None] * beams
     landed = (faces >= 0) & projector.in_panel(projector.panel(points)[0])
@@ -123,19 +112,15 @@ def _landed(
 
 
 def _lights(
-    planned: PlannedProjector,
+    projector: ProjectorCalibration,
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
     caster: RayCaster,
 ) -> NDArray[np.bool_]:
-    projector = calibrate_projector(planned)
-    pixels, depth = projector.panel(points)
-    local, beams = projector.to_ring(points), projector.beams(points)
-    rho, away = np.hypot(local[:, 0], local[:, 1]), depth
-    if projector.light == "diverging":
-        rho = rho / local[:, 2]
-        away = np.linalg.norm(points - projector.centre, axis=1)
-    lit = projector.in_panel(pixels) & (rho <= planned.ring_radii[-1])
+    pixels, _ = projector.panel(points)
+    _, beams, away = projector.aim(points)
+    lit = projector.in_panel(pixels)
+    lit &= projector.ring_coordinate(points) <= projector.radii[-1]
     lit &= np.einsum("ij,ij->i", normals, beams) < 0.0
     return lit & ~_blocked(points, -beams, away, caster)
 

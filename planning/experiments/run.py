@@ -6,12 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
-from planning.verify.reconstruction.check.check import conclude, reconstruct_plan
+from planning.verify.reconstruction.check.check import conclude, reconstruct
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import Progress
-from planning.verify.reconstruction.single_shot.single_shot_rig import shoot_rig
+from planning.verify.reconstruction.single_shot.single_shot import (
+    decoded_pairs,
+    shoot_rig,
+)
 
 from .one_image import LabelCount, Prior, judged_labels
 from .point_errors import MeasuredErrors, measured
@@ -37,7 +40,7 @@ class Outcome:
         viewpoints: Each camera alone, under all projectors.
         union: All points.
         merged: Those that stay where redundancy is removed.
-        fates: What became of each ring.
+        outcomes: What became of each ring.
         labels: Of single images; None: rings were told apart by a sequence.
     """
 
@@ -50,7 +53,7 @@ class Outcome:
     viewpoints: tuple[MeasuredErrors, ...]
     union: MeasuredErrors
     merged: MeasuredErrors
-    fates: tuple[RingOutcome, ...]
+    outcomes: tuple[RingOutcome, ...]
     labels: LabelCount | None
 
     @property
@@ -84,27 +87,33 @@ def run_experiment(
             image of each camera under each projector; None: by a coded sequence.
         progress: Called with the pairs done and their total.
     """
-    plan, labels = experiment.plan, None
+    scanner, labels = experiment.scanner, None
     if prior is None:
-        found = reconstruct_plan(
-            plan, seed=seed, threads=threads, photometry=photometry, progress=progress
+        found = reconstruct(
+            scanner,
+            seed=seed,
+            threads=threads,
+            photometry=photometry,
+            progress=progress,
         )
     else:
         shots = shoot_rig(
-            plan,
+            scanner,
             prior.mesh,
             tolerance_m=prior.tolerance_m,
             photometry=photometry,
             seed=seed,
             progress=progress,
         )
-        pairs = [((shot.projector, shot.camera), shot.decoded) for shot in shots]
-        found = conclude(plan, pairs, seed=seed, threads=threads, photometry=photometry)
-        labels = judged_labels(plan, shots)
+        pairs = decoded_pairs(shots)
+        found = conclude(
+            scanner, pairs, seed=seed, threads=threads, photometry=photometry
+        )
+        labels = judged_labels(scanner, shots)
     samples, visible = observable(experiment, seed)
     everything, merged = found.everything, found.merged.cloud
-    names = [camera.id for camera in plan.cameras]
-    first = f"{plan.projectors[0].id} with {names[0]}"
+    names = [camera.id for camera in scanner.cameras]
+    first = f"{scanner.projectors[0].id} with {names[0]}"
     by_one = (everything.camera == 0) & (everything.projector == 0)
     gap_m = experiment.gap_m
     mesh = experiment.mesh
@@ -128,7 +137,7 @@ def run_experiment(
         viewpoints,
         measured("all points", everything, mesh, samples, gap_m),
         measured("merged", merged, mesh, samples, gap_m),
-        ring_outcomes(plan, everything),
+        ring_outcomes(scanner, everything),
         labels,
     )
 
@@ -136,7 +145,7 @@ def run_experiment(
 def observable(experiment: Experiment, seed: int) -> tuple[SurfaceSamples, float]:
     """Return samples of what could be measured, and their share of the surface."""
     samples = sample_surface(experiment.mesh, _SAMPLES, seed=seed)
-    able = lit_and_seen(experiment.plan, samples.points, samples.normals)
+    able = lit_and_seen(experiment.scanner, samples.points, samples.normals)
     return samples.take(able), float(np.mean(able))
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import RigPlan
-from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.scanner import Scanner
 
 from .point_errors import MeasuredErrors, measured
 from .run import Outcome, observable
@@ -36,15 +36,10 @@ def midway(radii: NDArray[np.float64]) -> NDArray[np.float64]:
     return 0.5 * (np.concatenate([[0.0], radii[:-1]]) + radii)
 
 
-def second_sequence(plan: RigPlan) -> RigPlan:
-    """Return a plan whose projectors draw their rings midway between its own."""
-    shifted = [
-        entry | {"ring_radii": midway(projector.ring_radii).tolist()}
-        for entry, projector in zip(
-            plan.document["projectors"], plan.projectors, strict=True
-        )
-    ]
-    return RigPlan(plan.document | {"projectors": shifted}, plan.surface)
+def second_sequence(scanner: Scanner) -> Scanner:
+    """Return a rig whose projectors draw their rings midway between its own."""
+    shifted = [replace(one, radii=midway(one.radii)) for one in scanner.projectors]
+    return replace(scanner, projectors=tuple(shifted))
 
 
 def joined_sequences(first: Cloud, second: Cloud) -> Cloud:
@@ -66,8 +61,8 @@ def double_density(outcome: Outcome, *, seed: int = 0, threads: int = 2) -> Doub
         threads: Worker threads; the result doesn't depend on them.
     """
     experiment = outcome.experiment
-    second = reconstruct_plan(
-        second_sequence(experiment.plan),
+    second = reconstruct(
+        second_sequence(experiment.scanner),
         seed=seed + 1,
         threads=threads,
         photometry=outcome.photometry,

@@ -6,9 +6,9 @@ Everything else is ours, because the paper doesn't give it: directions of the de
 the size of the box, the box's radii, the head, the projectors' optics.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,17 @@ from scipy.spatial.transform import Rotation
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box
 from geometry.shapes.sample_head.sample_head import HeadShape, sample_head
-from planning.model.plan import RigPlan
-from planning.model.surface import Surface
+from planning.model.requirements import CheckLimits
+from planning.verify.reconstruction.light import LightName
+from planning.verify.reconstruction.scanner import ScanLimits, Scanner
 
 from .paper_devices import (
     FITTING,
     PRINTED,
-    STANDOFF_M,
-    Light,
     Optics,
     bearing,
-    camera_entry,
-    projector_entry,
+    placed_camera,
+    placed_projector,
 )
 
 Variant = Literal["printed", "fits"]
@@ -47,9 +46,9 @@ FACE_RADII_M = np.array([1.0, 2.0, 4.0]) * INCH_M
 # Between the tip of the nose and the eyes, on the surface of the head.
 _FACE_TARGET = np.array([0.0, -0.090, -0.020])
 _HEAD_FACES = 20_000
-# More than this slants rings until they smear; the decoder's limit [rad].
 _ANY_M = 1.0
-_MAX_INCIDENCE = np.deg2rad(70.0)
+# More than this slants rings until they smear; the decoder's limit [rad].
+_MAX_LIT, _MAX_SEEN = float(np.deg2rad(60.0)), float(np.deg2rad(70.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,20 +62,20 @@ class Experiment:
         light: Kind of light.
         optics: The cameras' interior.
         radii_m: Of the rings, on the object or, in diverging light, at 1 m [m].
-        plan: Devices and surface, as the decoder reads them.
+        scanner: Devices and object, as the decoder knows them.
     """
 
     name: str
     variant: str
-    light: Light
+    light: LightName
     optics: Optics
     radii_m: NDArray[np.float64]
-    plan: RigPlan
+    scanner: Scanner
 
     @property
     def mesh(self) -> TriangleMesh:
         """The object."""
-        return self.plan.surface.mesh
+        return self.scanner.mesh
 
     @property
     def gap_m(self) -> float:
@@ -86,7 +85,7 @@ class Experiment:
 
 def box_experiment(
     *,
-    light: Light = "parallel",
+    light: LightName = "parallel",
     variant: Variant = "printed",
     distortion: float = 0.0,
 ) -> Experiment:
@@ -106,7 +105,7 @@ def box_experiment(
 
 def face_experiment(
     *,
-    light: Light = "parallel",
+    light: LightName = "parallel",
     variant: Variant = "printed",
     distortion: float = 0.0,
     radii_m: NDArray[np.float64] = FACE_RADII_M,
@@ -125,14 +124,14 @@ def face_experiment(
     return _experiment("face", mesh, _FACE_TARGET, radii_m, light, variant, distortion)
 
 
-def single(experiment: Experiment, *, projector: int = 0, camera: int = 0) -> RigPlan:
-    """Return the plan of one projector and one camera of an experiment."""
-    document = experiment.plan.document
-    one = {
-        "projectors": document["projectors"][projector : projector + 1],
-        "cameras": document["cameras"][camera : camera + 1],
-    }
-    return RigPlan(document | one, experiment.plan.surface)
+def single(experiment: Experiment, *, projector: int = 0, camera: int = 0) -> Scanner:
+    """Return one projector and one camera of an experiment."""
+    scanner = experiment.scanner
+    return replace(
+        scanner,
+        projectors=scanner.projectors[projector : projector + 1],
+        cameras=scanner.cameras[camera : camera + 1],
+    )
 
 
 @cache
@@ -145,67 +144,32 @@ def _experiment(
     mesh: TriangleMesh,
     target: NDArray[np.float64],
     radii_m: NDArray[np.float64],
-    light: Light,
+    light: LightName,
     variant: Variant,
     distortion: float,
 ) -> Experiment:
     printed = VARIANTS[variant]
     optics = Optics(printed.focal_px, printed.centre_px, distortion)
     gap_m = float(np.median(np.diff(radii_m, prepend=0.0)))
-    document = {
-        "requirements": _requirements(mesh, gap_m),
-        "projectors": [
-            projector_entry(f"P{n}", light, bearing(*at), target, radii_m)
-            for n, at in enumerate(PROJECTORS_DEG, 1)
-        ],
-        "cameras": [
-            camera_entry(f"C{n}", optics, bearing(*at), target)
-            for n, at in enumerate(CAMERAS_DEG, 1)
-        ],
-    }
-    plan = RigPlan(document, _surface(mesh))
-    return Experiment(name, variant, light, optics, radii_m, plan)
+    n = len(mesh.faces)
+    scanner = Scanner(
+        tuple(
+            placed_projector(f"P{number}", light, bearing(*at), target, radii_m)
+            for number, at in enumerate(PROJECTORS_DEG, 1)
+        ),
+        tuple(
+            placed_camera(f"C{number}", optics, bearing(*at), target)
+            for number, at in enumerate(CAMERAS_DEG, 1)
+        ),
+        mesh,
+        np.zeros(n, dtype=np.int64),
+        np.ones(n, dtype=bool),
+        _limits(gap_m),
+    )
+    return Experiment(name, variant, light, optics, radii_m, scanner)
 
 
-def _surface(mesh: TriangleMesh) -> Surface:
-    """The whole surface is the target; there are no reference poses."""
-    n, none = len(mesh.faces), np.zeros((0, 4, 4))
-    member = np.zeros(n, dtype=np.int64)
-    return Surface(mesh, member, member, np.zeros((n, 3)), none, none, none)
-
-
-def _requirements(mesh: TriangleMesh, gap_m: float) -> dict[str, Any]:
-    """What was asked: nothing but to look; the decoder reads some of the limits."""
-    return {
-        "max_projectors": len(PROJECTORS_DEG),
-        "max_cameras": len(CAMERAS_DEG),
-        "coverage": 0.95,
-        "dominant_coverage": 0.9,
-        "min_reachable": 0.9,
-        "target": "surface",
-        "pattern": "rings",
-        "projector": {"max_incidence": np.deg2rad(60.0), "min_tangent_angle": 0.7},
-        "camera": {"max_incidence": _MAX_INCIDENCE, "max_sample_distance_m": None},
-        "triangulation": {"min_conditioning": 0.1, "noise_px": 0.1},
-        "check": {
-            "max_rms_m": _ANY_M,
-            "max_p95_m": _ANY_M,
-            "max_bias_m": _ANY_M,
-            "tau_m": gap_m,
-            "min_completeness": 0.0,
-            "max_predicted_missing": 1.0,
-        },
-        "workspace": {
-            "centre": mesh.centre.tolist(),
-            "object_radius_m": mesh.radius,
-            "up": [0.0, 0.0, 1.0],
-            "axis": [0.0, -1.0, 0.0],
-            "half_angle": np.pi,
-            "projector_radius_m": [STANDOFF_M, STANDOFF_M],
-            "camera_radius_m": [STANDOFF_M, STANDOFF_M],
-            "floor_m": None,
-            "n_reference_projectors": 0,
-            "n_reference_cameras": 0,
-            "reference_ring_radius": 0.0,
-        },
-    }
+def _limits(gap_m: float) -> ScanLimits:
+    """Nothing is asked but to look; the decoder reads some of the limits."""
+    check = CheckLimits(_ANY_M, _ANY_M, _ANY_M, gap_m, 0.0, 1.0)
+    return ScanLimits(check, 0.1, _MAX_LIT, _MAX_SEEN)

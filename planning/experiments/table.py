@@ -5,6 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+
 from .one_image import LabelCount
 from .paper_devices import CAMERA_PX, PROJECTOR_PX
 from .point_errors import Errors, MeasuredErrors
@@ -20,7 +25,7 @@ _NUMBERS = (
 
 def setup_lines(experiment: Experiment) -> list[str]:
     """Return what is set up: numbers of the paper, then ours."""
-    optics, plan = experiment.optics, experiment.plan
+    optics, scanner = experiment.optics, experiment.scanner
     width, height = (_MM * side for side in optics.field_m)
     radii = ", ".join(f"{_MM * radius:.4g}" for radius in experiment.radii_m)
     u, v = optics.centre_px
@@ -30,9 +35,9 @@ def setup_lines(experiment: Experiment) -> list[str]:
     lens = f", k1 = {optics.distortion:g}" if optics.distortion else ""
     return [
         f"{experiment.name}, {extent} mm; {experiment.light} light",
-        f"{len(plan.projectors)} projectors of {panel}, "
+        f"{len(scanner.projectors)} projectors of {panel}, "
         f"{len(experiment.radii_m)} circles: {radii} mm",
-        f"{len(plan.cameras)} cameras of {image}, about 1 m; "
+        f"{len(scanner.cameras)} cameras of {image}, about 1 m; "
         f"f = {optics.focal_px:g} px, centre ({u:g}, {v:g}){lens}: {width:.0f} x "
         f"{height:.0f} mm at 1 m",
     ]
@@ -52,20 +57,20 @@ def ring_lines(outcome: Outcome) -> list[str]:
 
     Shares are of the circumference; errors of all points of the ring.
     """
-    cameras = [camera.id for camera in outcome.experiment.plan.cameras]
+    cameras = [camera.id for camera in outcome.experiment.scanner.cameras]
     shown = "".join(f"{'seen ' + name:>9s}" for name in cameras)
     got = "".join(f"{'got ' + name:>9s}" for name in cameras)
     lines = [
         f"{'ring':10s}{'mm':>7s}{'landed':>9s}{shown}{got}{'got any':>9s}{_NUMBERS}"
     ]
-    for fate in outcome.fates:
-        seen = "".join(f"{fate.seen[name]:9.3f}" for name in cameras)
-        measured = "".join(f"{fate.measured[name]:9.3f}" for name in cameras)
-        radius = _MM * outcome.experiment.radii_m[fate.ring]
+    for ring in outcome.outcomes:
+        seen = "".join(f"{ring.seen[name]:9.3f}" for name in cameras)
+        measured = "".join(f"{ring.measured[name]:9.3f}" for name in cameras)
+        radius = _MM * outcome.experiment.radii_m[ring.ring]
         lines.append(
-            f"{fate.projector + ' ' + str(fate.ring + 1):10s}{radius:7.1f}"
-            f"{fate.on_object:9.3f}{seen}{measured}{fate.measured_by_any:9.3f}"
-            f"{_numbers(_of_ring(outcome, fate.projector, fate.ring))}"
+            f"{ring.projector + ' ' + str(ring.ring + 1):10s}{radius:7.1f}"
+            f"{ring.on_object:9.3f}{seen}{measured}{ring.measured_by_any:9.3f}"
+            f"{_numbers(_of_ring(outcome, ring.projector, ring.ring))}"
         )
     return lines
 
@@ -100,7 +105,8 @@ def outcome_lines(outcome: Outcome) -> list[str]:
 
 def outcome_document(outcome: Outcome) -> dict[str, Any]:
     """Return the same as plain values, in metres."""
-    experiment, plan = outcome.experiment, outcome.experiment.plan
+    experiment = outcome.experiment
+    scanner = experiment.scanner
     return {
         "experiment": experiment.name,
         "variant": experiment.variant,
@@ -111,22 +117,33 @@ def outcome_document(outcome: Outcome) -> dict[str, Any]:
         "ambient": outcome.photometry.ambient,
         "radii_m": experiment.radii_m.tolist(),
         "ring_gap_m": experiment.gap_m,
-        "projectors": plan.document["projectors"],
-        "cameras": plan.document["cameras"],
+        "projectors": [
+            {
+                **_device_document(one),
+                "light": one.light.name,
+                "world_from_ring": one.world_from_ring.tolist(),
+                "ring_radii": one.radii.tolist(),
+            }
+            for one in scanner.projectors
+        ],
+        "cameras": [
+            {**_device_document(one), "distortion": list(one.distortion)}
+            for one in scanner.cameras
+        ],
         "observable_share": outcome.visible,
         "labels": None if outcome.labels is None else vars(outcome.labels),
         "clouds": [_cloud_document(one) for one in outcome.clouds],
         "rings": [
             {
-                "projector": fate.projector,
-                "ring": fate.ring,
-                "on_object": fate.on_object,
-                "seen": fate.seen,
-                "measured": fate.measured,
-                "measured_by_any": fate.measured_by_any,
-                "errors": _of_ring(outcome, fate.projector, fate.ring).to_document(),
+                "projector": ring.projector,
+                "ring": ring.ring,
+                "on_object": ring.on_object,
+                "seen": ring.seen,
+                "measured": ring.measured,
+                "measured_by_any": ring.measured_by_any,
+                "errors": _of_ring(outcome, ring.projector, ring.ring).to_document(),
             }
-            for fate in outcome.fates
+            for ring in outcome.outcomes
         ],
     }
 
@@ -136,6 +153,18 @@ def doubled_document(doubled: Doubled) -> dict[str, Any]:
     return {
         "first": _cloud_document(doubled.first),
         "both": _cloud_document(doubled.both),
+    }
+
+
+def _device_document(
+    device: CameraCalibration | ProjectorCalibration,
+) -> dict[str, Any]:
+    """Pose and interior; of parallel light, pixels a metre on the diagonal of K."""
+    return {
+        "id": device.id,
+        "world_from_device": device.world_from_device.tolist(),
+        "K": device.matrix.tolist(),
+        "resolution": list(device.resolution),
     }
 
 
@@ -149,7 +178,7 @@ def _cloud_document(one: MeasuredErrors) -> dict[str, Any]:
 
 
 def _of_ring(outcome: Outcome, projector: str, ring: int) -> Errors:
-    ids = [one.id for one in outcome.experiment.plan.projectors]
+    ids = [one.id for one in outcome.experiment.scanner.projectors]
     cloud = outcome.union.cloud
     own = (cloud.projector == ids.index(projector)) & (cloud.ring == ring)
     return Errors.of(outcome.union.distances[own])

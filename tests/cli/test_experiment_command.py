@@ -9,10 +9,9 @@ from PIL import Image
 
 from planning.cli.experiment_command import experiment_of
 from planning.cli.main import commands
-from planning.experiments.setups import box_experiment
-from planning.model.plan import RigPlan
+from planning.experiments.setups import box_experiment, single
 from planning.verify.reconstruction.faults.causes import rejection
-from planning.verify.reconstruction.single_shot.single_shot_check import (
+from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
 )
 
@@ -90,15 +89,7 @@ def test_what_does_not_go_together_is_usage(arguments, sentence):
 
 
 def test_a_plan_is_measured_from_single_images_too():
-    plan = box_experiment(variant="fits").plan
-    one = RigPlan(
-        plan.document
-        | {
-            "projectors": plan.document["projectors"][:1],
-            "cameras": plan.document["cameras"][:1],
-        },
-        plan.surface,
-    )
+    one = single(box_experiment(variant="fits"))
     found = reconstruct_single_shot(one, tolerance_m=1e-3, seed=3)
     assert found.accuracy is not None
     assert found.accuracy.rms_m < 0.08e-3

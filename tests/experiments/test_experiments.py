@@ -20,8 +20,8 @@ from planning.experiments.paper_devices import (
     CAMERA_PX,
     PRINTED,
     bearing,
-    camera_entry,
-    projector_entry,
+    placed_camera,
+    placed_projector,
 )
 from planning.experiments.paper_figures import (
     camera_images,
@@ -41,22 +41,19 @@ from planning.experiments.setups import (
     single,
 )
 from planning.experiments.table import outcome_document, outcome_lines
-from planning.model.plan import RigPlan
-from planning.model.surface import Surface
 from planning.verify.reconstruction.calibration import (
     PairCalibration,
-    calibrate_camera,
-    calibrate_projector,
 )
 from planning.verify.reconstruction.check.accuracy import measure_accuracy
-from planning.verify.reconstruction.check.check import reconstruct_plan
+from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
-from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
-from planning.verify.reconstruction.render.render import Shown, render_lines
+from planning.verify.reconstruction.render.render import render_lines
+from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
+from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.ring_lines import line_patterns
-from planning.verify.reconstruction.single_shot.single_shot_rig import (
+from planning.verify.reconstruction.single_shot.single_shot import (
     drawn_lines,
     shoot_rig,
 )
@@ -80,13 +77,12 @@ def of_face() -> Outcome:
 @pytest.mark.parametrize("variant", ["printed", "fits"])
 def test_devices_stand_as_the_paper_says(make, variant):
     experiment = make(variant=variant)
-    plan = experiment.plan
+    plan = experiment.scanner
     assert len(plan.projectors) == len(plan.cameras) == 2
     middle = 0.5 * (np.array(CAMERA_PX) - 1.0)
-    aimed = calibrate_projector(plan.projectors[0])
+    aimed = plan.projectors[0]
     target = aimed.centre + aimed.axis
-    for planned in plan.cameras:
-        camera = calibrate_camera(planned)
+    for camera in plan.cameras:
         assert camera.resolution == (1280, 720)
         np.testing.assert_allclose(camera.project(target[None]), middle[None])
         assert np.linalg.norm(camera.centre - target) == pytest.approx(1.0)
@@ -94,8 +90,7 @@ def test_devices_stand_as_the_paper_says(make, variant):
         above = camera.project((target + [0.0, 0.0, 1e-3])[None])[0]
         assert above[1] < middle[1] - 1.0
         assert abs(above[0] - middle[0]) < 0.1 * (middle[1] - above[1])
-    for planned in plan.projectors:
-        projector = calibrate_projector(planned)
+    for projector in plan.projectors:
         assert projector.resolution == (1024, 768)
         np.testing.assert_allclose(
             projector.centre + projector.axis, target, atol=1e-12
@@ -110,12 +105,12 @@ def test_what_the_paper_prints_is_kept():
     face, boxed = face_experiment(), box_experiment()
     np.testing.assert_allclose(face.radii_m, np.array([1, 2, 4]) * 25.4e-3)
     assert len(boxed.radii_m) == 7
-    matrix = face.plan.cameras[0].device.camera_matrix
+    matrix = face.scanner.cameras[0].matrix
     np.testing.assert_array_equal(matrix, [[8e3, 0, 174], [0, 8e3, 68], [0, 0, 1]])
     np.testing.assert_allclose(face.optics.field_m, [0.160, 0.090])
     assert face.light == "parallel"
     diverging = face_experiment(light="diverging")
-    tangents = diverging.plan.projectors[0].ring_radii
+    tangents = diverging.scanner.projectors[0].radii
     np.testing.assert_allclose(tangents * 1.0, FACE_RADII_M)
 
 
@@ -146,8 +141,8 @@ def test_the_box_is_measured_to_a_fortieth_of_a_millimetre(of_box):
 def test_points_project_back_onto_their_edges_by_eq_3(of_box):
     """x = M y, M = M_in M_ex; M is 3 x 4, so that depth comes from the ring alone."""
     cloud = of_box.union.cloud
-    for c, planned in enumerate(of_box.experiment.plan.cameras):
-        matrix = projection_matrix(calibrate_camera(planned))
+    for c, camera in enumerate(of_box.experiment.scanner.cameras):
+        matrix = projection_matrix(camera)
         assert matrix.shape == (3, 4)
         own = cloud.take(cloud.camera == c)
         np.testing.assert_allclose(projected(matrix, own.points), own.pixels, atol=1e-6)
@@ -159,12 +154,9 @@ def test_points_project_back_onto_their_edges_by_eq_3(of_box):
 def test_eq_4_is_the_coaxial_case_of_eq_3():
     """z = f R / sqrt(u^2 + v^2), its right side (f R / z)^2 = u^2 + v^2 completed."""
     target, straight = np.zeros(3), bearing(0.0, 0.0)
-    entry = projector_entry("P1", "parallel", straight, target, FACE_RADII_M)
-    lens = camera_entry("C1", PRINTED, straight, target)
-    lens["world_from_device"] = entry["world_from_device"]
-    plan = of_devices(grid(0.2, 0.2, divisions=(1, 1)), [entry], [lens])
-    projector = calibrate_projector(plan.projectors[0])
-    camera = calibrate_camera(plan.cameras[0])
+    projector = placed_projector("P1", "parallel", straight, target, FACE_RADII_M)
+    camera = placed_camera("C1", PRINTED, straight, target)
+    camera = replace(camera, world_from_device=projector.world_from_device)
     turn = np.linspace(0.0, 6.0, 50)
     radii = np.resize(FACE_RADII_M, 50)
     depth = np.linspace(0.8, 1.2, 50)
@@ -184,12 +176,12 @@ def test_eq_4_is_the_coaxial_case_of_eq_3():
 def test_points_of_the_second_projector_come_into_the_frame_of_the_first_by_eq_6(light):
     """Y2 = J y2, each projector's points triangulated in its own ring frame."""
     experiment = box_experiment(variant="fits", light=light)
-    cloud = reconstruct_plan(
+    cloud = reconstruct(
         single(experiment, projector=1), seed=0, photometry=SOFT
     ).everything
-    first, second = (calibrate_projector(p) for p in experiment.plan.projectors)
+    first, second = experiment.scanner.projectors
     y2 = second.to_ring(cloud.points)
-    radii = experiment.plan.projectors[1].ring_radii[cloud.ring]
+    radii = experiment.scanner.projectors[1].radii[cloud.ring]
     across = np.hypot(y2[:, 0], y2[:, 1])
     on_ring = across / y2[:, 2] if light == "diverging" else across
     np.testing.assert_allclose(on_ring, radii, atol=1e-9)
@@ -199,18 +191,21 @@ def test_points_of_the_second_projector_come_into_the_frame_of_the_first_by_eq_6
     assert np.abs(moved - y2).max() > 0.05
 
 
-def of_devices(mesh: TriangleMesh, projectors: list, cameras: list) -> RigPlan:
-    """A plan of other devices about another object."""
-    plan = box_experiment().plan
-    n, none = len(mesh.faces), np.zeros((0, 4, 4))
-    zero = np.zeros(n, dtype=np.int64)
-    surface = Surface(mesh, zero, zero, np.zeros((n, 3)), none, none, none)
-    devices = {"projectors": projectors, "cameras": cameras}
-    return RigPlan(plan.document | devices, surface)
+def of_devices(mesh: TriangleMesh, projectors: list, cameras: list) -> Scanner:
+    """Other devices about another object."""
+    n = len(mesh.faces)
+    return replace(
+        box_experiment().scanner,
+        projectors=tuple(projectors),
+        cameras=tuple(cameras),
+        mesh=mesh,
+        region=np.zeros(n, dtype=np.int64),
+        target=np.ones(n, dtype=bool),
+    )
 
 
 @pytest.mark.parametrize("light", ["parallel", "diverging"])
-def test_fates_of_rings_on_a_plate_are_the_arcs_that_fit(light):
+def test_outcomes_of_rings_on_a_plate_are_the_arcs_that_fit(light):
     """Panel 0.230 m high, image 0.160 x 0.090 m, a plate square before both."""
     flat = grid(0.6, 0.6, divisions=(1, 1))
     # A quarter turn about x: the plate's normal comes to lie along -y.
@@ -221,27 +216,27 @@ def test_fates_of_rings_on_a_plate_are_the_arcs_that_fit(light):
     straight, target = bearing(0.0, 0.0), np.zeros(3)
     plan = of_devices(
         plate,
-        [projector_entry("P1", light, straight, target, radii)],
-        [camera_entry("C1", PRINTED, straight, target)],
+        [placed_projector("P1", light, straight, target, radii)],
+        [placed_camera("C1", PRINTED, straight, target)],
     )
-    fates = ring_outcomes(plan, Cloud.empty())
+    outcomes = ring_outcomes(plan, Cloud.empty())
     width, height = (0.3072, 0.2304) if light == "parallel" else (0.5, 0.375)
-    for fate, radius in zip(fates, radii, strict=True):
-        assert fate.on_object == pytest.approx(arc(radius, width, height), abs=2e-3)
+    for ring, radius in zip(outcomes, radii, strict=True):
+        assert ring.on_object == pytest.approx(arc(radius, width, height), abs=2e-3)
         # The rest of the circle is in the panel's corners, outside the image.
-        seen = arc(radius, *PRINTED.field_m) / fate.on_object
+        seen = arc(radius, *PRINTED.field_m) / ring.on_object
         # The lens looks past the plate, so that its image is no exact rectangle.
-        assert fate.seen["C1"] == pytest.approx(seen, abs=0.03)
-        assert fate.measured["C1"] == fate.measured_by_any == 0.0
+        assert ring.seen["C1"] == pytest.approx(seen, abs=0.03)
+        assert ring.measured["C1"] == ring.measured_by_any == 0.0
     everywhere = ring_outcomes(plan, on_plate(radii))
-    for fate in everywhere:
-        assert fate.measured == fate.seen
-        assert fate.measured_by_any == fate.seen["C1"]
-    assert fates[0].seen["C1"] == 1.0
-    assert 0.2 < fates[1].seen["C1"] < 0.8
-    assert fates[2].seen["C1"] == 0.0
+    for ring in everywhere:
+        assert ring.measured == ring.seen
+        assert ring.measured_by_any == ring.seen["C1"]
+    assert outcomes[0].seen["C1"] == 1.0
+    assert 0.2 < outcomes[1].seen["C1"] < 0.8
+    assert outcomes[2].seen["C1"] == 0.0
     if light == "parallel":
-        assert fates[2].on_object < 0.8
+        assert outcomes[2].on_object < 0.8
 
 
 def on_plate(radii: np.ndarray) -> Cloud:
@@ -267,7 +262,7 @@ def arc(radius: float, width: float, height: float) -> float:
 
 
 def test_of_a_box_the_front_is_lit_and_seen_and_the_back_is_not(of_box):
-    plan = of_box.experiment.plan
+    plan = of_box.experiment.scanner
     # Left and right of the front edge; behind; on top, which no projector lights.
     inner = np.array([[-0.02, -0.0649, 0.0], [0.02, -0.0649, 0.0], [0.0, 0.08, 0.0]])
     points = np.vstack([inner, [0.0, 0.0, 0.06]])
@@ -276,27 +271,29 @@ def test_of_a_box_the_front_is_lit_and_seen_and_the_back_is_not(of_box):
     expected = [True, True, False, False]
     assert lit_and_seen(plan, points, normals).tolist() == expected
     # Something small in the light of both projectors, in no camera's view.
-    blocks = [plan.surface.mesh]
+    blocks = [plan.mesh]
     for planned in plan.projectors:
         middle = points[0] - 0.3 * planned.world_from_device[:3, 2]
         small = box((0.02, 0.02, 0.02))
         blocks.append(TriangleMesh(small.vertices + middle, small.faces))
-    shaded = of_devices(
-        joined(*blocks), plan.document["projectors"], plan.document["cameras"]
-    )
+    shaded = of_devices(joined(*blocks), list(plan.projectors), list(plan.cameras))
     expected[0] = False
     assert lit_and_seen(shaded, points, normals).tolist() == expected
 
 
 def test_rings_that_are_measured_were_seen_and_landed(of_face):
-    for fate in of_face.fates:
-        assert 0.4 < fate.on_object <= 1.0
-        for name, measured in fate.measured.items():
-            assert measured <= fate.seen[name]
-        assert fate.measured_by_any >= max(fate.measured.values())
-        assert fate.measured_by_any > 0.6
+    for ring in of_face.outcomes:
+        assert 0.4 < ring.on_object <= 1.0
+        for name, measured in ring.measured.items():
+            assert measured <= ring.seen[name]
+        assert ring.measured_by_any >= max(ring.measured.values())
+        assert ring.measured_by_any > 0.6
     # The ring of 4 inches is wider than the head: a false projection.
-    assert [fate.on_object < 0.6 for fate in of_face.fates] == [False, False, True] * 2
+    assert [ring.on_object < 0.6 for ring in of_face.outcomes] == [
+        False,
+        False,
+        True,
+    ] * 2
 
 
 def test_few_rings_make_false_edges_where_one_surface_hides_another(of_face, of_box):
@@ -312,13 +309,13 @@ def test_few_rings_make_false_edges_where_one_surface_hides_another(of_face, of_
 
 def test_as_printed_the_image_holds_a_fraction_of_the_rings(of_face):
     printed = face_experiment()
-    fates = ring_outcomes(printed.plan, Cloud.empty())
-    outer = [fate for fate in fates if fate.ring == 2]
-    assert all(max(fate.seen.values()) < 0.05 for fate in outer)
-    inner = [fate for fate in fates if fate.ring == 0]
-    assert all(min(fate.seen.values()) > 0.7 for fate in inner)
-    fitting = [fate for fate in of_face.fates if fate.ring == 2]
-    assert all(max(fate.seen.values()) > 0.7 for fate in fitting)
+    outcomes = ring_outcomes(printed.scanner, Cloud.empty())
+    outer = [ring for ring in outcomes if ring.ring == 2]
+    assert all(max(ring.seen.values()) < 0.05 for ring in outer)
+    inner = [ring for ring in outcomes if ring.ring == 0]
+    assert all(min(ring.seen.values()) > 0.7 for ring in inner)
+    fitting = [ring for ring in of_face.outcomes if ring.ring == 2]
+    assert all(max(ring.seen.values()) > 0.7 for ring in fitting)
 
 
 def test_errors_are_summarised_by_hand():
@@ -333,11 +330,11 @@ def test_errors_are_summarised_by_hand():
 
 def test_a_second_sequence_doubles_the_density(of_box):
     np.testing.assert_allclose(midway(np.array([2.0, 4.0, 8.0])), [1.0, 3.0, 6.0])
-    shifted = second_sequence(of_box.experiment.plan)
+    shifted = second_sequence(of_box.experiment.scanner)
     for before, after in zip(
-        of_box.experiment.plan.projectors, shifted.projectors, strict=True
+        of_box.experiment.scanner.projectors, shifted.projectors, strict=True
     ):
-        np.testing.assert_allclose(after.ring_radii, before.ring_radii - 0.006)
+        np.testing.assert_allclose(after.radii, before.radii - 0.006)
     doubled = double_density(of_box, threads=1)
     first, both = doubled.first, doubled.both
     assert 1.8 < len(both.cloud) / len(first.cloud) < 2.2
@@ -345,7 +342,7 @@ def test_a_second_sequence_doubles_the_density(of_box):
     assert both.complete[0] > 0.98
     assert both.errors.rms_m < 1.1 * first.errors.rms_m
     # Rings are numbered outwards through both sequences.
-    ring = calibrate_projector(shifted.projectors[0])
+    ring = shifted.projectors[0]
     own = both.cloud.take(both.cloud.projector == 0)
     radius = np.hypot(*ring.to_ring(own.points)[:, :2].T)
     np.testing.assert_allclose(radius, 0.006 * (own.ring + 1), atol=1e-9)
@@ -354,13 +351,13 @@ def test_a_second_sequence_doubles_the_density(of_box):
 def test_distortion_and_ambient_light_are_switches(of_box):
     """A lens that is known costs nothing, one that isn't costs accuracy."""
     bent = box_experiment(variant="fits", distortion=-0.2)
-    known = reconstruct_plan(single(bent), seed=0, photometry=SOFT)
+    known = reconstruct(single(bent), seed=0, photometry=SOFT)
     assert known.accuracy.rms_m < 0.025e-3
     straight = single(box_experiment(variant="fits"))
-    unknown = reconstruct_plan(straight, seed=0, photometry=SOFT, truth=single(bent))
+    unknown = reconstruct(straight, seed=0, photometry=SOFT, truth=single(bent))
     assert unknown.accuracy.rms_m > 0.1e-3
     bright = replace(SOFT, ambient=1.0)
-    lit = reconstruct_plan(straight, seed=0, photometry=bright).accuracy.rms_m
+    lit = reconstruct(straight, seed=0, photometry=bright).accuracy.rms_m
     dark = of_box.single.errors.rms_m
     assert 1.3 * dark < lit < 5.0 * dark
 
@@ -409,30 +406,27 @@ def test_truth_of_labels_is_that_of_the_coded_sequence(of_box, light):
     """Edges that were decoded from a sequence lie on their rings, with their roots."""
     plan = single(box_experiment(variant="fits", light=light))
     # Nearly blind points too: there the cone's tilt decides the sign of r.m.
-    plan.document["requirements"]["triangulation"]["min_conditioning"] = 0.02
-    cloud = reconstruct_plan(plan, seed=0, photometry=SOFT).everything
-    camera = calibrate_camera(plan.cameras[0])
-    projector = calibrate_projector(plan.projectors[0])
-    pair = PairCalibration(projector, camera)
-    radii, caster = plan.projectors[0].ring_radii, RayCaster(of_box.experiment.mesh)
-    ring, root = true_labels(cloud.pixels, radii, pair, caster, 1e-3)
+    plan = replace(plan, limits=replace(plan.limits, min_conditioning=0.02))
+    cloud = reconstruct(plan, seed=0, photometry=SOFT).everything
+    pair = PairCalibration(plan.projectors[0], plan.cameras[0])
+    caster = RayCaster(of_box.experiment.mesh)
+    ring, root = true_labels(cloud.pixels, pair, caster, 1e-3)
     assert np.abs(cloud.conditioning).min() < 0.03
     np.testing.assert_array_equal(ring, cloud.ring)
     assert np.mean(root == np.sign(cloud.conditioning)) > 0.999
     beside = np.column_stack([cloud.pixels[:, 0] + 15.0, cloud.pixels[:, 1]])
-    off, _ = true_labels(beside, radii, pair, caster, 1e-3)
+    off, _ = true_labels(beside, pair, caster, 1e-3)
     assert np.mean(off == -1) > 0.7
 
 
 def test_lines_are_a_millimetre_wide_at_the_object_or_narrow_beside_their_gaps():
     for light, away in (("parallel", 1.0), ("diverging", 1.0), ("diverging", 2.5)):
-        plan = box_experiment(light=light).plan
-        source, mesh = plan.projectors[0], plan.surface.mesh
+        plan = box_experiment(light=light).scanner
+        source, mesh = plan.projectors[0], plan.mesh
         pose = source.world_from_device
         move = pose[:3, 3] + away * pose[:3, 2] - mesh.centre
         moved = TriangleMesh(mesh.vertices + move, mesh.faces)
-        camera = calibrate_camera(plan.cameras[0])
-        patterns = ring_patterns(calibrate_projector(source), source.ring_radii, camera)
+        patterns = source.pattern_for(plan.cameras[0])
         width, lines = drawn_lines(source, patterns, moved)
         assert width * (away if light == "diverging" else 1.0) == pytest.approx(1e-3)
         np.testing.assert_allclose(np.diff(lines.radii)[::2], width)
@@ -443,13 +437,11 @@ def test_lines_are_a_millimetre_wide_at_the_object_or_narrow_beside_their_gaps()
 def test_light_of_both_projectors_adds_up_in_one_image():
     experiment = box_experiment(variant="fits")
     caster = RayCaster(experiment.mesh, threads=1)
-    camera = calibrate_camera(experiment.plan.cameras[0])
+    camera = experiment.scanner.cameras[0]
     seen = view(camera, experiment.mesh, caster, CLEAN)
     shown = []
-    for source in experiment.plan.projectors:
-        projector = calibrate_projector(source)
-        patterns = ring_patterns(projector, source.ring_radii, camera)
-        lines = line_patterns(patterns, 1e-3)
+    for projector in experiment.scanner.projectors:
+        lines = line_patterns(projector.pattern_for(camera), 1e-3)
         shown.append(Shown(projector, projector, lines, caster))
     both, one, other = (
         render_lines(seen, some, CLEAN, (0,)).stack[0].ravel().astype(float)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from planning.verify.reconstruction.render.canvas import ImageCanvas
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.render.render import Shown
+from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import RenderedView
 
 _LEVELS = 256
@@ -49,7 +49,7 @@ def render_whites(
     canvas = ImageCanvas.about(seen, np.zeros(0, dtype=np.int64))
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
     ambient = canvas.image(around, canvas.inside, photometry)
-    lights = [one.light(seen, photometry) for one in shown]
+    lights = [one.light(seen, photometry.projector_blur_m) for one in shown]
     whites = [canvas.image(one.white, one.samples, photometry) for one in lights]
     brightest = max(float(np.percentile(white + ambient, 99.9)) for white in whites)
     gain = photometry.exposure * 255.0 / max(brightest, 1e-9)

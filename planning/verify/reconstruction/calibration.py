@@ -5,15 +5,19 @@ that a mistake in one shows against the other. Pixels follow OpenCV: the centre 
 top-left pixel is (0, 0).
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel, PinholeModel
+from geometry.devices import ParallelModel
+from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
 
+from .light import LIGHTS, Light
+from .patterns.ring_patterns import CameraPattern, RingPattern
+
+_Array = NDArray[np.float64]
 _UNDISTORT_STEPS = 60
 _UNDISTORT_TOLERANCE = 1e-13
 
@@ -28,16 +32,18 @@ class CameraCalibration:
         matrix: K in [px], shape (3, 3).
         distortion: k1, k2, p1, p2, k3.
         resolution: Width and height in [px].
+        body: Its housing; None: it takes no room.
     """
 
     id: str
-    world_from_device: NDArray[np.float64]
-    matrix: NDArray[np.float64]
+    world_from_device: _Array
+    matrix: _Array
     distortion: tuple[float, float, float, float, float]
     resolution: tuple[int, int]
+    body: Body | None = None
 
     @property
-    def centre(self) -> NDArray[np.float64]:
+    def centre(self) -> _Array:
         """Optical centre in the world in [m], shape (3,)."""
         return self.world_from_device[:3, 3]
 
@@ -46,7 +52,7 @@ class CameraCalibration:
         """Mean of the two focal lengths in [px]."""
         return 0.5 * float(self.matrix[0, 0] + self.matrix[1, 1])
 
-    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def project(self, points: _Array) -> _Array:
         """Return pixels (n, 2) of world points (n, 3); NaN behind the camera."""
         turn = self.world_from_device[:3, :3]
         x, y, z = ((points - self.centre) @ turn).T
@@ -57,7 +63,7 @@ class CameraCalibration:
             [matrix[0, 0] * x + matrix[0, 2], matrix[1, 1] * y + matrix[1, 2]]
         )
 
-    def rays(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rays(self, pixels: _Array) -> _Array:
         """Return unit viewing directions (n, 3) in the world of pixels (n, 2).
 
         The lens is inverted by the fixed point ``p = (q - tangential(p)) / radial(p)``;
@@ -72,9 +78,7 @@ class CameraCalibration:
         local = np.column_stack([x * scale, y * scale, scale])
         return local @ self.world_from_device[:3, :3].T
 
-    def _terms(
-        self, x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _terms(self, x: _Array, y: _Array) -> tuple[_Array, _Array, _Array]:
         """Radial factor and the two tangential shifts of the lens."""
         k1, k2, p1, p2, k3 = self.distortion
         xx, xy, yy = x * x, x * y, y * y
@@ -86,15 +90,11 @@ class CameraCalibration:
             p1 * (s + 2.0 * yy) + (2.0 * p2 * xy),
         )
 
-    def _bend(
-        self, x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _bend(self, x: _Array, y: _Array) -> tuple[_Array, _Array]:
         radial, shift_x, shift_y = self._terms(x, y)
         return x * radial + shift_x, y * radial + shift_y
 
-    def _unbend(
-        self, qx: NDArray[np.float64], qy: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _unbend(self, qx: _Array, qy: _Array) -> tuple[_Array, _Array]:
         x, y = qx, qy
         change = np.full_like(qx, np.inf)
         with np.errstate(all="ignore"):
@@ -111,11 +111,11 @@ class CameraCalibration:
 
 @dataclass(frozen=True, eq=False)
 class ProjectorCalibration:
-    """A projector: optics, pose and the frame of its rings.
+    """A projector: optics, pose, the frame of its rings and what it draws.
 
     Attributes:
         id: Name of the projector.
-        light: `diverging` (pinhole) or `parallel` (beam along +z from the plane z = 0).
+        light: How its light leaves it.
         world_from_device: Pose [m], shape (4, 4).
         world_from_ring: Pose of the ring frame [m], shape (4, 4).
         matrix: From panel coordinates to pixels, shape (3, 3): K for diverging light,
@@ -123,35 +123,57 @@ class ProjectorCalibration:
             (x, y) in [m], 1 / pixel pitch on the diagonal.
         resolution: Width and height in [px].
         beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
+        radii: Of the ring edges that it draws, as in `RingPattern`, shape (n_rings,).
+        body: Its housing; None: it takes no room.
     """
 
     id: str
-    light: Literal["diverging", "parallel"]
-    world_from_device: NDArray[np.float64]
-    world_from_ring: NDArray[np.float64]
-    matrix: NDArray[np.float64]
+    light: Light
+    world_from_device: _Array
+    world_from_ring: _Array
+    matrix: _Array
     resolution: tuple[int, int]
     beam_radius: float | None
+    radii: _Array = field(default_factory=lambda: np.zeros(0))
+    body: Body | None = None
 
     @property
-    def centre(self) -> NDArray[np.float64]:
+    def centre(self) -> _Array:
         """Optical centre, or centre of the panel, in the world in [m], shape (3,)."""
         return self.world_from_device[:3, 3]
 
     @property
-    def axis(self) -> NDArray[np.float64]:
+    def axis(self) -> _Array:
         """Direction of the optical axis in the world, shape (3,)."""
         return self.world_from_device[:3, 2]
 
-    def beams(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return unit directions of the light at world points, (n, 3) both."""
-        if self.light == "parallel":
-            return np.broadcast_to(self.axis, points.shape)
-        beams = points - self.centre
-        return beams / np.linalg.norm(beams, axis=1, keepdims=True)
+    @property
+    def pattern(self) -> RingPattern:
+        """What it draws."""
+        return RingPattern(self.light, self.radii)
+
+    def pattern_for(self, camera: CameraCalibration) -> CameraPattern:
+        """Return what it draws with the root disc of a camera."""
+        return CameraPattern(
+            self.light, self.radii, self.to_ring(camera.centre[None])[0]
+        )
+
+    def aim(self, points: _Array) -> tuple[_Array, _Array, _Array]:
+        """Return where the light of world points starts, its directions and lengths."""
+        depth = (points - self.centre) @ self.axis
+        return self.light.aim(self.world_from_device, points, depth)
+
+    def incidence_cosine(self, points: _Array, normals: _Array) -> _Array:
+        """Return the cosine of the incidence of its light, shadows left aside, (n,).
+
+        Args:
+            points: Of the surface [m], shape (n, 3).
+            normals: Unit normals there, shape (n, 3).
+        """
+        return -np.einsum("ij,ij->i", self.aim(points)[1], normals)
 
     @property
-    def ring_from_device(self) -> NDArray[np.float64]:
+    def ring_from_device(self) -> _Array:
         """Pose of the device in the ring frame, shape (4, 4)."""
         turn = self.world_from_ring[:3, :3].T
         pose = np.eye(4)
@@ -159,30 +181,35 @@ class ProjectorCalibration:
         pose[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
         return pose
 
-    def to_ring(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_ring(self, points: _Array) -> _Array:
         """Return world points (n, 3) in the ring frame."""
         return (points - self.world_from_ring[:3, 3]) @ self.world_from_ring[:3, :3]
 
-    def panel(
-        self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def ring_coordinate(self, points: _Array) -> _Array:
+        """Return |p| of the light at world points (n, 3), shape (n,)."""
+        p = self.light.plane(self.to_ring(points))
+        return np.hypot(p[:, 0], p[:, 1])
+
+    def ring_plane(self, pixels: _Array) -> _Array:
+        """Return where pixels (n, 2) lie in the plane that rings are drawn in, (n, 2).
+
+        (x/z, y/z) in diverging light, (x, y) in [m] in parallel light.
+        """
+        flat = self.panel_coordinates(pixels)
+        return self.light.turned(flat, self.ring_from_device)
+
+    def panel(self, points: _Array) -> tuple[_Array, _Array]:
         """Return pixels (n, 2) that light world points (n, 3), and depths z (n,).
 
         Pixels are NaN behind the device.
         """
         local = (points - self.centre) @ self.world_from_device[:3, :3]
         z = local[:, 2]
-        flat = local[:, :2]
-        front = np.where(z > 0.0, 1.0, np.nan)
-        flat = (
-            flat
-            * (front / np.where(z > 0.0, z, 1.0) if self._diverging else front)[:, None]
-        )
+        shrink = self.light.shrink(np.where(z > 0.0, z, 1.0))
+        flat = local[:, :2] * np.where(z > 0.0, shrink, np.nan)[:, None]
         return flat * np.diag(self.matrix)[:2] + self.matrix[:2, 2], z
 
-    def in_panel(
-        self, pixels: NDArray[np.float64], margin_px: float = 0.0
-    ) -> NDArray[np.bool_]:
+    def in_panel(self, pixels: _Array, margin_px: float = 0.0) -> NDArray[np.bool_]:
         """Return whether pixels (n, 2) are drawn: in the image and in the beam."""
         u, v = pixels.T
         width, height = self.resolution
@@ -195,13 +222,9 @@ class ProjectorCalibration:
             inside &= np.hypot(flat[:, 0], flat[:, 1]) <= reach
         return inside
 
-    def panel_coordinates(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    def panel_coordinates(self, pixels: _Array) -> _Array:
         """Return panel coordinates (n, 2) of pixels (n, 2)."""
         return (pixels - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
-
-    @property
-    def _diverging(self) -> bool:
-        return self.light == "diverging"
 
 
 @dataclass(frozen=True)
@@ -221,33 +244,29 @@ def calibrate_camera(camera: PlannedCamera) -> CameraCalibration:
         device.camera_matrix,
         device.distortion,
         device.resolution,
+        camera.body,
     )
 
 
 def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
     """Return what a plan says of a projector."""
     device = projector.device
-    beam_radius = device.beam_radius if isinstance(device, ParallelModel) else None
+    if isinstance(device, ParallelModel):
+        beam_radius = device.beam_radius
+        width, height = device.resolution
+        scale = 1.0 / device.pixel_pitch_m
+        matrix = np.diag([scale, scale, 1.0])
+        matrix[:2, 2] = 0.5 * (width - 1), 0.5 * (height - 1)
+    else:
+        beam_radius, matrix = None, device.camera_matrix
     return ProjectorCalibration(
         projector.id,
-        projector.light,
+        LIGHTS[projector.light],
         projector.world_from_device,
         projector.world_from_ring,
-        _panel_matrix(device),
+        matrix,
         device.resolution,
         beam_radius,
-    )
-
-
-def _panel_matrix(device: PinholeModel | ParallelModel) -> NDArray[np.float64]:
-    if isinstance(device, PinholeModel):
-        return device.camera_matrix
-    width, height = device.resolution
-    scale = 1.0 / device.pixel_pitch_m
-    return np.array(
-        [
-            [scale, 0.0, 0.5 * (width - 1)],
-            [0.0, scale, 0.5 * (height - 1)],
-            [0.0, 0.0, 1.0],
-        ]
+        projector.ring_radii,
+        projector.body,
     )

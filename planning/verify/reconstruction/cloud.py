@@ -1,7 +1,7 @@
 """Measured points and what the scanner knows of each."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,19 @@ class Cloud:
     def take(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> "Cloud":
         """Return some of the points."""
         return Cloud(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def of_devices(self, projector: int, camera: int) -> "Cloud":
+        """Return the points with these indices of their devices."""
+        return replace(
+            self,
+            projector=np.full(len(self), projector, dtype=np.int16),
+            camera=np.full(len(self), camera, dtype=np.int16),
+        )
+
+    def thinned(self, most: int) -> "Cloud":
+        """Return at most so many of the points, evenly."""
+        step = max(1, -(-len(self) // most))
+        return self.take(np.arange(0, len(self), step))
 
     def sigma(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the standard deviation [m] of each point along a normal, (n,).

@@ -12,11 +12,12 @@ from geometry.mesh.sampling import SurfaceSamples
 from planning.model.errors import CalibrationError
 from planning.model.plan import RigPlan
 from planning.verify.audit.coverage.prediction import predict_measured
-from planning.verify.reconstruction.captures.calibration_file import calibrated_plan
+from planning.verify.reconstruction.captures.calibration_file import calibrated
 from planning.verify.reconstruction.captures.captured import (
     Expected,
     reconstruct_rendered,
 )
+from planning.verify.reconstruction.scanner import Scanner
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])
@@ -88,7 +89,7 @@ def written(document: Any, folder) -> Any:
 
 def test_what_was_measured_replaces_the_plan_and_the_rest_stays(rigs, plan, tmp_path):
     document = measured(rigs, plan)
-    mounted = calibrated_plan(plan, written(document, tmp_path))
+    mounted = calibrated(Scanner.of(plan), written(document, tmp_path))
     projector, before = mounted.projectors[0], plan.projectors[0]
     assert np.allclose(
         projector.world_from_device, document["devices"][0]["world_from_device"]
@@ -100,26 +101,26 @@ def test_what_was_measured_replaces_the_plan_and_the_rest_stays(rigs, plan, tmp_
             ring, np.linalg.inv(before.world_from_device) @ before.world_from_ring
         )
     one, two = mounted.cameras
-    assert one.device.camera_matrix[0, 0] == 1616.0
-    assert one.device.distortion[0] == -0.2
-    assert two.device.distortion == (0.0,) * 5
-    assert np.array_equal(
-        two.device.camera_matrix, plan.cameras[1].device.camera_matrix
-    )
+    assert one.matrix[0, 0] == 1616.0
+    assert one.distortion[0] == -0.2
+    assert two.distortion == (0.0,) * 5
+    assert np.array_equal(two.matrix, plan.cameras[1].device.camera_matrix)
     assert plan.cameras[0].device.camera_matrix[0, 0] == 1600.0
 
 
 def test_a_rig_that_was_mounted_and_calibrated_measures_as_planned(
     rigs, plan, expected, tmp_path
 ):
-    mounted = calibrated_plan(plan, written(measured(rigs, plan), tmp_path))
+    mounted = calibrated(Scanner.of(plan), written(measured(rigs, plan), tmp_path))
     options = {"seed": 0, "threads": 1, "truth": mounted}
-    found = reconstruct_rendered(plan, expected, believed=mounted, **options)
+    found = reconstruct_rendered(
+        Scanner.of(plan), expected, believed=mounted, **options
+    )
     assert found.accuracy.rms_m < 6e-5
     assert found.accuracy.max_m < 5e-4
     assert all(pair.n_points > 1000 for pair in found.pairs)
     assert found.failures == ()
-    blind = reconstruct_rendered(plan, expected, **options)
+    blind = reconstruct_rendered(Scanner.of(plan), expected, **options)
     assert blind.n_merged == 0
     assert "poses that aren't those of the plan" in blind.failures[0]
 
@@ -140,9 +141,9 @@ def test_near_the_border_of_a_root_disc_drawn_for_another_place_no_root_is_guess
         pose = rigs.camera("C1", place + [0.0, 0.0, up])["world_from_device"]
         entry = {"id": "C1", "world_from_device": pose}
         document = {"format": "ringrig-calibration", "version": 1, "devices": [entry]}
-        mounted = calibrated_plan(plan, written(document, tmp_path))
+        mounted = calibrated(Scanner.of(plan), written(document, tmp_path))
         result = reconstruct_rendered(
-            plan,
+            Scanner.of(plan),
             expected_of(plan),
             seed=0,
             threads=1,
@@ -226,7 +227,7 @@ def test_what_is_wrong_is_said_in_one_line(rigs, plan, tmp_path, fault):
     change(document)
     path = written(document, tmp_path)
     with pytest.raises(CalibrationError) as caught:
-        calibrated_plan(plan, path)
+        calibrated(Scanner.of(plan), path)
     text = str(caught.value)
     assert text.startswith(f"{path}: ")
     assert len(text.splitlines()) == 1
@@ -241,8 +242,8 @@ def test_no_json_is_refused(plan, tmp_path, content, message):
     path = tmp_path / "calibration.json"
     path.write_bytes(content.encode("latin-1"))
     with pytest.raises(CalibrationError, match=message):
-        calibrated_plan(plan, path)
+        calibrated(Scanner.of(plan), path)
     with pytest.raises(CalibrationError, match="no such file"):
-        calibrated_plan(plan, tmp_path / "other.json")
+        calibrated(Scanner.of(plan), tmp_path / "other.json")
     with pytest.raises(CalibrationError, match="can't be read"):
-        calibrated_plan(plan, tmp_path)
+        calibrated(Scanner.of(plan), tmp_path)

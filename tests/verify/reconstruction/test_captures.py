@@ -22,8 +22,9 @@ from planning.verify.reconstruction.captures.captured import (
     reconstruct_captured,
     reconstruct_rendered,
 )
-from planning.verify.reconstruction.captures.captures import CaptureFolder, frame_names
+from planning.verify.reconstruction.captures.captures import CaptureFolder
 from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.scanner import Scanner
 
 # A point farther off than this is no noise: 20 times the rms of the good cloud.
 WRONG_M = 5e-4
@@ -92,6 +93,7 @@ class Job:
     """A plan, what it should measure, its images, and the cloud that they give."""
 
     plan: RigPlan
+    scanner: Scanner
     expected: Expected
     images: InMemory
     good: Reconstruction
@@ -103,7 +105,7 @@ class Job:
         return self.of({pair: change(self.images.stacks[pair].copy())})
 
     def of(self, changed: dict[tuple[int, int], np.ndarray]) -> Reconstruction:
-        images = InMemory(Path("x"), self.plan, self.images.stacks | changed)
+        images = InMemory(Path("x"), self.scanner, self.images.stacks | changed)
         return reconstruct_captured(images, self.expected, threads=1)
 
     def n_bits(self, p: int) -> int:
@@ -111,9 +113,10 @@ class Job:
 
 
 def job_of(plan: RigPlan) -> Job:
-    expected, images = expected_of(plan), InMemory(Path("x"), plan)
-    good = reconstruct_rendered(plan, expected, seed=0, threads=1, save=images)
-    return Job(plan, expected, images, good)
+    scanner, expected = Scanner.of(plan), expected_of(plan)
+    images = InMemory(Path("x"), scanner)
+    good = reconstruct_rendered(scanner, expected, seed=0, threads=1, save=images)
+    return Job(plan, scanner, expected, images, good)
 
 
 @pytest.fixture(scope="module")
@@ -134,8 +137,10 @@ def saved(rigs, tmp_path_factory) -> tuple[RigPlan, Expected, CaptureFolder]:
     plan = small_plan(rigs, "diverging")
     del plan.document["projectors"][1]
     expected = expected_of(plan)
-    folder = CaptureFolder(tmp_path_factory.mktemp("saved") / "captures", plan)
-    reconstruct_rendered(plan, expected, seed=0, threads=1, save=folder)
+    folder = CaptureFolder(
+        tmp_path_factory.mktemp("saved") / "captures", Scanner.of(plan)
+    )
+    reconstruct_rendered(Scanner.of(plan), expected, seed=0, threads=1, save=folder)
     return plan, expected, folder
 
 
@@ -144,7 +149,7 @@ def copied(saved, tmp_path) -> tuple[CaptureFolder, Expected]:
     """The same in a folder that may be spoiled."""
     plan, expected, folder = saved
     shutil.copytree(folder.path, tmp_path / "captures")
-    return CaptureFolder(tmp_path / "captures", plan), expected
+    return CaptureFolder(tmp_path / "captures", Scanner.of(plan)), expected
 
 
 def assert_no_wrong_point(found: Reconstruction) -> None:
@@ -359,8 +364,10 @@ def stood_there(job: Job, change, *, mesh=None) -> Reconstruction:
     change(document)
     surface = job.plan.surface
     surface = surface if mesh is None else replace(surface, mesh=mesh)
-    truth = RigPlan(document, surface)
-    return reconstruct_rendered(job.plan, job.expected, seed=0, threads=1, truth=truth)
+    truth = Scanner.of(RigPlan(document, surface))
+    return reconstruct_rendered(
+        job.scanner, job.expected, seed=0, threads=1, truth=truth
+    )
 
 
 def test_a_camera_that_stands_elsewhere_is_confirmed_by_no_pair_of_its_projectors(job):
@@ -427,7 +434,9 @@ def test_a_pair_without_light_is_missed_where_it_should_measure(job):
     assert "it should measure 1" in found.failures[0]
     spared = job.expected.by_pair.copy()
     spared[0, 0] = 0.0
-    images = InMemory(Path("x"), job.plan, job.images.stacks | {(0, 0): 0 * other(job)})
+    images = InMemory(
+        Path("x"), job.scanner, job.images.stacks | {(0, 0): 0 * other(job)}
+    )
     quiet = Expected(job.expected.samples, job.expected.measured, spared)
     found = reconstruct_captured(images, quiet, threads=1)
     assert not any("no light" in sentence for sentence in found.failures)
@@ -445,12 +454,12 @@ def test_no_light_at_all_is_an_error(job):
 
 def test_files_give_the_cloud_that_was_made_before_they_were_written(saved):
     plan, expected, folder = saved
-    before = reconstruct_rendered(plan, expected, seed=0, threads=1)
+    before = reconstruct_rendered(Scanner.of(plan), expected, seed=0, threads=1)
     after = reconstruct_captured(folder, expected, threads=2)
     assert before.failures == after.failures == ()
     assert np.array_equal(before.merged.cloud.points, after.merged.cloud.points)
     names = sorted(p.name for p in (folder.path / "C2" / "P1").iterdir())
-    assert names == [f"{name}.png" for name in sorted(frame_names(plan, 0, 1))]
+    assert names == [f"{name}.png" for name in sorted(folder.frame_names(0, 1))]
     assert names[-1] == "15-root-C2-inverse.png"
 
 

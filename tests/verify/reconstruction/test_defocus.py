@@ -12,14 +12,13 @@ from planning.verify.reconstruction.calibration import (
     calibrate_projector,
 )
 from planning.verify.reconstruction.check.check import reconstruct_plan
-from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
-from planning.verify.reconstruction.render.defocus import (
+from planning.verify.reconstruction.defocus import (
     Defocus,
     defocus_of,
-    through_lens,
 )
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_pair
+from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
@@ -55,11 +54,11 @@ def test_focus_comes_from_the_rigs_figures(rigs):
 
 
 def test_a_camera_out_of_focus_blurs_its_whole_image():
-    lens = through_lens(CLEAN, Defocus(1.15, 1.09e-3), 0.9, 3478.0)
+    lens = CLEAN.through_lens(Defocus(1.15, 1.09e-3), 0.9, 3478.0)
     disc = 1.09e-3 * (1.0 - 0.9 / 1.15) * 3478.0 / 0.9
     assert lens.camera_blur_px == pytest.approx(np.hypot(0.6, disc / 4))
-    assert through_lens(CLEAN, None, 0.9, 3478.0) is CLEAN
-    assert through_lens(CLEAN, LENS, -0.1, 3478.0) is CLEAN
+    assert CLEAN.through_lens(None, 0.9, 3478.0) is CLEAN
+    assert CLEAN.through_lens(LENS, -0.1, 3478.0) is CLEAN
 
 
 @pytest.mark.parametrize("focal", [1400.0, 3478.0])
@@ -76,14 +75,13 @@ def test_edges_off_the_plane_in_focus_are_as_wide_as_the_disc_makes_them(rigs, f
         calibrate_camera(plan.cameras[0]),
         calibrate_projector(plan.projectors[0]),
     )
-    patterns = ring_patterns(source, plan.projectors[0].ring_radii, camera)
+    patterns = source.pattern_for(camera)
     caster = RayCaster(plate, threads=1)
 
     def frames(lens, defocus):
         seen = view(camera, plate, caster, CLEAN)
-        return render_pair(
-            seen, source, source, patterns, caster, lens, (0,), defocus
-        ).stack
+        shown = Shown(source, source, patterns, caster, defocus)
+        return render_pair(seen, shown, lens, (0,)).stack
 
     blurred = frames(CLEAN, LENS)
     wide = Photometry(

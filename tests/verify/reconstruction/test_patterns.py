@@ -14,6 +14,7 @@ from planning.verify.reconstruction.patterns.pattern_files import (
     remove_patterns,
     write_patterns,
 )
+from planning.verify.reconstruction.scanner import Scanner
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])
@@ -21,7 +22,7 @@ def written(request, rigs, tmp_path_factory):
     """A plan of one projector and two cameras, and what was written for it."""
     plan = _plan(rigs, request.param)
     folder = tmp_path_factory.mktemp(request.param)
-    return plan, write_patterns(plan, folder)
+    return plan, write_patterns(Scanner.of(plan), folder)
 
 
 def _plan(rigs, light) -> RigPlan:
@@ -187,7 +188,7 @@ def test_root_discs_tell_the_sign_of_r_dot_m(written):
 
 def test_the_same_plan_gives_the_same_bytes(written, tmp_path):
     plan, folder = written
-    again = write_patterns(plan, tmp_path)
+    again = write_patterns(Scanner.of(plan), tmp_path)
     names = sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
     assert names == sorted(p.relative_to(again) for p in again.rglob("*.*"))
     for name in names:
@@ -196,11 +197,11 @@ def test_the_same_plan_gives_the_same_bytes(written, tmp_path):
 
 def test_what_an_earlier_plan_left_is_removed_and_nothing_else(rigs, tmp_path):
     plan = _plan(rigs, "parallel")
-    place = write_patterns(plan, tmp_path)
+    place = write_patterns(Scanner.of(plan), tmp_path)
     mine = place / "P1" / "note.txt"
     mine.write_text("kept")
     document = plan.document | {"cameras": plan.document["cameras"][:1]}
-    write_patterns(replace(plan, document=document), tmp_path)
+    write_patterns(Scanner.of(replace(plan, document=document)), tmp_path)
     assert not (place / "P1" / "18-root-C2.png").exists()
     assert not list(place.rglob("*root-C2*"))
     remove_patterns(tmp_path)

@@ -8,7 +8,6 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
 
 LENS = (-0.12, 0.05, 8e-4, -6e-4, -0.01)
 
@@ -80,9 +79,9 @@ def test_ring_plane_of_a_pixel_is_where_its_light_is_in_the_ring_frame(plan):
         pixels, depth = projector.panel(points)
         ring = projector.to_ring(points)
         flat = ring[:, :2]
-        if projector.light == "diverging":
+        if projector.light.name == "diverging":
             flat = flat / ring[:, 2:]
-        np.testing.assert_allclose(ring_plane(projector, pixels), flat, atol=1e-12)
+        np.testing.assert_allclose(projector.ring_plane(pixels), flat, atol=1e-12)
         away = np.linalg.norm(points - projector.centre, axis=1)
         assert np.all((depth > 0.9) & (depth <= away))
 

@@ -13,6 +13,7 @@ from geometry.mesh.sampling import sample_surface
 from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.calibration import (
+    ProjectorCalibration,
     calibrate_camera,
     calibrate_projector,
 )
@@ -21,10 +22,9 @@ from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import CAUSES, Decoded
 from planning.verify.reconstruction.faults.causes import rejection
-from planning.verify.reconstruction.faults.roots import wrong_roots
+from planning.verify.reconstruction.faults.inaccurate import wrong_roots
 from planning.verify.reconstruction.faults.supposed import Evidence, Supposed, places
-from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
-from planning.verify.reconstruction.render import rendered as rendered_module
+from planning.verify.reconstruction.scanner import Scanner
 
 FOCAL = 1400.0
 
@@ -67,15 +67,15 @@ def test_two_projectors_on_at_once_are_named(plan, claims):
 
 
 def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
-    draw = rendered_module.ring_patterns
+    draw = ProjectorCalibration.pattern_for
 
-    def drawn(projector, radii, camera):
-        patterns = draw(projector, radii, camera)
+    def drawn(projector, camera):
+        patterns = draw(projector, camera)
         if (projector.id, camera.id) != ("P1", "C2"):
             return patterns
         return replace(patterns, camera_in_ring=-patterns.camera_in_ring)
 
-    monkeypatch.setattr(rendered_module, "ring_patterns", drawn)
+    monkeypatch.setattr(ProjectorCalibration, "pattern_for", drawn)
     found = failures(plan, claims)
     words = r"P1 with C2: \d+ % of the points took the wrong one of the two roots"
     assert found
@@ -84,15 +84,16 @@ def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
 
 def test_only_a_point_whose_ray_meets_its_ring_on_the_mesh_has_a_wrong_root(plan):
     """Points 10 mm before the mesh: labelled with the ring there, and with another."""
+    scanner = Scanner.of(plan)
     camera, projector = plan.cameras[0], plan.projectors[0]
     n = 80
     away = np.linspace(-0.01, 0.01, n)
     pixels = calibrate_camera(camera).project(
         np.column_stack([away, np.full(n, -0.039), away])
     )
-    at = places(Evidence.at(plan, pixels, 0, 0), Supposed.of(plan)).points
+    at = places(Evidence.at(scanner, pixels, 0, 0), Supposed.of(scanner)).points
     design = calibrate_projector(projector)
-    rho = np.hypot(*ring_plane(design, design.panel(at)[0]).T)
+    rho = np.hypot(*design.ring_plane(design.panel(at)[0]).T)
     rays = calibrate_camera(camera).rays(pixels)
     numbers = np.zeros(n)
     cloud = Cloud(
@@ -109,12 +110,8 @@ def test_only_a_point_whose_ray_meets_its_ring_on_the_mesh_has_a_wrong_root(plan
     )
     order = np.argsort(rho)
     for shift, share in ((0.0, 1.0), (2e-3, None)):
-        marked = changed(
-            plan,
-            lambda d, s=shift: d["projectors"][0].update(
-                ring_radii=(rho[order] + s).tolist()
-            ),
-        )
+        drawn = replace(scanner.projectors[0], radii=rho[order] + shift)
+        marked = replace(scanner, projectors=(drawn, *scanner.projectors[1:]))
         pair = replace(Decoded.nothing(), cloud=cloud.take(order))
         pair = replace(pair, cloud=replace(pair.cloud, ring=cloud.ring))
         wrong = (("P1", "C1", share),) if share else ()

@@ -306,10 +306,10 @@ def exchange_frames(monkeypatch, projector: str) -> None:
     """Let two bits of one projector change places in every camera's images."""
     render = rendered_module.render_pair
 
-    def render_exchanged(seen, shining, design, *rest):
-        frames = render(seen, shining, design, *rest)
+    def render_exchanged(seen, shown, *rest):
+        frames = render(seen, shown, *rest)
         order = np.arange(len(frames.stack))
-        if design.id == projector:
+        if shown.design.id == projector:
             order[[6, 7, 8, 9]] = 8, 9, 6, 7
         return Frames(frames.stack[order], frames.corner)
 

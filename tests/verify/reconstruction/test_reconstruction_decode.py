@@ -15,13 +15,14 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.decode.decode import decode
 from planning.verify.reconstruction.decode.edges import find_edges
+from planning.verify.reconstruction.light import LIGHTS
 from planning.verify.reconstruction.patterns.ring_patterns import (
+    CameraPattern,
     Frames,
-    RingPatterns,
-    ring_patterns,
 )
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_pair
+from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
@@ -58,10 +59,12 @@ def shot(
     )
     camera = calibrate_camera(plan.cameras[0])
     projector = calibrate_projector(plan.projectors[0])
-    patterns = ring_patterns(projector, plan.projectors[0].ring_radii, camera)
+    patterns = projector.pattern_for(camera)
     caster = RayCaster(mesh, threads=1)
     seen = view(camera, mesh, caster, photometry)
-    frames = render_pair(seen, projector, projector, patterns, caster, photometry, (0,))
+    frames = render_pair(
+        seen, Shown(projector, projector, patterns, caster), photometry, (0,)
+    )
     return frames, patterns, PairCalibration(projector, camera)
 
 
@@ -72,7 +75,7 @@ def ring_coordinate(calibration: PairCalibration, pixels: np.ndarray) -> np.ndar
     points = camera.centre - rays * (camera.centre[1] / rays[:, 1])[:, None]
     local = projector.to_ring(points)
     across = np.hypot(local[:, 0], local[:, 1])
-    return across / local[:, 2] if projector.light == "diverging" else across
+    return across / local[:, 2] if projector.light.name == "diverging" else across
 
 
 def edge_error_px(edges, patterns, calibration) -> np.ndarray:
@@ -200,10 +203,12 @@ def test_light_from_behind_stays_behind(rigs):
     )
     projector = calibrate_projector(plan.projectors[0])
     camera = calibrate_camera(plan.cameras[0])
-    patterns = ring_patterns(projector, plan.projectors[0].ring_radii, camera)
+    patterns = projector.pattern_for(camera)
     caster = RayCaster(mesh, threads=1)
     seen = view(camera, mesh, caster, CLEAN)
-    frames = render_pair(seen, projector, projector, patterns, caster, CLEAN, (0,))
+    frames = render_pair(
+        seen, Shown(projector, projector, patterns, caster), CLEAN, (0,)
+    )
     assert frames.stack[0].max() > 0.0
     assert np.array_equal(frames.stack[0], frames.stack[1])
 
@@ -311,7 +316,7 @@ def test_a_missing_frame_is_refused(rigs):
 @pytest.mark.parametrize("n_rings", [2, 3, 4, 63, 64, 100])
 def test_neighbouring_annuli_differ_in_one_bit(n_rings):
     radii = np.arange(1.0, n_rings + 1.0)
-    patterns = RingPatterns("parallel", radii, np.zeros(3))
+    patterns = CameraPattern(LIGHTS["parallel"], radii, np.zeros(3))
     codes = patterns.codes
     changed = codes[1:] ^ codes[:-1]
     assert patterns.outer_radius == n_rings + 1.0

@@ -25,7 +25,7 @@ from planning.verify.reconstruction.calibration import (
 from planning.verify.reconstruction.faults.cause_words import _two_digits, in_words
 from planning.verify.reconstruction.faults.diagnosis import diagnose_edges
 from planning.verify.reconstruction.faults.supposed import Evidence
-from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
+from planning.verify.reconstruction.scanner import Scanner
 
 NOISE_PX = 0.02
 EDGES = 150
@@ -64,12 +64,12 @@ def edges(plan: RigPlan, truth: RigPlan, *, outliers: float = 0.03) -> Evidence:
     for p, planned in enumerate(plan.projectors):
         design, device = calibrate_projector(planned), shining[planned.id]
         to = samples.points - device.centre
-        if design.light == "parallel":
+        if design.light.name == "parallel":
             to = np.broadcast_to(device.axis, samples.points.shape)
         lit = np.einsum("ij,ij->i", to, samples.normals) < 0.0
         pixels, _ = device.panel(samples.points)
         lit &= device.in_panel(pixels)
-        rho = np.hypot(*ring_plane(design, pixels).T)
+        rho = np.hypot(*design.ring_plane(pixels).T)
         for c, looking in enumerate(plan.cameras):
             camera = standing[looking.id]
             rays = samples.points - camera.centre
@@ -84,7 +84,7 @@ def edges(plan: RigPlan, truth: RigPlan, *, outliers: float = 0.03) -> Evidence:
             where = camera.project(samples.points[rows])
             where += NOISE_PX * rng.normal(size=where.shape)
             noise = np.full(len(rows), NOISE_PX)
-            part = Evidence.at(plan, where, p, c)
+            part = Evidence.at(Scanner.of(plan), where, p, c)
             parts.append(replace(part, radii=radii, noise_px=noise))
     names = ("pixels", "radii", "camera", "projector", "noise_px")
     joined = (np.concatenate([getattr(part, n) for part in parts]) for n in names)
@@ -92,8 +92,8 @@ def edges(plan: RigPlan, truth: RigPlan, *, outliers: float = 0.03) -> Evidence:
 
 
 def said(plan: RigPlan, truth: RigPlan) -> list[str]:
-    causes = diagnose_edges(plan, edges(plan, truth))
-    return [in_words(cause, plan) for cause in causes]
+    causes = diagnose_edges(Scanner.of(plan), edges(plan, truth))
+    return [in_words(cause, Scanner.of(plan)) for cause in causes]
 
 
 def place(document: dict[str, Any], key: str, index: int, by: list[float]) -> None:
@@ -125,8 +125,10 @@ def swap(document: dict[str, Any], key: str) -> None:
 
 
 def test_edges_of_a_rig_that_stands_as_planned_ask_for_nothing(plan):
-    assert diagnose_edges(plan, edges(plan, plan)) == ()
-    assert diagnose_edges(plan, edges(plan, plan).take(np.zeros(0, int))) == ()
+    assert diagnose_edges(Scanner.of(plan), edges(plan, plan)) == ()
+    assert (
+        diagnose_edges(Scanner.of(plan), edges(plan, plan).take(np.zeros(0, int))) == ()
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from planning.verify.reconstruction.faults.supposed import (
     mismatches,
     places,
 )
-from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
+from planning.verify.reconstruction.scanner import Scanner
 
 RNG = np.random.default_rng(0)
 SLOPES = RNG.normal(size=(300, 3))
@@ -55,13 +55,13 @@ def test_mismatch_is_the_distance_from_the_cone_or_cylinder(rigs, light):
     viewer = rigs.camera("C1", rigs.direction(0.0, 10.0))
     plan = rigs.plan_of(mesh, [entry], [viewer])
     camera, projector = plan.cameras[0], plan.projectors[0]
-    supposed = Supposed.of(plan)
+    supposed = Supposed.of(Scanner.of(plan))
     middle = np.array(camera.device.resolution) / 2.0
     pixels = middle + RNG.uniform(-80.0, 80.0, (200, 2))
-    evidence = Evidence.at(plan, pixels, 0, 0)
+    evidence = Evidence.at(Scanner.of(plan), pixels, 0, 0)
     at = places(evidence, supposed)
     design = supposed.projectors[0]
-    rho = np.hypot(*ring_plane(design, design.panel(at.points)[0]).T)
+    rho = np.hypot(*design.ring_plane(design.panel(at.points)[0]).T)
     radii = rho + RNG.uniform(-3e-3, 3e-3, 200)
     off, _ = mismatches(replace(evidence, radii=radii), supposed, at)
     local = design.to_ring(at.points)

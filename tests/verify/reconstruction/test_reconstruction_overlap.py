@@ -1,5 +1,7 @@
 """Where two projectors' light falls: thresholds, both tests, light that adds up."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.white_frames import balanced_accuracy, best_threshold, render_whites
@@ -19,12 +21,14 @@ from planning.verify.reconstruction.check.image_overlap import (
 from planning.verify.reconstruction.faults.overlapping_light import (
     light_falls,
     lit_twice,
-    outer_radius,
 )
-from planning.verify.reconstruction.patterns.ring_patterns import ring_patterns
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.render.render import Shown
+from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
+from planning.verify.reconstruction.scanner import Scanner
+
+# Rings whose last annulus ends at 1.
+HALF = np.array([0.25, 0.625])
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +42,7 @@ def whites_of(plan, photometry):
     camera = calibrate_camera(plan.cameras[0])
     seen = view(camera, mesh, caster, photometry)
     shown = tuple(
-        Shown(device, device, ring_patterns(device, p.ring_radii, camera), caster)
+        Shown(device, device, device.pattern_for(camera), caster)
         for p in plan.projectors
         for device in (calibrate_projector(p),)
     )
@@ -121,22 +125,22 @@ def test_light_falls_where_a_sphere_faces_it(plan):
         to = device.centre - points
         to /= np.linalg.norm(to, axis=1, keepdims=True)
         cosine = np.einsum("ij,ij->i", to, normals)
-        lit = light_falls(device, outer_radius(p.ring_radii), caster, points, normals)
+        lit = light_falls(device, caster, points, normals)
         # Just above the facets the light may still graze one.
         assert np.all(lit[cosine > 0.1])
         assert not np.any(lit[cosine < np.cos(np.deg2rad(89.0))])
-        none = light_falls(device, 1e-6, caster, points, normals)
+        none = light_falls(replace(device, radii=1e-6 * HALF), caster, points, normals)
         assert not none.any()
 
 
 def test_pixels_in_both_beams_are_said_to_be(plan):
     camera = calibrate_camera(plan.cameras[0])
     middle = camera.project(np.array([[0.0, -0.04, -0.005]]))
-    assert lit_twice(plan, np.repeat(middle, 3, axis=0), 0, 0) == ("P2",)
+    assert lit_twice(Scanner.of(plan), np.repeat(middle, 3, axis=0), 0, 0) == ("P2",)
     side = camera.project(np.array([[-0.0385, -0.010, 0.0]]))
-    assert lit_twice(plan, side, 0, 0) == ()
+    assert lit_twice(Scanner.of(plan), side, 0, 0) == ()
     nowhere = np.array([[0.0, 0.0]])
-    assert lit_twice(plan, nowhere, 0, 0) == ()
+    assert lit_twice(Scanner.of(plan), nowhere, 0, 0) == ()
 
 
 def test_light_does_not_fall_behind_a_sphere(rigs):
@@ -150,5 +154,5 @@ def test_light_does_not_fall_behind_a_sphere(rigs):
     caster = RayCaster(two.surface.mesh, threads=1)
     normals = np.array([towards, towards, rigs.direction(35.0, 5.0)])
     points = np.array([0.06, 0.0, 0.0])[:, None] * towards + 0.02 * normals
-    lit = light_falls(device, 1.0, caster, points, normals)
+    lit = light_falls(replace(device, radii=HALF), caster, points, normals)
     assert lit.tolist() == [True, False, False]

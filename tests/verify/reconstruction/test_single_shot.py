@@ -15,10 +15,10 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
+from planning.verify.reconstruction.light import LIGHTS
 from planning.verify.reconstruction.patterns.ring_patterns import (
+    CameraPattern,
     Frames,
-    RingPatterns,
-    ring_patterns,
 )
 from planning.verify.reconstruction.single_shot.prior_labels import label_by_prior
 from planning.verify.reconstruction.single_shot.ring_lines import (
@@ -75,7 +75,7 @@ def test_what_is_faint_or_an_edge_is_no_line():
 
 
 def test_lines_alternate_with_gaps_and_must_fit_between_rings():
-    patterns = RingPatterns("parallel", np.array([0.02, 0.05]), np.zeros(3))
+    patterns = CameraPattern(LIGHTS["parallel"], np.array([0.02, 0.05]), np.zeros(3))
     lines = line_patterns(patterns, 0.002)
     np.testing.assert_allclose(lines.radii, [0.019, 0.021, 0.049, 0.051])
     for width in (0.0, np.nan, 0.031, 0.041):
@@ -89,7 +89,7 @@ def rig(light: str) -> PairCalibration:
     scale = 5000.0 if light == "parallel" else 2500.0
     matrix = np.array([[scale, 0, 499.5], [0, scale, 499.5], [0, 0, 1.0]])
     projector = ProjectorCalibration(
-        "P1", light, pose, pose, matrix, (1000, 1000), None
+        "P1", LIGHTS[light], pose, pose, matrix, (1000, 1000), None
     )
     a = np.deg2rad(35.0)
     eye = np.array([np.sin(a), -np.cos(a) * 0.95, np.cos(a) * 0.3])
@@ -125,7 +125,7 @@ def ring_points(light: str):
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     seen = np.einsum("ij,ij->i", rays, points) < -0.3 * BALL
     points, ring, rays = points[seen], ring[seen], rays[seen]
-    patterns = ring_patterns(pair.projector, radii, pair.camera)
+    patterns = replace(pair.projector, radii=radii).pattern_for(pair.camera)
     local = pair.projector.to_ring(points)
     plane = local[:, :2] / (local[:, 2:] if light == "diverging" else 1.0)
     root = np.where(patterns.root_side(plane) > 0.0, 1, -1)

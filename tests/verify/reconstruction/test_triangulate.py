@@ -8,9 +8,9 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
+from planning.verify.reconstruction.light import LIGHTS
 from planning.verify.reconstruction.patterns.ring_patterns import (
-    RingPatterns,
-    ring_patterns,
+    CameraPattern,
 )
 
 
@@ -28,7 +28,7 @@ def random_pose(rng: np.random.Generator, reach: float) -> np.ndarray:
 
 def projector_of(light: str, world_from_ring: np.ndarray) -> ProjectorCalibration:
     return ProjectorCalibration(
-        "P1", light, world_from_ring, world_from_ring, np.eye(3), (9, 9), None
+        "P1", LIGHTS[light], world_from_ring, world_from_ring, np.eye(3), (9, 9), None
     )
 
 
@@ -49,8 +49,8 @@ def scene(rng: np.random.Generator, light: str, n: int):
 def drawn_root(projector, local, eye) -> np.ndarray:
     """The root bit as it is drawn in the projector and lands on each point."""
     flat = local[:, :2]
-    plane = flat / local[:, 2:] if projector.light == "diverging" else flat
-    patterns = RingPatterns(
+    plane = flat / local[:, 2:] if projector.light.name == "diverging" else flat
+    patterns = CameraPattern(
         projector.light, np.array([0.1, 0.2]), projector.to_ring(eye[None])[0]
     )
     return np.where(patterns.root_side(plane) > 0.0, 1, -1).astype(np.int8)
@@ -151,7 +151,7 @@ def test_root_disc_is_a_distance_in_the_ring_plane():
     camera = CameraCalibration("C1", np.eye(4), np.eye(3), (0.0,) * 5, (10, 10))
     for light in ("diverging", "parallel"):
         projector = projector_of(light, random_pose(rng, 1.0))
-        patterns = ring_patterns(projector, np.array([0.1, 0.2]), camera)
+        patterns = projector.pattern_for(camera)
         p = rng.uniform(-0.3, 0.3, (200, 2))
         side = patterns.root_side(p)
         step = 1e-7

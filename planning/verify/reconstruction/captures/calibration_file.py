@@ -4,18 +4,22 @@ JSON; metres and pixels, as in `plan.json`. Devices and values that it lacks sta
 the plan.
 """
 
-import copy
 import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
 from planning.model.errors import CalibrationError
-from planning.model.plan import RigPlan
 from planning.model.table_types import Name, Table
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+from planning.verify.reconstruction.scanner import Scanner
 
 _Three = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Four = Annotated[list[float], Field(min_length=4, max_length=4)]
@@ -83,7 +87,7 @@ def _check_matrix(matrix: NDArray[np.float64]) -> None:
         raise ValueError(f"K: focal lengths {np.diag(matrix)[:2]} px must be positive")
 
 
-def calibrated_plan(plan: RigPlan, path: Path) -> RigPlan:
+def calibrated(plan: Scanner, path: Path) -> Scanner:
     """Return a plan with its devices as a calibration file says they are.
 
     The rings of a projector move with it: ``world_from_ring`` keeps its place in the
@@ -96,14 +100,11 @@ def calibrated_plan(plan: RigPlan, path: Path) -> RigPlan:
     Raises:
         CalibrationError: If the file can't be read, or doesn't fit the plan.
     """
-    file = _read(path)
-    document = copy.deepcopy(plan.document)
-    cameras = {entry["id"]: entry for entry in document["cameras"]}
-    projectors = {entry["id"]: entry for entry in document["projectors"]}
+    cameras = {camera.id: camera for camera in plan.cameras}
+    projectors = {projector.id: projector for projector in plan.projectors}
     seen: set[str] = set()
-    for device in file.devices:
-        entry = cameras.get(device.id) or projectors.get(device.id)
-        if entry is None:
+    for device in _read(path).devices:
+        if device.id not in cameras and device.id not in projectors:
             known = ", ".join((*projectors, *cameras))
             raise CalibrationError(
                 f"{path}: device {device.id!r} isn't in the plan, which has {known}"
@@ -112,66 +113,40 @@ def calibrated_plan(plan: RigPlan, path: Path) -> RigPlan:
             raise CalibrationError(f"{path}: device {device.id!r} twice; keep one")
         seen.add(device.id)
         try:
-            if device.id in projectors:
-                _require_same_optics(device, entry)
-            _move(device, entry, plan)
+            if device.id in cameras:
+                cameras[device.id] = _camera(device, cameras[device.id], plan)
+            else:
+                projectors[device.id] = _projector(device, projectors[device.id], plan)
         except ValueError as error:
             raise CalibrationError(f"{path}: {device.id}: {error}") from None
-        for key in ("K", "distortion") if device.id in cameras else ():
-            if getattr(device, key) is not None:
-                entry[key] = getattr(device, key)
-    found = RigPlan(document, plan.surface)
-    try:
-        _ = found.cameras, found.projectors
-    except ValueError as error:
-        raise CalibrationError(f"{path}: {error}") from None
-    return found
+    return replace(
+        plan, cameras=tuple(cameras.values()), projectors=tuple(projectors.values())
+    )
 
 
-def _move(device: _Device, entry: dict[str, Any], plan: RigPlan) -> None:
-    """Put a device where it was measured, and its rings with it.
-
-    Raises:
-        ValueError: If that is too far from the plan to be meant.
-    """
-    if device.world_from_device is None:
-        return
-    measured = np.array(device.world_from_device)
-    # The rotation next to what was written.
-    u, _, vt = np.linalg.svd(measured[:3, :3])
-    measured[:3, :3] = u @ vt
-    planned = np.array(entry["world_from_device"])
-    away = float(np.linalg.norm(measured[:3, 3] - planned[:3, 3]))
-    reach = float(np.linalg.norm(planned[:3, 3] - plan.surface.mesh.centre))
-    if not away <= _FARTHEST * reach:
-        raise ValueError(
-            f"stands {away:.3g} m from its place in the plan, at most "
-            f"{_FARTHEST * reach:.3g} m; write metres in the axes of the mesh, or plan "
-            f"with the device as it stands"
-        )
-    turn = measured[:3, :3].T @ planned[:3, :3]
-    angle = float(np.arccos(np.clip(0.5 * (np.trace(turn) - 1.0), -1.0, 1.0)))
-    if not angle <= _MOST_TURNED:
-        raise ValueError(
-            f"is turned by {np.degrees(angle):.1f} degrees from the plan, at most "
-            f"{np.degrees(_MOST_TURNED):.0f}; +x is right, +y down, +z along the axis"
-        )
-    if "world_from_ring" in entry:
-        ring = np.linalg.inv(planned) @ np.array(entry["world_from_ring"])
-        entry["world_from_ring"] = (measured @ ring).tolist()
-    entry["world_from_device"] = measured.tolist()
+def _camera(
+    device: _Device, camera: CameraCalibration, plan: Scanner
+) -> CameraCalibration:
+    pose = _measured_pose(device, camera, plan)
+    matrix = camera.matrix if device.K is None else np.array(device.K)
+    lens = camera.distortion
+    if device.distortion is not None:
+        k1, k2, p1, p2, k3 = device.distortion
+        lens = k1, k2, p1, p2, k3
+    return replace(camera, world_from_device=pose, matrix=matrix, distortion=lens)
 
 
-def _require_same_optics(device: _Device, entry: dict[str, Any]) -> None:
-    """Refuse other optics of a projector than those that its patterns are drawn for.
+def _projector(
+    device: _Device, projector: ProjectorCalibration, plan: Scanner
+) -> ProjectorCalibration:
+    """Put a projector where it was measured, and its rings with it.
 
     Raises:
-        ValueError: If they differ.
+        ValueError: If its optics aren't those that its patterns are drawn for.
     """
-    drawn = entry["K"]
+    drawn = projector.matrix.tolist() if projector.light.name == "diverging" else None
     if device.K is not None and (
-        drawn is None
-        or not np.allclose(device.K, np.array(drawn), rtol=0.0, atol=_SAME_PX)
+        drawn is None or not np.allclose(device.K, drawn, rtol=0.0, atol=_SAME_PX)
     ):
         raise ValueError(
             f"K = {device.K} isn't the one that its patterns are drawn for ({drawn}); "
@@ -182,6 +157,41 @@ def _require_same_optics(device: _Device, entry: dict[str, Any]) -> None:
             f"distortion = {device.distortion} of a projector isn't known to the "
             f"decoder; correct the images that it shows for its lens"
         )
+    pose = _measured_pose(device, projector, plan)
+    ring = np.linalg.inv(projector.world_from_device) @ projector.world_from_ring
+    return replace(projector, world_from_device=pose, world_from_ring=pose @ ring)
+
+
+def _measured_pose(
+    device: _Device, planned: CameraCalibration | ProjectorCalibration, plan: Scanner
+) -> NDArray[np.float64]:
+    """Return where a device was measured; where it should stand if it wasn't.
+
+    Raises:
+        ValueError: If that is too far from the plan to be meant.
+    """
+    if device.world_from_device is None:
+        return planned.world_from_device
+    measured = np.array(device.world_from_device)
+    # The rotation next to what was written.
+    u, _, vt = np.linalg.svd(measured[:3, :3])
+    measured[:3, :3] = u @ vt
+    away = float(np.linalg.norm(measured[:3, 3] - planned.centre))
+    reach = float(np.linalg.norm(planned.centre - plan.mesh.centre))
+    if not away <= _FARTHEST * reach:
+        raise ValueError(
+            f"stands {away:.3g} m from its place in the plan, at most "
+            f"{_FARTHEST * reach:.3g} m; write metres in the axes of the mesh, or plan "
+            f"with the device as it stands"
+        )
+    turn = measured[:3, :3].T @ planned.world_from_device[:3, :3]
+    angle = float(np.arccos(np.clip(0.5 * (np.trace(turn) - 1.0), -1.0, 1.0)))
+    if not angle <= _MOST_TURNED:
+        raise ValueError(
+            f"is turned by {np.degrees(angle):.1f} degrees from the plan, at most "
+            f"{np.degrees(_MOST_TURNED):.0f}; +x is right, +y down, +z along the axis"
+        )
+    return measured
 
 
 def _read(path: Path) -> _File:

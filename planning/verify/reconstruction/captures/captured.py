@@ -5,7 +5,6 @@ saved images is the one that was made of them before.
 """
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,34 +12,32 @@ from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.errors import CapturesError
-from planning.model.plan import RigPlan
-from planning.verify.reconstruction.calibration import (
-    calibrate_camera,
-    calibrate_projector,
-)
 from planning.verify.reconstruction.check.check import conclude
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
-from planning.verify.reconstruction.decode.decode import Decoded, decode
+from planning.verify.reconstruction.decode.decode import (
+    Decoded,
+    PairIndex,
+    Pairs,
+    decode,
+)
 from planning.verify.reconstruction.decode.inspection import DarkError, inspect
 from planning.verify.reconstruction.faults.causes import rejection
+from planning.verify.reconstruction.patterns.pattern_frames import PatternSequence
 from planning.verify.reconstruction.patterns.ring_patterns import (
+    CameraPattern,
     Frames,
     Images,
-    RingPatterns,
-    ring_patterns,
 )
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import (
-    Pairs,
     Progress,
     Spent,
     decode_rendered,
-    decoder_limits,
-    pair_calibrations,
-    reported,
+    over_pairs,
 )
+from planning.verify.reconstruction.scanner import Scanner
 
-from .captures import CaptureFolder, frame_names, whole_image
+from .captures import CaptureFolder, whole_image
 from .confirm import Confirmed, confirm
 
 _MM = 1e3
@@ -64,13 +61,13 @@ class Expected:
 
 
 def reconstruct_rendered(
-    plan: RigPlan,
+    plan: Scanner,
     expected: Expected,
     *,
     seed: int,
     threads: int = 2,
-    truth: RigPlan | None = None,
-    believed: RigPlan | None = None,
+    truth: Scanner | None = None,
+    believed: Scanner | None = None,
     photometry: Photometry | None = None,
     save: CaptureFolder | None = None,
     progress: Progress | None = None,
@@ -92,13 +89,13 @@ def reconstruct_rendered(
         OSError: If the images can't be written.
     """
     light, spent = photometry or Photometry(), Spent()
-    desk = _Desk(plan)
+    inspection = _Inspection(plan)
 
     def develop(p: int, c: int, frames: Frames) -> Frames | None:
-        stack = whole_image(frames, plan.cameras[c].device.resolution)
+        stack = whole_image(frames, plan.cameras[c].resolution)
         if save is not None:
             save.write(p, c, stack.astype(np.uint8))
-        return desk.inspected(p, c, lambda: stack)
+        return inspection.frames((p, c), lambda: stack)
 
     pairs = decode_rendered(
         plan,
@@ -114,7 +111,7 @@ def reconstruct_rendered(
     return _concluded(
         believed or plan,
         pairs,
-        desk,
+        inspection,
         expected,
         spent,
         threads=threads,
@@ -126,7 +123,7 @@ def reconstruct_captured(
     folder: CaptureFolder,
     expected: Expected,
     *,
-    believed: RigPlan | None = None,
+    believed: Scanner | None = None,
     threads: int = 2,
     progress: Progress | None = None,
 ) -> Reconstruction:
@@ -147,26 +144,26 @@ def reconstruct_captured(
     """
     folder.require()
     plan, spent = folder.plan, Spent()
-    desk = _Desk(plan)
-    known, limits = pair_calibrations(believed or plan), decoder_limits(plan)
+    inspection = _Inspection(plan)
+    known = dict((believed or plan).pairs())
 
-    def measure(pair: tuple[int, int]) -> Decoded:
-        p, c = pair
+    def measure(pair: PairIndex) -> Decoded:
         with spent.on("decode"):
-            frames = desk.inspected(p, c, lambda: folder.read(p, c))
+            frames = inspection.frames(pair, lambda: folder.read(*pair))
             if frames is None:
                 return Decoded.nothing()
-            return decode(frames, desk.patterns(p, c), known[p, c], **limits)
+            patterns = inspection.patterns(pair)
+            return decode(frames, patterns, known[pair], **plan.limits.decoder)
 
-    with ThreadPoolExecutor(threads) as pool:
-        done = list(reported(pool.map(measure, known), len(known), progress))
-    pairs = list(zip(known, done, strict=True))
-    desk.require_some()
-    return _concluded(believed or plan, pairs, desk, expected, spent, threads=threads)
+    pairs = over_pairs(plan, measure, threads=threads, progress=progress)
+    inspection.require_some()
+    return _concluded(
+        believed or plan, pairs, inspection, expected, spent, threads=threads
+    )
 
 
-class _Desk:
-    """Where the images of each pair are looked at on their way to the decoder.
+class _Inspection:
+    """What the images of each pair are found to be on their way to the decoder.
 
     Attributes:
         refused: Why the images of a pair aren't used, in words.
@@ -174,31 +171,31 @@ class _Desk:
         notes: What was left out of the images of a pair.
     """
 
-    def __init__(self, plan: RigPlan) -> None:
+    def __init__(self, plan: Scanner) -> None:
         self._plan = plan
-        self._cameras = [calibrate_camera(camera) for camera in plan.cameras]
-        self._projectors = [calibrate_projector(one) for one in plan.projectors]
-        self.refused: dict[tuple[int, int], str] = {}
-        self.dark: dict[tuple[int, int], str] = {}
-        self.notes: dict[tuple[int, int], tuple[str, ...]] = {}
+        self.refused: dict[PairIndex, str] = {}
+        self.dark: dict[PairIndex, str] = {}
+        self.notes: dict[PairIndex, tuple[str, ...]] = {}
 
-    def patterns(self, p: int, c: int) -> RingPatterns:
+    def patterns(self, pair: PairIndex) -> CameraPattern:
         """Return what a projector drew, as a camera's decoder knows it."""
-        radii = self._plan.projectors[p].ring_radii
-        return ring_patterns(self._projectors[p], radii, self._cameras[c])
+        p, c = pair
+        return self._plan.projectors[p].pattern_for(self._plan.cameras[c])
 
-    def inspected(self, p: int, c: int, read: Callable[[], Images]) -> Frames | None:
+    def frames(self, pair: PairIndex, read: Callable[[], Images]) -> Frames | None:
         """Return what may be decoded of a pair's images; None: nothing."""
+        p, c = pair
+        sequence = PatternSequence.of(self._plan.projectors[p], self._plan.cameras)
+        names = sequence.frame_names(self._plan.cameras[c].id)
         try:
-            names = frame_names(self._plan, p, c)
-            found = inspect(read(), self.patterns(p, c), names)
+            inspected = inspect(read(), self.patterns(pair), names)
         except DarkError as error:
-            self.dark[p, c] = str(error)
+            self.dark[pair] = str(error)
         except CapturesError as error:
-            self.refused[p, c] = str(error)
+            self.refused[pair] = str(error)
         else:
-            self.notes[p, c] = found.notes
-            return found.frames
+            self.notes[pair] = inspected.notes
+            return inspected.frames
         return None
 
     def require_some(self) -> None:
@@ -209,24 +206,22 @@ class _Desk:
         """
         if self.notes or not (self.refused or self.dark):
             return
-        (p, c), why = min((self.refused or self.dark).items())
+        pair, why = min((self.refused or self.dark).items())
         others = len(self.refused) + len(self.dark) - 1
         more = f"; the other {others} pairs can't be used either" if others else ""
-        raise CapturesError(f"{self.name(p, c)}: {why}{more}")
-
-    def name(self, p: int, c: int) -> str:
-        """Return what a pair is called."""
-        return f"{self._plan.projectors[p].id} with {self._plan.cameras[c].id}"
+        raise CapturesError(f"{self._plan.name(pair)}: {why}{more}")
 
     def sentences(
         self, pairs: Pairs, confirmed: Confirmed, expected: Expected
     ) -> tuple[str, ...]:
         """Return a sentence for each reason for which the cloud is smaller."""
-        found: list[str] = []
-        for (p, c), pair in pairs:
-            share = float(expected.by_pair[p, c])
-            for why in self._reasons(p, c, pair, confirmed, share):
-                found.append(f"{self.name(p, c)}: {why}")
+        found = [
+            f"{self._plan.name(pair)}: {why}"
+            for pair, decoded in pairs
+            for why in self._reasons(
+                pair, decoded, confirmed, float(expected.by_pair[pair])
+            )
+        ]
         if confirmed.by_each_other:
             found.append(
                 "the pairs agree with each other, but not with the mesh of the plan: "
@@ -235,44 +230,40 @@ class _Desk:
         return tuple(found)
 
     def _reasons(
-        self, p: int, c: int, pair: Decoded, confirmed: Confirmed, share: float
+        self, pair: PairIndex, decoded: Decoded, confirmed: Confirmed, share: float
     ) -> list[str]:
         should = f"it should measure {share:.0%} of the target"
-        if (p, c) in self.refused:
-            return [f"left out: {self.refused[p, c]}"]
-        if (p, c) in self.dark:
-            dark = f"left out: {self.dark[p, c]} ({should})"
+        if pair in self.refused:
+            return [f"left out: {self.refused[pair]}"]
+        if pair in self.dark:
+            dark = f"left out: {self.dark[pair]} ({should})"
             return [dark] if share >= _MISSED else []
-        found = list(self.notes.get((p, c), ()))
-        if (p, c) in confirmed.errors_m:
+        found = list(self.notes.get(pair, ()))
+        if pair in confirmed.errors_m:
             found.append(
-                f"left out: its points lie {_MM * confirmed.errors_m[p, c]:.3g} mm off "
+                f"left out: its points lie {_MM * confirmed.errors_m[pair]:.3g} mm off "
                 f"the mesh (median), and no other pair confirms them: images of other "
                 f"devices, or exchanged, or poses that aren't those of the plan or the "
                 f"calibration"
             )
-        elif (p, c) in confirmed.strays:
+        elif pair in confirmed.strays:
             found.append(
-                f"{confirmed.strays[p, c]} of its {len(pair.cloud)} points are left "
+                f"{confirmed.strays[pair]} of its {len(decoded.cloud)} points are left "
                 f"out: far off the mesh, and no other pair confirms them"
             )
-        elif not len(pair.cloud) and (share >= _MISSED or pair.rejected.get("labels")):
-            count = _count(pair)
+        elif not len(decoded.cloud) and (
+            share >= _MISSED or decoded.rejected.get("labels")
+        ):
+            count = PairCount.of(self._plan, pair, decoded)
             why = rejection((count,)) or "no ring edge was decoded"
             found.append(f"gave no point: {why} ({should})")
         return found
 
 
-def _count(pair: Decoded) -> PairCount:
-    return PairCount(
-        "", "", pair.lit_pixels, pair.n_edges, len(pair.cloud), pair.rejected
-    )
-
-
 def _concluded(
-    plan: RigPlan,
+    plan: Scanner,
     pairs: Pairs,
-    desk: _Desk,
+    inspection: _Inspection,
     expected: Expected,
     spent: Spent,
     *,
@@ -282,9 +273,9 @@ def _concluded(
     """Leave out what nothing confirms, merge, judge, and say what is missing."""
     confirmed = confirm(
         pairs,
-        plan.surface.mesh,
-        [calibrate_camera(camera) for camera in plan.cameras],
-        limit_m=plan.requirements.check.max_rms_m,
+        plan.mesh,
+        plan.cameras,
+        limit_m=plan.limits.check.max_rms_m,
         threads=threads,
     )
     found = conclude(
@@ -297,5 +288,5 @@ def _concluded(
         photometry=photometry,
         seconds=spent.seconds,
     )
-    sentences = desk.sentences(pairs, confirmed, expected)
+    sentences = inspection.sentences(pairs, confirmed, expected)
     return replace(found, failures=sentences + found.failures)

@@ -14,25 +14,15 @@ from PIL import Image
 
 from planning.model.errors import CapturesError
 from planning.model.files import write_together
-from planning.model.plan import RigPlan
-from planning.verify.reconstruction.patterns.pattern_frames import pattern_sequence
+from planning.verify.reconstruction.patterns.pattern_frames import PatternSequence
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, Images
+from planning.verify.reconstruction.scanner import Scanner
 
 from .images import SUFFIXES, read_grey
 
 # Bits that sensors have; 16-bit files hold what fewer bits gave.
 _DEPTHS = (8, 10, 12, 14, 16)
 _LISTED = 4
-
-
-def frame_names(plan: RigPlan, p: int, c: int) -> tuple[str, ...]:
-    """Return the names of a pair's frames, without ending, as decoders read them.
-
-    White, black, bits and their inverses, then the root disc of this camera.
-    """
-    camera = plan.cameras[c].id
-    frames = pattern_sequence(plan.projectors[p], plan.cameras).frames
-    return tuple(frame.name for frame in frames if frame.camera in (None, camera))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +35,21 @@ class CaptureFolder:
     """
 
     path: Path
-    plan: RigPlan
+    plan: Scanner
 
     def place(self, p: int, c: int) -> Path:
         """Return the folder of a pair."""
         return self.path / self.plan.cameras[c].id / self.plan.projectors[p].id
+
+    def frame_names(self, p: int, c: int) -> tuple[str, ...]:
+        """Return the names of a pair's frames, without ending, as decoders read them.
+
+        White, black, bits and their inverses, then the root disc of this camera.
+        """
+        return self._sequence(p).frame_names(self.plan.cameras[c].id)
+
+    def _sequence(self, p: int) -> PatternSequence:
+        return PatternSequence.of(self.plan.projectors[p], self.plan.cameras)
 
     def require(self) -> None:
         """Refuse a folder that holds none of the cameras.
@@ -74,7 +74,7 @@ class CaptureFolder:
                 or of another depth than the rest.
         """
         files = self._files(p, c)
-        resolution = self.plan.cameras[c].device.resolution
+        resolution = self.plan.cameras[c].resolution
         levels = [read_grey(file, resolution) for file in files]
         for file, image in zip(files, levels, strict=True):
             if image.dtype != levels[0].dtype:
@@ -98,14 +98,12 @@ class CaptureFolder:
                 place / f"{name}.png": lambda file, picture=picture: picture.save(
                     file, format="PNG", compress_level=1
                 )
-                for name, picture in zip(
-                    frame_names(self.plan, p, c), pictures, strict=True
-                )
+                for name, picture in zip(self.frame_names(p, c), pictures, strict=True)
             }
         )
 
     def _files(self, p: int, c: int) -> list[Path]:
-        place, names = self.place(p, c), frame_names(self.plan, p, c)
+        place, names = self.place(p, c), self.frame_names(p, c)
         if not place.is_dir():
             near = _contents(place.parent) if place.parent.is_dir() else ()
             holds = f"; {place.parent} holds {_some(near)}" if near else ""
@@ -116,8 +114,7 @@ class CaptureFolder:
                 found.setdefault(file.stem, []).append(file)
         missing = [name for name in names if name not in found]
         if missing:
-            everyone = pattern_sequence(self.plan.projectors[p], self.plan.cameras)
-            known = {frame.name for frame in everyone.frames}
+            known = {frame.name for frame in self._sequence(p).frames}
             others = [file.name for file in _entries(place) if file.stem not in known]
             also = f"; holds {_some(others)}, no frame's name" if others else ""
             raise CapturesError(f"{place}: lacks {_some(missing)}{also}")

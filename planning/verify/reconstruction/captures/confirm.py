@@ -4,6 +4,7 @@ Images that were mixed up among cameras or projectors can decode without a fault
 every point is wrong. No cloud is made of what nothing confirms.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -15,8 +16,12 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import closest_points
 from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.decode.decode import CAUSES, Decoded
-from planning.verify.reconstruction.render.rendered import Pairs
+from planning.verify.reconstruction.decode.decode import (
+    CAUSES,
+    Decoded,
+    PairIndex,
+    Pairs,
+)
 
 _MM = 1e3
 # Points of a pair that are looked at, and the fewest that say anything.
@@ -50,15 +55,15 @@ class Confirmed:
     """
 
     pairs: Pairs
-    errors_m: dict[tuple[int, int], float]
-    strays: dict[tuple[int, int], int]
+    errors_m: dict[PairIndex, float]
+    strays: dict[PairIndex, int]
     by_each_other: bool
 
 
 def confirm(
     pairs: Pairs,
     mesh: TriangleMesh,
-    cameras: list[CameraCalibration],
+    cameras: Sequence[CameraCalibration],
     *,
     limit_m: float,
     threads: int,
@@ -79,7 +84,7 @@ def confirm(
         threads: Worker threads of the closest points.
     """
     errors = {
-        key: np.abs(_distances(mesh, _some(pair.cloud), threads))
+        key: np.abs(_distances(mesh, pair.cloud.thinned(_LOOKED_AT), threads))
         for key, pair in pairs
         if len(pair.cloud)
     }
@@ -92,7 +97,7 @@ def confirm(
         if not good and _agree(off, apart, _APART * limit_m):
             return Confirmed(pairs, {}, {}, by_each_other=True)
         off = {key for key in off if not _seen_by(good, key, apart, _APART * limit_m)}
-    strays: dict[tuple[int, int], int] = {}
+    strays: dict[PairIndex, int] = {}
     kept: Pairs = []
     for key, pair in pairs:
         if key in off:
@@ -113,10 +118,6 @@ def confirm(
     )
 
 
-def _some(cloud: Cloud) -> Cloud:
-    return cloud.take(np.arange(0, len(cloud), -(-len(cloud) // _LOOKED_AT)))
-
-
 def _distances(mesh: TriangleMesh, cloud: Cloud, threads: int) -> NDArray[np.float64]:
     return closest_points(mesh, cloud.points, threads=threads).distances
 
@@ -124,15 +125,15 @@ def _distances(mesh: TriangleMesh, cloud: Cloud, threads: int) -> NDArray[np.flo
 def _left(pair: Decoded, kept: NDArray[np.bool_]) -> Decoded:
     """Return a pair with some of its points, the others counted as unconfirmed."""
     why = pair.rejected | {"unconfirmed": int(np.count_nonzero(~kept))}
-    fates = pair.fates.copy()
-    fates[np.flatnonzero(fates < 0)[~kept]] = CAUSES.index("unconfirmed")
-    return replace(pair, cloud=pair.cloud.take(kept), rejected=why, fates=fates)
+    outcomes = pair.outcomes.copy()
+    outcomes[np.flatnonzero(outcomes < 0)[~kept]] = CAUSES.index("unconfirmed")
+    return replace(pair, cloud=pair.cloud.take(kept), rejected=why, outcomes=outcomes)
 
 
 def _seen_by(
-    good: set[tuple[int, int]],
-    key: tuple[int, int],
-    apart: dict[frozenset[tuple[int, int]], float],
+    good: set[PairIndex],
+    key: PairIndex,
+    apart: dict[frozenset[PairIndex], float],
     tolerance: float,
 ) -> bool:
     """Whether a pair agrees with every confirmed one that saw the same spots."""
@@ -142,9 +143,9 @@ def _seen_by(
 
 
 def _seen_too(
-    key: tuple[int, int],
+    key: PairIndex,
     strays: Cloud,
-    others: dict[tuple[int, int], Cloud],
+    others: dict[PairIndex, Cloud],
     camera: CameraCalibration,
     tolerance: float,
 ) -> bool:
@@ -160,10 +161,10 @@ def _seen_too(
 
 
 def _disagreements(
-    clouds: dict[tuple[int, int], Cloud], cameras: list[CameraCalibration]
-) -> dict[frozenset[tuple[int, int]], float]:
+    clouds: dict[PairIndex, Cloud], cameras: Sequence[CameraCalibration]
+) -> dict[frozenset[PairIndex], float]:
     """Median difference [m] of each two pairs where both saw one spot."""
-    found: dict[frozenset[tuple[int, int]], float] = {}
+    found: dict[frozenset[PairIndex], float] = {}
     for one, other in combinations(sorted(clouds), 2):
         seen, also = clouds[one], clouds[other]
         same = one[0] == other[0]
@@ -215,8 +216,8 @@ def _place(
 
 
 def _agree(
-    keys: set[tuple[int, int]],
-    apart: dict[frozenset[tuple[int, int]], float],
+    keys: set[PairIndex],
+    apart: dict[frozenset[PairIndex], float],
     tolerance: float,
 ) -> bool:
     """Whether pairs of several cameras and projectors agree, each with some other."""

@@ -1,18 +1,12 @@
-"""The check of a plan from pixels: render, decode, triangulate, merge, compare."""
-
-from dataclasses import replace
+"""The simulated reconstruction: render, decode, triangulate, merge, compare."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
 from planning.model.plan import RigPlan
-from planning.verify.reconstruction.calibration import (
-    calibrate_camera,
-    calibrate_projector,
-)
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.decode.decode import Decoded
+from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.faults.causes import (
     MeasuredClouds,
     explained,
@@ -20,11 +14,11 @@ from planning.verify.reconstruction.faults.causes import (
 )
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import (
-    Pairs,
     Progress,
     Spent,
     decode_rendered,
 )
+from planning.verify.reconstruction.scanner import Scanner
 
 from .accuracy import judge, measure_accuracy, measure_completeness
 from .merge import merge
@@ -44,7 +38,31 @@ def reconstruct_plan(
     photometry: Photometry | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
-    """Measure the object of a plan through rendered images, and judge the result.
+    """Measure the object of a plan through rendered images, see `reconstruct`."""
+    return reconstruct(
+        Scanner.of(plan),
+        seed=seed,
+        threads=threads,
+        truth=None if truth is None else Scanner.of(truth),
+        samples=samples,
+        predicted=predicted,
+        photometry=photometry,
+        progress=progress,
+    )
+
+
+def reconstruct(
+    plan: Scanner,
+    *,
+    seed: int,
+    threads: int = 2,
+    truth: Scanner | None = None,
+    samples: SurfaceSamples | None = None,
+    predicted: NDArray[np.bool_] | None = None,
+    photometry: Photometry | None = None,
+    progress: Progress | None = None,
+) -> Reconstruction:
+    """Measure an object through rendered images, and judge the result.
 
     Args:
         plan: What the decoder believes: poses, optics, patterns; its mesh is compared.
@@ -62,8 +80,7 @@ def reconstruct_plan(
     Raises:
         ValueError: If `predicted` comes without samples, or in another number.
     """
-    light = photometry or Photometry()
-    spent = Spent()
+    light, spent = photometry or Photometry(), Spent()
     decoded = decode_rendered(
         plan,
         truth or plan,
@@ -86,7 +103,7 @@ def reconstruct_plan(
 
 
 def conclude(
-    plan: RigPlan,
+    plan: Scanner,
     decoded: Pairs,
     *,
     seed: int,
@@ -99,10 +116,10 @@ def conclude(
     """Merge what the pairs of a rig measured, and judge it.
 
     Args:
-        plan: As in `reconstruct_plan`.
+        plan: As in `reconstruct`.
         decoded: Projector, camera and what they gave, of every pair.
         seed: Of the samples, where none are given.
-        threads: As in `reconstruct_plan`.
+        threads: As in `reconstruct`.
         samples: Likewise.
         predicted: Likewise.
         photometry: Of the simulation; None: the images were taken.
@@ -110,28 +127,20 @@ def conclude(
     """
     samples, predicted = _target_samples(plan, samples, predicted, seed)
     spent = Spent(seconds)
-    parts = [
-        replace(
-            pair.cloud,
-            projector=np.full(len(pair.cloud), p, dtype=np.int16),
-            camera=np.full(len(pair.cloud), c, dtype=np.int16),
-        )
-        for (p, c), pair in decoded
-    ]
+    parts = [pair.cloud.of_devices(p, c) for (p, c), pair in decoded]
     everything = Cloud.join(parts)
     gap_m, pitch_px = _ring_gap(plan, everything)
     with spent.on("merge"):
         merged = merge(everything, gap_m=gap_m, pitch_px=pitch_px)
-    limits = plan.requirements.check
-    mesh = plan.surface.mesh
+    limits = plan.limits.check
     completeness = measure_completeness(
         everything, merged.cloud, samples, predicted, limits.tau_m
     )
-    pairs = tuple(_count(plan, p, c, pair) for (p, c), pair in decoded)
+    pairs = tuple(PairCount.of(plan, pair, gave) for pair, gave in decoded)
     accuracy, why = None, rejection(pairs) or "no ring edge was decoded"
     failures: tuple[str, ...] = (f"no point was measured: {why}",)
     if len(merged.cloud):
-        accuracy = measure_accuracy(merged.cloud, mesh, threads=threads)
+        accuracy = measure_accuracy(merged.cloud, plan.mesh, threads=threads)
         failures = judge(accuracy, completeness, limits)
     if accuracy is not None and failures:
         measured = MeasuredClouds(
@@ -151,18 +160,19 @@ def conclude(
 
 
 def _target_samples(
-    plan: RigPlan,
+    plan: Scanner,
     samples: SurfaceSamples | None,
     predicted: NDArray[np.bool_] | None,
     seed: int,
 ) -> tuple[SurfaceSamples, NDArray[np.bool_] | None]:
-    target = plan.surface.target_faces(plan.requirements.target)
     if samples is None:
         if predicted is not None:
             raise ValueError("predicted needs the samples that it speaks of")
-        mesh = plan.surface.mesh
-        return sample_surface(mesh, _DEFAULT_SAMPLES, seed=seed, within=target), None
-    inside = target[samples.faces]
+        fresh = sample_surface(
+            plan.mesh, _DEFAULT_SAMPLES, seed=seed, within=plan.target
+        )
+        return fresh, None
+    inside = plan.target[samples.faces]
     if predicted is None:
         return samples.take(inside), None
     if predicted.shape != (len(samples),):
@@ -172,32 +182,18 @@ def _target_samples(
     return samples.take(inside), predicted[inside]
 
 
-def _ring_gap(plan: RigPlan, cloud: Cloud) -> tuple[float, float]:
+def _ring_gap(plan: Scanner, cloud: Cloud) -> tuple[float, float]:
     """Median distance of neighbouring rings, across the beam [m] and in images [px]."""
     if len(cloud) == 0:
-        return plan.requirements.check.tau_m, 1.0
+        return plan.limits.check.tau_m, 1.0
     gaps = np.empty(len(cloud))
     for p, projector in enumerate(plan.projectors):
-        own = cloud.projector == p
-        radii = projector.ring_radii
-        step = np.diff(radii, prepend=radii[0] - (radii[1] - radii[0]))[cloud.ring[own]]
-        if projector.light == "diverging":
-            ring = calibrate_projector(projector).to_ring(cloud.points[own])
-            step = step * ring[:, 2] / np.sqrt(1.0 + radii[cloud.ring[own]] ** 2)
-        gaps[own] = step
-    centres = np.array([camera.world_from_device[:3, 3] for camera in plan.cameras])
-    focal = np.array([calibrate_camera(camera).focal_px for camera in plan.cameras])
+        chosen = cloud.projector == p
+        rings, depth = cloud.ring[chosen], projector.to_ring(cloud.points[chosen])[:, 2]
+        step, radii = projector.pattern.steps[rings], projector.radii[rings]
+        gaps[chosen] = projector.light.across_m(step, radii, depth)
+    centres = np.array([camera.centre for camera in plan.cameras])
+    focal = np.array([camera.focal_px for camera in plan.cameras])
     reach = np.linalg.norm(cloud.points - centres[cloud.camera], axis=1)
     pitch = gaps * focal[cloud.camera] / reach
     return float(np.median(gaps)), float(np.median(pitch))
-
-
-def _count(plan: RigPlan, p: int, c: int, pair: Decoded) -> PairCount:
-    return PairCount(
-        plan.projectors[p].id,
-        plan.cameras[c].id,
-        pair.lit_pixels,
-        pair.n_edges,
-        len(pair.cloud),
-        pair.rejected,
-    )

@@ -1,10 +1,12 @@
-"""What the check from pixels found."""
+"""What the simulated reconstruction gives."""
 
 from dataclasses import dataclass
 from typing import Any
 
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.decode import Decoded, PairIndex
 from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.scanner import Scanner
 
 from .accuracy import Accuracy, Completeness
 from .comparison import Comparison
@@ -30,6 +32,18 @@ class PairCount:
     n_edges: int
     n_points: int
     rejected: dict[str, int]
+
+    @classmethod
+    def of(cls, plan: Scanner, pair: PairIndex, decoded: Decoded) -> "PairCount":
+        """Count what a pair of a rig gave."""
+        return cls(
+            plan.projectors[pair[0]].id,
+            plan.cameras[pair[1]].id,
+            decoded.lit_pixels,
+            decoded.n_edges,
+            len(decoded.cloud),
+            decoded.rejected,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingPatterns
+from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
 
 from .edges import SATURATED, ImageEdges, find_edges
 from .triangulate import RingHits, intersect_rings
@@ -38,7 +38,7 @@ _MAX_SLANT = 2.14
 _STEPS_STEEPER = 1.74
 # Saturated pixels that are kept as evidence, about.
 _SATURATED_KEPT = 500
-# Why an edge may give no point, in the order in which it is asked; `fates` counts so.
+# Why an edge may give no point, in the order in which it is asked; outcomes count so.
 CAUSES = (
     "labels",
     "no_intersection",
@@ -51,6 +51,10 @@ CAUSES = (
 )
 
 
+# Indices of a projector and a camera of a rig.
+PairIndex = tuple[int, int]
+
+
 @dataclass(frozen=True, eq=False)
 class Decoded:
     """What one camera measured under one projector.
@@ -61,7 +65,7 @@ class Decoded:
         n_edges: Edges found, whether a point came of them or not.
         rejected: Edges that gave no point, by cause.
         edges: All edges, for the search for causes.
-        fates: Index in `CAUSES` of why each edge gave no point, -1 if it gave one,
+        outcomes: Index in `CAUSES` of why each edge gave no point, -1 if it gave one,
             shape (n_edges,).
         n_saturated: Pixels that the white frame saturates.
         saturated: Some of them, (u, v) in the camera's image, shape (k, 2).
@@ -72,21 +76,24 @@ class Decoded:
     n_edges: int
     rejected: dict[str, int]
     edges: ImageEdges
-    fates: NDArray[np.int8]
+    outcomes: NDArray[np.int8]
     n_saturated: int
     saturated: NDArray[np.float64]
 
     @classmethod
     def nothing(cls) -> "Decoded":
         """Return what a device that is off gives."""
-        fates = np.zeros(0, dtype=np.int8)
+        outcomes = np.zeros(0, dtype=np.int8)
         nowhere = np.zeros((0, 2))
-        return cls(Cloud.empty(), 0, 0, {}, ImageEdges.nothing(), fates, 0, nowhere)
+        return cls(Cloud.empty(), 0, 0, {}, ImageEdges.nothing(), outcomes, 0, nowhere)
+
+
+Pairs = list[tuple[PairIndex, Decoded]]
 
 
 def decode(
     frames: Frames,
-    patterns: RingPatterns,
+    patterns: CameraPattern,
     calibration: PairCalibration,
     *,
     min_conditioning: float = 0.1,
@@ -131,7 +138,7 @@ def decode(
 
 def measure_edges(
     edges: ImageEdges,
-    patterns: RingPatterns,
+    patterns: CameraPattern,
     calibration: PairCalibration,
     lit_pixels: int,
     saturated: NDArray[np.float64],
@@ -166,13 +173,13 @@ def measure_edges(
         "depth_step": across > _STEPS_STEEPER * max_slant,
     }
     kept = np.ones(len(edges), dtype=bool)
-    fates = np.full(len(edges), -1, dtype=np.int8)
+    outcomes = np.full(len(edges), -1, dtype=np.int8)
     rejected: dict[str, int] = {}
     if not believed:
         causes = {"labels": kept.copy()}
     for cause, fails in causes.items():
         rejected[cause] = int(np.count_nonzero(kept & fails))
-        fates[kept & fails] = CAUSES.index(cause)
+        outcomes[kept & fails] = CAUSES.index(cause)
         kept &= ~fails
     return Decoded(
         _cloud(edges, rays, hits, calibration).take(kept),
@@ -180,7 +187,7 @@ def measure_edges(
         len(edges),
         rejected,
         edges,
-        fates,
+        outcomes,
         len(saturated),
         saturated[:: max(1, len(saturated) // _SATURATED_KEPT)],
     )
@@ -189,7 +196,7 @@ def measure_edges(
 def _doubtful_root(
     edges: ImageEdges,
     rays: NDArray[np.float64],
-    patterns: RingPatterns,
+    patterns: CameraPattern,
     calibration: PairCalibration,
 ) -> NDArray[np.bool_]:
     """Edges of which both roots, or neither, lie on the side that the disc told.
@@ -206,11 +213,9 @@ def _doubtful_root(
         radii = patterns.radii[edges.rings]
         points = intersect_rings(camera.centre, rays, radii, roots, projector).points
         local = projector.to_ring(points)
-        flat = local[:, :2]
-        if patterns.light == "diverging":
-            flat = flat / local[:, 2:]
         inside = projector.in_panel(projector.panel(points)[0], 1.0)
-        return (np.sign(patterns.root_side(flat)) == edges.roots) & inside
+        side = patterns.root_side(patterns.light.plane(local))
+        return (np.sign(side) == edges.roots) & inside
 
     return fits(edges.roots) == fits(-edges.roots)
 
@@ -278,7 +283,7 @@ def _cloud(
     return Cloud(
         points=hits.points,
         rays=rays,
-        beams=calibration.projector.beams(hits.points),
+        beams=calibration.projector.aim(hits.points)[1],
         pixels=edges.pixels,
         camera=np.zeros(len(edges), dtype=np.int16),
         projector=np.zeros(len(edges), dtype=np.int16),

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.special import erfinv
 
 from planning.verify.reconstruction.patterns.ring_patterns import (
+    CameraPattern,
     Frames,
     Images,
-    RingPatterns,
 )
 
 _MIN_CONTRAST = 10.0
@@ -64,7 +64,7 @@ class ImageEdges:
         )
 
 
-def find_edges(frames: Frames, patterns: RingPatterns) -> tuple[ImageEdges, int]:
+def find_edges(frames: Frames, patterns: CameraPattern) -> tuple[ImageEdges, int]:
     """Return the labelled ring edges of a stack of images, and its lit pixels."""
     reader = _Reader(frames.stack, patterns)
     noise = reader.grey_noise()
@@ -98,7 +98,7 @@ class _Reader:
         even: Pixels about which the contrast is nearly the same.
     """
 
-    def __init__(self, stack: Images, patterns: RingPatterns) -> None:
+    def __init__(self, stack: Images, patterns: CameraPattern) -> None:
         self._stack = stack
         self.patterns = patterns
         white, black = stack[0].astype(np.float32), stack[1].astype(np.float32)

@@ -9,9 +9,9 @@ from scipy.ndimage import binary_opening
 
 from planning.model.errors import CapturesError
 from planning.verify.reconstruction.patterns.ring_patterns import (
+    CameraPattern,
     Frames,
     Images,
-    RingPatterns,
 )
 
 from .adding_up import broken_pixels
@@ -50,7 +50,7 @@ class DarkError(CapturesError):
     """White is no brighter than black; whether light should be there, others know."""
 
 
-def inspect(stack: Images, patterns: RingPatterns, names: Sequence[str]) -> Inspected:
+def inspect(stack: Images, patterns: CameraPattern, names: Sequence[str]) -> Inspected:
     """Hold the images of a camera under a projector against each other.
 
     Args:
@@ -185,7 +185,7 @@ def _require_different(stack: Images, names: Sequence[str]) -> None:
 
 
 def _require_codes(
-    stack: Images, good: NDArray[np.bool_], patterns: RingPatterns
+    stack: Images, good: NDArray[np.bool_], patterns: CameraPattern
 ) -> None:
     """Refuse images whose pixels hold codes that the projector never drew."""
     rows, columns = np.nonzero(good & (_contrast(stack) >= _LIT))

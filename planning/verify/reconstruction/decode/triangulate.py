@@ -1,12 +1,12 @@
 """Ray meets ring surface: a cylinder in parallel light, a cone in diverging light."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.verify.reconstruction.calibration import ProjectorCalibration
+from planning.verify.reconstruction.light import Light
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +59,12 @@ def intersect_rings(
     t = _distance(o, q, radii, roots.astype(np.float64), projector.light)
     with np.errstate(invalid="ignore"):
         bad = ~(t > 0.0)
-        if projector.light == "diverging":
-            bad |= ~(o[2] + t * q[:, 2] > 0.0)
+        bad |= ~projector.light.reaches(o[2] + t * q[:, 2])
     t = np.where(bad, np.nan, t)
     local = o + t[:, None] * q
-    normals = _ring_normals(local, radii, projector.light)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        outward = local[:, :2] / np.hypot(local[:, 0], local[:, 1])[:, None]
+    normals = projector.light.ring_normals(outward, radii)
     return RingHits(
         points=origin + t[:, None] * rays,
         distances=t,
@@ -77,10 +78,9 @@ def _distance(
     q: NDArray[np.float64],
     radii: NDArray[np.float64],
     root: NDArray[np.float64],
-    light: Literal["diverging", "parallel"],
+    light: Light,
 ) -> NDArray[np.float64]:
-    square = radii * radii
-    k, c = (square, 0.0) if light == "diverging" else (0.0, square)
+    k, c = light.quadric(radii)
     qx, qy, qz = q.T
     a = qx * qx + qy * qy - k * qz * qz
     b = o[0] * qx + o[1] * qy - k * o[2] * qz
@@ -90,19 +90,3 @@ def _distance(
         sign = np.where(b < 0.0, -1.0, 1.0)
         e = -(b + sign * spread)
         return np.where(root == sign, constant / e, e / a)
-
-
-def _ring_normals(
-    local: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    light: Literal["diverging", "parallel"],
-) -> NDArray[np.float64]:
-    x, y = local[:, 0], local[:, 1]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        across = np.hypot(x, y)
-        if light == "parallel":
-            return np.column_stack([x / across, y / across, np.zeros_like(across)])
-        return (
-            np.column_stack([x / across, y / across, -radii])
-            / np.sqrt(1.0 + radii * radii)[:, None]
-        )

@@ -4,15 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from planning.model.plan import RigPlan
-from planning.verify.reconstruction.calibration import (
-    ProjectorCalibration,
-    calibrate_projector,
-)
+from planning.verify.reconstruction.calibration import ProjectorCalibration
+from planning.verify.reconstruction.scanner import Scanner
 
 from .corrections import Device
 from .diagnosis import Cause, Explanation
-from .supposed import GRAZING, incidence_cosine
+from .supposed import GRAZING
 
 _MM = 1e3
 # Turns below this aren't worth a word [rad].
@@ -21,7 +18,7 @@ _NO_TURN = np.deg2rad(0.005)
 _MOST_ASIDE = 0.5
 
 
-def in_words(cause: Cause, plan: RigPlan) -> str:
+def in_words(cause: Cause, plan: Scanner) -> str:
     """Return what a cause looks like, and how far the edges were off their rings.
 
     Args:
@@ -36,7 +33,7 @@ def in_words(cause: Cause, plan: RigPlan) -> str:
     )
 
 
-def _looks(explanation: Explanation, plan: RigPlan) -> str:
+def _looks(explanation: Explanation, plan: Scanner) -> str:
     correction = explanation.correction
     if correction.role is None:
         return _object_looks(explanation)
@@ -99,26 +96,22 @@ def _displaced(before: Device, after: Device, away: float) -> str:
 
 
 def _grazing(
-    before: ProjectorCalibration, after: ProjectorCalibration, plan: RigPlan
+    before: ProjectorCalibration, after: ProjectorCalibration, plan: Scanner
 ) -> str:
     """Say at what angle the target is lit that the projector should serve.
 
     That is what it would meet more squarely than any other projector of the plan.
     """
-    mesh = plan.surface.mesh
-    target = plan.surface.target_faces(plan.requirements.target)
+    mesh, target = plan.mesh, plan.target
     middles, normals = mesh.face_centroids[target], mesh.face_normals[target]
     areas = mesh.face_areas[target]
-    each = [
-        incidence_cosine(calibrate_projector(p), middles, normals)
-        for p in plan.projectors
-    ]
-    planned = incidence_cosine(before, middles, normals)
-    limit = np.cos(plan.requirements.projector.max_incidence)
+    each = [one.incidence_cosine(middles, normals) for one in plan.projectors]
+    planned = before.incidence_cosine(middles, normals)
+    limit = np.cos(plan.limits.max_lit)
     own = (planned >= limit) & (planned >= np.max(each, axis=0))
     if not own.any():
         return ""
-    lit = incidence_cosine(after, middles[own], normals[own])
+    lit = after.incidence_cosine(middles[own], normals[own])
     order = np.argsort(lit)
     half = np.searchsorted(np.cumsum(areas[own][order]), 0.5 * areas[own].sum())
     angle = float(np.arccos(np.clip(lit[order[half]], -1.0, 1.0)))
@@ -140,18 +133,18 @@ def _two_digits(value: float) -> str:
     return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
 
 
-def _too_wide(name: str, after: Device, plan: RigPlan) -> str:
+def _too_wide(name: str, after: Device, plan: Scanner) -> str:
     """Name a baseline of the plan that exceeds its limit with the camera so placed."""
-    centres = {c.id: c.world_from_device[:3, 3] for c in plan.cameras}
-    for row in plan.document.get("baselines") or ():
-        if name not in row["cameras"] or row["d_max"] is None:
+    centres = {camera.id: camera.centre for camera in plan.cameras}
+    for limit in plan.baselines:
+        if name not in limit.cameras:
             continue
-        (other,) = (one for one in row["cameras"] if one != name)
+        (other,) = limit.cameras - {name}
         d = float(np.linalg.norm(after.centre - centres[other]))
-        if row["d"] < row["d_max"] < d:
+        if limit.d < limit.d_max < d:
             return (
                 f", which makes its baseline to {other} {_MM * d:.1f} mm: too wide, "
-                f"eq. (10) allows {_MM * row['d_max']:.1f} mm"
+                f"eq. (10) allows {_MM * limit.d_max:.1f} mm"
             )
     return ""
 

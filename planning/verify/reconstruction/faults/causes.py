@@ -6,26 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.model.plan import RigPlan
 from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.scanner import Scanner
 
 from .cause_words import in_words
-from .diagnosis import Pairs, diagnose
-from .inaccurate import where_inaccurate
+from .diagnosis import diagnose
+from .inaccurate import where_inaccurate, wrong_roots
 from .missing import hole_between, left_out_nearby, missing_where, no_edges
 from .overlapping_light import lit_twice
-from .roots import wrong_roots
 
-_MM = 1e3
-# Points of each pair that the search for a cause looks at.
-_POINTS_A_PAIR = 1000
 # A device whose edges are fewer than this share of what its role gives is all but dark.
 _DARK_SHARE = 0.01
 # More saturated pixels than this share of the lit ones are no highlights.
 _SATURATED_SHARE = 0.02
-# A projector counts if so many of the points that are off are its own.
-_MUCH = 0.25
 
 
 _WORDS = {
@@ -71,7 +66,7 @@ class MeasuredClouds:
         missing: Which of those have no point, shape (n,).
     """
 
-    plan: RigPlan
+    plan: Scanner
     decoded: Pairs
     counts: tuple[PairCount, ...]
     cloud: Cloud

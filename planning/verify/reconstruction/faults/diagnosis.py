@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.model.plan import RigPlan
-from planning.verify.reconstruction.decode.decode import Decoded
+from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.scanner import Scanner
 
 from .explanations import CAP_M, SOUND_SHARE, Explanation, State, capped
 from .supposed import Evidence, Places, Supposed, mismatches, places
@@ -25,8 +25,6 @@ _AS_GOOD_ERRORS, _AS_GOOD_SHARE, _WORSE_SHARE = 4.0, 0.03, 0.25
 # distance, or so many standard deviations of their own noise.
 _FINE_SHARE, _FINE_NOISE = 0.12, 2.0
 _MOST_CAUSES = 3
-
-Pairs = list[tuple[tuple[int, int], Decoded]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +40,12 @@ class Cause:
     before_m: float
 
 
-def diagnose(plan: RigPlan, decoded: Pairs) -> tuple[Cause, ...]:
+def diagnose(plan: Scanner, decoded: Pairs) -> tuple[Cause, ...]:
     """Return the changes that the edges of a check ask for, see `diagnose_edges`."""
     return diagnose_edges(plan, Evidence.of(plan, decoded))
 
 
-def diagnose_edges(plan: RigPlan, evidence: Evidence) -> tuple[Cause, ...]:
+def diagnose_edges(plan: Scanner, evidence: Evidence) -> tuple[Cause, ...]:
     """Return the changes that edges ask for, what explains most first.
 
     Args:
@@ -59,7 +57,7 @@ def diagnose_edges(plan: RigPlan, evidence: Evidence) -> tuple[Cause, ...]:
     supposed = Supposed.of(plan)
     at = places(evidence, supposed)
     fine = max(
-        _FINE_SHARE * plan.requirements.check.max_rms_m,
+        _FINE_SHARE * plan.limits.check.max_rms_m,
         _FINE_NOISE * _noise(evidence, supposed, at),
     )
     lies = mismatches(evidence, supposed, at)[0]

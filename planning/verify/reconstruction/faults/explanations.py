@@ -11,8 +11,15 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from .corrections import Correction, of_device, of_object, standing_at, swapped
-from .far_poses import far_poses, turns_aside
+from .corrections import (
+    Correction,
+    far_poses,
+    of_device,
+    of_object,
+    standing_at,
+    swapped,
+    turns_aside,
+)
 from .fits import fit, least_change
 from .supposed import Evidence, Role, Supposed, mismatches, places
 

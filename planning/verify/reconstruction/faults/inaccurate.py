@@ -1,26 +1,36 @@
 """What points that are off the mesh have in common, no device being displaced."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.proximity import closest_points
-from planning.model.plan import RigPlan
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.scanner import Scanner
 
-from .supposed import GRAZING
+from .supposed import GRAZING, Evidence, Supposed, mismatches, places
 
 _MM = 1e3
 # Points of each pair that are looked at.
 _POINTS_A_PAIR = 1000
 # A projector counts if so many of the points that are off are its own.
 _MUCH = 0.25
+# An edge lies on its ring on the mesh within this, its point lies this far from there:
+# as shares of the limit on the rms distance.
+_ON_RING_SHARE, _ELSEWHERE_SHARE = 1.0, 20.0
+# Fewer wrong roots are what noise does near the border of a disc.
+_LEAST_SHARE = 0.05
 
 
-def where_inaccurate(plan: RigPlan, cloud: Cloud) -> str:
+def where_inaccurate(plan: Scanner, cloud: Cloud) -> str:
     """Say what the points that are off have in common, nothing being displaced."""
-    limit = plan.requirements.check.max_rms_m
-    few = cloud.take(_some_of_each_pair(cloud))
-    mesh = plan.surface.mesh
+    limit = plan.limits.check.max_rms_m
+    key = cloud.projector.astype(np.int64) << 16 | cloud.camera
+    by_pair = [cloud.take(key == k) for k in np.unique(key)]
+    few = Cloud.join([one.thinned(_POINTS_A_PAIR) for one in by_pair])
+    mesh = plan.mesh
     nearest = closest_points(mesh, few.points)
     error = np.abs(nearest.distances)
     far = error > limit
@@ -51,7 +61,7 @@ def where_inaccurate(plan: RigPlan, cloud: Cloud) -> str:
 
 
 def _grazing(
-    plan: RigPlan, projector: NDArray[np.int16], cosine: NDArray[np.float64]
+    plan: Scanner, projector: NDArray[np.int16], cosine: NDArray[np.float64]
 ) -> list[str]:
     """Name projectors whose points among those that are off are lit at grazing light.
 
@@ -69,15 +79,6 @@ def _grazing(
                 angle = np.rad2deg(np.arccos(np.clip(lit, -1.0, 1.0)))
                 names.append(f"{device.id} at {angle:.0f} degrees")
     return names
-
-
-def _some_of_each_pair(cloud: Cloud) -> NDArray[np.int64]:
-    chosen: list[NDArray[np.int64]] = []
-    pair = cloud.projector.astype(np.int64) << 16 | cloud.camera
-    for key in np.unique(pair):
-        rows = np.flatnonzero(pair == key)
-        chosen.append(rows[:: -(-len(rows) // _POINTS_A_PAIR)])
-    return np.concatenate(chosen)
 
 
 def _pair_medians(
@@ -125,3 +126,35 @@ def _name_devices(
             )
     pairs = ", ".join(f"{projectors[p]} with {cameras[c]}" for p, c in np.argwhere(off))
     return f"some pairs of devices are off and others aren't: {pairs}"
+
+
+def wrong_roots(plan: Scanner, decoded: Pairs) -> tuple[tuple[str, str, float], ...]:
+    """Return pairs of projector and camera whose points often lie on the other root.
+
+    The ray of such a point meets the mesh where its ring is drawn, but the point was
+    put elsewhere on the ray: labels and poses are right, the root bit isn't.
+
+    Args:
+        plan: Of the rig.
+        decoded: What each pair gave.
+
+    Returns:
+        Id of the projector and the camera, and the share of the pair's points.
+    """
+    limit = plan.limits.check.max_rms_m
+    supposed = Supposed.of(plan)
+    found: list[tuple[str, str, float]] = []
+    for (p, c), pair in decoded:
+        cloud = pair.cloud.thinned(_POINTS_A_PAIR)
+        if len(cloud) == 0:
+            continue
+        radii = plan.projectors[p].radii[cloud.ring]
+        evidence = replace(Evidence.at(plan, cloud.pixels, p, c), radii=radii)
+        at = places(evidence, supposed)
+        off = np.abs(mismatches(evidence, supposed, at)[0])
+        apart = np.linalg.norm(cloud.points - at.points, axis=1)
+        wrong = (off < _ON_RING_SHARE * limit) & (apart > _ELSEWHERE_SHARE * limit)
+        share = float(np.mean(wrong))
+        if share > _LEAST_SHARE:
+            found.append((plan.projectors[p].id, plan.cameras[c].id, share))
+    return tuple(found)

@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.model.plan import RigPlan
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.decode.decode import CAUSES
+from planning.verify.reconstruction.decode.decode import CAUSES, Pairs
+from planning.verify.reconstruction.scanner import Scanner
 
-from .diagnosis import Pairs
-from .overlapping_light import light_falls, outer_radius
-from .supposed import GRAZING, Evidence, Supposed, incidence_cosine, places
+from .overlapping_light import light_falls
+from .supposed import GRAZING, Evidence, Supposed, places
 
 _MM = 1e3
 _MOST_REGIONS = 3
@@ -28,13 +27,13 @@ _MOST = 0.5
 
 
 def missing_where(
-    plan: RigPlan,
+    plan: Scanner,
     samples: SurfaceSamples,
     predicted: NDArray[np.bool_],
     missing: NDArray[np.bool_],
 ) -> str:
     """Return the regions that most of the missing samples lie in, with their shares."""
-    region = plan.surface.region[samples.faces]
+    region = plan.region[samples.faces]
     ids, place = np.unique(region, return_inverse=True)
     promised = np.bincount(place[predicted], minlength=len(ids))
     lost = np.bincount(place[missing], minlength=len(ids))
@@ -53,7 +52,7 @@ def missing_where(
 
 
 def hole_between(
-    plan: RigPlan, cloud: Cloud, samples: SurfaceSamples, missing: NDArray[np.bool_]
+    plan: Scanner, cloud: Cloud, samples: SurfaceSamples, missing: NDArray[np.bool_]
 ) -> str | None:
     """Return the pair of cameras between whose measured parts most missing samples lie.
 
@@ -67,7 +66,7 @@ def hole_between(
         missing: Which of them have no point, shape (n,).
     """
     points = samples.points[missing]
-    reach = _REACH_TAU * plan.requirements.check.tau_m
+    reach = _REACH_TAU * plan.limits.check.tau_m
     sides = {
         c: _side(cloud.points[cloud.camera == c], points, reach)
         for c in np.unique(cloud.camera).tolist()
@@ -78,7 +77,7 @@ def hole_between(
         if np.mean(between) < _MOST:
             continue
         width = float(np.median((near + far)[between]))
-        centres = [plan.cameras[k].world_from_device[:3, 3] for k in (one, other)]
+        centres = [plan.cameras[k].centre for k in (one, other)]
         d = float(np.linalg.norm(centres[1] - centres[0]))
         names = f"{plan.cameras[one].id} and {plan.cameras[other].id}"
         return (
@@ -110,7 +109,7 @@ def _side(
 
 
 def left_out_nearby(
-    plan: RigPlan,
+    plan: Scanner,
     decoded: Pairs,
     samples: SurfaceSamples,
     missing: NDArray[np.bool_],
@@ -129,11 +128,11 @@ def left_out_nearby(
     """
     supposed = Supposed.of(plan)
     points = samples.points[missing]
-    tau = plan.requirements.check.tau_m
+    tau = plan.limits.check.tau_m
     reached = np.zeros((len(CAUSES), len(points)), dtype=bool)
     for (p, c), pair in decoded:
-        for cause in np.unique(pair.fates[pair.fates >= 0]).tolist():
-            own = pair.fates == cause
+        for cause in np.unique(pair.outcomes[pair.outcomes >= 0]).tolist():
+            own = pair.outcomes == cause
             evidence = Evidence.at(plan, pair.edges.pixels[own], p, c)
             lie = places(evidence, supposed).points
             lie = lie[np.isfinite(lie[:, 0])]
@@ -147,7 +146,7 @@ def left_out_nearby(
 
 
 def no_edges(
-    plan: RigPlan, points: NDArray[np.float64], normals: NDArray[np.float64]
+    plan: Scanner, points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> str:
     """Say why there is no edge about missing samples, by the plan's own geometry.
 
@@ -159,9 +158,8 @@ def no_edges(
     supposed = Supposed.of(plan)
     cosines = np.full((len(supposed.projectors), len(points)), -1.0)
     for p, projector in enumerate(supposed.projectors):
-        outer = outer_radius(plan.projectors[p].ring_radii)
-        lit = light_falls(projector, outer, supposed.body.caster, points, normals)
-        cosines[p, lit] = incidence_cosine(projector, points, normals)[lit]
+        lit = light_falls(projector, supposed.body.caster, points, normals)
+        cosines[p, lit] = projector.incidence_cosine(points, normals)[lit]
     best, projector = cosines.max(axis=0), cosines.argmax(axis=0)
     if np.mean(best > 0.0) < _MOST:
         return "no edge was found there: no projector's light falls on most of them"

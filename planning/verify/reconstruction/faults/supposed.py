@@ -6,7 +6,7 @@ and the projector draws something there: how far that is from ring k is the mism
 needs no root of a cone and no nearest point, and so stays smooth far from the truth.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.plan import RigPlan
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
-    calibrate_camera,
-    calibrate_projector,
 )
-from planning.verify.reconstruction.decode.decode import Decoded
-from planning.verify.reconstruction.patterns.ring_patterns import ring_plane
+from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.scanner import Scanner
 
 Role = Literal["cameras", "projectors"]
 # Edges of each pair of devices that are looked at.
@@ -79,26 +76,12 @@ class Supposed:
     body: Object
 
     @classmethod
-    def of(cls, plan: RigPlan) -> "Supposed":
+    def of(cls, plan: Scanner) -> "Supposed":
         """Return what the plan says."""
-        mesh = plan.surface.mesh
-        return cls(
-            tuple(calibrate_camera(camera) for camera in plan.cameras),
-            cls.designs(plan),
-            Object(
-                mesh,
-                RayCaster(mesh, threads=1),
-                mesh.centre,
-                np.eye(3),
-                1.0,
-                np.zeros(3),
-            ),
-        )
-
-    @staticmethod
-    def designs(plan: RigPlan) -> tuple[ProjectorCalibration, ...]:
-        """Return the projectors as their patterns were drawn for them."""
-        return tuple(calibrate_projector(projector) for projector in plan.projectors)
+        mesh = plan.mesh
+        caster = RayCaster(mesh, threads=1)
+        body = Object(mesh, caster, mesh.centre, np.eye(3), 1.0, np.zeros(3))
+        return cls(plan.cameras, plan.projectors, body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,28 +118,23 @@ class Evidence:
 
     def take(self, chosen: NDArray[np.int64]) -> "Evidence":
         """Return some of the edges."""
-        return Evidence(
-            self.pixels[chosen],
-            self.radii[chosen],
-            self.camera[chosen],
-            self.projector[chosen],
-            self.noise_px[chosen],
-            self.designs,
-        )
+        return replace(self, **{n: getattr(self, n)[chosen] for n in self._arrays()})
+
+    @classmethod
+    def _arrays(cls) -> list[str]:
+        return [field.name for field in fields(cls)[:-1]]
 
     @classmethod
     def at(
-        cls, plan: RigPlan, pixels: NDArray[np.float64], p: int, c: int
+        cls, plan: Scanner, pixels: NDArray[np.float64], p: int, c: int
     ) -> "Evidence":
         """Return pixels (n, 2) of one pair that are on no ring in particular."""
         n = len(pixels)
         index = np.full(n, c), np.full(n, p)
-        return cls(pixels, np.zeros(n), *index, np.zeros(n), Supposed.designs(plan))
+        return cls(pixels, np.zeros(n), *index, np.zeros(n), plan.projectors)
 
     @classmethod
-    def of(
-        cls, plan: RigPlan, decoded: list[tuple[tuple[int, int], Decoded]]
-    ) -> "Evidence":
+    def of(cls, plan: Scanner, decoded: Pairs) -> "Evidence":
         """Take as many edges of each pair, evenly; none with disordered labels."""
         parts = [cls.at(plan, np.zeros((0, 2)), 0, 0)]
         for (p, c), pair in decoded:
@@ -165,18 +143,15 @@ class Evidence:
                 continue
             rows = np.linspace(0, len(edges) - 1, min(EDGES_A_PAIR, len(edges)))
             rows = rows.astype(np.int64)
-            radii = plan.projectors[p].ring_radii[edges.rings[rows]]
+            radii = plan.projectors[p].radii[edges.rings[rows]]
             part = cls.at(plan, edges.pixels[rows], p, c)
             noise = edges.noise_px[rows]
             parts.append(replace(part, radii=radii, noise_px=noise))
-        return cls(
-            np.concatenate([part.pixels for part in parts]),
-            np.concatenate([part.radii for part in parts]),
-            np.concatenate([part.camera for part in parts]),
-            np.concatenate([part.projector for part in parts]),
-            np.concatenate([part.noise_px for part in parts]),
-            parts[0].designs,
-        )
+        joined = {
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in cls._arrays()
+        }
+        return replace(parts[0], **joined)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,29 +207,8 @@ def mismatches(
         points, radii = at.points[own], evidence.radii[own]
         with np.errstate(invalid="ignore", divide="ignore"):
             pixels, depth = projector.panel(points)
-            plane = ring_plane(design, pixels)
+            plane = design.ring_plane(pixels)
             off = np.hypot(plane[:, 0], plane[:, 1]) - radii
-            if design.light == "diverging":
-                off = off * depth / np.sqrt(1.0 + radii * radii)
-            cosine[own] = incidence_cosine(projector, points, at.normals[own])
-        mismatch[own] = off
+            mismatch[own] = design.light.across_m(off, radii, depth)
+            cosine[own] = projector.incidence_cosine(points, at.normals[own])
     return np.where(cosine > 0.0, mismatch, np.nan), cosine
-
-
-def incidence_cosine(
-    projector: ProjectorCalibration,
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the cosine of the incidence of a projector's light, shadows left aside.
-
-    Args:
-        projector: As it is supposed to stand.
-        points: Of the surface [m], shape (n, 3).
-        normals: Unit normals there, shape (n, 3).
-    """
-    if projector.light == "parallel":
-        return -(normals @ projector.axis)
-    beams = points - projector.centre
-    beams = beams / np.linalg.norm(beams, axis=1, keepdims=True)
-    return -np.einsum("ij,ij->i", beams, normals)

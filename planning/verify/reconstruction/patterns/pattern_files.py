@@ -8,9 +8,9 @@ from typing import Any, BinaryIO
 from PIL import Image
 
 from planning.model.files import write_together
-from planning.model.plan import RigPlan
+from planning.verify.reconstruction.scanner import Scanner
 
-from .pattern_frames import Frame, PatternSequence, pattern_sequence
+from .pattern_frames import Frame, PatternSequence
 from .pattern_images import PatternCanvas, canvas
 
 FOLDER = "patterns"
@@ -32,14 +32,14 @@ _NOTES = {
 }
 
 
-def write_patterns(plan: RigPlan, folder: Path) -> Path:
+def write_patterns(scanner: Scanner, folder: Path) -> Path:
     """Write `patterns/` into a plan's folder: PNG images and `sequence.json`.
 
     No file is moved into place before all are complete, and the manifest is the last.
     Files that an earlier manifest lists and this one doesn't are removed.
 
     Args:
-        plan: With rings; devices as written.
+        scanner: Devices as planned.
         folder: The plan's folder.
 
     Returns:
@@ -52,8 +52,8 @@ def write_patterns(plan: RigPlan, folder: Path) -> Path:
     before = _listed(place)
     files: dict[Path, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
-    for projector in plan.projectors:
-        sequence = pattern_sequence(projector, plan.cameras)
+    for projector in scanner.projectors:
+        sequence = PatternSequence.of(projector, scanner.cameras)
         drawn = canvas(sequence)
         (place / projector.id).mkdir(parents=True, exist_ok=True)
         for frame in sequence.frames:
@@ -84,10 +84,11 @@ def _manifest(entries: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _entry(sequence: PatternSequence) -> dict[str, Any]:
-    rings, projector = sequence.rings, sequence.projector
+    projector = sequence.projector
+    rings = projector.pattern
     return {
         "id": projector.id,
-        "light": projector.light,
+        "light": projector.light.name,
         "resolution": list(projector.resolution),
         "n_annuli": rings.n_annuli,
         "n_bits": rings.n_bits,

@@ -1,6 +1,6 @@
 """The frames that a projector shows, in order: what each means to a decoder.
 
-What is drawn is defined once, in `reconstruction.patterns`, which the check renders.
+What is drawn is defined once, in `ring_patterns`, which the check renders.
 """
 
 from collections.abc import Sequence
@@ -11,14 +11,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
     ProjectorCalibration,
-    calibrate_camera,
-    calibrate_projector,
 )
 
-from .ring_patterns import RingPatterns, ring_patterns
+from .ring_patterns import CameraPattern
 
 Kind = Literal["white", "black", "bit", "root"]
 
@@ -55,49 +53,41 @@ class PatternSequence:
 
     Attributes:
         projector: As the patterns are drawn for it.
-        patterns: Rings and codes; for each camera one, of which only the disc differs.
+        discs: Of each camera by its id: what is drawn, with its root disc.
     """
 
     projector: ProjectorCalibration
-    patterns: dict[str, RingPatterns]
+    discs: dict[str, CameraPattern]
 
-    @property
-    def rings(self) -> RingPatterns:
-        """Rings and codes, the same for every camera."""
-        return next(iter(self.patterns.values()))
+    @classmethod
+    def of(
+        cls, projector: ProjectorCalibration, cameras: Sequence[CameraCalibration]
+    ) -> "PatternSequence":
+        """Return what a projector shows for the cameras of a rig, one or more."""
+        discs = {camera.id: projector.pattern_for(camera) for camera in cameras}
+        return cls(projector, discs)
 
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
         """White, black, each bit and its inverse, each camera's disc and inverse."""
-        found = [Frame(0, "white"), Frame(1, "black")]
-        for bit in range(self.rings.n_bits):
+        frames = [Frame(0, "white"), Frame(1, "black")]
+        for bit in range(self.projector.pattern.n_bits):
             for inverse in (False, True):
-                found.append(Frame(len(found), "bit", bit=bit, inverse=inverse))
-        for camera in self.patterns:
+                frames.append(Frame(len(frames), "bit", bit=bit, inverse=inverse))
+        for camera in self.discs:
             for inverse in (False, True):
-                found.append(Frame(len(found), "root", camera=camera, inverse=inverse))
-        return tuple(found)
+                frames.append(
+                    Frame(len(frames), "root", camera=camera, inverse=inverse)
+                )
+        return tuple(frames)
+
+    def frame_names(self, camera: str) -> tuple[str, ...]:
+        """Return the names of the frames that a camera's decoder reads, in order."""
+        return tuple(f.name for f in self.frames if f.camera in (None, camera))
 
     def annulus_levels(self, frame: Frame) -> NDArray[np.bool_]:
         """Return whether each annulus is bright in a white, black or bit frame."""
-        n = self.rings.n_annuli
-        if frame.kind == "bit":
-            assert frame.bit is not None
-            return (self.rings.bit(frame.bit) > 0.5) != frame.inverse
-        return np.full(n, frame.kind == "white")
-
-
-def pattern_sequence(
-    projector: PlannedProjector, cameras: Sequence[PlannedCamera]
-) -> PatternSequence:
-    """Return what a projector shows for the cameras of a plan, one or more."""
-    design = calibrate_projector(projector)
-    return PatternSequence(
-        design,
-        {
-            camera.id: ring_patterns(
-                design, projector.ring_radii, calibrate_camera(camera)
-            )
-            for camera in cameras
-        },
-    )
+        pattern = self.projector.pattern
+        if frame.bit is not None:
+            return (pattern.bit(frame.bit) > 0.5) != frame.inverse
+        return np.full(pattern.n_annuli, frame.kind == "white")

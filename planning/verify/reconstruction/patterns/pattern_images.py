@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .pattern_frames import Frame, PatternSequence
-from .ring_patterns import RingPatterns, ring_plane
+from .ring_patterns import CameraPattern
 
 _WHITE = 255.0
 _NEIGHBOURS = (slice(None, -1), slice(1, None))
@@ -54,7 +54,7 @@ class PatternCanvas:
         """Where r.m > 0, by camera: outside its root disc."""
         white = self.within + self.beyond
         found: dict[str, NDArray[np.uint8]] = {}
-        for camera, patterns in self.sequence.patterns.items():
+        for camera, patterns in self.sequence.discs.items():
             share = _share_at_once(_root_level(patterns, self.x, self.y))
             found[camera] = np.rint(white * share).astype(np.uint8)
         return found
@@ -62,11 +62,12 @@ class PatternCanvas:
 
 def canvas(sequence: PatternSequence) -> PatternCanvas:
     """Return where a projector's pixels lie among its rings."""
-    patterns, projector = sequence.rings, sequence.projector
+    projector = sequence.projector
+    patterns = projector.pattern
     width, height = projector.resolution
     v, u = np.indices((height, width), dtype=np.float64)
     pixels = np.column_stack([u.ravel(), v.ravel()])
-    x, y = (part.reshape(height, width) for part in ring_plane(projector, pixels).T)
+    x, y = (part.reshape(height, width) for part in projector.ring_plane(pixels).T)
     rho = np.hypot(x, y)
     slope = _slope(rho)
     radii = patterns.radii
@@ -82,14 +83,14 @@ def canvas(sequence: PatternSequence) -> PatternCanvas:
 
 
 def _root_level(
-    patterns: RingPatterns, x: NDArray[np.float64], y: NDArray[np.float64]
+    patterns: CameraPattern, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return what is zero on the border of a root disc, with the sign of r.m.
 
     |p|^2 o_z - o_x p_x - o_y p_y, with o_z = 1 in parallel light.
     """
     across, down, away = patterns.camera_in_ring
-    depth = away if patterns.light == "diverging" else 1.0
+    depth = patterns.light.root_weight(away)
     return x * (depth * x - across) + y * (depth * y - down)
 
 

@@ -7,32 +7,26 @@ camera the disc that tells the two roots of its rays apart, with its inverse: in
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.verify.reconstruction.calibration import (
-    CameraCalibration,
-    ProjectorCalibration,
-)
+from planning.verify.reconstruction.light import Light
 
 Images = NDArray[np.uint8 | np.float32]
 
 
 @dataclass(frozen=True, eq=False)
-class RingPatterns:
-    """The patterns of one projector, as seen by one camera's decoder.
+class RingPattern:
+    """What one projector draws.
 
     Attributes:
-        light: `diverging` or `parallel`.
+        light: Its light.
         radii: Ring edges, rising: tangents R = x/z (diverging) or radii in [m], (n,).
-        camera_in_ring: The camera's optical centre in the ring frame [m], shape (3,).
     """
 
-    light: Literal["diverging", "parallel"]
+    light: Light
     radii: NDArray[np.float64]
-    camera_in_ring: NDArray[np.float64]
 
     @property
     def n_annuli(self) -> int:
@@ -43,11 +37,6 @@ class RingPatterns:
     def n_bits(self) -> int:
         """Bits of the annulus index."""
         return max(1, (self.n_annuli - 1).bit_length())
-
-    @property
-    def n_frames(self) -> int:
-        """Frames that one camera's decoder reads."""
-        return 2 * self.n_bits + 4
 
     @property
     def outer_radius(self) -> float:
@@ -77,6 +66,28 @@ class RingPatterns:
         """Return whether each annulus is bright in the frame of a bit, (n_annuli,)."""
         return ((self.codes >> bit) & 1).astype(np.float32)
 
+    @property
+    def steps(self) -> NDArray[np.float64]:
+        """Distance of each ring from the next one inwards, shape (n,)."""
+        first = self.radii[0] - (self.radii[1] - self.radii[0])
+        return np.diff(self.radii, prepend=first)
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPattern(RingPattern):
+    """What one projector draws, as one camera's decoder reads it.
+
+    Attributes:
+        camera_in_ring: The camera's optical centre in the ring frame [m], shape (3,).
+    """
+
+    camera_in_ring: NDArray[np.float64]
+
+    @property
+    def n_frames(self) -> int:
+        """Frames that the decoder reads."""
+        return 2 * self.n_bits + 4
+
     def root_side(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the signed distance of ring-plane points from the border of the disc.
 
@@ -92,7 +103,7 @@ class RingPatterns:
         Returns:
             Shape (n,).
         """
-        square = self.camera_in_ring[2] if self.light == "diverging" else 1.0
+        square = self.light.root_weight(self.camera_in_ring[2])
         flat = self.camera_in_ring[:2]
         level = square * np.sum(p * p, axis=1) - p @ flat
         slope = np.linalg.norm(2.0 * square * p - flat, axis=1)
@@ -111,34 +122,3 @@ class Frames:
 
     stack: Images
     corner: tuple[int, int]
-
-
-def ring_patterns(
-    projector: ProjectorCalibration,
-    radii: NDArray[np.float64],
-    camera: CameraCalibration,
-) -> RingPatterns:
-    """Return the patterns of a projector with the root disc of one camera."""
-    return RingPatterns(
-        projector.light, radii, projector.to_ring(camera.centre[None])[0]
-    )
-
-
-def ring_plane(
-    projector: ProjectorCalibration, pixels: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return where projector pixels (n, 2) lie in the plane that rings are drawn in.
-
-    Args:
-        projector: As the patterns were drawn for it.
-        pixels: Projector pixels, shape (n, 2).
-
-    Returns:
-        (x/z, y/z) in diverging light, (x, y) in [m] in parallel light, shape (n, 2).
-    """
-    flat = projector.panel_coordinates(pixels)
-    pose = projector.ring_from_device
-    if projector.light == "parallel":
-        return flat @ pose[:2, :2].T + pose[:2, 3]
-    x, y, z = pose[:3, :2] @ flat.T + pose[:3, 2:3]
-    return np.column_stack([x / z, y / z])

@@ -3,7 +3,6 @@
 A body is dark: light that meets it is lost, and a camera that looks at it sees nothing.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -12,8 +11,11 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+from planning.verify.reconstruction.scanner import Scanner
 
 # Six quads of a box whose corner i has the signs of the bits of i.
 _QUADS = np.array(
@@ -59,17 +61,14 @@ class Both:
         return self.surface.occluded(*ray) | self.obstacles.occluded(*ray)
 
 
-def obstacles_of(plan: RigPlan, name: str) -> RayCaster | None:
+def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
     """Return the bodies of all devices but one; None where there are none.
 
     Args:
-        plan: What really stands there.
+        scanner: What really stands there.
         name: Id of the device whose light or view they are in the way of.
     """
-    every: Sequence[PlannedProjector | PlannedCamera] = (
-        *plan.projectors,
-        *plan.cameras,
-    )
+    every = (*scanner.projectors, *scanner.cameras)
     corners = [
         _corners(device) for device in every if device.id != name and device.body
     ]
@@ -81,7 +80,9 @@ def obstacles_of(plan: RigPlan, name: str) -> RayCaster | None:
     return RayCaster(mesh, threads=1)
 
 
-def _corners(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
+def _corners(
+    device: ProjectorCalibration | CameraCalibration,
+) -> NDArray[np.float64]:
     """Corners of a device's body in the world, shape (8, 3); it has one."""
     assert device.body is not None
     signs = np.array([[2 * (i >> k & 1) - 1 for k in range(3)] for i in range(8)])

@@ -1,9 +1,11 @@
 """How bright a pixel comes out: albedo, lens blur, exposure, noise, quantisation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from planning.verify.reconstruction.defocus import Defocus
 
 _WAVELENGTHS_M = (0.009, 0.017, 0.031)
 # Rows that are blurred at a time: what is between both passes stays in the cache.
@@ -40,6 +42,28 @@ class Photometry:
         """Standard deviation of a half-bright pixel in grey levels of 255."""
         shot = 127.5 * 255.0 / self.full_well
         return float(np.sqrt(shot + self.read_noise**2)) if self.noisy else 0.0
+
+    def through_lens(
+        self, defocus: Defocus | None, away_m: float, focal_px: float
+    ) -> "Photometry":
+        """Return light as a camera records it whose object is so far away.
+
+        One blur for the whole image, that of the object's middle: across 200 mm of
+        depth it changes by less than the lens's own.
+
+        Args:
+            defocus: Of the camera.
+            away_m: Depth of the object's middle [m].
+            focal_px: Focal length [px].
+        """
+        if defocus is None or not away_m > 0.0:
+            return self
+        more = float(defocus.blur_m(np.array(away_m))) * focal_px / away_m
+        return replace(self, camera_blur_px=float(np.hypot(self.camera_blur_px, more)))
+
+    def gain(self, brightest: float) -> float:
+        """Return grey levels in a unit of irradiance for the brightest one."""
+        return self.exposure * 255.0 / max(brightest, 1e-9)
 
     def albedo(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the albedo of world points (n, 3): a solid texture about 1."""

@@ -1,51 +1,88 @@
 """Every pair of a rig, rendered as it really stands and decoded as it is believed."""
 
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from threading import Lock
 
-import numpy as np
-
 from geometry.rays.rays import RayCaster
-from planning.model.plan import RigPlan
-from planning.verify.reconstruction.calibration import (
-    CameraCalibration,
-    PairCalibration,
-    calibrate_camera,
-    calibrate_projector,
+from planning.verify.reconstruction.decode.decode import (
+    Decoded,
+    PairIndex,
+    Pairs,
+    decode,
 )
-from planning.verify.reconstruction.decode.decode import Decoded, decode
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, ring_patterns
+from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
+from planning.verify.reconstruction.scanner import Scanner
 
-from .defocus import defocus_of, through_lens
 from .occluders import Both, obstacles_of
 from .photometry import Photometry
-from .render import Shown, render_pair
-from .render_schedule import on_at_once
+from .render import render_pair
+from .rendered_light import Shown
 from .view import RenderedView, view
 
-# Rings that run more steeply along the viewing ray cross steps between surfaces, unless
-# the plan counts on surface seen at such incidence [rad].
-_SLANTED = np.deg2rad(65.0)
-_SLANT_MARGIN = np.deg2rad(5.0)
 Progress = Callable[[int, int], None]
-Pairs = list[tuple[tuple[int, int], Decoded]]
 # From a projector, a camera and what it took to what is decoded; None: nothing.
 Develop = Callable[[int, int, Frames], Frames | None]
 
 
+class RenderedScene:
+    """What really stands there while the patterns of a plan are shown.
+
+    Args:
+        plan: For which the patterns are drawn.
+        truth: What really stands there, devices matched by id.
+        photometry: Simulated light and sensor.
+
+    Attributes:
+        lenses: Light and sensor behind each camera's lens, focused as it is.
+    """
+
+    def __init__(self, plan: Scanner, truth: Scanner, photometry: Photometry) -> None:
+        self._plan, self._truth = plan, truth
+        self._caster = RayCaster(truth.mesh, threads=1)
+        self._cameras = {camera.id: camera for camera in truth.cameras}
+        self._projectors = {one.id: one for one in truth.projectors}
+        middle = truth.mesh.centre
+        self.lenses = [
+            photometry.through_lens(
+                truth.camera_focus,
+                float((middle - camera.centre) @ camera.world_from_device[:3, 2]),
+                camera.focal_px,
+            )
+            for camera in plan.cameras
+        ]
+
+    def seen(self, c: int) -> RenderedView | None:
+        """Return what a camera sees; None: nothing, or it isn't there."""
+        camera = self._cameras.get(self._plan.cameras[c].id)
+        if camera is None:
+            return None
+        before = obstacles_of(self._truth, camera.id)
+        return view(camera, self._truth.mesh, self._caster, self.lenses[c], before)
+
+    def shown(self, p: int, patterns: CameraPattern) -> Shown | None:
+        """Return a projector that shows its patterns; None: it isn't there."""
+        design = self._plan.projectors[p]
+        projector = self._projectors.get(design.id)
+        if projector is None:
+            return None
+        before = obstacles_of(self._truth, projector.id)
+        past = self._caster if before is None else Both(self._caster, before)
+        return Shown(projector, design, patterns, past, self._truth.projector_focus)
+
+
 def decode_rendered(
-    plan: RigPlan,
-    truth: RigPlan,
+    plan: Scanner,
+    truth: Scanner,
     photometry: Photometry,
     *,
     seed: int,
     threads: int,
     spent: "Spent",
     progress: Progress | None = None,
-    believed: RigPlan | None = None,
+    believed: Scanner | None = None,
     develop: Develop | None = None,
 ) -> Pairs:
     """Render and decode every pair; the order, and every number, is always the same.
@@ -62,102 +99,71 @@ def decode_rendered(
         develop: Called with the indices of projector and camera and the frames of each
             pair, in any thread; returns those that are decoded.
     """
-    mesh = truth.surface.mesh
-    caster = RayCaster(mesh, threads=1)
-    standing = {camera.id: calibrate_camera(camera) for camera in truth.cameras}
-    shining = {
-        projector.id: calibrate_projector(projector) for projector in truth.projectors
-    }
-    known = pair_calibrations(believed or plan)
-    drawn = [calibrate_camera(camera) for camera in plan.cameras]
-    designed = [calibrate_projector(projector) for projector in plan.projectors]
-    radii = [projector.ring_radii for projector in plan.projectors]
-    lenses = _lenses(truth, drawn, photometry)
-    blurred = defocus_of(truth, "projector")
-    limits = decoder_limits(plan)
+    scene = RenderedScene(plan, truth, photometry)
+    known = dict((believed or plan).pairs())
+    beside = _on_at_once(plan, truth)
 
     def look(c: int) -> RenderedView | None:
-        camera = standing.get(drawn[c].id)
         with spent.on("render"):
-            if camera is None:
-                return None
-            before = obstacles_of(truth, camera.id)
-            return view(camera, mesh, caster, lenses[c], before)
+            return scene.seen(c)
 
     def shown(p: int, c: int) -> Shown | None:
-        """Return a projector as it shows its patterns and a camera's disc."""
-        projector = shining.get(designed[p].id)
-        if projector is None:
-            return None
-        before = obstacles_of(truth, projector.id)
-        past = caster if before is None else Both(caster, before)
-        patterns = ring_patterns(designed[p], radii[p], drawn[c])
-        return Shown(projector, designed[p], patterns, past, blurred)
+        return scene.shown(p, plan.projectors[p].pattern_for(plan.cameras[c]))
 
-    beside = on_at_once(plan, truth)
-
-    def measure(pair: tuple[int, int]) -> Decoded:
+    def measure(pair: PairIndex) -> Decoded:
         p, c = pair
-        design, seen = designed[p], views[c]
         with spent.on("render"):
-            one = shown(p, c)
+            one, seen = shown(p, c), views[c]
             if seen is None or one is None:
                 return Decoded.nothing()
-            others = (shown(k, c) for k in beside[p])
-            frames = render_pair(
-                seen,
-                one.projector,
-                design,
-                one.patterns,
-                one.caster,
-                lenses[c],
-                (seed, p, c),
-                blurred,
-                tuple(other for other in others if other is not None),
-            )
+            others = [other for k in beside[p] if (other := shown(k, c)) is not None]
+            lens = scene.lenses[c]
+            frames = render_pair(seen, one, lens, (seed, p, c), others)
         if develop is not None:
             frames = develop(p, c, frames)
             if frames is None:
                 return Decoded.nothing()
         with spent.on("decode"):
-            return decode(frames, one.patterns, known[p, c], **limits)
+            return decode(frames, one.patterns, known[pair], **plan.limits.decoder)
 
     with ThreadPoolExecutor(threads) as pool:
-        views = list(pool.map(look, range(len(drawn))))
-        done = list(reported(pool.map(measure, known), len(known), progress))
-    return list(zip(known, done, strict=True))
+        views = list(pool.map(look, range(len(plan.cameras))))
+    return over_pairs(plan, measure, threads=threads, progress=progress)
 
 
-def _lenses(
-    truth: RigPlan, cameras: list[CameraCalibration], photometry: Photometry
-) -> list[Photometry]:
-    """Return light and sensor behind each camera's lens, focused as it is."""
-    defocus, middle = defocus_of(truth, "camera"), truth.surface.mesh.centre
-    away = [(middle - c.centre) @ c.world_from_device[:3, 2] for c in cameras]
-    return [
-        through_lens(photometry, defocus, float(depth), camera.focal_px)
-        for camera, depth in zip(cameras, away, strict=True)
-    ]
+def over_pairs(
+    scanner: Scanner,
+    measure: Callable[[PairIndex], Decoded],
+    *,
+    threads: int,
+    progress: Progress | None,
+) -> Pairs:
+    """Measure every pair, in any order, and report how many are done.
+
+    Args:
+        scanner: Whose pairs of projector and camera are measured.
+        measure: Called with the indices of each pair, in any thread.
+        threads: Worker threads.
+        progress: Called with the pairs done and their total.
+    """
+    keys = [pair for pair, _ in scanner.pairs()]
+    measured: Pairs = []
+    with ThreadPoolExecutor(threads) as pool:
+        for pair, decoded in zip(keys, pool.map(measure, keys), strict=True):
+            measured.append((pair, decoded))
+            if progress is not None:
+                progress(len(measured), len(keys))
+    return measured
 
 
-def pair_calibrations(plan: RigPlan) -> dict[tuple[int, int], PairCalibration]:
-    """Return what a plan says of every pair, camera by camera."""
-    projectors = [calibrate_projector(projector) for projector in plan.projectors]
-    return {
-        (p, c): PairCalibration(projector, calibrate_camera(camera))
-        for c, camera in enumerate(plan.cameras)
-        for p, projector in enumerate(projectors)
-    }
+def _on_at_once(plan: Scanner, truth: Scanner) -> list[list[int]]:
+    """Return for each projector those that are on at the same time, by mistake.
 
-
-def decoder_limits(plan: RigPlan) -> dict[str, float]:
-    """Return the limits that `decode` takes of a plan."""
-    requirements = plan.requirements
-    steepest = max(requirements.camera.max_incidence - _SLANT_MARGIN, _SLANTED)
-    return {
-        "min_conditioning": requirements.triangulation.min_conditioning,
-        "max_slant": float(np.tan(steepest)),
-    }
+    What the plan itself exposes together lights apart, and is rendered one by one.
+    """
+    names = [projector.id for projector in plan.projectors]
+    wrong = [truth.shining_with(name) - plan.shining_with(name) for name in names]
+    return [[k for k, one in enumerate(names) if one in others] for others in wrong]
 
 
 class Spent:
@@ -176,13 +182,3 @@ class Spent:
         finally:
             with self._lock:
                 self.seconds[stage] += time.thread_time() - begin
-
-
-def reported(
-    results: Iterator[Decoded], total: int, progress: Progress | None
-) -> Iterator[Decoded]:
-    """Pass results on, and say how many there were."""
-    for n, result in enumerate(results, start=1):
-        if progress is not None:
-            progress(n, total)
-        yield result

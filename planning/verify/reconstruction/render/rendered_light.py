@@ -8,19 +8,16 @@ from scipy.special import ndtr
 
 from geometry.rays.rays import CHUNK, equal_parts
 from planning.verify.reconstruction.calibration import ProjectorCalibration
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    RingPatterns,
-    ring_plane,
-)
+from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern
 
-from .defocus import Defocus
 from .occluders import Occluder
 from .view import RenderedView
 
 # Standard deviation of the unit square that a pixel gathers light over.
 _PIXEL_SPREAD = 1.0 / np.sqrt(12.0)
 # Shadow rays stop this share of their length before the point they ask about.
-_SHADOW_SLACK = 2e-5
+SHADOW_SLACK = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,134 +43,95 @@ class RenderedLight:
         return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
 
 
-@dataclass(frozen=True)
-class Blur:
-    """Blur of drawn edges across the beam: in focus, and off it."""
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A projector that shows its patterns.
 
-    in_focus_m: float
-    defocus: Defocus | None
-
-    def square(self, depth: NDArray[np.float64]) -> NDArray[np.float64] | float:
-        """Return the variance at depths [m^2], shape (n,)."""
-        if self.defocus is None:
-            return self.in_focus_m**2
-        return self.in_focus_m**2 + self.defocus.blur_m(depth) ** 2
-
-
-def shine(
-    seen: RenderedView,
-    projector: ProjectorCalibration,
-    design: ProjectorCalibration,
-    patterns: RingPatterns,
-    caster: Occluder,
-    blur: Blur,
-) -> RenderedLight:
-    """Return a projector's light on the samples of a view.
-
-    Args:
-        seen: What the camera sees.
+    Attributes:
         projector: As it really stands.
         design: As the patterns were drawn for it.
         patterns: What is drawn.
         caster: Of the mesh, and the bodies, that really stand there.
-        blur: Of drawn edges.
+        defocus: Of the projector; None: equally sharp everywhere.
     """
-    facing = _facing(seen, projector)
-    # In parts, so that what is between stays in the cache.
-    parts = [
-        _shine_on(seen, facing[part], projector, design, patterns, caster, blur)
-        for part in equal_parts(len(facing), CHUNK) or [slice(0)]
-    ]
-    light = RenderedLight.joined([light for light, _ in parts])
-    if projector.light == "parallel" or not len(light.samples):
-        return light
-    depth = np.concatenate([depth for _, depth in parts])
-    falloff = (float(np.median(depth)) / depth) ** 2
-    return replace(light, white=(light.white * falloff).astype(np.float32))
 
+    projector: ProjectorCalibration
+    design: ProjectorCalibration
+    patterns: CameraPattern
+    caster: Occluder
+    defocus: Defocus | None = None
 
-def _shine_on(
-    seen: RenderedView,
-    facing: NDArray[np.int64],
-    projector: ProjectorCalibration,
-    design: ProjectorCalibration,
-    patterns: RingPatterns,
-    caster: Occluder,
-    blur: Blur,
-) -> tuple[RenderedLight, NDArray[np.float64]]:
-    """Light on those of some samples that it reaches, and their depths.
+    def light(self, seen: RenderedView, in_focus_m: float) -> RenderedLight:
+        """Return its light on the samples of a view.
 
-    How it falls off with depth is left to the caller.
-    """
-    lit, cosine, pixels, depth = _reached(seen, facing, projector, caster)
-    rays, normals = seen.rays[lit], seen.normals[lit]
-    plane = ring_plane(design, pixels)
-    rho = np.hypot(plane[:, 0], plane[:, 1])
-    # Ring coordinate in a metre across the beam.
-    scale = np.ones_like(rho)
-    if projector.light == "diverging":
-        scale = np.sqrt(1.0 + rho * rho) / depth
-    across = _across(plane, rho, design)
-    slant = np.einsum("ij,ij->i", across, rays) / np.einsum("ij,ij->i", normals, rays)
-    stretch = 1.0 - 2.0 * slant * np.einsum("ij,ij->i", across, normals) + slant**2
-    cell = _PIXEL_SPREAD / seen.fold
-    pixel = cell * seen.distances[lit] / seen.camera.focal_px
-    spread = scale * np.sqrt(blur.square(depth) + pixel**2 * np.maximum(stretch, 0.0))
-    annulus = np.searchsorted(patterns.radii, rho)
-    edges = np.concatenate([[-np.inf], patterns.radii, [np.inf]])
-    drawn = ndtr((patterns.outer_radius - rho) / spread)
-    light = RenderedLight(
-        lit,
-        (seen.albedo[lit] * cosine * drawn).astype(np.float32),
-        annulus,
-        ndtr((edges[annulus] - rho) / spread).astype(np.float32),
-        ndtr((rho - edges[annulus + 1]) / spread).astype(np.float32),
-        ndtr(patterns.root_side(plane) / spread).astype(np.float32),
-    )
-    return light, depth
+        Args:
+            seen: What the camera sees.
+            in_focus_m: Blur of a drawn edge in focus, across the beam [m].
+        """
+        pose = self.projector.world_from_device
+        facing = self.projector.light.faces(pose, seen.points, seen.normals)
+        samples = np.flatnonzero(facing)
+        # In parts, so that what is between stays in the cache.
+        parts = [
+            self._light_on(seen, samples[part], in_focus_m)
+            for part in equal_parts(len(samples), CHUNK) or [slice(0)]
+        ]
+        light = RenderedLight.joined([light for light, _ in parts])
+        if not len(light.samples):
+            return light
+        depth = np.concatenate([depth for _, depth in parts])
+        falloff = self.projector.light.falloff(depth)
+        return replace(light, white=(light.white * falloff).astype(np.float32))
 
+    def _light_on(
+        self, seen: RenderedView, samples: NDArray[np.int64], in_focus_m: float
+    ) -> tuple[RenderedLight, NDArray[np.float64]]:
+        """Light on those of some samples that it reaches, and their depths.
 
-def _reached(
-    seen: RenderedView,
-    facing: NDArray[np.int64],
-    projector: ProjectorCalibration,
-    caster: Occluder,
-) -> tuple[
-    NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-]:
-    """Samples that the projector lights, their cos(incidence), pixels and depths."""
-    pixels, depth = projector.panel(seen.points[facing])
-    drawn = projector.in_panel(pixels)
-    able, pixels, depth = facing[drawn], pixels[drawn], depth[drawn]
-    points = seen.points[able]
-    if projector.light == "diverging":
-        starts = projector.centre
-        beams = points - starts
-        reach = np.sqrt(np.einsum("ij,ij->i", beams, beams))
-        beams /= reach[:, None]
-    else:
-        beams, reach = np.broadcast_to(projector.axis, points.shape), depth
-        starts = points - reach[:, None] * beams
-    shadowed = caster.occluded(starts, beams, reach * (1.0 - _SHADOW_SLACK))
-    cosine = -np.einsum("ij,ij->i", beams, seen.normals[able])
-    lit = ~shadowed
-    return able[lit], cosine[lit], pixels[lit], depth[lit]
+        How it falls off with depth is left to the caller.
+        """
+        law, patterns = self.projector.light, self.patterns
+        lit, cosine, pixels, depth = self._reached(seen, samples)
+        rays, normals = seen.rays[lit], seen.normals[lit]
+        plane = self.design.ring_plane(pixels)
+        rho = np.hypot(plane[:, 0], plane[:, 1])
+        outward = plane / np.maximum(rho, 1e-12)[:, None]
+        across = law.ring_normals(outward, rho) @ self.design.world_from_ring[:3, :3].T
+        slant = np.einsum("ij,ij->i", across, rays)
+        slant /= np.einsum("ij,ij->i", normals, rays)
+        stretch = 1.0 - 2.0 * slant * np.einsum("ij,ij->i", across, normals) + slant**2
+        cell = _PIXEL_SPREAD / seen.fold
+        pixel = cell * seen.distances[lit] / seen.camera.focal_px
+        square = in_focus_m**2
+        if self.defocus is not None:
+            square = square + self.defocus.blur_m(depth) ** 2
+        blur = np.sqrt(square + pixel**2 * np.maximum(stretch, 0.0))
+        spread = law.per_metre(rho, depth) * blur
+        annulus = np.searchsorted(patterns.radii, rho)
+        edges = np.concatenate([[-np.inf], patterns.radii, [np.inf]])
+        drawn = ndtr((patterns.outer_radius - rho) / spread)
+        light = RenderedLight(
+            lit,
+            (seen.albedo[lit] * cosine * drawn).astype(np.float32),
+            annulus,
+            ndtr((edges[annulus] - rho) / spread).astype(np.float32),
+            ndtr((rho - edges[annulus + 1]) / spread).astype(np.float32),
+            ndtr(patterns.root_side(plane) / spread).astype(np.float32),
+        )
+        return light, depth
 
-
-def _facing(seen: RenderedView, projector: ProjectorCalibration) -> NDArray[np.int64]:
-    """Samples whose faces are turned towards the projector."""
-    along = seen.normals @ projector.axis
-    if projector.light == "diverging":
-        along = np.einsum("ij,ij->i", seen.normals, seen.points)
-        along -= seen.normals @ projector.centre
-    return np.flatnonzero(along < 0.0)
-
-
-def _across(
-    plane: NDArray[np.float64], rho: NDArray[np.float64], design: ProjectorCalibration
-) -> NDArray[np.float64]:
-    """Unit normals of the ring surfaces in the world, (n, 3)."""
-    tilt = rho if design.light == "diverging" else np.zeros_like(rho)
-    flat = plane / np.maximum(rho, 1e-12)[:, None]
-    local = np.column_stack([flat, -tilt]) / np.sqrt(1.0 + tilt * tilt)[:, None]
-    return local @ design.world_from_ring[:3, :3].T
+    def _reached(
+        self, seen: RenderedView, samples: NDArray[np.int64]
+    ) -> tuple[
+        NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+    ]:
+        """Samples that are lit, their cos(incidence), pixels and depths."""
+        projector = self.projector
+        pixels, depth = projector.panel(seen.points[samples])
+        drawn = projector.in_panel(pixels)
+        able, pixels, depth = samples[drawn], pixels[drawn], depth[drawn]
+        pose, points = projector.world_from_device, seen.points[able]
+        starts, beams, reach = projector.light.aim(pose, points, depth)
+        lit = ~self.caster.occluded(starts, beams, reach * (1.0 - SHADOW_SLACK))
+        cosine = -np.einsum("ij,ij->i", beams, seen.normals[able])
+        return able[lit], cosine[lit], pixels[lit], depth[lit]

@@ -1,6 +1,6 @@
 """Labels for one image of rings, from a mesh that the object is known to lie near."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,12 +90,12 @@ class _Candidates:
     points: NDArray[np.float64]
 
     def take(self, chosen: NDArray[np.bool_]) -> "_Candidates":
-        return _Candidates(
-            self.rows[chosen],
-            self.rings[chosen],
-            self.roots[chosen],
-            self.points[chosen],
-        )
+        return _Candidates(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+    @classmethod
+    def join(cls, parts: "list[_Candidates]") -> "_Candidates":
+        names = [field.name for field in fields(cls)]
+        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
 
 
 def _candidates(
@@ -119,12 +119,7 @@ def _candidates(
             rows = np.flatnonzero(inside)
             number = np.full(len(rows), ring, dtype=np.int64)
             parts.append(_Candidates(rows, number, side[rows], hits.points[rows]))
-    return _Candidates(
-        np.concatenate([part.rows for part in parts]),
-        np.concatenate([part.rings for part in parts]),
-        np.concatenate([part.roots for part in parts]),
-        np.concatenate([part.points for part in parts]),
-    )
+    return _Candidates.join(parts)
 
 
 def _possible(
@@ -139,16 +134,13 @@ def _possible(
         return met
     projector = pair.projector
     near = np.abs(closest_points(prior, met.points).distances) <= tolerance_m
-    pixels, depth = projector.panel(met.points)
+    pixels, _ = projector.panel(met.points)
     met = met.take(near & projector.in_panel(pixels))
-    depth = depth[near & projector.in_panel(pixels)]
     caster = RayCaster(prior, threads=1)
     reach = np.linalg.norm(met.points - pair.camera.centre, axis=1)
     hidden = _behind_prior(met.points, rays[met.rows], reach, caster, tolerance_m)
-    if projector.light == "diverging":
-        depth = np.linalg.norm(met.points - projector.centre, axis=1)
-    beams = projector.beams(met.points)
-    hidden |= _behind_prior(met.points, beams, depth, caster, tolerance_m)
+    _, beams, length = projector.aim(met.points)
+    hidden |= _behind_prior(met.points, beams, length, caster, tolerance_m)
     return met.take(~hidden)
 
 

@@ -4,13 +4,13 @@ Lines are found after Steger, "An unbiased detector of curvilinear structures", 
 PAMI 20(2), 1998: where the image, smoothed at the scale of the line, has a ridge.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve, gaussian_filter1d, map_coordinates
 
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingPatterns
+from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
 
 # Least brightness of a line above what lies beside it, in grey levels and in noises.
 _MIN_CONTRAST = 10.0
@@ -43,7 +43,7 @@ class RingLines:
         return len(self.pixels)
 
 
-def line_patterns(patterns: RingPatterns, width: float) -> RingPatterns:
+def line_patterns(patterns: CameraPattern, width: float) -> CameraPattern:
     """Return patterns whose odd annuli are bright lines on the rings.
 
     Args:
@@ -61,7 +61,7 @@ def line_patterns(patterns: RingPatterns, width: float) -> RingPatterns:
             f"lines of width {width:.4g} must be positive and narrower than the least "
             f"gap between rings, {gap:.4g}, in the unit of the radii"
         )
-    return RingPatterns(patterns.light, radii, patterns.camera_in_ring)
+    return replace(patterns, radii=radii)
 
 
 def find_lines(frames: Frames, width_px: float) -> RingLines:

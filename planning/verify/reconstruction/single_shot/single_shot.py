@@ -1,22 +1,178 @@
-"""One image of rings to measured points: labels by a prior mesh, not by a sequence."""
+"""A rig that measures from one image of each camera under each projector.
 
-from dataclasses import replace
+Rings are told apart by a mesh that the object is known to lie near, not by a sequence.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.verify.reconstruction.calibration import PairCalibration
-from planning.verify.reconstruction.decode.decode import Decoded, measure_edges
+from geometry.mesh.sampling import SurfaceSamples
+from planning.verify.reconstruction.calibration import (
+    PairCalibration,
+    ProjectorCalibration,
+)
+from planning.verify.reconstruction.check.check import conclude
+from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.decode.decode import (
+    Decoded,
+    PairIndex,
+    Pairs,
+    measure_edges,
+)
 from planning.verify.reconstruction.decode.edges import ImageEdges
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingPatterns
+from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.render import render_lines
+from planning.verify.reconstruction.render.rendered import Progress, RenderedScene
+from planning.verify.reconstruction.scanner import Scanner
 
 from .prior_labels import PriorLabels, label_by_prior
-from .ring_lines import RingLines, find_lines
+from .ring_lines import RingLines, find_lines, line_patterns
+
+# Drawn width of a ring at the object [m]: 4 blurs of a projector; and at most this
+# share of the least gap between rings.
+_LINE_M = 1.0e-3
+_MAX_SHARE = 0.4
+# Tells the noise of single images from that of sequences.
+_STREAM = 7
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """What one image gave.
+
+    Attributes:
+        index: Of projector and camera.
+        pair: Calibration of both.
+        width: Of a drawn line, in the unit of the radii.
+        decoded: The points.
+        lines: Points of lines that were found.
+        labels: What they were taken for.
+    """
+
+    index: PairIndex
+    pair: PairCalibration
+    width: float
+    decoded: Decoded
+    lines: RingLines
+    labels: PriorLabels
+
+
+def reconstruct_single_shot(
+    plan: Scanner,
+    samples: SurfaceSamples | None = None,
+    predicted: NDArray[np.bool_] | None = None,
+    *,
+    tolerance_m: float,
+    seed: int,
+    threads: int = 2,
+    photometry: Photometry | None = None,
+    progress: Progress | None = None,
+) -> Reconstruction:
+    """Measure the object of a plan from one image of each pair of devices.
+
+    Args:
+        plan: Devices, patterns and the object; its mesh is the prior, too.
+        samples: As in `reconstruct`.
+        predicted: Likewise; what sequences would measure.
+        tolerance_m: How near the object is taken to lie to the mesh [m].
+        seed: Of the pixel noise.
+        threads: Worker threads; the result doesn't depend on them.
+        photometry: Simulated light and sensor.
+        progress: Called with the pairs done and their total.
+    """
+    light = photometry or Photometry()
+    begin = time.thread_time()
+    shots = shoot_rig(
+        plan,
+        plan.mesh,
+        tolerance_m=tolerance_m,
+        photometry=light,
+        seed=seed,
+        progress=progress,
+    )
+    return conclude(
+        plan,
+        decoded_pairs(shots),
+        seed=seed,
+        threads=threads,
+        samples=samples,
+        predicted=predicted,
+        photometry=light,
+        seconds={"render": 0.0, "decode": time.thread_time() - begin, "merge": 0.0},
+    )
+
+
+def shoot_rig(
+    plan: Scanner,
+    prior: TriangleMesh,
+    *,
+    tolerance_m: float,
+    photometry: Photometry,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[Shot, ...]:
+    """Render and decode single images of bright rings, projectors shining in turn.
+
+    Cameras that see nothing of the object give no shot.
+
+    Args:
+        plan: Devices, and the object that is rendered.
+        prior: What the decoder knows of the object.
+        tolerance_m: How near the object lies to it [m].
+        photometry: Light and sensor.
+        seed: Of the pixel noise.
+        progress: Called with the pairs done and their total.
+    """
+    scene = RenderedScene(plan, plan, photometry)
+    views = [scene.seen(c) for c in range(len(plan.cameras))]
+    shots: list[Shot] = []
+    total = len(plan.cameras) * len(plan.projectors)
+    for done, ((p, c), pair) in enumerate(plan.pairs(), start=1):
+        patterns = pair.projector.pattern_for(pair.camera)
+        width, lines = drawn_lines(pair.projector, patterns, plan.mesh)
+        seen, shown = views[c], scene.shown(p, lines)
+        if seen is not None and shown is not None:
+            key = (seed, _STREAM, p, c)
+            measured = decode_single_shot(
+                render_lines(seen, [shown], scene.lenses[c], key),
+                patterns,
+                pair,
+                prior,
+                line_width=width,
+                tolerance_m=tolerance_m,
+                min_conditioning=plan.limits.min_conditioning,
+            )
+            shots.append(Shot((p, c), pair, width, *measured))
+        if progress is not None:
+            progress(done, total)
+    return tuple(shots)
+
+
+def decoded_pairs(shots: Sequence[Shot]) -> Pairs:
+    """Return what each pair of projector and camera measured."""
+    return [(shot.index, shot.decoded) for shot in shots]
+
+
+def drawn_lines(
+    projector: ProjectorCalibration, patterns: CameraPattern, mesh: TriangleMesh
+) -> tuple[float, CameraPattern]:
+    """Return the width of a projector's lines, in the unit of its radii, and them."""
+    depth = (mesh.centre - projector.centre)[None] @ projector.axis
+    width = _LINE_M * float(projector.light.shrink(depth)[0])
+    gap = float(np.diff(patterns.radii, prepend=0.0).min())
+    width = min(width, _MAX_SHARE * gap)
+    return width, line_patterns(patterns, width)
 
 
 def decode_single_shot(
     frames: Frames,
-    patterns: RingPatterns,
+    patterns: CameraPattern,
     calibration: PairCalibration,
     prior: TriangleMesh,
     *,
@@ -40,9 +196,9 @@ def decode_single_shot(
     """
     camera, projector = calibration.camera, calibration.projector
     away = float(np.linalg.norm(prior.centre - camera.centre))
-    width_m = line_width
-    if projector.light == "diverging":
-        width_m *= float(projector.to_ring(prior.centre[None])[0, 2])
+    depth = projector.to_ring(prior.centre[None])[:, 2]
+    # Lines are as wide as at the ring axis.
+    width_m = line_width / float(projector.light.shrink(depth)[0])
     lines = find_lines(frames, width_m * camera.focal_px / away)
     labels = label_by_prior(
         lines.pixels, patterns.radii, calibration, prior, tolerance_m=tolerance_m

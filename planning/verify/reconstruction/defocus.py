@@ -1,15 +1,13 @@
 """Blur of what lies off the plane that a lens is focused on."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
-
-from .photometry import Photometry
 
 
 @dataclass(frozen=True)
@@ -52,23 +50,3 @@ def defocus_of(plan: RigPlan, role: str) -> Defocus | None:
         return None
     focal_m = device["K"][0][0] * pixel_um * 1e-6
     return Defocus(focus["distance_mm"] * 1e-3, focal_m / focus["f_number"])
-
-
-def through_lens(
-    light: Photometry, defocus: Defocus | None, away_m: float, focal_px: float
-) -> Photometry:
-    """Return light as a camera records it whose object is so far away.
-
-    One blur for the whole image, that of the object's middle: across 200 mm of depth
-    it changes by less than the lens's own.
-
-    Args:
-        light: Simulated light and sensor.
-        defocus: Of the camera.
-        away_m: Depth of the object's middle [m].
-        focal_px: Focal length [px].
-    """
-    if defocus is None or not away_m > 0.0:
-        return light
-    more = float(defocus.blur_m(np.array(away_m))) * focal_px / away_m
-    return replace(light, camera_blur_px=float(np.hypot(light.camera_blur_px, more)))

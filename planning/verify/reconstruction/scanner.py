@@ -1,0 +1,133 @@
+"""A rig as the simulated reconstruction takes it: devices, limits and the object."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh.mesh import TriangleMesh
+from planning.model.plan import RigPlan
+from planning.model.requirements import CheckLimits
+
+from .calibration import (
+    CameraCalibration,
+    PairCalibration,
+    ProjectorCalibration,
+    calibrate_camera,
+    calibrate_projector,
+)
+from .defocus import Defocus, defocus_of
+
+# Rings that run more steeply along the viewing ray cross steps between surfaces, unless
+# the plan counts on surface seen at such incidence [rad].
+_SLANTED = np.deg2rad(65.0)
+_SLANT_MARGIN = np.deg2rad(5.0)
+
+
+@dataclass(frozen=True)
+class ScanLimits:
+    """What is asked of a scanner.
+
+    Attributes:
+        check: What the measured points must reach.
+        min_conditioning: Least |r.m| of a point.
+        max_lit: Largest incidence of light that counts [rad].
+        max_seen: Largest incidence at a camera that counts [rad].
+    """
+
+    check: CheckLimits
+    min_conditioning: float
+    max_lit: float
+    max_seen: float
+
+    @property
+    def decoder(self) -> dict[str, float]:
+        """Limits that `decode` takes."""
+        steepest = max(self.max_seen - _SLANT_MARGIN, _SLANTED)
+        return {
+            "min_conditioning": self.min_conditioning,
+            "max_slant": float(np.tan(steepest)),
+        }
+
+
+@dataclass(frozen=True)
+class BaselineLimit:
+    """The distance of two cameras, and the largest that eq. (10) allows [m]."""
+
+    cameras: frozenset[str]
+    d: float
+    d_max: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scanner:
+    """Devices as they are planned, or stand, about an object.
+
+    Attributes:
+        projectors: In the order of the plan.
+        cameras: Likewise.
+        mesh: The object.
+        region: Dominant region of each face, -1 for none, shape (n_f,).
+        target: Faces that are to be measured, shape (n_f,).
+        limits: What is asked.
+        projector_focus: How the projectors are focused; None: unknown.
+        camera_focus: Likewise of the cameras.
+        groups: Ids of the projectors that shine at the same time.
+        baselines: Of pairs of cameras that eq. (10) limits.
+    """
+
+    projectors: tuple[ProjectorCalibration, ...]
+    cameras: tuple[CameraCalibration, ...]
+    mesh: TriangleMesh
+    region: NDArray[np.int64]
+    target: NDArray[np.bool_]
+    limits: ScanLimits
+    projector_focus: Defocus | None = None
+    camera_focus: Defocus | None = None
+    groups: tuple[frozenset[str], ...] = ()
+    baselines: tuple[BaselineLimit, ...] = ()
+
+    @classmethod
+    def of(cls, plan: RigPlan) -> Self:
+        """Return what a plan says."""
+        document, wanted = plan.document, plan.requirements
+        schedule = document.get("firing_schedule") or {}
+        return cls(
+            tuple(calibrate_projector(projector) for projector in plan.projectors),
+            tuple(calibrate_camera(camera) for camera in plan.cameras),
+            plan.surface.mesh,
+            plan.surface.region,
+            plan.surface.target_faces(wanted.target),
+            ScanLimits(
+                wanted.check,
+                wanted.triangulation.min_conditioning,
+                wanted.projector.max_incidence,
+                wanted.camera.max_incidence,
+            ),
+            defocus_of(plan, "projector"),
+            defocus_of(plan, "camera"),
+            tuple(frozenset(group) for group in schedule.get("groups", ())),
+            tuple(
+                BaselineLimit(frozenset(row["cameras"]), row["d"], row["d_max"])
+                for row in document.get("baselines") or ()
+                if row["d_max"] is not None
+            ),
+        )
+
+    def pairs(self) -> Iterator[tuple[tuple[int, int], PairCalibration]]:
+        """Yield the indices of projector and camera and both, camera by camera."""
+        for c, camera in enumerate(self.cameras):
+            for p, projector in enumerate(self.projectors):
+                yield (p, c), PairCalibration(projector, camera)
+
+    def name(self, pair: tuple[int, int]) -> str:
+        """Return what a pair is called."""
+        p, c = pair
+        return f"{self.projectors[p].id} with {self.cameras[c].id}"
+
+    def shining_with(self, projector: str) -> frozenset[str]:
+        """Return the other projectors that shine at the same time as one."""
+        together = (group for group in self.groups if projector in group)
+        return next(together, frozenset()) - {projector}
