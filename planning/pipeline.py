@@ -205,7 +205,7 @@ def _placed(
     with clock.stage("projector_poses", "projector poses: widest margins"):
         projectors = widen_margins(scene, stage)
     with clock.stage("cameras", "cameras: candidates, measurability and cover"):
-        n_cameras = max(rig.n_candidate_cameras, rig.n_reference_cameras)
+        n_cameras = rig.n_camera_poses
         camera = PlannedCamera(
             "", np.eye(4), rig.camera_device(), body=rig.camera_body()
         )

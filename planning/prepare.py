@@ -103,7 +103,7 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
             stage = plan_projectors(
                 ready.scene,
                 ready.template,
-                max(rig.n_candidate_projectors, rig.n_reference_projectors),
+                rig.n_projector_poses,
                 ring_offset=ready.ring_offset,
             )
         except NothingLitError as error:

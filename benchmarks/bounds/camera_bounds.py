@@ -93,7 +93,7 @@ def _case(
     projectors = widen_margins(ready.scene, first_projectors(ready, Stopwatch()))
     rig = order.rig
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
-    n = max(rig.n_candidate_cameras, rig.n_reference_cameras)
+    n = rig.n_camera_poses
     try:
         stage = place_cameras(ready.scene, projectors, camera, n, ready.tilt).stage
     except InfeasibleLimitsError:

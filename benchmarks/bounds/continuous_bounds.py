@@ -148,7 +148,7 @@ def ready_for(
 def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
     """Return the projectors chosen of so many times the candidates; None: no light."""
     rig = ready.order.rig
-    number = times * max(rig.n_candidate_projectors, rig.n_reference_projectors)
+    number = times * rig.n_projector_poses
     try:
         return plan_projectors(
             ready.scene,

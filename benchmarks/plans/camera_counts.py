@@ -149,7 +149,7 @@ class Job:
         rig, ready = self.order.rig, self.ready
         body = rig.camera_body()
         camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=body)
-        n = max(rig.n_candidate_cameras, rig.n_reference_cameras)
+        n = rig.n_camera_poses
         with self.clock.stage("cameras", "cameras"):
             return place_cameras(
                 ready.scene, self.projectors, camera, n, ready.tilt, by

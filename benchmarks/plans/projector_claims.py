@@ -80,7 +80,7 @@ def _arguments() -> argparse.Namespace:
 
 def _row(ready: Prepared) -> tuple[str, int]:
     scene, rig = ready.scene, ready.order.rig
-    number = max(rig.n_candidate_projectors, rig.n_reference_projectors)
+    number = rig.n_projector_poses
     begin = time.perf_counter()
     try:
         stage = plan_projectors(

@@ -143,7 +143,7 @@ def _margins(
 
 def _number(ready: Prepared) -> int:
     rig = ready.order.rig
-    return max(rig.n_candidate_projectors, rig.n_reference_projectors)
+    return rig.n_projector_poses
 
 
 def _print_axes(given: argparse.Namespace) -> None:
@@ -170,7 +170,7 @@ def _axes(ready: Prepared) -> tuple[list[str], str, list[float]]:
     )
     posed = widen_margins(scene, stage)
     camera = PlannedCamera("", np.eye(4), rig.camera_device())
-    n_cameras = max(rig.n_candidate_cameras, rig.n_reference_cameras)
+    n_cameras = rig.n_camera_poses
     offered = offered_cameras(scene, camera, n_cameras)
     middle = tuple(
         replace(p, world_from_ring=ring_frame(p.world_from_device, p.device, 0.0, 0.0))

@@ -13,54 +13,6 @@ from numpy.typing import NDArray
 _Length = TypeVar("_Length", float, NDArray[np.float64])
 
 
-def focal_length_px(focal_m: float, pixel_m: float) -> float:
-    """Return the focal length of a lens on a sensor in pixels.
-
-    ::
-
-        f_px = f / p
-
-    The lens is taken as focused far away against f, where image distance and focal
-    length agree: at 1 m and f = 12 mm they differ by 1.2 %, which a calibration
-    replaces.
-
-    Args:
-        focal_m: Focal length f in [m].
-        pixel_m: Pixel pitch p in [m].
-
-    Raises:
-        ValueError: If either isn't positive.
-    """
-    if not (focal_m > 0.0 and pixel_m > 0.0):
-        raise ValueError(f"focal {focal_m} m and pixel {pixel_m} m must be positive")
-    return focal_m / pixel_m
-
-
-def focal_length_from_throw(throw_ratio: float, width_px: int) -> float:
-    """Return the focal length of a projector in pixels from its throw ratio.
-
-    With image width W at distance D of the optical centre, T = D / W and, by similar
-    triangles, W / D = w / f::
-
-        f_px = T w
-
-    A maker's law `distance = a W - b` counts the distance from the housing: the
-    optical centre lies b behind that and the ratio to use is a.
-
-    Args:
-        throw_ratio: T, distance from the optical centre over image width.
-        width_px: w, native image width in [px].
-
-    Raises:
-        ValueError: If either isn't positive.
-    """
-    if not (throw_ratio > 0.0 and width_px > 0):
-        raise ValueError(
-            f"throw {throw_ratio} and width {width_px} px must be positive"
-        )
-    return throw_ratio * width_px
-
-
 def principal_row(height_px: int, offset_percent: float) -> float:
     """Return the row of the optical axis of a projector with a vertical offset.
 

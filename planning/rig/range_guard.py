@@ -13,7 +13,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.scene.ranges.ranged_body import RangedBody
 
 from .rig import Rig
-from .rig_tables import ParallelTable, PinholeTable
+from .rig_tables import RigTable
 
 _SIGMAS = 2.0
 _SOURCE = "distances that are sharp, less two standard deviations of --ranges"
@@ -51,7 +51,8 @@ def guarded(rig: Rig, body: RangedBody) -> tuple[Rig, Guard]:
     sigma = body.position_sigma_m
     length = _SIGMAS * sigma
     nearest = rig.standoff_m - rig.standoff_play_m
-    _require(length <= rig.standoff_play_m, body, length, _play_of(rig))
+    play = f"placement.standoff_play_mm is {1e3 * rig.standoff_play_m:g}"
+    _require(length <= rig.standoff_play_m, body, length, play)
     _require(length < nearest, body, length, "devices stand no nearer than that")
     angle = math.asin(length / nearest)
     limits = rig.table.limits
@@ -66,58 +67,41 @@ def guarded(rig: Rig, body: RangedBody) -> tuple[Rig, Guard]:
     return tight, Guard(sigma, length, angle, stated)
 
 
-def _tightened(rig: Rig, body: RangedBody, length: float, angle_deg: float) -> Any:  # noqa: ANN401
+def _tightened(rig: Rig, body: RangedBody, length: float, angle_deg: float) -> RigTable:
     table, limits = rig.table, rig.table.limits
-    incidences = {
-        name: getattr(limits, name) - angle_deg
-        for name in ("projector_max_incidence_deg", "camera_max_incidence_deg")
-    }
-    for name, left in incidences.items():
-        told = f"limits.{name} = {getattr(limits, name):g} leaves no room for it"
-        _require(left > 0.0, body, length, told)
+    incidences: dict[str, float] = {}
+    for name in ("projector_max_incidence_deg", "camera_max_incidence_deg"):
+        stated = getattr(limits, name)
+        incidences[name] = stated - angle_deg
+        rule = f"limits.{name} = {stated:g} leaves no room for it"
+        _require(incidences[name] > 0.0, body, length, rule)
     play = table.placement.standoff_play_mm - 1e3 * length
-    projector = "parallel_projector" if rig.light == "parallel" else "projector"
-    return table.model_copy(
-        update={
-            "placement": table.placement.model_copy(update={"standoff_play_mm": play}),
-            "limits": limits.model_copy(update=incidences),
-            "camera": _sharp(
-                table.camera, rig.camera_device().range_m, rig, body, length
-            ),
-            projector: _sharp(
-                getattr(table, projector),
-                rig.projector_device().range_m,
-                rig,
-                body,
-                length,
-            ),
+    devices = {
+        "camera": rig.camera_device(),
+        "projector" if rig.light == "diverging" else "parallel_projector": (
+            rig.projector_device()
+        ),
+    }
+    update: dict[str, Any] = {
+        "placement": table.placement.model_copy(update={"standoff_play_mm": play}),
+        "limits": limits.model_copy(update=incidences),
+    }
+    for key, device in devices.items():
+        # A device that is trusted to be sharp over less than it is.
+        named = getattr(table, key)
+        low, high = device.range_m[0] + length, device.range_m[1] - length
+        near, far = (1e3 * end for end in device.range_m)
+        rule = (
+            f"{named.name} is sharp from {near:.0f} to {far:.0f} mm, and the standoff "
+            f"is {1e3 * rig.standoff_m:.0f} mm"
+        )
+        _require(low <= rig.standoff_m <= high, body, length, rule)
+        sharp = {
+            "range_mm": [1e3 * low, 1e3 * high],
+            "sources": named.sources | {"range_mm": _SOURCE},
         }
-    )
-
-
-def _sharp(
-    table: PinholeTable | ParallelTable,
-    sharp: tuple[float, float],
-    rig: Rig,
-    body: RangedBody,
-    length: float,
-) -> PinholeTable | ParallelTable:
-    """A device that is trusted to be sharp over less than it is."""
-    low, high = sharp[0] + length, sharp[1] - length
-    _require(
-        low <= rig.standoff_m <= high,
-        body,
-        length,
-        f"{table.name} is sharp from {1e3 * sharp[0]:.0f} to {1e3 * sharp[1]:.0f} mm, "
-        f"and the standoff is {1e3 * rig.standoff_m:.0f} mm",
-    )
-    sources = table.sources | {"range_mm": _SOURCE}
-    update = {"range_mm": [1e3 * low, 1e3 * high], "sources": sources}
+        update[key] = named.model_copy(update=sharp)
     return table.model_copy(update=update)
-
-
-def _play_of(rig: Rig) -> str:
-    return f"placement.standoff_play_mm is {1e3 * rig.standoff_play_m:g}"
 
 
 def _require(holds: bool, body: RangedBody, length: float, limit: str) -> None:

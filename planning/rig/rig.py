@@ -20,16 +20,11 @@ from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements
 
 from . import optics
-from .rig_devices import (
-    parallel_device,
-    parallel_document,
-    pinhole_device,
-    pinhole_document,
-)
+from .rig_devices import device_document, parallel_device, pinhole_device
 from .rig_existing import build_existing, check_existing
 from .rig_files import Figure, Preset, list_presets, read_rig
 from .rig_requirements import Pattern, Target, build_requirements
-from .rig_tables import RigTable
+from .rig_tables import ParallelTable, PinholeTable, RigTable
 
 __all__ = ["Figure", "Preset", "Rig", "list_presets", "load_rig"]
 
@@ -109,24 +104,16 @@ class Rig:
         return self.table.rings.spacing
 
     @property
-    def n_candidate_projectors(self) -> int:
-        """Projector poses offered to the cover."""
-        return self.table.placement.n_candidate_projectors
+    def n_projector_poses(self) -> int:
+        """Projector poses offered to the cover, or that define what is reachable."""
+        placement = self.table.placement
+        return max(placement.n_candidate_projectors, placement.n_reference_projectors)
 
     @property
-    def n_candidate_cameras(self) -> int:
-        """Camera poses offered to the cover."""
-        return self.table.placement.n_candidate_cameras
-
-    @property
-    def n_reference_projectors(self) -> int:
-        """Projector poses that define what is reachable."""
-        return self.table.placement.n_reference_projectors
-
-    @property
-    def n_reference_cameras(self) -> int:
-        """Camera poses that define what is reachable."""
-        return self.table.placement.n_reference_cameras
+    def n_camera_poses(self) -> int:
+        """Camera poses offered to the cover, or that define what is reachable."""
+        placement = self.table.placement
+        return max(placement.n_candidate_cameras, placement.n_reference_cameras)
 
     def projector_device(self) -> PinholeModel | ParallelModel:
         """Return the optics of a projector.
@@ -134,7 +121,7 @@ class Rig:
         Raises:
             RigError: If the rig has no projector for this light.
         """
-        return self._projector[0]
+        return self._projector
 
     def camera_device(self) -> PinholeModel:
         """Return the optics of a camera."""
@@ -142,9 +129,7 @@ class Rig:
 
     def projector_body(self) -> Body | None:
         """Return the body of a projector of this light, None where none is given."""
-        table, parallel = self.table, self.table.parallel_projector
-        device = parallel if self.light == "parallel" else table.projector
-        return None if device is None else Body.of(device.body)
+        return Body.of(self._projector_table.body)
 
     def camera_body(self) -> Body | None:
         """Return the body of a camera, None where none is given."""
@@ -162,9 +147,7 @@ class Rig:
             return optics.largest_corner_tangent(
                 device.camera_matrix, device.resolution, self.ring_tilt_rad
             )
-        reach = float(np.hypot(*device.half_panel))
-        if device.beam_radius is not None:
-            reach = min(reach, device.beam_radius)
+        reach = min(float(np.hypot(*device.half_panel)), device.beam_reach)
         return reach + self.ring_shift_m
 
     def notes(self, object_radius_m: float | None = None) -> tuple[str, ...]:
@@ -284,16 +267,20 @@ class Rig:
         Tables whose keys end in _mm or _deg are as written in the rig file.
         """
         table, parallel = self.table, self.light == "parallel"
+        existing = [device.to_document() for device in table.existing]
         return {
             "name": self.name,
             "description": table.description,
             "light": self.light,
-            "projector": {**self._projector[1], "light": self.light},
-            "camera": pinhole_document(table.camera, self.camera_device()),
+            "projector": {
+                **device_document(self._projector_table, self._projector),
+                "light": self.light,
+            },
+            "camera": device_document(table.camera, self._camera),
             "standoff_m": self.standoff_m,
             "standoff_play_m": self.standoff_play_m,
-            "n_candidate_projectors": self.n_candidate_projectors,
-            "n_candidate_cameras": self.n_candidate_cameras,
+            "n_candidate_projectors": table.placement.n_candidate_projectors,
+            "n_candidate_cameras": table.placement.n_candidate_cameras,
             "rings": {
                 "tilt": None if parallel else self.ring_tilt_rad,
                 "shift_m": self.ring_shift_m if parallel else None,
@@ -306,33 +293,32 @@ class Rig:
             "requirements": table.requirements.model_dump(mode="json"),
             "check": table.check.model_dump(mode="json"),
             "notes": list(self.notes()),
-            **self._existing_document(),
+            # No key where there are none.
+            **({"existing": existing} if existing else {}),
         }
-
-    def _existing_document(self) -> dict[str, Any]:
-        """Return the existing devices as written; no key where there are none."""
-        tables = [table.to_document() for table in self.table.existing]
-        return {"existing": tables} if tables else {}
 
     @cached_property
     def _camera(self) -> PinholeModel:
         return pinhole_device(self.table.camera, "camera")
 
     @cached_property
-    def _projector(self) -> tuple[PinholeModel | ParallelModel, dict[str, Any]]:
-        """The projector of this light and its plain values."""
-        if self.light == "diverging" and self.table.projector is not None:
-            pinhole = pinhole_device(self.table.projector, "projector")
-            return pinhole, pinhole_document(self.table.projector, pinhole)
-        beam_table = self.table.parallel_projector
-        if self.light == "parallel" and beam_table is not None:
-            beam = parallel_device(beam_table)
-            return beam, parallel_document(beam_table, beam)
+    def _projector(self) -> PinholeModel | ParallelModel:
+        table = self._projector_table
+        if isinstance(table, ParallelTable):
+            return parallel_device(table)
+        return pinhole_device(table, "projector")
+
+    @property
+    def _projector_table(self) -> PinholeTable | ParallelTable:
+        """The projector of this light as written."""
         key = "projector" if self.light == "diverging" else "parallel_projector"
-        raise RigError(
-            f"rig {self.name}: light '{self.light}' needs a table [{key}]; "
-            f'add it, or lay the file over one that has it: base = "default"'
-        )
+        table: PinholeTable | ParallelTable | None = getattr(self.table, key)
+        if table is None:
+            raise RigError(
+                f"rig {self.name}: light '{self.light}' needs a table [{key}]; "
+                f'add it, or lay the file over one that has it: base = "default"'
+            )
+        return table
 
 
 def _check_devices(rig: Rig) -> None:

@@ -57,19 +57,8 @@ def test_arguments_must_be_positive(bad):
         arguments[place] = bad
         with pytest.raises(ValueError, match="must be positive"):
             optics.hyperfocal_distance(*arguments)
-    with pytest.raises(ValueError, match="must be positive"):
-        optics.focal_length_px(0.012, bad)
-    with pytest.raises(ValueError, match="must be positive"):
-        optics.focal_length_from_throw(bad, 1024)
     with pytest.raises(ValueError, match="beyond the focal length"):
         optics.depth_of_field(0.012, 11.0, 3.45e-6, min(bad, 0.012))
-
-
-def test_throw_ratio_is_distance_over_width():
-    f = optics.focal_length_from_throw(1.5, 1024)
-    edges = np.array([-0.5, 1023.5]) - 511.5
-    width_at_2_m = 2.0 * np.ptp(edges) / f
-    assert 2.0 / width_at_2_m == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize(

@@ -127,8 +127,11 @@ def test_presets_are_listed_with_sources():
 def test_default_counts_and_contract_values():
     rig = load_rig()
     assert rig.name == "default"
-    assert min(rig.n_candidate_projectors, rig.n_reference_projectors) >= 600
-    assert min(rig.n_candidate_cameras, rig.n_reference_cameras) >= 400
+    placement = rig.table.placement
+    assert (
+        min(placement.n_candidate_projectors, placement.n_reference_projectors) >= 600
+    )
+    assert min(placement.n_candidate_cameras, placement.n_reference_cameras) >= 400
     assert (rig.standoff_m, rig.standoff_play_m) == (1.0, 0.05)
     assert rig.ring_gap_m is None
     assert rig.ring_tilt_rad == pytest.approx(np.deg2rad(8.0))
@@ -471,7 +474,7 @@ def test_shell_follows_the_object():
     assert space.half_angle == pytest.approx(math.pi)
     assert space.floor_m is None
     assert space.reference_ring_radius == rig.outer_ring_radius()
-    assert space.n_reference_cameras == rig.n_reference_cameras
+    assert space.n_reference_cameras == rig.table.placement.n_reference_cameras
 
 
 def test_cone_floor_and_up(write):
