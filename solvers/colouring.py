@@ -167,7 +167,7 @@ def _binaries(
     answer = milp(
         -gains,
         integrality=np.ones(gains.size),
-        bounds=Bounds(np.zeros(upper.size), upper),
+        bounds=Bounds(0.0, upper),  # type: ignore[arg-type]
         constraints=limits,
         options={"node_limit": max_nodes},
     )
