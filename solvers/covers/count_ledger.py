@@ -19,8 +19,6 @@ from solvers.status import SolveStatus, WorkBudget
 
 from .answers import INTEGER_PROOF, NONE, CountAnswer, better, cut_short
 
-# Tuples are for counts below it; branch and bound on rows and cuts for larger ones.
-_LARGE_COUNT = 8
 # K sets that meet the requirements or None; what exhausted all K-tuples, or None.
 TupleSearch = Callable[[int, WorkBudget], tuple[NDArray[np.int64] | None, str | None]]
 # K sets of much weight, from a cover of as many or from nothing.
@@ -92,30 +90,18 @@ class CountLedger:
             self.selected = prune(self.cover, fewer)
 
     def by_exact_search(
-        self,
-        tuples: TupleSearch,
-        budget: WorkBudget,
-        share: float = 1.0,
-        groups: TupleSearch | None = None,
+        self, exhaust: TupleSearch, budget: WorkBudget, share: float = 1.0
     ) -> None:
-        """Exhaust tuples and branch and bound, in the order that suits the count.
+        """Exhaust few sets, then leave a small program to HiGHS.
 
         Args:
-            tuples: Search over K sets.
+            exhaust: Search over K sets.
             budget: Work.
             share: Part of what is left that each of them may spend.
-            groups: Search over groups of alike sets, which goes first.
         """
-        if groups is not None and not self.settled:
-            self._by_tuples(groups, budget.part(share * budget.remaining))
-        for exhaust in (True, False) if self.lower < _LARGE_COUNT else (False, True):
-            part = budget.part(share * budget.remaining)
-            if self.settled:
-                break
-            if exhaust:
-                self._by_tuples(tuples, part)
-            else:
-                self._by_integers(part)
+        self._by_tuples(exhaust, budget.part(share * budget.remaining))
+        if not self.settled:
+            self._by_integers(budget.part(share * budget.remaining))
 
     def _by_tuples(self, tuples: TupleSearch, budget: WorkBudget) -> None:
         """Exhaust the tuples of as many sets as the bound, then of one more."""

@@ -1,8 +1,8 @@
 """Fewest sets, and most weight of K sets: the order in which the methods are tried.
 
 From above: greedy, swaps, large-neighbourhood search. From below: Lagrangian bound,
-then exact search, over groups of alike sets and over K-tuples. Each spends a share of
-one counted budget.
+then exact search, over pairs or over groups of alike sets. Each spends a share of one
+counted budget.
 """
 
 from collections.abc import Callable
@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import coverage_bounds, tighten
-from solvers.covers.exact.exact_cover import TupleSearch, best_tuple
-from solvers.covers.exact.group_branching import GroupSearch, best_by_groups
+from solvers.covers.exact.group_branching import best_by_groups
+from solvers.covers.exact.incumbent import ExactSearch
+from solvers.covers.exact.pairs import best_pair, pair_proof
 from solvers.covers.full.full_cover import fewest_full
 from solvers.covers.search.neighbourhood import greedy, most_coverage, prune
 from solvers.status import SolveStatus, WorkBudget
@@ -27,8 +28,8 @@ _FIRST_MOVES = 60
 _MOVES_A_SET = 50
 # Pairs are exhausted by a matrix product; groups are for more sets.
 _LEAST_GROUPED = 3
-# Share of an exact search's work that goes to groups of alike sets.
-_GROUPED = 0.8
+# Share of what is left that exact search may spend before HiGHS.
+_EXHAUSTED = 0.95
 # Work after which the first bounds are asked whether more search is worth it.
 _FIRST_UNITS = 4e8
 
@@ -76,10 +77,11 @@ def fewest_sets(
     )
     _improve(ledger, budget.part(0.15 * budget.units), seed)
 
-    def tuples(
+    def exhaust(
         n_sets: int, part: WorkBudget
     ) -> tuple[NDArray[np.int64] | None, str | None]:
-        search = best_tuple(
+        search, proof = _exact(n_sets)
+        found = search(
             cover,
             n_sets,
             target=cover.required,
@@ -87,25 +89,9 @@ def fewest_sets(
             budget=part,
             first=True,
         )
-        proof = _tuple_proof(n_sets, search) if search.complete else None
-        return search.selected, proof
+        return found.selected, proof if found.complete else None
 
-    def groups(
-        n_sets: int, part: WorkBudget
-    ) -> tuple[NDArray[np.int64] | None, str | None]:
-        if n_sets < _LEAST_GROUPED:
-            return tuples(n_sets, part)
-        search = best_by_groups(
-            cover,
-            n_sets,
-            target=cover.required,
-            multipliers=multipliers,
-            budget=part,
-            first=True,
-        )
-        return search.selected, _group_proof(n_sets) if search.complete else None
-
-    ledger.by_exact_search(tuples, budget, share=0.8, groups=groups)
+    ledger.by_exact_search(exhaust, budget, share=_EXHAUSTED)
     again = seed
     while not ledger.settled and not budget.exhausted:
         again += 1
@@ -156,24 +142,19 @@ def most_weight(
         weight = cover.weight_of(best)
     if upper < weight + least:
         return WeightAnswer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
-    searches: list[Callable[..., GroupSearch | TupleSearch]] = [best_tuple]
-    if n_sets >= _LEAST_GROUPED:
-        searches.insert(0, best_by_groups)
-    for search in searches:
-        share = _GROUPED if search is best_by_groups else 1.0
-        found = search(
-            cover,
-            n_sets,
-            target=weight + least,
-            multipliers=step.multipliers,
-            budget=budget.part(share * budget.remaining),
-        )
-        if found.selected is not None:
-            best, weight = found.selected, found.weight
-        upper = max(weight, min(upper, found.upper_bound))
-        if found.complete:
-            proof = _proof_by(n_sets, found)
-            return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
+    search, proof = _exact(n_sets)
+    found = search(
+        cover,
+        n_sets,
+        target=weight + least,
+        multipliers=step.multipliers,
+        budget=budget.part(budget.remaining),
+    )
+    if found.selected is not None:
+        best, weight = found.selected, found.weight
+    upper = max(weight, min(upper, found.upper_bound))
+    if found.complete:
+        return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
     proof = cut_short("Lagrangian bound", budget)
     return WeightAnswer(SolveStatus.FEASIBLE, best, upper, proof)
 
@@ -195,19 +176,8 @@ def _improve(ledger: CountLedger, budget: WorkBudget, seed: int) -> None:
     ledger.improve(cover.weight_of, search)
 
 
-def _proof_by(n_sets: int, search: GroupSearch | TupleSearch) -> str:
-    if isinstance(search, GroupSearch):
-        return _group_proof(n_sets)
-    return _tuple_proof(n_sets, search)
-
-
-def _group_proof(n_sets: int) -> str:
-    return f"sets of {n_sets} by branching on groups of alike sets"
-
-
-def _tuple_proof(n_sets: int, search: TupleSearch) -> str:
-    if n_sets == 1:
-        return "single sets by exhaustion"
-    if search.pairs_only and n_sets == 2:
-        return "pairs by exhaustion"
-    return f"sets of {n_sets} by branch and bound"
+def _exact(n_sets: int) -> tuple[Callable[..., ExactSearch], str]:
+    """Return the search that exhausts K sets, and what it proves."""
+    if n_sets < _LEAST_GROUPED:
+        return best_pair, pair_proof(n_sets)
+    return best_by_groups, f"sets of {n_sets} by branching on groups of alike sets"

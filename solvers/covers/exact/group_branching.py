@@ -13,7 +13,7 @@ References:
 """
 
 import heapq
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
@@ -24,7 +24,7 @@ from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
 
 from .group_bounds import GroupPart, PartBounds
-from .incumbent import Incumbent
+from .incumbent import ExactSearch, Incumbent
 
 # Larger covers aren't searched: the dense copy takes four bytes an entry, the table
 # of what is alike four for each pair of sets.
@@ -42,23 +42,6 @@ _CENTRES = 6
 _LIKENESS = (0.6, 0.3)
 
 
-@dataclass(frozen=True, eq=False)
-class GroupSearch:
-    """Answer of :func:`best_by_groups`.
-
-    Attributes:
-        selected: Best selection found that reaches the target, or None.
-        weight: Integer-valued weight that it covers, 0 without one.
-        upper_bound: No K sets cover more than this.
-        complete: Whether nothing is left open.
-    """
-
-    selected: NDArray[np.int64] | None
-    weight: float
-    upper_bound: float
-    complete: bool
-
-
 def best_by_groups(
     cover: ReducedCover,
     n_sets: int,
@@ -67,7 +50,7 @@ def best_by_groups(
     multipliers: NDArray[np.float64],
     budget: WorkBudget,
     first: bool = False,
-) -> GroupSearch:
+) -> ExactSearch:
     """Find K sets that cover at least a target, the most if all of the budget lasts.
 
     Args:
@@ -83,12 +66,12 @@ def best_by_groups(
     # A table of what is alike that leaves no work to use it is made for nothing.
     too_dear = _table_units(cover) > _PREPARED * budget.remaining
     if too_large or too_dear or n_sets >= cover.n_sets:
-        return GroupSearch(None, 0.0, cover.total, complete=False)
+        return ExactSearch(None, 0.0, cover.total, complete=False)
     budget.spend(_table_units(cover))
     return _Tree(cover, n_sets, target, budget, first=first).run(multipliers)
 
 
-class _Tree(Incumbent[NDArray[np.int64]]):
+class _Tree(Incumbent):
     """Search over groups; see `best_by_groups`. It is its own incumbent."""
 
     def __init__(
@@ -107,7 +90,7 @@ class _Tree(Incumbent[NDArray[np.int64]]):
         self.bounds = PartBounds(cover, n_sets, target, budget)
         self._alike = _likeness(self.bounds.covers, cover.weights)
 
-    def run(self, multipliers: NDArray[np.float64]) -> GroupSearch:
+    def run(self, multipliers: NDArray[np.float64]) -> ExactSearch:
         whole = self.bounds.whole(multipliers / self.cover.weights)
         self._take([whole], _FIRST_STEPS)
         most = _MAX_OPEN // (4 * self.cover.weights.size + 5 * self.cover.n_sets)
@@ -116,12 +99,12 @@ class _Tree(Incumbent[NDArray[np.int64]]):
                 # What the clock cut before it was bounded may cover everything.
                 left = min(-self._open[0][0], self.cover.total)
                 upper = max(self.weight, left // self.cover.grain * self.cover.grain)
-                return GroupSearch(self.selected, self.weight, upper, complete=False)
+                return ExactSearch(self.selected, self.weight, upper, complete=False)
             split: list[GroupPart] = []
             while self._promising and len(split) < _BATCH:
                 split += self._children(heapq.heappop(self._open)[2])
             self._take(split, _STEPS)
-        return GroupSearch(self.selected, self.weight, self.refuted, complete=True)
+        return ExactSearch(self.selected, self.weight, self.refuted, complete=True)
 
     @property
     def _promising(self) -> bool:

@@ -5,17 +5,33 @@ to be better by more than that, and by a grain at least.
 """
 
 import math
-from typing import Generic, TypeVar
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import rounding
 
-_C = TypeVar("_C")
+
+@dataclass(frozen=True, eq=False)
+class ExactSearch:
+    """What an exact search for K sets found.
+
+    Attributes:
+        selected: Best selection found that reaches the target, or None.
+        weight: Integer-valued weight that it covers, 0 without one.
+        upper_bound: No K sets cover more than this.
+        complete: Whether nothing is left open.
+    """
+
+    selected: NDArray[np.int64] | None
+    weight: float
+    upper_bound: float
+    complete: bool
 
 
-class Incumbent(Generic[_C]):
+class Incumbent:
     """What a search for the most weight of K sets has found.
 
     Args:
@@ -31,14 +47,14 @@ class Incumbent(Generic[_C]):
 
     def __init__(self, cover: ReducedCover, target: float, *, first: bool) -> None:
         self.target = target
-        self.selected: _C | None = None
+        self.selected: NDArray[np.int64] | None = None
         self.weight = 0.0
         self._first = first
         self._grain = cover.grain
         least = np.floor(cover.total * rounding(cover.weights.size))
         self._least = max(cover.grain, float(least))
 
-    def offer(self, chosen: _C, weight: float) -> None:
+    def offer(self, chosen: NDArray[np.int64], weight: float) -> None:
         """Keep a selection that reaches the target, and ask for more from then on."""
         if weight >= self.target:
             self.selected, self.weight = chosen, weight

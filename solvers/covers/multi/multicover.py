@@ -1,7 +1,7 @@
 """Fewest sets, most weight of K sets: several needs of a row, several row sets.
 
-From above: greedy and exchanges. From below: Lagrangian bound, exact search over
-K-tuples, HiGHS' branch and bound. Each spends a share of one counted budget.
+From above: greedy and exchanges. From below: Lagrangian bound, all pairs,
+HiGHS' branch and bound. Each spends a share of one counted budget.
 """
 
 from dataclasses import replace
@@ -22,11 +22,14 @@ from solvers.covers.bounds.mixed_integer import TOLERANCE, fits, heaviest_intege
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import coverage_bounds, rounding, tighten
 from solvers.covers.count_ledger import CountLedger
+from solvers.covers.exact.pairs import any_pair, pair_proof
 from solvers.covers.search.neighbourhood import greedy, prune
 from solvers.status import SolveStatus, WorkBudget
 
-from .exact_multicover import any_tuple
 from .multicover_swaps import exchange, worth_of
+
+# Sets of which all selections are looked at.
+_MOST_EXHAUSTED = 2
 
 
 def fewest_multicover(
@@ -50,18 +53,19 @@ def fewest_multicover(
     ledger = CountLedger(cover, prune(cover, greedy(cover, NONE, budget)), max_sets)
     _improve(ledger, budget.part(0.2 * budget.units), seed)
     ascending = budget.part(0.25 * budget.units)
-    multipliers = ledger.by_multipliers(
+    ledger.by_multipliers(
         lambda n_sets, start: (
             ascend(cover, start, ascending, target=0.0, n_sets=n_sets).multipliers
         )
     )
 
-    def tuples(
+    def exhaust(
         n_sets: int, part: WorkBudget
     ) -> tuple[NDArray[np.int64] | None, str | None]:
-        search = any_tuple(cover, n_sets, multipliers, part)
-        proof = f"sets of {n_sets} by branch and bound" if search.complete else None
-        return search.selected, proof
+        if n_sets > _MOST_EXHAUSTED:
+            return None, None
+        search = any_pair(cover, n_sets, part)
+        return search.selected, pair_proof(n_sets) if search.complete else None
 
     def heavier(
         n_sets: int, start: NDArray[np.int64], part: WorkBudget
@@ -70,7 +74,7 @@ def fewest_multicover(
             return _heavier(cover, start, part, seed)
         return heaviest_of(cover, n_sets, part, seed=seed).selected
 
-    ledger.by_exact_search(tuples, budget)
+    ledger.by_exact_search(exhaust, budget)
     return ledger.closed(heavier, budget, heaviest=heaviest)
 
 

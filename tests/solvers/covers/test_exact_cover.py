@@ -10,7 +10,8 @@ from solvers.covers.bounds.mixed_integer import linear_multipliers, solve_intege
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.bounds.relaxation import cost_bound, coverage_bounds, tighten
 from solvers.covers.cover_problem import CoverProblem
-from solvers.covers.exact.exact_cover import best_tuple
+from solvers.covers.exact.group_branching import best_by_groups
+from solvers.covers.exact.pairs import best_pair
 from solvers.covers.search.neighbourhood import cheapest, greedy, most_coverage, prune
 from solvers.covers.search.swaps import Swaps
 from solvers.status import WorkBudget
@@ -37,6 +38,11 @@ def random_cover(seed, *, n_e=36, n_s=12, density=0.3, share=0.9, costs=None):
 
 def plenty():
     return WorkBudget(5e9)
+
+
+def best_tuple(cover, n_sets, **ask):
+    """The engine's exact search for so many sets."""
+    return (best_pair if n_sets < 3 else best_by_groups)(cover, n_sets, **ask)
 
 
 def most_by_hand(cover, k):
@@ -120,7 +126,7 @@ def test_sums_of_equal_weights_come_in_whole_grains():
         assert search.upper_bound == best
 
 
-def test_full_covers_branch_on_scarce_rows():
+def test_planted_full_covers_are_found_among_decoys():
     """A planted exact cover of five among decoys that miss a row each."""
     rng = np.random.default_rng(2)
     part = rng.integers(0, 5, 120)
@@ -169,7 +175,7 @@ def arcs(rng):
 def test_many_pairs_agree_with_a_dense_product(kind, monkeypatch):
     """More columns than a block, more rows than the first look."""
     if kind == "arcs":  # Else the few that are left are too many to go one by one.
-        monkeypatch.setattr("solvers.covers.exact.exact_cover._FEW_PAIRS", 8)
+        monkeypatch.setattr("solvers.covers.exact.pairs._FEW_PAIRS", 8)
     rng = np.random.default_rng(4)
     covers = {
         "even": rng.random((900, 420)) < 0.32,
@@ -186,7 +192,6 @@ def test_many_pairs_agree_with_a_dense_product(kind, monkeypatch):
         cover, 2, target=1.0, multipliers=cover.weights, budget=plenty()
     )
     assert search.weight == best
-    assert search.pairs_only
     known = best_tuple(
         cover, 2, target=best, multipliers=cover.weights, budget=plenty()
     )

@@ -1,0 +1,199 @@
+"""The one or two sets that cover the most, or that are enough, by looking at all.
+
+What a pair leaves open of a cover in which each row is needed once is a product of
+matrices over the open rows::
+
+    left(i, j) = sum_e w_e (1 - a_ei) (1 - a_ej)
+
+With several needs and row sets, i and j complete the rows that need one set and have
+either, and those that need two and have both, in each row set G::
+
+    w_G(i, j) = g_i + g_j - sum_{r_e = 1} w_e a_ei a_ej + sum_{r_e = 2} w_e a_ei a_ej
+
+Integer-valued weights make both exact, whatever the BLAS and its threads.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.relaxation import rounding
+from solvers.status import WorkBudget
+
+from .incumbent import ExactSearch, Incumbent
+
+# Larger covers aren't searched: the dense copy takes a byte an entry.
+_MAX_DENSE = 200_000_000
+_PAIR_BLOCK = 256
+_FIRST_ROWS = 64
+# Pairs are looked at one by one once fewer than this fraction is left.
+_FEW_PAIRS = 64
+# A dense multiply-add costs this share of a unit.
+_DENSE_UNIT = 1.0 / 8.0
+_CALL_UNITS = 1e5
+_PAIR = 2
+
+
+def pair_proof(n_sets: int) -> str:
+    """Return the sentence for an exhaustion of one or two sets."""
+    return "single sets by exhaustion" if n_sets == 1 else "pairs by exhaustion"
+
+
+def best_pair(
+    cover: ReducedCover,
+    n_sets: int,
+    *,
+    target: float,
+    multipliers: NDArray[np.float64],
+    budget: WorkBudget,
+    first: bool = False,
+) -> ExactSearch:
+    """Find one or two sets that cover at least a target, the most if work lasts.
+
+    Args:
+        cover: A simple cover.
+        n_sets: K, 1 or 2.
+        target: Integer-valued weight below which nothing is of interest.
+        multipliers: Row multipliers in [0, w] that leave sets out, shape (n_e,).
+        budget: Work.
+        first: Whether any selection that reaches the target will do.
+    """
+    if cover.n_sets * cover.weights.size > _MAX_DENSE:
+        return ExactSearch(None, 0.0, cover.total, complete=False)
+    best = Incumbent(cover, target, first=first)
+    gains = np.asarray(cover.by_set @ cover.weights)
+    budget.spend(cover.by_set.nnz + 8.0 * cover.weights.size + _CALL_UNITS)
+    if min(n_sets, cover.n_sets) == 1:
+        one = int(np.argmax(gains))
+        best.offer(np.array([one]), float(gains[one]))
+        complete = True
+    else:
+        complete = _Pairs(cover, best, budget).search(gains, multipliers)
+    upper = best.refuted if complete else cover.total
+    return ExactSearch(best.selected, best.weight, upper, complete)
+
+
+class _Pairs:
+    """All pairs of a simple cover that may reach a target."""
+
+    def __init__(
+        self,
+        cover: ReducedCover,
+        best: Incumbent,
+        budget: WorkBudget,
+    ) -> None:
+        self.cover, self.best, self.budget = cover, best, budget
+        # Rows that few sets cover refute most.
+        order = np.argsort(np.diff(cover.by_row.indptr), kind="stable")
+        self._weights = cover.weights[order]
+        self._missed = ~cover.by_set.astype(bool).toarray()[:, order]
+        self._slack = 1.0 + rounding(cover.weights.size)
+
+    def search(
+        self, gains: NDArray[np.float64], multipliers: NDArray[np.float64]
+    ) -> bool:
+        """Offer the best pair of each block of leaders; return whether all were met."""
+        cover, best = self.cover, self.best
+        multipliers = np.minimum(multipliers, cover.weights)
+        floor = float(np.sum(cover.weights - multipliers))
+        paid = np.asarray(cover.by_set @ multipliers)
+        self.budget.spend(float(cover.by_set.nnz))
+        sets = np.flatnonzero(self._may_help(gains, 0.0) & self._may_help(paid, floor))
+        # The larger of a pair meets the need with every partner that can.
+        sets = sets[np.argsort(-gains[sets], kind="stable")]
+        gains, missed = gains[sets], self._missed[sets]
+        self.budget.spend(2.0 * missed.size + _CALL_UNITS)
+        for start in range(0, sets.size, _PAIR_BLOCK):
+            # Partners before the leaders were leaders; those of too little gain end.
+            short = best.target - gains[start]
+            stop = int(np.searchsorted(-gains, -short, side="right"))
+            if stop <= start or best.done:
+                break
+            if self.budget.exhausted:
+                return False
+            block = slice(start, start + _PAIR_BLOCK)
+            i, j, left = self._best_of(missed[block], missed[start:stop])
+            if left is not None:
+                ends = np.unique([start + i, start + j])
+                best.offer(np.sort(sets[ends]), cover.total - left)
+        return True
+
+    def _may_help(self, values: NDArray[np.float64], rest: float) -> NDArray[np.bool_]:
+        """Return the sets that reach the target together with the best other."""
+        return (rest + values.max() + values) * self._slack >= self.best.target
+
+    def _best_of(
+        self, ones: NDArray[np.bool_], others: NDArray[np.bool_]
+    ) -> tuple[int, int, float | None]:
+        """Return the pair that leaves the least weight, if that is little enough.
+
+        What a pair leaves open only grows with the rows looked at, so most pairs are
+        refuted by the rows that fewest sets cover, which come first.
+        """
+        weights, allowed = self._weights, self.cover.total - self.best.target
+        left = np.zeros((len(ones), len(others)))
+        start, length = 0, _FIRST_ROWS
+        while start < weights.size:
+            part = slice(start, start + length)
+            left += (ones[:, part] * weights[part]) @ others[:, part].T.astype(float)
+            width = min(length, weights.size - start)
+            self.budget.spend(left.size * (4.0 + width * _DENSE_UNIT))
+            start, length = start + length, 4 * length
+            alive = left <= allowed
+            n_alive = int(np.count_nonzero(alive))
+            if n_alive == 0:
+                return 0, 0, None
+            if n_alive * _FEW_PAIRS < left.size and start < weights.size:
+                i, j = np.nonzero(alive)
+                rest = slice(start, None)
+                for k in range(0, i.size, _PAIR_BLOCK):
+                    few = slice(k, k + _PAIR_BLOCK)
+                    both = ones[i[few], rest] & others[j[few], rest]
+                    left[i[few], j[few]] += both @ weights[rest]
+                    self.budget.spend(2.0 * both.size)
+                left[~alive] = np.inf
+                break
+        i, j = np.unravel_index(int(np.argmin(left)), left.shape)
+        value = float(left[i, j])
+        return int(i), int(j), value if value <= allowed else None
+
+
+def any_pair(cover: ReducedCover, n_sets: int, budget: WorkBudget) -> ExactSearch:
+    """Find one or two sets that meet the requirements, or show that there are none.
+
+    Args:
+        cover: A cover of any needs and row sets.
+        n_sets: K, 1 or 2.
+        budget: Counted work.
+    """
+    cut = ExactSearch(None, 0.0, cover.total, complete=False)
+    if cover.n_sets * cover.weights.size > _MAX_DENSE:
+        return cut
+    n_sets, dense = min(n_sets, cover.n_sets), cover.by_set.toarray()
+    quotas = [
+        (float(quota), cover.needs[rows], cover.weights[rows], dense[:, rows])
+        for g, quota in enumerate(cover.quotas)
+        for rows in [np.flatnonzero(cover.row_sets == g)]
+    ]
+    # A set counts once: where one is asked for, none stands beside it.
+    beside = np.arange(cover.n_sets if n_sets == _PAIR else 1)
+    for start in range(0, cover.n_sets, _PAIR_BLOCK):
+        if budget.exhausted:
+            return cut
+        block = slice(start, start + _PAIR_BLOCK)
+        enough = np.ones((len(dense[block]), beside.size), dtype=bool)
+        for quota, needs, weights, covers in quotas:
+            light, heavy = weights * (needs == 1), weights * (needs == _PAIR)
+            gains = covers @ light
+            reached = np.repeat(gains[block, None], beside.size, axis=1)
+            if n_sets == _PAIR:
+                reached += gains + ((covers[block] * (heavy - light)) @ covers.T)
+            enough &= reached >= quota
+            budget.spend(2.0 * enough.size * (4.0 + _DENSE_UNIT * needs.size))
+        i, j = np.nonzero(enough)
+        apart = np.flatnonzero((i + start != j) | (n_sets == 1))
+        if apart.size:
+            k = apart[0]
+            pair = [i[k] + start, j[k]] if n_sets == _PAIR else [i[k] + start]
+            return ExactSearch(np.sort(pair), 0.0, cover.total, complete=True)
+    return ExactSearch(None, 0.0, cover.total, complete=True)
