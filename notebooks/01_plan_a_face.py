@@ -69,13 +69,13 @@ draw_mesh(
 # %%
 plan = plan_rig(mesh, load_rig("default"), max_projectors=3, seed=0)
 for kind in ("projectors", "cameras"):
-    proof = plan.document["certificates"][kind]
+    proof = plan.to_document()["certificates"][kind]
     print(
         f"{proof['count']} {kind}; at least {proof['candidates']['lower_bound']} are "
         f"needed over {proof['candidates']['n_candidates']} candidates "
         f"and {proof['n_samples']} samples ({proof['status']})"
     )
-target = plan.coverage["target"]
+target = plan.to_document()["coverage"]["target"]
 print({key: f"{1e4 * value:.1f} cm²" for key, value in target.items()})
 
 # %%
@@ -88,7 +88,7 @@ draw_rig(plan, face_status=face_status(plan))
 # triangulated them, by code that shares nothing with the planner:
 
 # %%
-check = plan.document["reconstruction"]
+check = plan.to_document()["reconstruction"]
 {key: check[key] for key in ("accuracy_rms_m", "accuracy_p95_m", "predicted_missing")}
 
 # %% [markdown]

@@ -114,9 +114,9 @@ try:
 except RequirementError as error:
     plan = error.plan
     print("\n".join(error.shortfalls))
-target = plan.coverage["target"]
+target = plan.to_document()["coverage"]["target"]
 print({key: f"{1e4 * value:.1f} cm²" for key, value in target.items()})
-check = plan.document["reconstruction"]
+check = plan.to_document()["reconstruction"]
 print({key: check[key] for key in ("n_points", "accuracy_rms_m", "accuracy_p95_m")})
 draw_rig(plan, face_status=face_status(plan))
 

@@ -145,8 +145,8 @@ def plan_rig(
     # BLAS must not split sums differently with another number of threads.
     with threadpool_limits(1):
         plan = _plan(order, clock, check=check)
-    missed = shortfalls(plan.document, plan.requirements)
-    if check and plan.document["reconstruction"] is None:
+    missed = shortfalls(plan.to_document(), plan.requirements)
+    if check and plan.to_document()["reconstruction"] is None:
         missed += ("the check wasn't made: the time limit came first",)
     if missed:
         raise RequirementError(plan, missed)
@@ -231,7 +231,7 @@ def _one_more(
 
     The proved bound stays what it is; the count is then above it, and says so.
     """
-    asked, areas = plan.requirements, plan.coverage["target"]
+    asked, areas = plan.requirements, plan.to_document()["coverage"]["target"]
     if falls_short(
         areas, "lit_m2", "reachable_by_projectors_m2", asked.dominant_coverage
     ):
@@ -344,13 +344,13 @@ def _checked(plan: RigPlan, draft: PartialPlan, clock: Stopwatch) -> RigPlan:
         entry["passed"] = entry["passed"] and not false
     greedy = draft.camera_stage.certificate["greedy_count"]
     seconds = clock.processor | ({} if found is None else found.seconds)
-    document = plan.document | {
+    document = plan.to_document() | {
         "reconstruction": entry,
-        "members": [plan.document["members"][0] | {"reconstruction": entry}],
+        "members": [plan.to_document()["members"][0] | {"reconstruction": entry}],
         "timings_s": dict(clock.seconds),
         "cost": cost_entry(plan.cameras, greedy, seconds),
     }
-    return RigPlan(document, plan.surface)
+    return RigPlan.from_document(document, plan.surface)
 
 
 def _whole(target: str | None, unselected: bool) -> Literal["surface"]:

@@ -217,8 +217,8 @@ def planned() -> None:
             )
         except RequirementError as error:
             plan = error.plan
-        target = plan.coverage["target"]
-        check = plan.document["reconstruction"]
+        target = plan.to_document()["coverage"]["target"]
+        check = plan.to_document()["reconstruction"]
         rows.append(
             [
                 f"{len(plan.projectors)} and {len(plan.cameras)}",

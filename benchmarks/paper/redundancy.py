@@ -177,8 +177,8 @@ def served(plan: RigPlan) -> SurfaceSamples:
 def rig(mesh: TriangleMesh, light: str = "diverging") -> RigPlan:
     """Return two projectors and three cameras about the front of an object."""
     plan = RIGS.small_rig(mesh, light)
-    plan.document["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
-    return RigPlan(plan.document, plan.surface)
+    plan.to_document()["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
+    return RigPlan.from_document(plan.to_document(), plan.surface)
 
 
 def main() -> None:

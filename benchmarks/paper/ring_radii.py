@@ -75,7 +75,7 @@ def _compare(name: str, path: Path, unit: dict[str, float]) -> float:
         surface.mesh, surface.region, surface.steep, plan.requirements, 0, threads=1
     )
     outer = plan.projectors[0].ring_radii[-1]
-    n_even = plan.document["projectors"][0]["rings"]["n_even"]
+    n_even = plan.to_document()["projectors"][0]["rings"]["n_even"]
     even = [
         replace(p, ring_radii=uniform_radii(outer, outer / n_even * (1.0 + 1e-12)))
         for p in plan.projectors

@@ -40,13 +40,13 @@ def small_job() -> RigPlan:
             RIGS.camera("C2", RIGS.direction(20.0, 25.0), focal=3000.0),
         ],
     )
-    for projector in plan.document["projectors"]:
+    for projector in plan.to_document()["projectors"]:
         outer = projector["ring_radii"][-1]
         projector["ring_radii"] = np.linspace(outer / RINGS, outer, RINGS).tolist()
-    for camera in plan.document["cameras"]:
+    for camera in plan.to_document()["cameras"]:
         camera["resolution"] = list(RESOLUTION)
         camera["K"][0][2], camera["K"][1][2] = (0.5 * (n - 1) for n in RESOLUTION)
-    return RigPlan(plan.document, plan.surface)
+    return RigPlan.from_document(plan.to_document(), plan.surface)
 
 
 def timed(job: Callable[[], object]) -> tuple[float, float]:

@@ -9,7 +9,6 @@ seeds of the audit's samples and the pixels' noise, all of which must pass.
 Without a plan the sample is planned first.
 """
 
-import copy
 import re
 import sys
 import tempfile
@@ -186,16 +185,16 @@ def check(fault: Fault, claims: Claims) -> tuple[str, ...]:
 
 def changed(plan: RigPlan, change: Callable[[Document], object]) -> RigPlan:
     """Return a plan with its document changed."""
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     change(document)
-    return RigPlan(document, plan.surface)
+    return RigPlan.from_document(document, plan.surface)
 
 
 def replaced(plan: RigPlan, mesh: TriangleMesh) -> RigPlan:
     """Return a plan's devices about another mesh of the same faces."""
     from dataclasses import replace
 
-    return RigPlan(plan.document, replace(plan.surface, mesh=mesh))
+    return RigPlan.from_document(plan.to_document(), replace(plan.surface, mesh=mesh))
 
 
 def _too_wide() -> Fault:

@@ -35,8 +35,8 @@ def wall_rig(baseline: float) -> RigPlan:
         [_projector()],
         [_camera("C1", -0.5 * baseline), _camera("C2", 0.5 * baseline)],
     )
-    plan.document["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
-    return RigPlan(plan.document, plan.surface)
+    plan.to_document()["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
+    return RigPlan.from_document(plan.to_document(), plan.surface)
 
 
 def predicted_limit() -> float:

@@ -229,7 +229,7 @@ def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:
     pixels = None if found is None else found.reconstruction
     for sentence in (*false, *(() if pixels is None else pixels.failures)):
         print(f"  {sentence}", file=sys.stderr, flush=True)
-    areas = plan.coverage["target"]
+    areas = plan.to_document()["coverage"]["target"]
     measured = areas["measured_m2"] / areas["reachable_by_cameras_m2"]
     told = "not made"
     if pixels is not None:

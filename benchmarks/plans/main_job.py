@@ -95,13 +95,13 @@ def _run(mesh: Path, words: tuple[str, ...], light: str) -> tuple[int, str, str]
     if plan is None:
         said = " ".join(done.stderr.replace(str(mesh), "FILE").split())[:160]
         return code, f"{start} | | | {wall:.1f} | {said} | | | | | | |", "no plan"
-    times = plan.document["timings_s"].items()
+    times = plan.to_document()["timings_s"].items()
     timings = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in times)
     return code, f"{start} {_row(plan, wall)} |", timings
 
 
 def _row(plan: RigPlan, wall: float) -> str:
-    document, areas = plan.document, plan.coverage["target"]
+    document, areas = plan.to_document(), plan.to_document()["coverage"]["target"]
     counts = [
         f"{proof['count']} of {proof['needed']['count']} needed "
         f"({proof['needed']['lower_bound']})"

@@ -82,7 +82,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         files = _save(plan, folder, report, patterns=not options["no_patterns"])
     if options["as_json"]:
-        print_json(plan.document | {"files": files, "missed": list(missed)})
+        print_json(plan.to_document() | {"files": files, "missed": list(missed)})
     else:
         click.echo(summary(plan, files, missed))
     return code

@@ -74,7 +74,7 @@ def _reconstruct(
     report: Report | None,
 ) -> Reconstruction:
     seed = options["seed"]
-    seed = int(plan.document["seed"]) if seed is None else seed
+    seed = int(plan.to_document()["seed"]) if seed is None else seed
     threads = options["threads"] or cores()
     mounted = options["calibration"]
     mounted = None if mounted is None else calibrated(scanner, mounted)
@@ -126,7 +126,7 @@ def _save(plan: RigPlan, found: Reconstruction, path: Path) -> CloudFile | None:
     if not found.n_merged:
         remove_cloud(path)
         return None
-    file = CloudFile.of(found.merged, LengthUnit.of(plan.document["meshes"]))
+    file = CloudFile.of(found.merged, LengthUnit.of(plan.to_document()["meshes"]))
     file.save(path)
     return file
 

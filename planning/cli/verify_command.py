@@ -41,7 +41,7 @@ def verify_command(options: Mapping[str, Any]) -> int:
 
 def _same_scale(path: Path, plan: RigPlan) -> TriangleMesh:
     """Read a mesh in the unit of the plan's, or at its size where a size was given."""
-    unit = plan.document["meshes"][0]["unit"]
+    unit = plan.document.meshes[0].unit
     if unit in UNITS:
         return load_mesh(path, unit=unit)
     size = np.ptp(plan.surface.mesh.bounds, axis=0).max()

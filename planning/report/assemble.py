@@ -77,9 +77,8 @@ def write_plan(draft: PartialPlan, clock: Stopwatch) -> RigPlan:
         marginal,
         surface,
     )
-    plan = RigPlan(document, surface)
     add_what_helps(document, draft, devices, claims, clock)
-    return plan
+    return RigPlan.from_document(document, surface)
 
 
 def _final_requirements(

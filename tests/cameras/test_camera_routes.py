@@ -285,7 +285,7 @@ def test_a_plan_by_the_papers_route_alone_bears_the_audit(planned):
     assert audit_plan(plan).failures == ()
     proof = document["certificates"]["cameras"]
     assert routes["paper"] == proof["needed"]["count"] == len(plan.cameras)
-    areas = plan.coverage["target"]
+    areas = plan.to_document()["coverage"]["target"]
     assert areas["measured_m2"] >= 0.95 * areas["reachable_by_cameras_m2"]
 
 

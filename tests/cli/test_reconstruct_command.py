@@ -30,24 +30,16 @@ def folder(rigs, tmp_path_factory) -> Path:
         entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
         entry["resolution"] = [320, 240]
     lamp = rigs.diverging("P1", rigs.direction(-30.0, 5.0), 0.055, 6.2e-3)
-    plan = rigs.plan_of(body, [lamp], cameras)
-    plan.document["requirements"]["check"] = rigs.CHECK | {"tau_m": 6.2e-3}
-    names = ("units", "regions", "coverage", "marginal", "certificates")
-    names += ("cost", "members", "reconstruction", "timings_s")
-    document = {
-        "format": "ringrig-plan",
-        "version": 1,
-        "seed": 3,
-        "truncated": False,
-        "meshes": [{"unit": "in", "scale_to_m": 0.0254}],
-        "surface": {"path": "surface.npz"},
-        **dict.fromkeys(names),
-        "rig": {},
-        "baselines": [],
-        **plan.document,
-    }
+    plan = rigs.plan_of(
+        body,
+        [lamp],
+        cameras,
+        check=rigs.CHECK | {"tau_m": 6.2e-3},
+        seed=3,
+        meshes=[rigs.MESH_TABLE | {"unit": "in", "scale_to_m": 0.0254}],
+    )
     place = tmp_path_factory.mktemp("reconstruct")
-    RigPlan(document, plan.surface).save(place / "plan.json")
+    plan.save(place / "plan.json")
     return place
 
 

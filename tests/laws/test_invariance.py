@@ -67,7 +67,7 @@ def plans(head, tmp_path_factory, with_few_samples):
 
 
 def test_counts_bounds_and_regions_stay(plans):
-    still, moved = (p.document for p in plans)
+    still, moved = (p.to_document() for p in plans)
     for kind in ("projectors", "cameras"):
         a, b = still["certificates"][kind], moved["certificates"][kind]
         assert (a["count"], a["status"], a["candidates"]) == (
@@ -81,7 +81,7 @@ def test_counts_bounds_and_regions_stay(plans):
 
 def test_every_area_stays(plans):
     for part in ("target", "surface"):
-        still, moved = (p.coverage[part] for p in plans)
+        still, moved = (p.to_document()["coverage"][part] for p in plans)
         for key, area in still.items():
             assert moved[key] == pytest.approx(area, abs=2e-3 * still["area_m2"]), key
 

@@ -67,12 +67,12 @@ def quick(tmp_path_factory):
 
 
 def test_every_requirement_is_met_and_the_check_passed(plan):
-    asked, areas = plan.requirements, plan.coverage["target"]
+    asked, areas = plan.requirements, plan.to_document()["coverage"]["target"]
     assert len(plan.projectors) <= 4
     assert areas["lit_m2"] >= 0.90 * areas["reachable_by_projectors_m2"]
     assert areas["measured_m2"] >= 0.95 * areas["reachable_by_cameras_m2"]
     assert areas["reachable_by_projectors_m2"] >= 0.90 * areas["area_m2"]
-    check = plan.document["reconstruction"]
+    check = plan.to_document()["reconstruction"]
     assert check["passed"]
     assert check["failures"] == []
     assert check["accuracy_rms_m"] <= asked.check.max_rms_m
@@ -82,7 +82,7 @@ def test_every_requirement_is_met_and_the_check_passed(plan):
 
 def test_areas_are_nested_and_causes_add_up(plan):
     for part in ("target", "surface"):
-        areas = plan.coverage[part]
+        areas = plan.to_document()["coverage"][part]
         assert (
             areas["measured_m2"]
             <= areas["reachable_by_cameras_m2"]
@@ -90,17 +90,17 @@ def test_areas_are_nested_and_causes_add_up(plan):
             <= areas["reachable_by_projectors_m2"]
             <= areas["area_m2"] * (1 + 1e-9)
         )
-    areas = plan.coverage["target"]
+    areas = plan.to_document()["coverage"]["target"]
     missing = areas["area_m2"] - areas["measured_m2"]
-    causes = plan.coverage["uncovered_by_cause"]
+    causes = plan.to_document()["coverage"]["uncovered_by_cause"]
     assert sum(causes.values()) == pytest.approx(missing)
 
 
 def test_counts_bounds_and_candidates_are_stated(plan):
-    proofs = plan.document["certificates"]
+    proofs = plan.to_document()["certificates"]
     for kind, least in (("projectors", 600), ("cameras", 400)):
         proof = proofs[kind]
-        assert proof["count"] == len(plan.document[kind])
+        assert proof["count"] == len(plan.to_document()[kind])
         assert 1 <= proof["candidates"]["lower_bound"] <= proof["count"]
         assert proof["candidates"]["n_candidates"] >= least
         continuous = proof["continuous"]
@@ -114,7 +114,7 @@ def test_counts_bounds_and_candidates_are_stated(plan):
 
 def test_bounds_over_all_poses_are_told_each_after_its_count(plan):
     lines = summary(plan, [], ()).splitlines()
-    proofs = plan.document["certificates"]
+    proofs = plan.to_document()["certificates"]
     parallel = plan.projectors[0].light == "parallel"
     for kind, poses in (
         ("projector", "direction in" if parallel else "position and aim in"),
@@ -131,7 +131,7 @@ def test_bounds_over_all_poses_are_told_each_after_its_count(plan):
 
 
 def test_pairs_that_each_inequality_excluded_are_told_and_add_up(plan):
-    proof = plan.document["certificates"]["projectors"]
+    proof = plan.to_document()["certificates"]["projectors"]
     (line,) = [s for s in summary(plan, [], ()).splitlines() if "pairs of pose" in s]
     pairs = proof["n_samples"] * proof["candidates"]["n_candidates"]
     assert f" {pairs:,} pairs" in line
@@ -146,19 +146,19 @@ def test_pairs_that_each_inequality_excluded_are_told_and_add_up(plan):
 
 def test_marginal_table_rises_and_knows_the_plan(plan):
     for kind, key in (("n_projectors", "lit"), ("n_cameras", "measured")):
-        rows = [row for row in plan.document["marginal"] if kind in row]
+        rows = [row for row in plan.to_document()["marginal"] if kind in row]
         assert [row[kind] for row in rows] == list(range(1, len(rows) + 1))
         areas = [row[f"{key}_target_m2"] for row in rows]
         assert areas == sorted(areas)
         count = len(getattr(plan, kind.removeprefix("n_")))
         assert len(rows) >= count + 1
-        assert areas[count - 1] == plan.coverage["target"][f"{key}_m2"]
+        assert areas[count - 1] == plan.to_document()["coverage"]["target"][f"{key}_m2"]
 
 
 def test_what_was_written_is_what_is_read_and_verified(plan, tmp_path):
     plan.save(tmp_path / "new" / "plan.json")
     again = RigPlan.load(tmp_path / "new" / "plan.json")
-    assert again.document == json.loads(plan.to_json())
+    assert again.to_document() == json.loads(plan.to_json())
     found = verify_plan(again, seed=5, check_pixels=False)
     assert found.failures == ()
     assert found.unmet == ()
@@ -188,7 +188,7 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
             check=False,
         )
     plan, lines = caught.value.plan, caught.value.shortfalls
-    areas = plan.coverage["target"]
+    areas = plan.to_document()["coverage"]["target"]
     share = areas["reachable_by_projectors_m2"] / areas["area_m2"]
     assert share < 0.9
     assert f"{100 * share:.1f} %" in lines[0]
@@ -208,7 +208,7 @@ def test_too_few_projectors_say_how_many_are_needed():
     options = {"max_projectors": 1, "target": "surface", "coverage": 0.8}
     with pytest.raises(RequirementError, match="--max-projectors") as caught:
         plan_rig(cube, load_rig("default"), check=False, **options)
-    proof = caught.value.plan.document["certificates"]["projectors"]
+    proof = caught.value.plan.to_document()["certificates"]["projectors"]
     assert (proof["count"], proof["status"]) == (1, "infeasible")
     assert proof["needed"]["count"] >= proof["needed"]["lower_bound"] >= 2
 
@@ -238,10 +238,10 @@ def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     with pytest.raises(InterruptedPlanError) as caught:
         quick(progress=interrupt)
     plan = caught.value.plan
-    assert plan.document["truncated"] is True
-    assert plan.document["reconstruction"] is None
+    assert plan.to_document()["truncated"] is True
+    assert plan.to_document()["reconstruction"] is None
     # The whole surface of a plate is a target: all of its front is lit.
-    assert 0.009 < plan.coverage["target"]["lit_m2"] < 0.011
+    assert 0.009 < plan.to_document()["coverage"]["target"]["lit_m2"] < 0.011
     assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
@@ -254,7 +254,7 @@ def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     with pytest.raises(RequirementError, match="check wasn't made") as caught:
         quick(progress=cut)
     plan = caught.value.plan
-    assert plan.document["truncated"] is True
+    assert plan.to_document()["truncated"] is True
     text = summary(plan, [], caught.value.shortfalls)
     assert "NOT CHECKED (the run was cut)" in text
     assert "--no-check" not in text

@@ -455,7 +455,7 @@ def test_a_depth_of_field_that_holds_half_is_told_by_cause_and_audited(
     # The deep floor.
     assert beyond == pytest.approx(0.0036, rel=0.1)
     assert coverage["unmeasurable_by_cause"]["camera_range"] > 0.99 * beyond
-    missed = " ".join(shortfalls(written.document, written.requirements))
+    missed = " ".join(shortfalls(written.to_document(), written.requirements))
     of = f"{1e4 * beyond:.1f} cm² of {1e4 * areas['lit_m2']:.1f} cm² can't be"
     assert of in missed
     assert "out of the cameras' depth of field" in missed
@@ -469,7 +469,7 @@ def test_a_depth_of_field_that_holds_half_is_told_by_cause_and_audited(
 
 
 def test_too_few_cameras_say_why_how_many_and_which_limit(handmade):
-    document = copy.deepcopy(handmade.build_plan().document)
+    document = copy.deepcopy(handmade.build_plan().to_document())
     document["certificates"]["cameras"] |= {
         "count": 1,
         "needed": {"count": 3, "lower_bound": 2, "relaxations": ["a = 2 (now 1)"]},

@@ -12,6 +12,7 @@ from geometry.poses import look_at, transform
 from geometry.rays.rays import RayCaster
 from geometry.shapes.sample_head.geodesic import geodesic_grid
 from geometry.shapes.sample_head.sample_head import sample_head
+from planning.experiments.bare_plan import bare_plan
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
 from planning.report.drawing.face_colours import region_colours
@@ -34,6 +35,7 @@ from planning.report.drawing.rig_picture import (
     save_rig_picture,
 )
 from planning.report.drawing.shader import Shader, draw_mesh
+from tests.support.reconstruction_rigs import MESH_TABLE
 
 K_PROJECTOR = [[2100.0, 0, 639.5], [0, 2100.0, 399.5], [0, 0, 1]]
 K_CAMERA = [[3500.0, 0, 1223.5], [0, 3500.0, 1023.5], [0, 0, 1]]
@@ -122,15 +124,23 @@ def camera(mesh, name, azimuth, elevation):
 
 
 def plan_of(mesh, projectors, cameras, up=(0.0, 0.0, 1.0)):
-    areas = {"measured_m2": 0.05, "reachable_by_cameras_m2": 0.055, "area_m2": 0.06}
-    document = {
-        "meshes": [{"path": "some/face.obj"}],
-        "requirements": requirements(mesh, up),
-        "projectors": projectors,
-        "cameras": cameras,
-        "coverage": {"target": areas},
+    areas = {
+        "area_m2": 0.06,
+        "reachable_by_projectors_m2": 0.06,
+        "lit_m2": 0.055,
+        "reachable_by_cameras_m2": 0.055,
+        "measured_m2": 0.05,
     }
-    return RigPlan(document, surface_of(mesh))
+    coverage = {"samples": 0, "surface": areas, "target": areas}
+    causes = {"uncovered_by_cause": {}, "unreachable_by_cause": {}}
+    return bare_plan(
+        requirements(mesh, up),
+        projectors,
+        cameras,
+        surface_of(mesh),
+        meshes=[MESH_TABLE | {"path": "some/face.obj"}],
+        coverage=coverage | causes,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -490,7 +500,8 @@ def test_what_cannot_be_drawn_is_refused(plan):
 def test_a_large_mesh_is_drawn_in_seconds(plan):
     large = sample_head(n_faces=40_000)
     begin = time.process_time()
-    draw_rig(plan_of(large, plan.document["projectors"], plan.document["cameras"]))
+    document = plan.to_document()
+    draw_rig(plan_of(large, document["projectors"], document["cameras"]))
     assert time.process_time() - begin < 4.0, "about 0.5 s on an idle core"
 
 
@@ -501,10 +512,10 @@ def zone(name, centre, half, degrees=0.0):
 
 
 def zoned(plan, **zones):
-    required = plan.document["requirements"]
+    required = plan.to_document()["requirements"]
     space = required["workspace"] | zones
-    document = plan.document | {"requirements": required | {"workspace": space}}
-    return RigPlan(document, plan.surface)
+    document = plan.to_document() | {"requirements": required | {"workspace": space}}
+    return RigPlan.from_document(document, plan.surface)
 
 
 PRESS = zone("press", [0.7, -0.2, 0.1], [0.3, 0.1, 0.2], 30.0)
@@ -566,9 +577,9 @@ def test_the_picture_holds_the_zones_and_names_them(plan):
 
 
 def test_a_device_that_stands_already_is_framed_and_named(plan):
-    first, *rest = plan.document["cameras"]
+    first, *rest = plan.to_document()["cameras"]
     old = [first | {"existing": True, "name": "old camera"}, *rest]
-    known = RigPlan(plan.document | {"cameras": old}, plan.surface)
+    known = RigPlan.from_document(plan.to_document() | {"cameras": old}, plan.surface)
     assert [figure.existing for figure in device_figures(known, body_m=0.1)] == [
         "",
         "",

@@ -1,6 +1,5 @@
 """Light of two projectors on one surface: areas of closed form, and who fires when."""
 
-import copy
 from dataclasses import replace
 
 import numpy as np
@@ -171,8 +170,11 @@ def failures(plan):
     """What the audit of these two claims says of a document."""
     shadow = Shadow(plan.surface.mesh, threads=2)
     samples = draw_samples(plan.surface, "dominant", 20_000, 0)
-    areas = (plan.coverage[part]["area_m2"] for part in ("surface", "target"))
-    estimator = Estimator(samples, plan.coverage["samples"], *areas)
+    areas = (
+        plan.to_document()["coverage"][part]["area_m2"]
+        for part in ("surface", "target")
+    )
+    estimator = Estimator(samples, plan.to_document()["coverage"]["samples"], *areas)
 
     def failures_of(document):
         ledger = Ledger(document)
@@ -184,7 +186,7 @@ def failures(plan):
 
 
 def test_the_whole_audit_looks_at_both_claims(plan):
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     _area(document)
     document["firing_schedule"]["n_groups"] = 3
     found = audit_plan(replace(plan, document=document)).failures
@@ -246,7 +248,7 @@ def _together_and_nothing_shared(document):
     ],
 )
 def test_each_false_claim_alone_turns_the_audit_red(plan, failures, change, sentence):
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     assert failures(document) == ()
     change(document)
     found = failures(document)
@@ -256,7 +258,7 @@ def test_each_false_claim_alone_turns_the_audit_red(plan, failures, change, sent
 
 def test_exhaustion_is_tried_again_by_the_audit(plan, failures):
     """One group is enough for two that share nothing, whatever was tried."""
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     document["firing_schedule"] |= {"proof": "exhaustion"}
     assert failures(document) == ()
     document["overlaps"][0] |= {"target_m2": 0.0, "surface_m2": 0.0}
@@ -265,12 +267,12 @@ def test_exhaustion_is_tried_again_by_the_audit(plan, failures):
 
 
 def test_the_line_says_who_fires_when_and_why_not_in_fewer(plan):
-    line = schedule_line(plan.document)
+    line = schedule_line(plan.to_document())
     assert line.startswith("FIRING   P1, then P2: 2 groups, fewer won't do: any two of")
-    share = plan.document["overlaps"][0]["target_m2"]
-    share /= plan.document["coverage"]["target"]["area_m2"]
+    share = plan.to_document()["overlaps"][0]["target_m2"]
+    share /= plan.to_document()["coverage"]["target"]["area_m2"]
     assert f"most shared: P1 and P2, {100 * share:.1f} % of the target" in line
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     document["firing_schedule"] |= {"groups": [["P1", "P2"]], "n_groups": 1}
     assert "all projectors together" in schedule_line(document)
     assert schedule_line(document | {"overlaps": []}) == ""

@@ -241,16 +241,23 @@ def planned(tmp_path_factory, with_few_samples):
 
 
 def test_a_body_in_its_beam_leaves_a_projector_little_to_light(planned):
-    (old, *new), areas = planned.document["projectors"], planned.coverage["target"]
+    (old, *new), areas = (
+        planned.to_document()["projectors"],
+        planned.to_document()["coverage"]["target"],
+    )
     assert old["lit_area_m2"] < 0.2 * min(entry["lit_area_m2"] for entry in new)
     assert areas["lit_m2"] == pytest.approx(0.02, rel=0.01)
-    proof = planned.document["certificates"]["projectors"]
+    proof = planned.to_document()["certificates"]["projectors"]
     assert proof["excluded_pairs"]["projector_body"] > 1000
     assert "bodies of chosen devices" in proof["bounds_leave_out"]
     names = [
-        d["id"] for kind in ("projectors", "cameras") for d in planned.document[kind]
+        d["id"]
+        for kind in ("projectors", "cameras")
+        for d in planned.to_document()[kind]
     ]
-    assert sorted(planned.coverage["blocked_by_body_m2"]) == sorted(names)
+    assert sorted(planned.to_document()["coverage"]["blocked_by_body_m2"]) == sorted(
+        names
+    )
 
 
 def test_they_stay_are_marked_and_the_audit_agrees(planned):
@@ -260,13 +267,13 @@ def test_they_stay_are_marked_and_the_audit_agrees(planned):
         ("projectors", "old projector", [0.1, -1.2, 0.3]),
         ("cameras", "old camera", [-0.3, -0.88, 0.25]),
     ):
-        entries = planned.document[kind]
+        entries = planned.to_document()[kind]
         (entry,) = [e for e in entries if e.get("existing")]
         assert entry["name"] == name
         stands = np.array(entry["world_from_device"])[:3, 3] - centre
         assert stands == pytest.approx(place, abs=1e-5)
         assert len(entries) >= 2
-        proof = planned.document["certificates"][kind]
+        proof = planned.to_document()["certificates"][kind]
         assert proof["given"] == 1
         assert proof["count"] == len(entries)
     text = summary(planned, (), ())
@@ -335,9 +342,11 @@ def test_they_stay_are_marked_and_the_audit_agrees(planned):
     ],
 )
 def test_false_claims_about_them_are_named(planned, change, sentence):
-    document = copy.deepcopy(planned.document)
+    document = planned.to_document()
     change(document)
-    found = audit_plan(RigPlan(document, planned.surface), n_samples=500).failures
+    found = audit_plan(
+        RigPlan.from_document(document, planned.surface), n_samples=500
+    ).failures
     assert any(sentence in failure for failure in found), found
 
 
@@ -379,16 +388,16 @@ def test_a_projector_that_lights_nothing_has_no_margin():
 
 
 def test_the_summary_says_who_does_nothing_and_asks_no_one_to_register_it(planned):
-    document = copy.deepcopy(planned.document)
+    document = planned.to_document()
     assert "none of the target" not in summary(planned, (), ())
     document["projectors"][0]["lit_area_m2"] = 0.0
     document["cameras"][0]["seen_area_m2"] = 0.0
     names = [entry["id"] for entry in document["cameras"]]
     document["camera_groups"] = [names[:1], names[1:]]
-    text = summary(RigPlan(document, planned.surface), (), ())
+    text = summary(RigPlan.from_document(document, planned.surface), (), ())
     assert "P1 lights none of the target" in text
     assert "C1 measures none of the target" in text
     assert "don't overlap" not in text
     document["cameras"][0]["seen_area_m2"] = 1e-4
-    text = summary(RigPlan(document, planned.surface), (), ())
+    text = summary(RigPlan.from_document(document, planned.surface), (), ())
     assert "don't overlap" in text

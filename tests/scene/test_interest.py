@@ -310,18 +310,20 @@ def test_one_side_of_a_box_needs_one_projector(plan: RigPlan) -> None:
     surface = plan.surface
     np.testing.assert_array_equal(surface.region >= 0, top_of(surface.mesh))
     assert len(plan.projectors) == 1
-    assert plan.document["certificates"]["projectors"]["status"] == "optimal"
-    assert plan.coverage["target"]["area_m2"] == pytest.approx(0.0048, rel=1e-9)
+    assert plan.to_document()["certificates"]["projectors"]["status"] == "optimal"
+    assert plan.to_document()["coverage"]["target"]["area_m2"] == pytest.approx(
+        0.0048, rel=1e-9
+    )
     # It stands on the side that was chosen.
     assert plan.projectors[0].world_from_device[2, 3] > 0.5
-    assert len(plan.document["regions"]) == 1
+    assert len(plan.to_document()["regions"]) == 1
 
 
 def test_the_plan_says_who_chose_the_target(plan: RigPlan) -> None:
     # The box came in 2 N^2 triangles a side; they were cut, and chosen as before.
     n_faces = int(top_of(plan.surface.mesh).sum())
     assert n_faces > 2 * N * N
-    assert plan.document["surface"]["selection"] == {
+    assert plan.to_document()["surface"]["selection"] == {
         "kind": "faces",
         "source": "ply:painted",
         "sha256": None,
@@ -340,11 +342,13 @@ def test_a_plan_for_a_selection_verifies_and_a_changed_one_does_not(
     plan: RigPlan,
 ) -> None:
     assert verify_plan(plan, seed=5, check_pixels=False).failures == ()
-    surface = plan.document["surface"]
+    surface = plan.to_document()["surface"]
     for key, value in (("n_faces", 31), ("area_m2", 0.0049), ("kind", "mood")):
         spoiled = surface | {"selection": surface["selection"] | {key: value}}
-        document = plan.document | {"surface": spoiled}
-        found = audit_plan(RigPlan(document, plan.surface), n_samples=1000)
+        document = plan.to_document() | {"surface": spoiled}
+        found = audit_plan(
+            RigPlan.from_document(document, plan.surface), n_samples=1000
+        )
         assert [f for f in found.failures if f.startswith(f"surface.selection.{key}")]
 
 

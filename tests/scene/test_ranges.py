@@ -1,6 +1,5 @@
 """Ranges by least squares: points, their sphere, and what isn't known of it."""
 
-import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -399,12 +398,12 @@ def plan(body, with_few_samples, tmp_path_factory):
     with with_few_samples(), pytest.MonkeyPatch.context() as patch:
         patch.setattr("planning.pipeline.slide_routes", noted)
         made = plan_rig(body, load_rig(rig), max_projectors=8, check=False)
-    assert set(spared) == {made.document["ranges"]["guard_rad"]}
+    assert set(spared) == {made.to_document()["ranges"]["guard_rad"]}
     return made
 
 
 def test_the_plan_carries_points_sphere_and_guard(plan, body):
-    entry = plan.document["ranges"]
+    entry = plan.to_document()["ranges"]
     assert len(entry["observations"]) == 42
     assert entry["sphere"]["radius_m"] == body.ball.radius
     assert plan.requirements.target == "surface"
@@ -414,9 +413,9 @@ def test_the_plan_carries_points_sphere_and_guard(plan, body):
     least, most = plan.requirements.workspace.camera_radius_m
     width = 0.1 - 4.0 * body.position_sigma_m
     assert most - least == pytest.approx(width, abs=1e-9)
-    text = "\n".join(summary_lines(plan.document))
+    text = "\n".join(summary_lines(plan.to_document()))
     assert "14 points" in text
-    rows = plan.document["baselines"]
+    rows = plan.to_document()["baselines"]
     assert f"{len(rows)} of {len(rows)} rows" in text
 
 
@@ -424,8 +423,8 @@ def test_rows_keep_two_sigma_of_d_max(plan, body):
     """Against d_max of spheres drawn from the estimate's own covariance."""
     rng = np.random.default_rng(0)
     cameras = {camera.id: camera for camera in plan.cameras}
-    assert plan.document["baselines"]
-    for row in plan.document["baselines"]:
+    assert plan.to_document()["baselines"]
+    for row in plan.to_document()["baselines"]:
         assert row["covered_at_2_sigma"] is True
         assert row["d"] < row["d_max_stated"] - 2.0 * row["d_max_sigma"]
         assert row["d_max_stated"] >= row["d_max"]
@@ -440,7 +439,7 @@ def test_rows_keep_two_sigma_of_d_max(plan, body):
 
 
 def test_d_max_of_a_row_is_that_of_the_incidence_as_stated(plan, body):
-    row = plan.document["baselines"][0]
+    row = plan.to_document()["baselines"][0]
     _, guard = guarded(load_rig("default"), body)
     stated = {"camera.max_incidence": row["iota"][1] + 0.05}
     (found,) = with_spread(
@@ -459,12 +458,12 @@ def test_d_max_of_a_row_is_that_of_the_incidence_as_stated(plan, body):
 
 def audited(plan, document):
     ledger = Ledger(document)
-    audit_ranges(RigPlan(document, plan.surface), ledger)
+    audit_ranges(RigPlan.from_document(document, plan.surface), ledger)
     return ledger.failures
 
 
 def test_the_audit_finds_nothing_in_a_true_plan(plan):
-    assert audited(plan, plan.document) == ()
+    assert audited(plan, plan.to_document()) == ()
 
 
 SPOILED = {
@@ -503,7 +502,7 @@ SPOILED = {
 
 @pytest.mark.parametrize("what", SPOILED)
 def test_the_audit_finds_each_false_claim(plan, what):
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     SPOILED[what](document["ranges"])
     failures = audited(plan, document)
     name = {"position_m": "points.p3", "a little off": "points.p3"}.get(what, what)
@@ -515,7 +514,7 @@ def test_the_audit_finds_each_false_claim(plan, what):
     [("d_max_stated", 1.9), ("d_max_sigma", 1e-3), ("covered_at_2_sigma", False)],
 )
 def test_the_audit_finds_false_rows(plan, name, value):
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     document["baselines"][0][name] = value
     failures = audited(plan, document)
     assert any(name in failure for failure in failures), failures
@@ -524,14 +523,14 @@ def test_the_audit_finds_false_rows(plan, name, value):
 def test_the_audit_finds_a_surface_that_is_not_the_sphere(plan):
     mesh = plan.surface.mesh
     grown = replace(mesh, vertices=mesh.vertices * 1.0001)
-    other = RigPlan(plan.document, replace(plan.surface, mesh=grown))
-    ledger = Ledger(other.document)
+    other = RigPlan.from_document(plan.to_document(), replace(plan.surface, mesh=grown))
+    ledger = Ledger(other.to_document())
     audit_ranges(other, ledger)
     assert any("surface.npz" in failure for failure in ledger.failures)
 
 
 def test_a_plan_of_a_mesh_has_no_such_claims(plan):
-    document = {k: v for k, v in plan.document.items() if k != "ranges"}
+    document = {k: v for k, v in plan.to_document().items() if k != "ranges"}
     assert audited(plan, document) == ()
     assert summary_lines(document) == []
 

@@ -323,7 +323,9 @@ def test_the_zone_that_leaves_no_position_is_named(
 
 
 def test_zones_survive_the_plan_file_and_others_get_no_key(handmade, workspace_of):
-    asked = Requirements.from_document(handmade.build_plan().document["requirements"])
+    asked = Requirements.from_document(
+        handmade.build_plan().to_document()["requirements"]
+    )
     assert not {"box", "keep_out", "mounting"} & set(asked.to_document()["workspace"])
     zoned = replace(asked, workspace=workspace_of(ZONES["both"] + CEILING))
     document = zoned.to_document()
@@ -372,14 +374,16 @@ def test_devices_are_mounted_and_the_audit_agrees(planned):
     moved = planned.projectors[0].world_from_device[:3, 3]
     offered = planned.surface.reference_projectors[:, :3, 3]
     assert np.linalg.norm(offered - moved, axis=1).min() > 1e-3
-    proof = planned.document["certificates"]["projectors"]
+    proof = planned.to_document()["certificates"]["projectors"]
     assert proof["continuous"]["lower_bound"] == proof["count"] == 1
 
 
 def _tampered(plan, change):
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     change(document)
-    return audit_plan(RigPlan(document, plan.surface), n_samples=500).failures
+    return audit_plan(
+        RigPlan.from_document(document, plan.surface), n_samples=500
+    ).failures
 
 
 @pytest.mark.parametrize(

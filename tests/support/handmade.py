@@ -7,8 +7,6 @@ Neither planner nor audit is used. `build_plan` is cached, `make_plan` isn't, `t
 gives a changed copy.
 """
 
-import copy
-import json
 import math
 from collections.abc import Callable
 from functools import cache
@@ -60,22 +58,21 @@ def make_plan(light: str = "diverging", target: str = "dominant") -> RigPlan:
     surface = _surface(light)
     document = _document(light, target, surface)
     _claim(document, surface)
-    # As written: what JSON can't hold must not be in a plan.
-    return RigPlan(json.loads(json.dumps(document, allow_nan=False)), surface)
+    return RigPlan.from_document(document, surface)
 
 
 def tampered(plan: RigPlan, change: Callable[[dict[str, Any]], object]) -> RigPlan:
     """Return a copy of a plan whose document was changed in place by `change`."""
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     change(document)
-    return RigPlan(document, plan.surface)
+    return RigPlan.from_document(document, plan.surface)
 
 
 def save(plan: RigPlan, folder: Any) -> Any:
     """Write a plan into a folder with a true digest; return the path of plan.json."""
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     document["surface"]["sha256"] = plan.surface.sha256()
-    RigPlan(document, plan.surface).save(folder / "plan.json")
+    RigPlan.from_document(document, plan.surface).save(folder / "plan.json")
     return folder / "plan.json"
 
 
@@ -611,11 +608,15 @@ def _claim_regions(
             document["projectors"][row["server"]]["id"] for row, _ in mine if row["lit"]
         }
         whole = sum(weight for _, weight in mine)
+        mean = areas[members] @ surface.mesh.face_normals[members]
         document["regions"].append(
             {
                 "id": number,
                 "area_m2": float(areas[members].sum()),
                 "n_faces": int(members.sum()),
+                "mean_normal": (mean / np.linalg.norm(mean)).tolist(),
+                "cone_angle": 1.0,
+                "mean_curvedness": 20.0,
                 "lit_by": sorted(names),
                 "lit_fraction": sum(weight for row, weight in mine if row["lit"])
                 / whole,
@@ -630,22 +631,18 @@ def _claim_tables(
     document: Any, surface: Surface, area: Any, everything: Any, inside: Any
 ) -> None:
     parts = (("target", inside), ("surface", everything))
-    document["marginal"] = {
-        kind: [
-            {f"n_{kind}": n}
-            | {
-                f"{verb}_{part}_m2": area(
-                    lambda row, n=n, k=key: any(row[k][:n]), within
-                )
-                for part, within in parts
-            }
-            for n in (1, 2)
-        ]
+    document["marginal"] = [
+        {f"n_{kind}": n}
+        | {
+            f"{verb}_{part}_m2": area(lambda row, n=n, k=key: any(row[k][:n]), within)
+            for part, within in parts
+        }
         for kind, verb, key in (
             ("projectors", "lit", "lit_by"),
             ("cameras", "measured", "seen"),
         )
-    }
+        for n in (1, 2)
+    ]
     target, limits = document["coverage"]["target"], document["requirements"]
     document["certificates"] = {
         kind: {
@@ -693,6 +690,7 @@ def _baselines(document: Any, mesh: TriangleMesh) -> list[dict[str, Any]]:
         phi = math.acos((d1 * d1 + d2 * d2 - d * d) / (2 * d1 * d2))
         axial = float((o2 - o1) @ axis)
         one, two = o1 - meeting, o2 - meeting
+        onward = np.cross(np.cross(one, two), normal)
         field, incidence = _slacks(one, two, normal, entries[second], theta)
         before, _ = _slacks(two, one, normal, entries[first], theta)
         limit = phi + min(field, incidence)
@@ -734,6 +732,7 @@ def _baselines(document: Any, mesh: TriangleMesh) -> list[dict[str, Any]]:
                 "delta_surface": 0.0,
                 "shares_border": True,
                 "n_seam": 12,
+                "onward": (onward / np.linalg.norm(onward)).tolist(),
             }
         )
     return rows

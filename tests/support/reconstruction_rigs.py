@@ -8,9 +8,19 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
+from planning.experiments.bare_plan import bare_plan
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
 
+MESH_TABLE = {
+    "path": None,
+    "sha256": None,
+    "unit": "m",
+    "scale_to_m": 1.0,
+    "n_vertices": 3,
+    "n_faces": 1,
+    "area_m2": 1.0,
+}
 CHECK = {
     "max_rms_m": 1e-4,
     "max_p95_m": 3e-4,
@@ -110,7 +120,11 @@ def parallel(
 
 
 def plan_of(
-    mesh: TriangleMesh, projectors: list[dict[str, Any]], cameras: list[dict[str, Any]]
+    mesh: TriangleMesh,
+    projectors: list[dict[str, Any]],
+    cameras: list[dict[str, Any]],
+    check: dict[str, float] = CHECK,
+    **sections: Any,
 ) -> RigPlan:
     """A plan that holds what the check reads, the rest empty."""
     n = len(mesh.faces)
@@ -132,7 +146,7 @@ def plan_of(
         "projector": {"max_incidence": np.pi / 3, "min_tangent_angle": 0.7},
         "camera": {"max_incidence": 1.22, "max_sample_distance_m": None},
         "triangulation": {"min_conditioning": 0.1, "noise_px": 0.1},
-        "check": CHECK,
+        "check": check,
         "workspace": {
             "centre": [0.0, 0.0, 0.0],
             "object_radius_m": mesh.radius,
@@ -147,10 +161,7 @@ def plan_of(
             "reference_ring_radius": 0.2,
         },
     }
-    return RigPlan(
-        {"requirements": requirements, "projectors": projectors, "cameras": cameras},
-        surface,
-    )
+    return bare_plan(requirements, projectors, cameras, surface, **sections)
 
 
 def small_rig(mesh: TriangleMesh, light: str = "diverging", focal: float = 3478.0):

@@ -67,14 +67,14 @@ def lost_to_rings_m2(
 
 def rings_lines(plan: RigPlan) -> list[str]:
     """Return the summary's lines on rings; none for plans that don't speak of them."""
-    entries = plan.document["projectors"]
+    entries = plan.to_document()["projectors"]
     if any(entry.get("ring_shares") is None for entry in entries):
         return []
     lines = [_line(entry) for entry in entries]
     lines += [note for entry in entries for note in _notes(entry)]
-    lost = plan.coverage.get("lost_to_rings_m2", 0.0)
+    lost = plan.to_document()["coverage"].get("lost_to_rings_m2", 0.0)
     if lost > 0.0:
-        share = 100.0 * lost / plan.coverage["target"]["area_m2"]
+        share = 100.0 * lost / plan.to_document()["coverage"]["target"]["area_m2"]
         lines.append(f"{share:.2f} % of the target is measured by even rings only")
     return [f"{'RINGS' if k == 0 else '':<9}{line}" for k, line in enumerate(lines)]
 

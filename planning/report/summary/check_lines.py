@@ -8,9 +8,9 @@ from planning.model.plan import RigPlan
 
 def check_lines(plan: RigPlan) -> str:
     """Return the verdict, errors, completeness, and how far the prediction held."""
-    check = plan.document["reconstruction"]
+    check = plan.to_document()["reconstruction"]
     if check is None:
-        why = "the run was cut" if plan.document["truncated"] else "--no-check"
+        why = "the run was cut" if plan.to_document()["truncated"] else "--no-check"
         return f"\nNOT CHECKED ({why}): no reconstruction from pixels was made"
     if check["n_merged"] == 0:
         return "\nCHECK    FAILED: no point was measured in the rendered pixels"

@@ -39,7 +39,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *_rings(plan),
         _marginal(plan),
         check_lines(plan),
-        *cost_lines(plan.document["cost"]),
+        *cost_lines(plan.to_document()["cost"]),
         *(f"MISSED   {line}" for line in missed),
         *(f"files    {name}" for name in files[:1]),
         *(f"         {name}" for name in files[1:]),
@@ -48,7 +48,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
 
 
 def _head(plan: RigPlan) -> str:
-    document, workspace = plan.document, plan.requirements.workspace
+    document, workspace = plan.to_document(), plan.requirements.workspace
     mesh = document["meshes"][0]
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = (
@@ -195,7 +195,7 @@ def _middle(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
 
 def _proofs(plan: RigPlan) -> str:
     asked = plan.requirements
-    proofs = plan.document["certificates"]
+    proofs = plan.to_document()["certificates"]
     lines = [
         _proof("projector", proofs["projectors"], asked.dominant_coverage, "light"),
         _continuous(proofs["projectors"], _freedom(plan)),
@@ -298,7 +298,7 @@ def _continuous(proof: dict[str, Any], poses: str) -> str:
 
 
 def _coverage(plan: RigPlan) -> str:
-    coverage = plan.coverage
+    coverage = plan.to_document()["coverage"]
     target, surface = coverage["target"], coverage["surface"]
     rows = [
         ("area", "area_m2"),
@@ -324,8 +324,8 @@ def _coverage(plan: RigPlan) -> str:
     left = coverage["uncovered_by_cause"]
     if left:
         lines.append(f"         not measured: {causes_line(left, target['area_m2'])}")
-    idle = {e["id"] for e in plan.document["cameras"] if e["seen_area_m2"] == 0.0}
-    groups = [g for g in plan.document["camera_groups"] if not idle.issuperset(g)]
+    idle = {e["id"] for e in plan.to_document()["cameras"] if e["seen_area_m2"] == 0.0}
+    groups = [g for g in plan.to_document()["camera_groups"] if not idle.issuperset(g)]
     if len(groups) > 1:
         names = ", ".join("{" + " ".join(group) + "}" for group in groups)
         lines.append(
@@ -338,10 +338,10 @@ def _coverage(plan: RigPlan) -> str:
             ("lights", "projectors", "lit_area_m2"),
             ("measures", "cameras", "seen_area_m2"),
         )
-        for entry in plan.document[kind]
+        for entry in plan.to_document()[kind]
         if entry[area] == 0.0
     ]
-    if firing := schedule_line(plan.document):
+    if firing := schedule_line(plan.to_document()):
         lines.append(firing)
     return "\n".join(lines)
 
@@ -352,7 +352,7 @@ def _target_name(plan: RigPlan) -> str:
 
 def _regions(plan: RigPlan) -> str:
     """Return how many regions there are, and what chose their faces."""
-    regions = plan.document["regions"]
+    regions = plan.to_document()["regions"]
     many = f"region{'s' * (len(regions) != 1)}"
     own = _own(plan)
     if own is None:
@@ -366,7 +366,7 @@ def _regions(plan: RigPlan) -> str:
 
 def _own(plan: RigPlan) -> dict[str, Any] | None:
     """Return `surface.selection` if the user made it; older plans have none."""
-    found = plan.document["surface"].get("selection")
+    found = plan.to_document()["surface"].get("selection")
     return None if found is None or found["kind"] == "curvature" else found
 
 
@@ -383,7 +383,7 @@ def _ratio(part: float, whole: float) -> str:
 
 
 def _ranges(plan: RigPlan) -> list[str]:
-    lines = summary_lines(plan.document)
+    lines = summary_lines(plan.to_document())
     return ["\n" + "\n".join(lines)] if lines else []
 
 
@@ -393,8 +393,8 @@ def _rings(plan: RigPlan) -> list[str]:
 
 
 def _marginal(plan: RigPlan) -> str:
-    area = plan.coverage["target"]["area_m2"]
-    rows = plan.document["marginal"]
+    area = plan.to_document()["coverage"]["target"]["area_m2"]
+    rows = plan.to_document()["marginal"]
     lines: list[str] = []
     for kind, key, verb, planned in (
         ("n_projectors", "lit_target_m2", "lit", len(plan.projectors)),

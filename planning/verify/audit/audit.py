@@ -106,7 +106,7 @@ def audit_plan(
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
     _require_whole(plan)
-    ledger = Ledger(plan.document)
+    ledger = Ledger(plan.to_document())
     target = plan.requirements.target
     samples = draw_samples(plan.surface, target, n_samples, seed)
     shadow = Shadow(plan.surface.mesh, threads=threads)

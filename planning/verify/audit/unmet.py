@@ -14,7 +14,7 @@ def unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
     figures apart.
     """
     limits = plan.requirements
-    target = plan.coverage.get("target")
+    target = plan.to_document()["coverage"].get("target")
     areas = target if isinstance(target, dict) else {}
     rules = (
         (

@@ -43,7 +43,7 @@ def defocus_of(plan: RigPlan, role: str) -> Defocus | None:
         plan: With the published figures of its rig.
         role: `projector` or `camera`.
     """
-    device: Mapping[str, Any] = plan.document.get("rig", {}).get(role, {})
+    device: Mapping[str, Any] = plan.to_document().get("rig", {}).get(role, {})
     figures = device.get("figures", {})
     focus, pixel_um = figures.get("focus"), figures.get("pixel_um")
     if not focus or not pixel_um or device.get("K") is None:

@@ -58,7 +58,7 @@ def moved(mesh: TriangleMesh, shift: tuple[float, float, float], scale: float = 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])
 def test_every_limit_agrees_with_the_scalar_loop_point_by_point(handmade, light):
     plan = handmade.build_plan(light)
-    document = plan.document
+    document = plan.to_document()
     samples = draw_samples(plan.surface, "dominant", 1500, seed=9)
     own = recompute(plan, samples, Shadow(plan.surface.mesh, threads=1))
     limits = document["requirements"]

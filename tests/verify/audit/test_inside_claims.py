@@ -112,7 +112,7 @@ def test_target_out_of_reach_is_said_to_lie_inside(
     handmade: Any, kind: str, words: str
 ) -> None:
     plan = handmade.build_plan()
-    document = dict(plan.document)
+    document = dict(plan.to_document())
     target = document["coverage"]["target"] | {"reachable_by_projectors_m2": 1e-4}
     coverage = {"target": target, "unreachable_inside_m2": 12.5e-4}
     document["coverage"] = document["coverage"] | coverage

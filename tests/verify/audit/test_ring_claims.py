@@ -68,14 +68,14 @@ def with_claims(plan: RigPlan, light: str) -> RigPlan:
     claims = SimpleNamespace(
         target_samples=rows.target, measured_by=measured_by(scene, plan.cameras, rows)
     )
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     document["rig"]["rings"] = {"spacing": "curvature"}
     document["projectors"] = with_rings(document["projectors"], scene, devices, stage)
     document["coverage"]["lost_to_rings_m2"] = lost_to_rings_m2(
         scene, devices, stage, claims
     )
     document["members"][0]["coverage"] = document["coverage"]
-    return RigPlan(document, surface)
+    return RigPlan.from_document(document, surface)
 
 
 @pytest.fixture(scope="module", params=LIGHTS)
@@ -93,7 +93,9 @@ def drum(request, handmade):
         steep=np.zeros((len(mesh.faces), 3)),
         member=np.zeros(len(mesh.faces), dtype=np.int64),
     )
-    plan = with_claims(RigPlan(plan.document, surface), request.param)
+    plan = with_claims(
+        RigPlan.from_document(plan.to_document(), surface), request.param
+    )
     samples = draw_samples(surface, "dominant", 4000, 0)
     shadow = Shadow(mesh, threads=1)
     areas = mesh.face_areas
@@ -105,11 +107,11 @@ def drum(request, handmade):
 
 def failures(drum, change=None, seed=0):
     plan, own, shadow, estimator = drum
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     if change is not None:
         change(document)
     ledger = Ledger(document)
-    plan = RigPlan(document, plan.surface)
+    plan = RigPlan.from_document(document, plan.surface)
     audit_rings(plan, own, shadow, estimator, ledger, seed=seed)
     return ledger.failures
 
@@ -117,11 +119,13 @@ def failures(drum, change=None, seed=0):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_what_the_planner_says_of_rings_holds(drum, seed):
     assert failures(drum, seed=seed) == ()
-    rings = [entry["rings"] for entry in drum[0].document["projectors"]]
+    rings = [entry["rings"] for entry in drum[0].to_document()["projectors"]]
     assert all(r["creases"]["length_m"] > 0.01 for r in rings)
     assert all(r["error_p99_m"] > 1e-6 for r in rings)
     light = drum[0].projectors[0].light
-    assert (drum[0].coverage["lost_to_rings_m2"] > 0.0) is (light == "parallel")
+    assert (drum[0].to_document()["coverage"]["lost_to_rings_m2"] > 0.0) is (
+        light == "parallel"
+    )
 
 
 def _rings(*path_and_change):
@@ -160,7 +164,10 @@ def test_a_gap_that_only_a_sliver_has_is_looked_for_before_it_is_called_false(
     drum, place
 ):
     plan, _, shadow, _ = drum
-    light, claims = RingLight(plan, shadow), plan.document["projectors"][1]["rings"]
+    light, claims = (
+        RingLight(plan, shadow),
+        plan.to_document()["projectors"][1]["rings"],
+    )
     lamp, rng = light.lamps[1], np.random.default_rng(0)
     even = float(lamp.radii[-1]) * np.arange(1, claims["n_even"] + 1) / claims["n_even"]
     strikes = random_beam(light, lamp, 0.5 * even[0], rng).strikes
@@ -174,7 +181,7 @@ def test_a_gap_that_only_a_sliver_has_is_looked_for_before_it_is_called_false(
     for factor in (1.0, 1.2 if place == 1 else 0.8):
         rings = copy.deepcopy(claims)
         rings["gap_m"][place] *= factor
-        ledger = Ledger(plan.document)
+        ledger = Ledger(plan.to_document())
         audit_gaps("P2.rings", rings, lamp, even, missed, ledger, light, rng)
         audited.append([f for f in ledger.failures if f"gap_m.{place}" in f])
     assert audited[0] == []

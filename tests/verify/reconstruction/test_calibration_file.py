@@ -33,8 +33,7 @@ def plan(request, rigs) -> RigPlan:
         entry["resolution"] = [320, 240]
     lamp = make("P1", rigs.direction(-30.0, 5.0), 0.055, 6.2e-3)
     body = rigs.bumpy_sphere(0.05, subdivisions=4)
-    plan = rigs.plan_of(body, [lamp], cameras)
-    plan.document["requirements"]["check"] = rigs.CHECK | {"tau_m": 6.2e-3}
+    plan = rigs.plan_of(body, [lamp], cameras, check=rigs.CHECK | {"tau_m": 6.2e-3})
     return plan
 
 
@@ -60,8 +59,8 @@ def moved(rigs, pose: list[list[float]], by_m: list[float], degrees: float):
 
 def measured(rigs, plan: RigPlan) -> dict[str, Any]:
     """All devices millimetres and tenths of degrees off, and another lens."""
-    lamp = plan.document["projectors"][0]["world_from_device"]
-    one, two = (entry["world_from_device"] for entry in plan.document["cameras"])
+    lamp = plan.to_document()["projectors"][0]["world_from_device"]
+    one, two = (entry["world_from_device"] for entry in plan.to_document()["cameras"])
     return {
         "format": "ringrig-calibration",
         "version": 1,

@@ -43,13 +43,17 @@ def test_a_point_in_focus_is_a_disc_elsewhere():
 def test_focus_comes_from_the_rigs_figures(rigs):
     plan = rigs.small_rig(grid(0.1, 0.1, divisions=(2, 2)))
     assert defocus_of(plan, "projector") is None
-    known = RigPlan(plan.document | figures("projector"), plan.surface)
+    known = RigPlan.from_document(
+        plan.to_document() | figures("projector"), plan.surface
+    )
     lens = defocus_of(known, "projector")
     assert lens.focus_m == pytest.approx(1.2)
     assert lens.aperture_m == pytest.approx(0.0192 / 1.6)
     assert defocus_of(known, "camera") is None
     for changes in ({"K": None}, {"figures": {"pixel_um": 12.5}}):
-        beam = RigPlan(plan.document | figures("projector", **changes), plan.surface)
+        beam = RigPlan.from_document(
+            plan.to_document() | figures("projector", **changes), plan.surface
+        )
         assert defocus_of(beam, "projector") is None
 
 
@@ -97,7 +101,7 @@ def test_the_check_focuses_what_really_stands_there(rigs):
     ball = rigs.bumpy_sphere(0.05, subdivisions=4)
     plan = rigs.small_rig(ball)
     near = figures("projector")["rig"] | figures("camera")["rig"]
-    blurred = RigPlan(plan.document | {"rig": near}, plan.surface)
+    blurred = RigPlan.from_document(plan.to_document() | {"rig": near}, plan.surface)
     sharp, soft = (
         reconstruct_plan(one, seed=0, truth=one).merged for one in (plan, blurred)
     )

@@ -1,6 +1,5 @@
 """Failures that no displaced device explains: each is named for what it is."""
 
-import copy
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -43,9 +42,9 @@ def claims(rigs, plan) -> dict[str, Any]:
 
 
 def changed(plan: RigPlan, change: Callable[[dict[str, Any]], object]) -> RigPlan:
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     change(document)
-    return RigPlan(document, plan.surface)
+    return RigPlan.from_document(document, plan.surface)
 
 
 def failures(plan: RigPlan, claims: dict[str, Any], truth: RigPlan | None = None):
@@ -151,7 +150,9 @@ def test_a_hidden_region_is_named_with_its_share(plan, claims):
     """Faces with x > 0.02 are region 7, which C3 sees best; and C3 is off."""
     mesh = plan.surface.mesh
     region = np.where(mesh.face_centroids[:, 0] > 0.02, 7, 0)
-    marked = RigPlan(plan.document, replace(plan.surface, region=region))
+    marked = RigPlan.from_document(
+        plan.to_document(), replace(plan.surface, region=region)
+    )
     truth = changed(plan, lambda d: d["cameras"].pop(2))
     samples = claims["samples"]
     found = failures(marked, claims, truth)

@@ -1,6 +1,5 @@
 """The whole check: a sound plan passes, a rig that differs fails with a cause."""
 
-import copy
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -69,10 +68,10 @@ def changed(
     change: Callable[[dict[str, Any]], object],
     mesh: TriangleMesh | None = None,
 ) -> RigPlan:
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     change(document)
     surface = plan.surface if mesh is None else replace(plan.surface, mesh=mesh)
-    return RigPlan(document, surface)
+    return RigPlan.from_document(document, surface)
 
 
 def test_a_sound_plan_passes(check):
@@ -251,12 +250,15 @@ def test_two_equal_cameras_have_noise_of_their_own(rigs, one_light):
 def test_samples_outside_the_target_are_left_aside(rigs, one_light, samples, ball):
     """Claims about the back would fail, but the target is the front."""
     front = ball.face_centroids[:, 1] < 0.0
-    document = copy.deepcopy(one_light.document)
+    document = one_light.to_document()
     document["requirements"]["target"] = "dominant"
     surface = replace(one_light.surface, region=np.where(front, 0, -1))
     claimed = rigs.predict_on_sphere(one_light, samples) | (samples.normals[:, 1] > 0.8)
     result = reconstruct_plan(
-        RigPlan(document, surface), seed=0, samples=samples, predicted=claimed
+        RigPlan.from_document(document, surface),
+        seed=0,
+        samples=samples,
+        predicted=claimed,
     )
     assert result.passed, result.failures
     assert len(result.completeness.missing) == np.count_nonzero(front[samples.faces])
@@ -377,11 +379,11 @@ def housed(document: dict[str, Any], owner: str, before: str) -> None:
 def test_bodies_of_others_stop_light_and_views(rigs, owner, before, dark):
     ball = sphere(0.04, subdivisions=3)
     rig = rigs.small_rig(ball, focal=700.0)
-    document = copy.deepcopy(rig.document)
+    document = rig.to_document()
     document["projectors"] = document["projectors"][:1]
     document["cameras"] = document["cameras"][:2]
     housed(document, owner, before)
-    found = reconstruct_plan(RigPlan(document, rig.surface), seed=0)
+    found = reconstruct_plan(RigPlan.from_document(document, rig.surface), seed=0)
     points = {pair.camera: pair.n_points for pair in found.pairs}
     assert {name for name, n in points.items() if n == 0} == dark
     assert all(n > 200 for name, n in points.items() if name not in dark)

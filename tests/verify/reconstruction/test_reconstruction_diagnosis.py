@@ -4,7 +4,6 @@ No image is rendered: points of the surface are imaged by the rig that really st
 there, and labelled with the ring coordinate at which it lights them.
 """
 
-import copy
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -46,10 +45,10 @@ def changed(
     change: Callable[[dict[str, Any]], object],
     mesh: TriangleMesh | None = None,
 ) -> RigPlan:
-    document = copy.deepcopy(plan.document)
+    document = plan.to_document()
     change(document)
     surface = plan.surface if mesh is None else replace(plan.surface, mesh=mesh)
-    return RigPlan(document, surface)
+    return RigPlan.from_document(document, surface)
 
 
 def edges(plan: RigPlan, truth: RigPlan, *, outliers: float = 0.03) -> Evidence:

@@ -24,7 +24,7 @@ def audit_baselines(plan: RigPlan, ledger: Ledger) -> None:
     """Recompute each row from the poses and its E; a pair has both orders."""
     cameras = {camera.id: camera for camera in plan.cameras}
     seen: set[tuple[str, str]] = set()
-    for place, row in enumerate(entries(plan.document["baselines"])):
+    for place, row in enumerate(entries(plan.to_document()["baselines"])):
         names = row.get("cameras")
         named = list(names) if isinstance(names, list) else []
         if len(set(named)) != 2 or not set(named) <= set(cameras):

@@ -26,7 +26,7 @@ _LENGTH_M = 1e-9
 
 def audit_ranges(plan: RigPlan, ledger: Ledger) -> None:
     """Check `ranges` and what follows from it; a plan of a mesh has none."""
-    claimed = plan.document.get("ranges")
+    claimed = plan.to_document().get("ranges")
     if claimed is None:
         return
     try:

@@ -22,7 +22,7 @@ _KINK = 2e-5
 def audit_range_rows(plan: RigPlan, claimed: Mapping[str, Any], ledger: Ledger) -> None:
     """Recompute d_max at the stated limits, its sigma, and the verdict of each row."""
     cameras = {camera.id: camera for camera in plan.cameras}
-    for row in entries(plan.document["baselines"]):
+    for row in entries(plan.to_document()["baselines"]):
         one, two = row["cameras"]
         section = Section(
             cameras[one],

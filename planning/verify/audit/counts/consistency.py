@@ -99,7 +99,7 @@ def _audit_rings(plan: RigPlan, ledger: Ledger) -> None:
 
 
 def _audit_scales(plan: RigPlan, ledger: Ledger) -> None:
-    for place, mesh in enumerate(entries(plan.document["meshes"])):
+    for place, mesh in enumerate(entries(plan.to_document()["meshes"])):
         key = f"meshes.{place}.scale_to_m"
         unit, scale = mesh.get("unit"), as_number(mesh.get("scale_to_m"))
         if scale is None or not scale > 0.0:
@@ -117,7 +117,7 @@ def _audit_scales(plan: RigPlan, ledger: Ledger) -> None:
 
 def _audit_cost(plan: RigPlan, ledger: Ledger) -> None:
     """Eq. (8): C = pixels (t1 + t2) + t3 + t4 + t5, from the entry's own times."""
-    cost = plan.document.get("cost")
+    cost = plan.to_document().get("cost")
     if not ledger.holds(isinstance(cost, dict), "cost", "is missing"):
         return
     assert isinstance(cost, dict)

@@ -108,7 +108,7 @@ def _audit_column(
 
 def audit_rest(plan: RigPlan, ledger: Ledger) -> None:
     """Check the dominant share, the mesh areas, and members of a single mesh."""
-    document, surface = plan.document, plan.surface
+    document, surface = plan.to_document(), plan.surface
     share = float(
         surface.mesh.face_areas[surface.in_dominant].sum() / surface.mesh.area
     )

@@ -115,10 +115,10 @@ def audit_contributions(
     """Check lit_area_m2, seen_area_m2 and sole_area_m2 of every device."""
     target, whole = own.samples.in_target, estimator.target_m2
     claims: list[tuple[str, Any, NDArray[np.bool_]]] = []
-    for row, entry in enumerate(plan.document["projectors"]):
+    for row, entry in enumerate(plan.to_document()["projectors"]):
         key = f"{entry['id']}.lit_area_m2"
         claims.append((key, entry.get("lit_area_m2"), own.lit_by[row]))
-    for row, entry in enumerate(plan.document["cameras"]):
+    for row, entry in enumerate(plan.to_document()["cameras"]):
         seen = own.measured_by[row]
         others = np.any(np.delete(own.measured_by, row, axis=0), axis=0)
         key = f"{entry['id']}.seen_area_m2"

@@ -32,7 +32,7 @@ def audit_margins(
     centroids = samples_at_centroids(plan.surface, within)
     _, at_centroids = light_only(plan, centroids, shadow)
     target = own.samples.in_target
-    for row, entry in enumerate(plan.document["projectors"]):
+    for row, entry in enumerate(plan.to_document()["projectors"]):
         both = np.concatenate([own.margins[row, target], at_centroids[row]])
         served = own.margins[row, target & (own.server == row)]
         key = f"{entry['id']}.min_margin_rad"

@@ -30,7 +30,7 @@ def audit_regions(
     centroids = samples_at_centroids(plan.surface, plan.surface.in_dominant)
     able = _able(plan, centroids, shadow)
     numbers = {int(number) for number in centroids.region}
-    listed = _listed(plan.document["regions"])
+    listed = _listed(plan.to_document()["regions"])
     ledger.holds(
         set(listed) == numbers,
         "regions",

@@ -21,7 +21,7 @@ _POSITION_M = 2e-5
 
 def audit_devices(plan: RigPlan, ledger: Ledger) -> None:
     """Check ids, poses, ring frames and models of the devices, and their number."""
-    document, limits = plan.document, plan.requirements
+    document, limits = plan.to_document(), plan.requirements
     for kind, entries, most in (
         ("projectors", document["projectors"], limits.max_projectors),
         ("cameras", document["cameras"], limits.max_cameras),

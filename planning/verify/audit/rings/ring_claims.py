@@ -67,7 +67,7 @@ def audit_rings(
         ledger: Takes the false claims.
         seed: Of the rays.
     """
-    entries = plan.document["projectors"]
+    entries = plan.to_document()["projectors"]
     spoken = [key in e for e in entries for key in ("rings", "ring_shares")]
     lost = ledger.read("coverage", "lost_to_rings_m2")
     if lost is None and not any(spoken):
@@ -83,7 +83,7 @@ def audit_rings(
         every_even.append(lamp.radii)
         if not isinstance(rings, dict):
             ledger.holds(
-                rings is None and plan.document["truncated"], key, "is missing"
+                rings is None and plan.to_document()["truncated"], key, "is missing"
             )
             continue
         even = audit_spacing(key, rings, lamp, wish, ledger)

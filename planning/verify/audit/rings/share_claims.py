@@ -46,7 +46,7 @@ def audit_ring_shares(
         ledger: Takes the false claims.
     """
     rng = np.random.default_rng((seed, _RAYS))
-    for entry, lamp in zip(plan.document["projectors"], light.lamps, strict=True):
+    for entry, lamp in zip(plan.to_document()["projectors"], light.lamps, strict=True):
         claims = entry.get("ring_shares")
         key = f"{entry['id']}.ring_shares"
         if not ledger.holds(isinstance(claims, dict), key, "is missing"):

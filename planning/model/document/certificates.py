@@ -1,0 +1,133 @@
+"""`certificates`: what was proved of the numbers of devices, and over what."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from .part import Part
+
+
+class CandidateBound(Part):
+    """Least number among the candidate poses."""
+
+    lower_bound: int
+    n_candidates: int
+    proof: str = ""
+
+
+class ContinuousProof(Part):
+    """What was proved over all poses of the workspace.
+
+    Attributes:
+        occlusion: Whether shadows took part.
+        n_samples: Samples that the bound speaks of.
+        n_reached: Those of them that some candidate covers.
+        one_fewer_upper_bound_m2: Most area that one device fewer covers, from any
+            poses; None: not known.
+    """
+
+    lower_bound: int
+    status: str
+    proof: str
+    occlusion: bool
+    n_samples: int
+    n_reached: int
+    n_cells: int
+    one_fewer_upper_bound_m2: float | None
+
+
+class NeededCount(Part):
+    """How many devices the requirement takes, allowed or not.
+
+    Attributes:
+        count: Of the smallest cover that was found.
+        lower_bound: Proven least number.
+        wider_field: Field with which the devices that are allowed would be enough.
+        relaxations: Single changes with which they would be.
+    """
+
+    count: int
+    lower_bound: int
+    wider_field: str | None = None
+    relaxations: tuple[str, ...] = ()
+
+
+class CountArea(Part):
+    """What so many candidates cover: found, and at most."""
+
+    count: int
+    value_m2: float
+    upper_bound_m2: float
+
+
+class BestArea(Part):
+    """What as many candidates as planned cover: found, and at most."""
+
+    value_m2: float
+    upper_bound_m2: float
+    scope: str = "candidates"
+
+
+class OneFewer(Part):
+    """What one device fewer covers at most."""
+
+    upper_bound_m2: float
+    scope: str = "candidates"
+
+
+class RouteCounts(Part):
+    """Cameras by either route, and which was taken; None: it has no answer."""
+
+    asked: Literal["cover", "paper", "both"]
+    cover: int | None
+    paper: int | None
+    taken: Literal["cover", "paper"]
+    why: str
+
+
+class Certificate(Part):
+    """What was proved of the projectors, or of the cameras given the projectors.
+
+    Attributes:
+        count: Devices of the plan.
+        required_m2: Area that must be covered.
+        n_samples: Samples that the cover was solved on.
+        continuous: Over all poses; None: nothing was proved.
+        greedy_count: Candidates that the greedy cover takes.
+        one_fewer: None: all of them stand already.
+        given: Existing devices, which the bounds count.
+        but_for_bodies: How many would do if bodies took no room.
+        bounds_leave_out: What the bounds know nothing of.
+        excluded_pairs: Pairs of candidate and sample by the first limit that they fail.
+        n_regions: Regions of the target.
+    """
+
+    count: int
+    status: Literal["optimal", "feasible", "infeasible"]
+    required_m2: float
+    n_samples: int
+    candidates: CandidateBound
+    continuous: ContinuousProof | None
+    greedy_count: int
+    needed: NeededCount
+    by_count: tuple[CountArea, ...] = ()
+    best_area: BestArea
+    one_fewer: OneFewer | None
+    given: int = 0
+    but_for_bodies: int = 0
+    bounds_leave_out: str = ""
+    excluded_pairs: dict[str, int] = Field(default={})
+    n_regions: int = 0
+    routes: RouteCounts | None = None
+
+    @property
+    def too_few(self) -> bool:
+        """Whether fewer devices are allowed than the requirement takes."""
+        return self.needed.count > self.count
+
+
+class Certificates(Part):
+    """The two certificates of a plan."""
+
+    projectors: Certificate
+    cameras: Certificate

@@ -1,0 +1,199 @@
+"""`projectors` and `cameras` of a plan file."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator
+
+from geometry.devices import ParallelModel, PinholeModel
+from planning.model.bodies import Body
+from planning.model.planned import PlannedCamera, PlannedProjector
+
+from .part import Interval, Matrix3, Part, Pose, Resolution
+
+
+class CreasesRecord(Part):
+    """Creases that a projector lights: their length and what rings cut off them."""
+
+    length_m: float
+    max_slope_jump: float
+    max_error_m: float
+
+
+class RingsRecord(Part):
+    """How the rings of a projector are spaced; gaps h and errors in [m].
+
+    Attributes:
+        kept_even: Whether they stay even since others would lose measured samples.
+        n_even: How many evenly spaced rings there were.
+        gap_m: Least and largest gap on the object; None: no ring lands on it.
+        error_tolerance_m: Error between rings that is accepted.
+        over_tolerance: Share of the target that strays by more.
+        limits_cross: Share that would even with rings as fine as can be told apart.
+    """
+
+    spacing: Literal["uniform", "curvature"]
+    kept_even: bool
+    n_even: int
+    gap_m: Interval | None
+    error_tolerance_m: float
+    error_p99_m: float | None
+    error_p99_even_m: float | None
+    over_tolerance: float
+    limits_cross: float
+    creases: CreasesRecord
+
+
+class RingSharesRecord(Part):
+    """What becomes of each ring: shares of its azimuth, one number a ring."""
+
+    drawn: tuple[float, ...]
+    on_object: tuple[float, ...]
+    on_target: tuple[float, ...]
+    measured: tuple[float, ...]
+
+
+def _are_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
+    if len(radii) < 2 or not np.all(np.diff(radii, prepend=0.0) > 0):
+        raise ValueError("must be 2 or more, rising from 0")
+    return radii
+
+
+class ProjectorRecord(Part):
+    """One of `projectors`; areas are of the target.
+
+    Attributes:
+        K: Camera matrix in [px], diverging light.
+        pixel_pitch_m: Side of a pixel of the panel, parallel light.
+        min_margin_rad: Least margin over the samples assigned to it; None: none are.
+        lit_area_m2: Area that it lights.
+        rings: None: the run was cut before they were spaced.
+    """
+
+    id: str
+    light: Literal["diverging", "parallel"]
+    world_from_device: Pose
+    world_from_ring: Pose
+    K: Matrix3 | None
+    resolution: Resolution
+    pixel_pitch_m: float | None
+    range_m: Interval
+    beam_radius: float | None
+    ring_radii: Annotated[tuple[float, ...], AfterValidator(_are_radii)]
+    min_margin_rad: float | None
+    lit_area_m2: float
+    body: Body | None = None
+    existing: bool = False
+    name: str = ""
+    rings: RingsRecord | None = None
+    ring_shares: RingSharesRecord | None = None
+
+    def planned(self) -> PlannedProjector:
+        """Return the projector.
+
+        Raises:
+            ValueError: If its optics are none.
+        """
+        return PlannedProjector(
+            self.id,
+            self.light,
+            np.array(self.world_from_device),
+            np.array(self.world_from_ring),
+            self._device(),
+            np.array(self.ring_radii),
+            self.name if self.existing else "",
+            self.body,
+        )
+
+    def _device(self) -> PinholeModel | ParallelModel:
+        if self.light == "diverging":
+            matrix = np.array(self.K, dtype=np.float64)
+            return PinholeModel(matrix, self.resolution, self.range_m)
+        if self.pixel_pitch_m is None:
+            raise ValueError("pixel_pitch_m is missing, parallel light needs it")
+        return ParallelModel(
+            self.resolution, self.pixel_pitch_m, self.range_m, self.beam_radius
+        )
+
+
+class CameraRecord(Part):
+    """One of `cameras`; areas are of the target.
+
+    Attributes:
+        K: Camera matrix in [px].
+        distortion: k1, k2, p1, p2, k3.
+        seen_area_m2: Area that it measures.
+        sole_area_m2: Area that no other camera measures.
+    """
+
+    id: str
+    world_from_device: Pose
+    K: Matrix3
+    distortion: tuple[float, float, float, float, float]
+    resolution: Resolution
+    range_m: Interval
+    seen_area_m2: float
+    sole_area_m2: float
+    body: Body | None = None
+    existing: bool = False
+    name: str = ""
+
+    def planned(self) -> PlannedCamera:
+        """Return the camera.
+
+        Raises:
+            ValueError: If its optics are none.
+        """
+        device = PinholeModel(
+            np.array(self.K), self.resolution, self.range_m, self.distortion
+        )
+        pose = np.array(self.world_from_device)
+        existing = self.name if self.existing else ""
+        return PlannedCamera(self.id, pose, device, existing, self.body)
+
+
+def projector_record(
+    projector: PlannedProjector, *, min_margin_rad: float | None, lit_area_m2: float
+) -> ProjectorRecord:
+    """Return a projector with its claims as the file holds it."""
+    device = projector.device
+    pinhole = isinstance(device, PinholeModel)
+    return ProjectorRecord(
+        id=projector.id,
+        light=projector.light,
+        world_from_device=projector.world_from_device.tolist(),
+        world_from_ring=projector.world_from_ring.tolist(),
+        K=device.camera_matrix.tolist() if pinhole else None,
+        resolution=device.resolution,
+        pixel_pitch_m=None if pinhole else device.pixel_pitch_m,
+        range_m=device.range_m,
+        beam_radius=None if pinhole else device.beam_radius,
+        ring_radii=tuple(projector.ring_radii.tolist()),
+        min_margin_rad=min_margin_rad,
+        lit_area_m2=lit_area_m2,
+        **_where_known(projector),
+    )
+
+
+def camera_record(
+    camera: PlannedCamera, *, seen_area_m2: float, sole_area_m2: float
+) -> CameraRecord:
+    """Return a camera with its claims as the file holds it."""
+    return CameraRecord(
+        id=camera.id,
+        world_from_device=camera.world_from_device.tolist(),
+        K=camera.device.camera_matrix.tolist(),
+        distortion=camera.device.distortion,
+        resolution=camera.device.resolution,
+        range_m=camera.device.range_m,
+        seen_area_m2=seen_area_m2,
+        sole_area_m2=sole_area_m2,
+        **_where_known(camera),
+    )
+
+
+def _where_known(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:
+    """Body, and name of an existing device; no key where there is none."""
+    body = {} if device.body is None else {"body": device.body}
+    name = {"existing": True, "name": device.existing} if device.existing else {}
+    return body | name

@@ -1,0 +1,110 @@
+"""What a plan was made from: `meshes`, `surface` and `rig`."""
+
+from typing import Any
+
+from pydantic import Field
+
+from planning.model.bodies import Body
+
+from .part import Interval, Matrix3, Part, Resolution
+
+
+class Units(Part):
+    """Of every figure that doesn't name its own."""
+
+    length: str
+    angle: str
+
+
+class Repair(Part):
+    """What was repaired, and how often."""
+
+    kind: str
+    count: int
+
+
+class ShellRecord(Part):
+    """What kind of body a mesh is: `solid`, `hollow shell` and so on."""
+
+    kind: str
+    wall_m: float | None = None
+    mean_wall_m: float | None = None
+    inside_m2: float = 0.0
+    sealed_m2: float = 0.0
+
+
+class MeshRecord(Part):
+    """A mesh as it was read; None where it came from no file."""
+
+    path: str | None
+    sha256: str | None
+    unit: str
+    scale_to_m: float
+    n_vertices: int
+    n_faces: int
+    area_m2: float
+    repairs: tuple[Repair, ...] = ()
+    shell: ShellRecord = ShellRecord(kind="solid")
+
+
+class SelectionRecord(Part):
+    """What the faces of the regions were chosen by.
+
+    Attributes:
+        kind: `curvature`, or what the user gave.
+        n_removed_by_repair: Chosen faces that repair took away.
+    """
+
+    kind: str
+    source: str | None
+    sha256: str | None
+    n_faces: int
+    area_m2: float
+    n_removed_by_repair: int
+
+
+class SurfaceRecord(Part):
+    """The file of the surface as planned."""
+
+    path: str
+    sha256: str
+    curvature_radius_m: float
+    dominant_share: float
+    selection: SelectionRecord | None = None
+
+
+class ModelRecord(Part):
+    """A device model of the rig: optics, figures as written, and their sources."""
+
+    name: str = ""
+    K: Matrix3 | None
+    resolution: Resolution
+    distortion: tuple[float, ...] | None = None
+    range_m: Interval
+    pixel_pitch_m: float | None = None
+    beam_radius: float | None = None
+    figures: dict[str, Any] = Field(default={})
+    sources: dict[str, str] = Field(default={})
+    body: Body | None = None
+    light: str = ""
+
+
+class RigRecord(Part):
+    """The resolved rig; tables whose keys end in _mm or _deg are as in its file."""
+
+    name: str = ""
+    description: str = ""
+    light: str
+    projector: ModelRecord
+    camera: ModelRecord
+    standoff_m: float | None = None
+    standoff_play_m: float | None = None
+    n_candidate_projectors: int | None = None
+    n_candidate_cameras: int | None = None
+    rings: dict[str, Any] = Field(default={})
+    workspace: dict[str, Any] = Field(default={})
+    limits: dict[str, float | None] = Field(default={})
+    requirements: dict[str, float] = Field(default={})
+    check: dict[str, float] = Field(default={})
+    notes: tuple[str, ...] = ()
+    existing: tuple[dict[str, Any], ...] = ()

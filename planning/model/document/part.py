@@ -1,0 +1,46 @@
+"""What every part of a plan file is: frozen, and written with the keys it was given.
+
+Fields stand in the order in which they are written. A field with a default may be
+absent from a file, and is then absent from the file that is written again.
+"""
+
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict
+
+Vector3 = tuple[float, float, float]
+Interval = tuple[float, float]
+Resolution = tuple[int, int]
+Matrix3 = tuple[Vector3, Vector3, Vector3]
+Row4 = tuple[float, float, float, float]
+
+
+class Part(BaseModel):
+    """A part of a plan file; keys that aren't known are kept and not looked at."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return fresh plain JSON values, with the keys that were given."""
+        return self.model_dump(mode="json", exclude_unset=True)
+
+    def changed(self, **values: object) -> Self:
+        """Return a copy with other values, validated.
+
+        Raises:
+            ValueError: If a value isn't of its field's type.
+        """
+        present = {name: getattr(self, name) for name in self.model_fields_set}
+        return type(self)(**(present | values))
+
+
+def _is_pose(rows: tuple[Row4, Row4, Row4, Row4]) -> tuple[Row4, Row4, Row4, Row4]:
+    turn = np.array(rows)[:3, :3]
+    if not np.allclose(turn.T @ turn, np.eye(3), atol=1e-6) or np.linalg.det(turn) < 0:
+        raise ValueError("must hold a rotation")
+    return rows
+
+
+# b_from_a, rows of a 4 x 4 matrix; its last column in [m].
+Pose = Annotated[tuple[Row4, Row4, Row4, Row4], AfterValidator(_is_pose)]

@@ -1,0 +1,93 @@
+"""The whole plan file, format `ringrig-plan`, version 1."""
+
+from typing import Any, Literal, Self
+
+from pydantic import field_serializer
+
+from planning.model.requirements import Requirements
+
+from .baseline_records import BaselineRow
+from .certificates import Certificates
+from .check_records import ReconstructionRecord
+from .coverage_records import (
+    CameraMarginal,
+    Coverage,
+    ExposureSchedule,
+    Overlap,
+    ProjectorMarginal,
+    RegionRecord,
+)
+from .device_records import CameraRecord, ProjectorRecord
+from .input_records import MeshRecord, RigRecord, SurfaceRecord, Units
+from .part import Part
+from .range_records import RangesRecord
+
+FORMAT = "ringrig-plan"
+VERSION = 1
+
+
+class CostRecord(Part):
+    """Eq. (8); `docs/cost.md` defines every key. None where no check was made."""
+
+    pixels: int
+    n_cameras_before: int
+    t4: float
+    t5: float
+    t1: float | None
+    t2: float | None
+    t3: float | None
+    C: float | None
+    C_before: float | None
+
+
+class MemberRecord(Part):
+    """What the plan does for one of its meshes."""
+
+    mesh: int
+    coverage: Coverage
+    regions: tuple[int, ...]
+    reconstruction: ReconstructionRecord | None = None
+
+
+class PlanDocument(Part):
+    """A plan as it is written; metres, radians, and pixels where named."""
+
+    format: Literal["ringrig-plan"]
+    version: Literal[1]
+    units: Units
+    seed: int
+    created: str
+    command: tuple[str, ...]
+    truncated: bool
+    meshes: tuple[MeshRecord, ...]
+    surface: SurfaceRecord
+    rig: RigRecord
+    requirements: Requirements
+    regions: tuple[RegionRecord, ...]
+    projectors: tuple[ProjectorRecord, ...]
+    cameras: tuple[CameraRecord, ...]
+    coverage: Coverage
+    overlaps: tuple[Overlap, ...] = ()
+    firing_schedule: ExposureSchedule | None = None
+    marginal: tuple[ProjectorMarginal | CameraMarginal, ...]
+    certificates: Certificates
+    baselines: tuple[BaselineRow, ...]
+    ranges: RangesRecord | None = None
+    camera_groups: tuple[tuple[str, ...], ...] = ()
+    cost: CostRecord
+    members: tuple[MemberRecord, ...]
+    reconstruction: ReconstructionRecord | None
+    timings_s: dict[str, float]
+
+    @field_serializer("requirements")
+    def _write_requirements(self, requirements: Requirements) -> dict[str, Any]:
+        return requirements.to_document()
+
+    @classmethod
+    def read(cls, text: str | bytes) -> Self:
+        """Read the text of a plan file; nothing is converted.
+
+        Raises:
+            ValueError: If anything is missing or of another type.
+        """
+        return cls.model_validate_json(text, strict=True)
