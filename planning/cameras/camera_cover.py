@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
@@ -98,7 +98,7 @@ class CameraStage:
     rows: LitSamples
     measured: NDArray[np.bool_]
     by_count: dict[int, tuple[PlannedCamera, ...]]
-    certificate: dict[str, Any]
+    certificate: Certificate
     routes: Routes | None = None
 
     @property
@@ -238,6 +238,16 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
         n = len(cover.selection.chosen)
         others = resolve_others(cover.crowd, candidate, others, n)
     target, candidates = cover.rows.target, cover.offered.cameras
+    proof = certificate(
+        cover.selection,
+        others,
+        n_rows=len(target),
+        row_area_m2=target.samples.weight,
+        n_candidates=len(candidates),
+        given=given,
+    )
+    if bodied:
+        proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
     return CameraStage(
         cover.cameras,
         cover.offered,
@@ -247,15 +257,7 @@ def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
             number: tuple(candidates[i] for i in chosen)
             for number, chosen in others.by_count.items()
         },
-        certificate(
-            cover.selection,
-            others,
-            n_rows=len(target),
-            row_area_m2=target.samples.weight,
-            n_candidates=len(candidates),
-            given=given,
-        )
-        | ({"bounds_leave_out": BODIES_LEFT_OUT} if bodied else {}),
+        proof,
     )
 
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from planning.model.document.certificates import Certificate
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
@@ -175,7 +175,7 @@ def follow_cameras(
     return CameraSolution(tuple(projectors), stage)
 
 
-def proves_as_much(new: Selection, old: dict[str, Any], count: int) -> bool:
+def proves_as_much(new: Selection, old: Certificate, count: int) -> bool:
     """Return whether a selection takes so many cameras, met and bounded no worse.
 
     Args:
@@ -186,8 +186,8 @@ def proves_as_much(new: Selection, old: dict[str, Any], count: int) -> bool:
     taken = len(new.chosen)
     return (
         taken == count
-        and new.status in (old["status"], "optimal")
-        and min(new.lower_bound, taken) >= old["candidates"]["lower_bound"]
+        and new.status in (old.status, "optimal")
+        and min(new.lower_bound, taken) >= old.candidates.lower_bound
     )
 
 

@@ -1,8 +1,9 @@
 """What the two routes to the cameras found, and which was taken."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
+from planning.model.document.certificates import RouteCounts
 from planning.model.planned import PlannedCamera
 
 CamerasBy = Literal["cover", "paper", "both"]
@@ -29,17 +30,12 @@ class Routes:
     why: str
     rival: tuple[PlannedCamera, ...] = ()
 
-    def entry(self) -> dict[str, Any]:
+    def counts(self) -> RouteCounts:
         """Return the plan's `routes` of the cameras' certificate."""
-        return {
-            "asked": self.asked,
-            "cover": self.cover,
-            "paper": self.paper,
-            "taken": self.taken,
-            "why": self.why,
-        }
-
-
-def routes_entry(routes: Routes | None) -> dict[str, Any]:
-    """Return what the cameras' certificate gains; nothing where no route was told."""
-    return {} if routes is None else {"routes": routes.entry()}
+        return RouteCounts(
+            asked=self.asked,
+            cover=self.cover,
+            paper=self.paper,
+            taken=self.taken,
+            why=self.why,
+        )

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
 from planning.proofs.conflicts import (
@@ -101,7 +101,7 @@ class ProjectorStage:
     rows: Target
     stages: NDArray[np.int8]
     by_count: dict[int, tuple[PlannedProjector, ...]]
-    certificate: dict[str, Any]
+    certificate: Certificate
     most_area: tuple[PlannedProjector, ...]
 
 
@@ -267,7 +267,7 @@ def with_more(
     """
     lit = lit_stages(scene, more, stage.rows)
     stages = np.concatenate([stage.stages, lit], axis=1)
-    before = stage.certificate["needed"]["count"]
+    before = stage.certificate.needed.count
     # Mostly they save none, and nothing is spent on which cover most.
     if fewest_count(_cover(scene, stages)) >= before:
         return stage
@@ -275,7 +275,7 @@ def with_more(
     every = stage.reference + more
     found = _stage(scene, every, stage.rows, stages, selection, selection.chosen)
     # Bodies in each other's way may cost what fewer would have saved.
-    return found if found.certificate["needed"]["count"] < before else stage
+    return found if found.certificate.needed.count < before else stage
 
 
 def _good_cover(scene: Scene, stages: NDArray[np.int8]) -> NDArray[np.int64]:
@@ -323,13 +323,15 @@ def _stage(
         given=given,
     )
     if crowd.bodied:
-        proof["bounds_leave_out"] = BODIES_LEFT_OUT
-    proof["excluded_pairs"] = {
-        cause: int((stages == index).sum())
-        for index, cause in enumerate(projector_limits.CAUSES)
-        if index != projector_limits.BLOCKED or scene.standing
-    }
-    proof["n_regions"] = int(scene.region.max()) + 1
+        proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
+    proof = proof.changed(
+        excluded_pairs={
+            cause: int((stages == index).sum())
+            for index, cause in enumerate(projector_limits.CAUSES)
+            if index != projector_limits.BLOCKED or scene.standing
+        },
+        n_regions=int(scene.region.max()) + 1,
+    )
     return ProjectorStage(
         tuple(candidates[i] for i in selection.chosen),
         candidates,

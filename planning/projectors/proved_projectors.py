@@ -38,7 +38,7 @@ def prove_fewest(
         ring_offset: Of candidates, as `projector_candidates` takes it.
     """
     workspace = scene.requirements.workspace
-    while stage.certificate["needed"]["count"] > stage.certificate.get("given", 0):
+    while stage.certificate.needed.count > stage.certificate.given:
         bound = _bound_of(scene, stage, template, effort)
         found = projectors_towards(
             template,
@@ -50,10 +50,10 @@ def prove_fewest(
         found = with_clearance(scene, found)
         better = with_more(scene, stage, found) if found else stage
         if better is stage:
-            return replace(stage, certificate=joined(stage.certificate, bound.entry()))
+            return replace(stage, certificate=joined(stage.certificate, bound.proof()))
         stage = better
     entry = enough(stage.certificate, np.any(stage.stages == LIT, axis=1))
-    return replace(stage, certificate=stage.certificate | {"continuous": entry})
+    return replace(stage, certificate=stage.certificate.changed(continuous=entry))
 
 
 def _bound_of(
@@ -70,7 +70,7 @@ def _bound_of(
         template,
         stage.rows.take(np.flatnonzero(reached & ~free)),
         max(required - int(free.sum()), 0),
-        stage.certificate["needed"]["count"] - given.count,
+        stage.certificate.needed.count - given.count,
         effort,
         n_samples=n,
         row_area_m2=stage.rows.samples.weight * len(stage.rows) / n,

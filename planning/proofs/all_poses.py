@@ -1,11 +1,11 @@
 """What was proved over all poses of the workspace, and how a certificate says it."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.certificates import Certificate, ContinuousProof
 from solvers.cells.cell_bound import CellBound, CellStatus
 
 
@@ -32,55 +32,55 @@ class ContinuousBound:
     given: int = 0
     n_free: int = 0
 
-    def entry(self) -> dict[str, Any]:
+    def proof(self) -> ContinuousProof:
         """Return the plan's `continuous` of a certificate."""
         found = self.found
         most = found.most_weight
         if found.status is CellStatus.PROVED:
             # Fewer fall short of what is required, by a sample at least.
             most = min(most, float(found.problem.required_weight[0]) - 1.0)
-        return {
-            "lower_bound": int(found.lower_bound) + self.given,
-            "status": found.status.name.lower(),
-            "proof": found.proof,
-            "occlusion": self.shadows,
-            "n_samples": self.n_samples,
-            "n_reached": len(found.problem.weights) + self.n_free,
-            "n_cells": found.cells_used,
-            "one_fewer_upper_bound_m2": (most + self.n_free) * self.row_area_m2,
-        }
+        return ContinuousProof(
+            lower_bound=int(found.lower_bound) + self.given,
+            status=found.status.name.lower(),
+            proof=found.proof,
+            occlusion=self.shadows,
+            n_samples=self.n_samples,
+            n_reached=len(found.problem.weights) + self.n_free,
+            n_cells=found.cells_used,
+            one_fewer_upper_bound_m2=(most + self.n_free) * self.row_area_m2,
+        )
 
 
-def joined(certificate: dict[str, Any], bound: dict[str, Any]) -> dict[str, Any]:
+def joined(certificate: Certificate, bound: ContinuousProof) -> Certificate:
     """Return a certificate with a bound over all poses: it holds for some of them."""
-    needed, candidates = certificate["needed"], certificate["candidates"]
-    joined = certificate | {"continuous": bound}
-    least = bound["lower_bound"]
-    other_samples = bound["n_samples"] != certificate["n_samples"]
-    if other_samples or least <= needed["lower_bound"]:
-        return joined
-    count = certificate["count"]
-    joined["needed"] = needed | {"lower_bound": least}
-    joined["candidates"] = candidates | {
-        "lower_bound": min(least, count),
-        "proof": f"over all poses: {bound['proof']}",
-    }
-    if certificate["status"] == "feasible" and least >= count:
-        joined["status"] = "optimal"
-    _cap_fewer(joined, needed["count"], bound["one_fewer_upper_bound_m2"])
-    return joined
+    before = certificate.changed(continuous=bound)
+    needed, least = before.needed, bound.lower_bound
+    if bound.n_samples != before.n_samples or least <= needed.lower_bound:
+        return before
+    optimal = before.status == "feasible" and least >= before.count
+    return _fewer_capped(before, bound.one_fewer_upper_bound_m2).changed(
+        status="optimal" if optimal else before.status,
+        needed=needed.changed(lower_bound=least),
+        candidates=before.candidates.changed(
+            lower_bound=min(least, before.count),
+            proof=f"over all poses: {bound.proof}",
+        ),
+    )
 
 
-def _cap_fewer(joined: dict[str, Any], needed: int, most_m2: float) -> None:
-    """Lower what fewer candidates serve at most to what fewer devices do anywhere."""
-    joined["by_count"] = [
-        row | {"upper_bound_m2": min(row["upper_bound_m2"], most_m2)}
-        if row["count"] < needed
+def _fewer_capped(proof: Certificate, most_m2: float | None) -> Certificate:
+    """Lower what fewer candidates cover at most to what fewer devices do anywhere."""
+    if most_m2 is None:
+        return proof
+    needed, best, fewer = proof.needed.count, proof.best_area, proof.one_fewer
+    if fewer is not None and proof.count - 1 < needed:
+        fewer = fewer.changed(upper_bound_m2=min(fewer.upper_bound_m2, most_m2))
+    if proof.count < needed:
+        best = best.changed(upper_bound_m2=min(best.upper_bound_m2, most_m2))
+    by_count = tuple(
+        row.changed(upper_bound_m2=min(row.upper_bound_m2, most_m2))
+        if row.count < needed
         else row
-        for row in joined["by_count"]
-    ]
-    for key, n in (("one_fewer", joined["count"] - 1), ("best_area", joined["count"])):
-        area = joined[key]
-        if area is not None and n < needed:
-            least = min(area["upper_bound_m2"], most_m2)
-            joined[key] = area | {"upper_bound_m2": least}
+        for row in proof.by_count
+    )
+    return proof.changed(by_count=by_count, best_area=best, one_fewer=fewer)

@@ -10,11 +10,11 @@ is free can only lower the bound.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.certificates import Certificate, ContinuousProof
 from planning.model.planned import PlannedProjector
 from planning.scene.existing import existing_projectors
 from planning.scene.lighting import lit_stages
@@ -52,20 +52,20 @@ def given_on(scene: Scene, template: PlannedProjector, rows: Target) -> Given:
     return Given(len(projectors), lit)
 
 
-def enough(certificate: dict[str, Any], reached: NDArray[np.bool_]) -> dict[str, Any]:
+def enough(certificate: Certificate, reached: NDArray[np.bool_]) -> ContinuousProof:
     """Return the plan's `continuous` where existing projectors suffice: no cells.
 
     Args:
         certificate: As it stands.
         reached: Which of its samples some candidate lights, shape (n,).
     """
-    return {
-        "lower_bound": certificate["given"],
-        "status": "proved",
-        "proof": "those that stand already are enough, and in every plan",
-        "occlusion": True,
-        "n_samples": certificate["n_samples"],
-        "n_reached": int(reached.sum()),
-        "n_cells": 0,
-        "one_fewer_upper_bound_m2": None,
-    }
+    return ContinuousProof(
+        lower_bound=certificate.given,
+        status="proved",
+        proof="those that stand already are enough, and in every plan",
+        occlusion=True,
+        n_samples=certificate.n_samples,
+        n_reached=int(reached.sum()),
+        n_cells=0,
+        one_fewer_upper_bound_m2=None,
+    )

@@ -7,12 +7,20 @@ weights are counts and every comparison is exact.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol, TypeVar
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers import CoverProblem, SolveStatus, solve_cover
+from planning.model.document.certificates import (
+    BestArea,
+    CandidateBound,
+    Certificate,
+    CountArea,
+    NeededCount,
+    OneFewer,
+)
+from solvers import CoverProblem, solve_cover
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
 from solvers.dense_rows import sparse_rows
@@ -44,7 +52,7 @@ class Selection:
     chosen: NDArray[np.int64]
     smallest: NDArray[np.int64]
     lower_bound: int
-    status: str
+    status: Literal["optimal", "feasible", "infeasible"]
     proof: str
     required: int
     n_covered: int
@@ -167,12 +175,12 @@ def select_fewest(
     )
     n_covered = cover.n_covered(chosen)
     met = needed <= allowed and n_covered >= required
-    status = SolveStatus.OPTIMAL if lower_bound >= needed else SolveStatus.FEASIBLE
+    proved = "optimal" if lower_bound >= needed else "feasible"
     return Selection(
         chosen,
         smallest,
         min(lower_bound, needed),
-        status.name.lower() if met else "infeasible",
+        proved if met else "infeasible",
         solution.proof,
         required,
         n_covered,
@@ -277,66 +285,65 @@ def certificate(
     row_area_m2: float,
     n_candidates: int,
     given: int = 0,
-) -> dict[str, Any]:
+) -> Certificate:
     """Return the plan's certificate: what was proved, and over what.
 
     With devices given, its bounds count them, and speak of covers that hold them.
     """
     count = len(selection.chosen)
-    bounded = min(selection.lower_bound, count)
-    by_count = [
-        {
-            "count": n,
-            "value_m2": rows * row_area_m2,
-            "upper_bound_m2": bound * row_area_m2,
-        }
+    by_count = tuple(
+        CountArea(
+            count=n, value_m2=rows * row_area_m2, upper_bound_m2=bound * row_area_m2
+        )
         for n, (rows, bound) in sorted(others.n_covered.items())
-    ]
-    return {
-        "count": count,
-        "status": selection.status,
-        "required_m2": selection.required * row_area_m2,
-        "n_samples": n_rows,
-        "candidates": {
-            "lower_bound": bounded,
-            "n_candidates": n_candidates,
-            "proof": selection.proof,
-        },
-        "continuous": None,
-        "greedy_count": others.greedy,
-        "needed": {"count": selection.needed, "lower_bound": selection.lower_bound},
-        "by_count": by_count,
-        **_areas(by_count, count, given),
-        **({"given": given} if given else {}),
-        **(
-            {"but_for_bodies": selection.but_for_bodies}
-            if selection.but_for_bodies is not None
-            else {}
+    )
+    proof = Certificate(
+        count=count,
+        status=selection.status,
+        required_m2=selection.required * row_area_m2,
+        n_samples=n_rows,
+        candidates=CandidateBound(
+            lower_bound=min(selection.lower_bound, count),
+            n_candidates=n_candidates,
+            proof=selection.proof,
         ),
-    }
+        continuous=None,
+        greedy_count=others.greedy,
+        needed=NeededCount(count=selection.needed, lower_bound=selection.lower_bound),
+        by_count=by_count,
+        best_area=_best_area(by_count, count),
+        one_fewer=_one_fewer(by_count, count, given),
+    )
+    if given:
+        proof = proof.changed(given=given)
+    if selection.but_for_bodies is not None:
+        proof = proof.changed(but_for_bodies=selection.but_for_bodies)
+    return proof
 
 
-def _areas(by_count: list[dict[str, Any]], count: int, given: int) -> dict[str, Any]:
-    """What so many devices, and one fewer, cover at most among the candidates."""
-    table = {entry["count"]: entry for entry in by_count}
-    fewer = table.get(count - 1, {"upper_bound_m2": 0.0})
-    return {
-        "best_area": {key: table[count][key] for key in ("value_m2", "upper_bound_m2")}
-        | {"scope": "candidates"},
-        "one_fewer": {
-            "upper_bound_m2": fewer["upper_bound_m2"],
-            "scope": "candidates",
-        }
-        if count > given
-        else None,
-    }
+def _best_area(by_count: tuple[CountArea, ...], count: int) -> BestArea:
+    """What so many devices cover among the candidates."""
+    (row,) = (row for row in by_count if row.count == count)
+    return BestArea(
+        value_m2=row.value_m2, upper_bound_m2=row.upper_bound_m2, scope="candidates"
+    )
+
+
+def _one_fewer(
+    by_count: tuple[CountArea, ...], count: int, given: int
+) -> OneFewer | None:
+    """What one device fewer covers at most; None where all stand already."""
+    if count <= given:
+        return None
+    most = (row.upper_bound_m2 for row in by_count if row.count == count - 1)
+    return OneFewer(upper_bound_m2=next(most, 0.0), scope="candidates")
 
 
 class PlannedStage(Protocol):
     """What projector and camera stages have in common."""
 
     @property
-    def certificate(self) -> dict[str, Any]:
+    def certificate(self) -> Certificate:
         """What was proved."""
         ...
 
@@ -360,22 +367,21 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
         present: Devices in it now.
         allowed: Devices at most; None for no limit.
     """
-    count = len(present) + 1
-    met = stage.certificate["status"] != "infeasible"
+    count, before = len(present) + 1, stage.certificate
+    met = before.status != "infeasible"
     if not met or count not in stage.by_count or (allowed or count) < count:
         return None
     if len(stage.by_count[count]) < count:
         return None
-    before = stage.certificate
-    given = int(before.get("given", 0))
-    proof = before | {
-        "count": count,
-        "status": "feasible",
-        "needed": {**before["needed"], "count": count},
-        **_areas(before["by_count"], count, given),
-    }
-    if before["continuous"] is not None:
+    proof = before.changed(
+        count=count,
+        status="feasible",
+        needed=before.needed.changed(count=count),
+        best_area=_best_area(before.by_count, count),
+        one_fewer=_one_fewer(before.by_count, count, before.given),
+    )
+    if before.continuous is not None:
         # It bounded one fewer than before.
-        unknown = {"one_fewer_upper_bound_m2": None}
-        proof["continuous"] = before["continuous"] | unknown
+        unknown = before.continuous.changed(one_fewer_upper_bound_m2=None)
+        proof = proof.changed(continuous=unknown)
     return replace(stage, certificate=proof)  # type: ignore[type-var]

@@ -1,27 +1,34 @@
-"""Turns a draft into a plan: poses rounded, every claim recomputed from them."""
+"""Turns a partial plan into a plan: poses rounded, every claim recomputed from them."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
 
 import numpy as np
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import overlap_components
-from planning.cameras.routes import routes_entry
-from planning.model.plan import FORMAT, VERSION, RigPlan
+from planning.model.document.baseline_records import BaselineRow
+from planning.model.document.certificates import Certificates
+from planning.model.document.coverage_records import (
+    CameraMarginal,
+    ProjectorMarginal,
+)
+from planning.model.document.input_records import RigRecord, SurfaceRecord, Units
+from planning.model.document.plan_document import (
+    FORMAT,
+    VERSION,
+    MemberRecord,
+    PlanDocument,
+)
+from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
-from planning.report.advice.what_helps import add_what_helps
-from planning.report.entries.cost import cost_entry
-from planning.report.entries.overlaps import overlap_entries
-from planning.report.entries.range_entries import ranges_entry, with_spread
-from planning.report.entries.ring_entries import (
-    evenly_ringed,
-    lost_to_rings_m2,
-    with_rings,
-)
+from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
+from planning.report.entries.cost import cost_record
+from planning.report.entries.overlaps import overlap_records
+from planning.report.entries.range_entries import ranges_record, with_spread
+from planning.report.entries.ring_entries import evenly_ringed, lost_to_rings_m2
 from planning.rings.ring_axes import widest_gap
 
 from .claims import Claims, Devices, make_claims
@@ -32,53 +39,114 @@ from .partial_plan import PartialPlan
 
 def write_plan(draft: PartialPlan, clock: Stopwatch) -> RigPlan:
     """Round the poses, recompute every claim from them, and write the document."""
-    projectors = tuple(
-        entries.rounded_projector(p, f"P{i}")
-        for i, p in enumerate(draft.final_projectors, 1)
-    )
-    cameras = tuple(
-        entries.rounded_camera(c, f"C{i}") for i, c in enumerate(draft.cameras, 1)
-    )
-    reference = tuple(entries.rounded_projector(p, "") for p in draft.stage.reference)
-    reference_cameras = tuple(
-        entries.rounded_camera(c, "") for c in draft.camera_stage.reference
-    )
-    devices = Devices(projectors, cameras, reference, reference_cameras)
+    devices = _rounded_devices(draft)
     scene = draft.scene
-    standing = scene.among((*projectors, *cameras))
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
-        marginal = [
-            *projector_table(scene, devices, draft.stage.by_count, claims),
-            # Rings are fine for the planned cameras; others would get their own.
-            *camera_table(
-                scene,
-                evenly_ringed(devices, draft.rings),
-                draft.camera_stage.by_count,
-                claims,
+        marginal = _marginal(draft, devices, claims)
+    standing = replace(
+        draft, scene=scene.among((*devices.projectors, *devices.cameras))
+    )
+    lost = lost_to_rings_m2(standing.scene, devices, draft.rings, claims)
+    coverage = entries.coverage_record(claims, lost)
+    coverage = with_relaxations(coverage, draft, devices, claims, clock)
+    regions = entries.region_records(draft.regions, claims)
+    overlaps, schedule = overlap_records(standing.scene, devices.projectors)
+    surface, requirements = (
+        _surface(draft, devices),
+        _final_requirements(standing, claims, devices),
+    )
+    certificates = with_fewer_needed(_certificates(draft), draft, clock)
+    document = PlanDocument(
+        format=FORMAT,
+        version=VERSION,
+        units=Units(length="m", angle="rad"),
+        seed=draft.order.seed,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        command=draft.order.command,
+        truncated=draft.truncated,
+        meshes=(entries.mesh_record(scene.mesh, scene.shell),),
+        surface=_surface_record(draft, surface),
+        rig=RigRecord(**draft.order.rig.to_document()),
+        requirements=requirements,
+        regions=regions,
+        projectors=entries.projector_records(
+            standing.scene, devices, draft.rings, claims
+        ),
+        cameras=entries.camera_records(devices.cameras, claims),
+        coverage=coverage,
+        overlaps=overlaps,
+        firing_schedule=schedule,
+        marginal=marginal,
+        certificates=certificates,
+        baselines=_baselines(draft, devices, claims, requirements),
+        camera_groups=_camera_groups(devices, claims),
+        cost=cost_record(
+            devices.cameras, certificates.cameras.greedy_count, clock.processor
+        ),
+        members=(
+            MemberRecord(
+                mesh=0,
+                coverage=coverage,
+                regions=tuple(region.id for region in regions),
+                reconstruction=None,
             ),
-        ]
-    surface = Surface(
+        ),
+        reconstruction=None,
+        timings_s=dict(clock.seconds),
+    )
+    if draft.order.ranges is not None:
+        document = document.changed(ranges=ranges_record(*draft.order.ranges))
+    return RigPlan(document, surface)
+
+
+def _rounded_devices(draft: PartialPlan) -> Devices:
+    """The devices and the reference sets as they will be written."""
+    projectors, cameras = draft.final_projectors, draft.cameras
+    return Devices(
+        tuple(
+            entries.rounded_projector(p, f"P{i}") for i, p in enumerate(projectors, 1)
+        ),
+        tuple(entries.rounded_camera(c, f"C{i}") for i, c in enumerate(cameras, 1)),
+        tuple(entries.rounded_projector(p, "") for p in draft.stage.reference),
+        tuple(entries.rounded_camera(c, "") for c in draft.camera_stage.reference),
+    )
+
+
+def _marginal(
+    draft: PartialPlan, devices: Devices, claims: Claims
+) -> tuple[ProjectorMarginal | CameraMarginal, ...]:
+    # Rings are fine for the planned cameras; others would get their own.
+    even, scene = evenly_ringed(devices, draft.rings), draft.scene
+    return (
+        *projector_table(scene, devices, draft.stage.by_count, claims),
+        *camera_table(scene, even, draft.camera_stage.by_count, claims),
+    )
+
+
+def _surface(draft: PartialPlan, devices: Devices) -> Surface:
+    scene, reference = draft.scene, devices.reference_projectors
+    return Surface(
         scene.mesh,
         np.zeros(len(scene.mesh.faces), dtype=np.int64),
         scene.region,
         scene.steep,
         np.stack([p.world_from_device for p in reference]),
         np.stack([p.world_from_ring for p in reference]),
-        np.stack([c.world_from_device for c in reference_cameras]),
+        np.stack([c.world_from_device for c in devices.reference_cameras]),
     )
-    requirements = _final_requirements(draft, claims, devices)
-    document = _document(
-        replace(draft, scene=standing),
-        clock,
-        devices,
-        claims,
-        requirements,
-        marginal,
-        surface,
+
+
+def _surface_record(draft: PartialPlan, surface: Surface) -> SurfaceRecord:
+    return SurfaceRecord(
+        path="surface.npz",
+        sha256=surface.sha256(),
+        curvature_radius_m=draft.curvature_radius_m,
+        dominant_share=draft.regions.dominant_share,
+        selection=entries.selection_record(
+            draft.scene.mesh, draft.scene.region, draft.order.interest
+        ),
     )
-    add_what_helps(document, draft, devices, claims, clock)
-    return RigPlan.from_document(document, surface)
 
 
 def _final_requirements(
@@ -91,103 +159,42 @@ def _final_requirements(
         n_reference_projectors=len(devices.reference_projectors),
         n_reference_cameras=len(devices.reference_cameras),
     )
-    scene = draft.scene.among((*devices.projectors, *devices.cameras))
-    gap = widest_gap(scene, devices.projectors, claims.target_samples)
+    gap = widest_gap(draft.scene, devices.projectors, claims.target_samples)
     check = replace(requirements.check, tau_m=round(gap, 6))
     return replace(requirements, workspace=workspace, check=check)
 
 
-def _document(
-    draft: PartialPlan,
-    clock: Stopwatch,
-    devices: Devices,
-    claims: Claims,
-    requirements: Requirements,
-    marginal: list[dict[str, Any]],
-    surface: Surface,
-) -> dict[str, Any]:
+def _certificates(draft: PartialPlan) -> Certificates:
+    cameras, routes = draft.camera_stage.certificate, draft.camera_stage.routes
+    if routes is not None:
+        cameras = cameras.changed(routes=routes.counts())
+    return Certificates(projectors=draft.stage.certificate, cameras=cameras)
+
+
+def _baselines(
+    draft: PartialPlan, devices: Devices, claims: Claims, requirements: Requirements
+) -> tuple[BaselineRow, ...]:
     samples = claims.target_samples.samples
-    coverage = entries.coverage_entry(claims)
-    coverage["lost_to_rings_m2"] = lost_to_rings_m2(
-        draft.scene, devices, draft.rings, claims
+    rows = tuple(
+        BaselineRow(**row)
+        for row in baseline_rows(
+            devices.cameras,
+            samples.points,
+            samples.normals,
+            claims.measured_by,
+            samples.weight,
+            requirements.camera.max_incidence,
+        )
     )
-    regions = [
-        {
-            "id": region.id,
-            "area_m2": region.area_m2,
-            "n_faces": len(region.faces),
-            "mean_normal": region.mean_normal.tolist(),
-            "cone_angle": region.cone_angle,
-            "mean_curvedness": region.mean_curvedness,
-            **entry,
-        }
-        for region, entry in zip(draft.regions, claims.regions, strict=True)
-    ]
-    greedy = draft.camera_stage.certificate["greedy_count"]
-    baselines = baseline_rows(
-        devices.cameras,
-        samples.points,
-        samples.normals,
-        claims.measured_by,
-        samples.weight,
-        requirements.camera.max_incidence,
+    if draft.order.ranges is None:
+        return rows
+    body, guard = draft.order.ranges
+    return with_spread(rows, devices.cameras, body.ball, guard)
+
+
+def _camera_groups(devices: Devices, claims: Claims) -> tuple[tuple[str, ...], ...]:
+    weight = claims.target_samples.samples.weight
+    return tuple(
+        tuple(devices.cameras[c].id for c in group)
+        for group in overlap_components(claims.measured_by, weight)
     )
-    ranges: dict[str, Any] = {}
-    if draft.order.ranges is not None:
-        body, guard = draft.order.ranges
-        ranges = {"ranges": ranges_entry(body, guard)}
-        baselines = with_spread(baselines, devices.cameras, body.ball, guard)
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "units": {"length": "m", "angle": "rad"},
-        "seed": draft.order.seed,
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": list(draft.order.command),
-        "truncated": draft.truncated,
-        "meshes": [entries.mesh_entry(draft.scene.mesh, draft.scene.shell)],
-        "surface": {
-            "path": "surface.npz",
-            "sha256": surface.sha256(),
-            "curvature_radius_m": draft.curvature_radius_m,
-            "dominant_share": draft.regions.dominant_share,
-            "selection": entries.selection_entry(
-                draft.scene.mesh, draft.scene.region, draft.order.interest
-            ),
-        },
-        "rig": draft.order.rig.to_document(),
-        "requirements": requirements.to_document(),
-        "regions": regions,
-        "projectors": with_rings(
-            entries.projector_entries(devices.projectors, claims),
-            draft.scene,
-            devices,
-            draft.rings,
-        ),
-        "cameras": entries.camera_entries(devices.cameras, claims),
-        "coverage": coverage,
-        **overlap_entries(draft.scene, devices.projectors),
-        "marginal": marginal,
-        "certificates": {
-            "projectors": draft.stage.certificate,
-            "cameras": draft.camera_stage.certificate
-            | routes_entry(draft.camera_stage.routes),
-        },
-        "baselines": baselines,
-        **ranges,
-        "camera_groups": [
-            [devices.cameras[c].id for c in group]
-            for group in overlap_components(claims.measured_by, samples.weight)
-        ],
-        "cost": cost_entry(devices.cameras, greedy, clock.processor),
-        "members": [
-            {
-                "mesh": 0,
-                "coverage": coverage,
-                "regions": [region["id"] for region in regions],
-                "reconstruction": None,
-            }
-        ],
-        "reconstruction": None,
-        "timings_s": dict(clock.seconds),
-    }

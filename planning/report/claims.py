@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
+from planning.model.document.coverage_records import Areas
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import lighting
 from planning.scene.camera_views import view_of
@@ -39,19 +39,12 @@ class Devices:
     reference_cameras: tuple[PlannedCamera, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Areas:
-    """The five areas that belong together, in [m²]."""
+@dataclass(frozen=True)
+class RegionLight:
+    """Projectors that samples of a region are assigned to, and its lit share."""
 
-    area_m2: float
-    reachable_by_projectors_m2: float
-    lit_m2: float
-    reachable_by_cameras_m2: float
-    measured_m2: float
-
-    def to_document(self) -> dict[str, float]:
-        """Return plain JSON values."""
-        return dict(vars(self))
+    lit_by: tuple[str, ...]
+    lit_fraction: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +77,7 @@ class Claims:
     min_margin_rad: tuple[float | None, ...]
     seen_area_m2: tuple[float, ...]
     sole_area_m2: tuple[float, ...]
-    regions: tuple[dict[str, Any], ...]
+    regions: tuple[RegionLight, ...]
     target_samples: Target
     measured_by: NDArray[np.bool_]
     blocked_by_body_m2: dict[str, float]
@@ -184,14 +177,13 @@ def _areas(
             break
         rows = LitSamples.of(devices.projectors, target.take(left), lit[left])
         by_cameras[left] = measured_by(among, [camera], rows)[:, 0]
-    counts = (
-        len(target),
-        reachable.sum(),
-        _any(lit).sum(),
-        by_cameras.sum(),
-        measured.sum(),
+    return Areas(
+        area_m2=weight * len(target),
+        reachable_by_projectors_m2=weight * int(reachable.sum()),
+        lit_m2=weight * int(_any(lit).sum()),
+        reachable_by_cameras_m2=weight * int(by_cameras.sum()),
+        measured_m2=weight * int(measured.sum()),
     )
-    return Areas(*(float(weight * count) for count in counts))
 
 
 def _lit(
@@ -318,14 +310,12 @@ def _regions(
     target: Target,
     lit: NDArray[np.bool_],
     served: NDArray[np.int64],
-) -> tuple[dict[str, Any], ...]:
+) -> tuple[RegionLight, ...]:
     region = scene.region[target.samples.faces]
-    entries: list[dict[str, Any]] = []
+    lights: list[RegionLight] = []
     for index in range(int(scene.region.max()) + 1):
         inside = region == index
         by = np.unique(served[inside & (served >= 0)])
         share = float(lit[inside].any(axis=1).mean()) if inside.any() else 0.0
-        entries.append(
-            {"lit_by": [devices.projectors[p].id for p in by], "lit_fraction": share}
-        )
-    return tuple(entries)
+        lights.append(RegionLight(tuple(devices.projectors[p].id for p in by), share))
+    return tuple(lights)

@@ -1,8 +1,12 @@
 """What one device more or fewer would change."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from planning.model.document.coverage_records import (
+    CameraMarginal,
+    ProjectorMarginal,
+)
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.scene import Scene
 
@@ -16,7 +20,7 @@ def projector_table(
     devices: Devices,
     by_count: Mapping[int, Sequence[PlannedProjector]],
     claims: Claims,
-) -> list[dict[str, Any]]:
+) -> tuple[ProjectorMarginal, ...]:
     """Return the lit areas with 1, 2, ... projectors, on the claims' own samples."""
     areas = _areas(
         by_count,
@@ -24,10 +28,10 @@ def projector_table(
         (claims.target.lit_m2, claims.surface.lit_m2),
         lambda projectors: lit_area(scene, projectors),
     )
-    return [
-        {"n_projectors": n, "lit_target_m2": target, "lit_surface_m2": surface}
+    return tuple(
+        ProjectorMarginal(n_projectors=n, lit_target_m2=target, lit_surface_m2=surface)
         for n, (target, surface) in areas.items()
-    ]
+    )
 
 
 def camera_table(
@@ -35,7 +39,7 @@ def camera_table(
     devices: Devices,
     by_count: Mapping[int, Sequence[PlannedCamera]],
     claims: Claims,
-) -> list[dict[str, Any]]:
+) -> tuple[CameraMarginal, ...]:
     """Return the measured areas with 1, 2, ... cameras, given the projectors."""
     areas = _areas(
         by_count,
@@ -43,10 +47,12 @@ def camera_table(
         (claims.target.measured_m2, claims.surface.measured_m2),
         lambda cameras: measured_area(scene, devices.projectors, cameras),
     )
-    return [
-        {"n_cameras": n, "measured_target_m2": target, "measured_surface_m2": surface}
+    return tuple(
+        CameraMarginal(
+            n_cameras=n, measured_target_m2=target, measured_surface_m2=surface
+        )
         for n, (target, surface) in areas.items()
-    ]
+    )
 
 
 def _areas(

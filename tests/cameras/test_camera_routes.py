@@ -99,7 +99,7 @@ def test_fewer_by_the_paper_join_the_candidates_and_the_proof(ball, coarse):
         3,
         "paper",
     )
-    proof = camera_stage(scene, better).certificate
+    proof = camera_stage(scene, better).certificate.to_document()
     assert proof["count"] == proof["needed"]["count"] == 3
     assert proof["candidates"]["lower_bound"] <= 3
     assert proof["candidates"]["n_candidates"] == len(better.offered.cameras) > 16
@@ -145,9 +145,9 @@ def test_the_route_alone_is_bounded_over_candidates_and_itself(ball):
     assert np.all(found.chosen >= 40)
     stage = camera_stage(scene, cover)
     assert stage.cameras == stage.by_count[3]
-    for entry in stage.certificate["by_count"]:
-        assert entry["value_m2"] <= entry["upper_bound_m2"] * (1 + 1e-9)
-    fewer = stage.certificate["one_fewer"]["upper_bound_m2"]
+    for row in stage.certificate.by_count:
+        assert row.value_m2 <= row.upper_bound_m2 * (1 + 1e-9)
+    fewer = stage.certificate.one_fewer.upper_bound_m2
     assert fewer > 0.0
 
 
@@ -171,7 +171,7 @@ def test_bodies_of_the_routes_cameras_keep_off_each_other(ball):
     assert cover.crowd.stand_together(chosen)
     rows = cover.crowd.covers(chosen, chosen).any(axis=1).sum()
     assert rows >= cover.selection.required
-    assert "bounds_leave_out" in camera_stage(scene, cover).certificate
+    assert camera_stage(scene, cover).certificate.bounds_leave_out
 
 
 def test_what_no_camera_sees_is_refused(ball):

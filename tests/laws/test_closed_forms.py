@@ -72,9 +72,7 @@ def planned(
     stage = plan_projectors(scene, ready.template, 300, **offset, rounds=1)
     stage = prove_fewest(scene, stage, ready.template, effort, **offset)
     proof = stage.certificate
-    return Planned(
-        scene, stage, proof["needed"]["count"], proof["continuous"]["lower_bound"]
-    )
+    return Planned(scene, stage, proof.needed.count, proof.continuous.lower_bound)
 
 
 def away(projector, centre=(0.0, 0.0, 0.0)):

@@ -471,10 +471,10 @@ def test_a_certificate_says_what_holds_over_all_poses(given):
     """One that stands already is in every plan; what it measures is free."""
     existing = [standing("old", (0.0, 1.1, 0.0))][:given]
     scene, stage = staged(existing)
-    assert stage.certificate["continuous"] is None
+    assert stage.certificate.continuous is None
     device = load_rig("default").camera_device()
     found = bound_stage(scene, stage, device, replace(EFFORT, finest=6))
-    proof = found.certificate
+    proof = found.certificate.to_document()
     entry, needed = proof["continuous"], proof["needed"]
     assert given < entry["lower_bound"] <= needed["count"]
     assert entry["lower_bound"] >= needed["count"] - 1
@@ -499,8 +499,8 @@ def test_cameras_that_stand_already_and_are_enough_need_no_cells():
     ]
     scene, stage = staged(existing)
     device = load_rig("default").camera_device()
-    entry = bound_stage(scene, stage, device, EFFORT).certificate["continuous"]
-    assert (entry["lower_bound"], entry["n_cells"]) == (len(existing), 0)
+    proof = bound_stage(scene, stage, device, EFFORT).certificate.continuous
+    assert (proof.lower_bound, proof.n_cells) == (len(existing), 0)
 
 
 def test_a_bound_over_all_poses_raises_that_over_candidates_and_lowers_areas():

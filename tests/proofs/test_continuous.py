@@ -336,7 +336,11 @@ def test_plates_that_face_each_other_need_light_through_the_gap():
 
 
 def test_one_projector_is_the_fewest_without_a_look_at_cells():
-    entry = bounded(sphere(0.08, subdivisions=3), "diverging", 0.2, 1, n=100).entry()
+    entry = (
+        bounded(sphere(0.08, subdivisions=3), "diverging", 0.2, 1, n=100)
+        .proof()
+        .to_document()
+    )
     assert (entry["lower_bound"], entry["status"]) == (1, "proved")
     assert entry["occlusion"] is True
     assert entry["n_cells"] == 6
@@ -354,14 +358,18 @@ def test_devices_inside_the_object_cast_no_shadows_that_are_relied_on():
 
 def test_the_entry_says_what_was_proved():
     ball = sphere(0.08, subdivisions=4)
-    entry = bounded(ball, "parallel", 0.48, 2).entry()
+    entry = bounded(ball, "parallel", 0.48, 2).proof().to_document()
     assert (entry["lower_bound"], entry["status"]) == (2, "proved")
     assert (entry["n_samples"], entry["n_reached"]) == (400, 400)
     assert entry["occlusion"] is True
     assert entry["n_cells"] > 6
     # One projector lights a quarter of the ball at most, and less than is required.
     assert 0.25 * ball.area < entry["one_fewer_upper_bound_m2"] < 0.48 * ball.area
-    cut = bounded(ball, "parallel", 0.9, 7, replace(QUICK, budget=1e6)).entry()
+    cut = (
+        bounded(ball, "parallel", 0.9, 7, replace(QUICK, budget=1e6))
+        .proof()
+        .to_document()
+    )
     assert cut["status"] == "cut"
     assert 1 <= cut["lower_bound"] < 7
 

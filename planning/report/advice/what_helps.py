@@ -1,10 +1,10 @@
 """What would help a plan that misses a requirement, written beside what it misses."""
 
 from contextlib import AbstractContextManager
-from typing import Any
 
+from planning.model.document.certificates import Certificate, Certificates
+from planning.model.document.coverage_records import Coverage
 from planning.model.progress import Stopwatch
-from planning.model.requirements import Requirements
 from planning.report.claims import Claims, Devices
 from planning.report.partial_plan import PartialPlan
 
@@ -13,68 +13,68 @@ from .relaxations import reachability_relaxations
 from .wider_field import wider_field
 
 
-def add_what_helps(
-    document: dict[str, Any],
+def with_relaxations(
+    coverage: Coverage,
     draft: PartialPlan,
     devices: Devices,
     claims: Claims,
     clock: Stopwatch,
-) -> None:
-    """Add relaxations to a plan's document, where it misses what they relax.
+) -> Coverage:
+    """Return the coverage with what would let devices reach enough, where they don't.
 
     Args:
-        document: The plan; changed.
-        draft: What it was written from.
+        coverage: Of the plan.
+        draft: What the plan is written from.
         devices: As written, with the reference sets.
         claims: Made for these devices.
         clock: Times it.
     """
-    asked = draft.scene.requirements
-    coverage, proofs = document["coverage"], document["certificates"]
-    areas = coverage["target"]
-    if falls_short(areas, "reachable_by_projectors_m2", "area_m2", asked.min_reachable):
+    areas, least = coverage.target, draft.scene.requirements.min_reachable
+    if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
-            coverage["relaxations"] = reachability_relaxations(
+            found = reachability_relaxations(
                 draft.scene, devices.reference_projectors, (draft.tilt, 0.0)
             )
-    if _too_few(proofs["projectors"], asked.max_projectors):
-        with _timed(clock):
-            field = wider_field(draft.scene, draft.stage, asked.max_projectors)
-        if field is not None:
-            _add_to_needed(proofs, "projectors", {"wider_field": field})
-    if falls_short(areas, "reachable_by_cameras_m2", "lit_m2", asked.min_reachable):
+        coverage = coverage.changed(relaxations=found)
+    if falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least):
         with _timed(clock):
             out = out_of_reach(draft.scene, draft.order.rig, devices, claims)
-        coverage["unmeasurable_by_cause"] = out.by_cause
-        coverage["camera_relaxations"] = out.relaxations
-    if _too_few(proofs["cameras"], asked.max_cameras):
-        _add_for_so_many(proofs, draft, asked, clock)
+        coverage = coverage.changed(
+            unmeasurable_by_cause=out.by_cause, camera_relaxations=out.relaxations
+        )
+    return coverage
 
 
-def falls_short(areas: dict[str, float], part: str, whole: str, share: float) -> bool:
+def with_fewer_needed(
+    proofs: Certificates, draft: PartialPlan, clock: Stopwatch
+) -> Certificates:
+    """Return the certificates with what would let as many as are allowed be enough."""
+    required = draft.scene.requirements
+    if _too_few(proofs.projectors, required.max_projectors):
+        with _timed(clock):
+            field = wider_field(draft.scene, draft.stage, required.max_projectors)
+        if field is not None:
+            needed = proofs.projectors.needed.changed(wider_field=field)
+            proofs = proofs.changed(projectors=proofs.projectors.changed(needed=needed))
+    if _too_few(proofs.cameras, required.max_cameras):
+        with _timed(clock):
+            scene, count = draft.scene.among(draft.projectors), required.max_cameras
+            changes = for_so_many(
+                scene, draft.order.rig, draft.camera_stage, count or 0
+            )
+        if changes:
+            needed = proofs.cameras.needed.changed(relaxations=changes)
+            proofs = proofs.changed(cameras=proofs.cameras.changed(needed=needed))
+    return proofs
+
+
+def falls_short(area_m2: float, whole_m2: float, share: float) -> bool:
     """Return whether an area is less than a share of another."""
-    return areas[part] < share * areas[whole]
+    return area_m2 < share * whole_m2
 
 
-def _add_for_so_many(
-    proofs: dict[str, Any], draft: PartialPlan, asked: Requirements, clock: Stopwatch
-) -> None:
-    """What would let the cameras that are allowed be enough."""
-    with _timed(clock):
-        scene = draft.scene.among(draft.projectors)
-        rig, count = draft.order.rig, asked.max_cameras or 0
-        helps = for_so_many(scene, rig, draft.camera_stage, count)
-    if helps:
-        _add_to_needed(proofs, "cameras", {"relaxations": list(helps)})
-
-
-def _too_few(proof: dict[str, Any], allowed: int | None) -> bool:
-    return allowed is not None and proof["needed"]["count"] > allowed
-
-
-def _add_to_needed(proofs: dict[str, Any], kind: str, entry: dict[str, Any]) -> None:
-    proof = proofs[kind]
-    proofs[kind] = proof | {"needed": proof["needed"] | entry}
+def _too_few(proof: Certificate, allowed: int | None) -> bool:
+    return allowed is not None and proof.needed.count > allowed
 
 
 def _timed(clock: Stopwatch) -> AbstractContextManager[None]:

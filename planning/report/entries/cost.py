@@ -1,8 +1,8 @@
 """Eq. (8): what a reconstruction costs, before and after the cameras were minimised."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
+from planning.model.document.plan_document import CostRecord
 from planning.model.planned import PlannedCamera
 
 # Stages of planning that place light, with what they need to know of the surface, and
@@ -11,11 +11,11 @@ _PROJECTOR_STAGES = ("regions", "projectors", "bounds", "projector_poses", "ring
 _CAMERA_STAGES = ("cameras", "baselines")
 
 
-def cost_entry(
+def cost_record(
     cameras: Sequence[PlannedCamera],
     n_before: int,
     seconds: Mapping[str, float],
-) -> dict[str, Any]:
+) -> CostRecord:
     """Return the plan's `cost`; `docs/method/cost.md` defines every key.
 
     With M_j N_j pixels of camera j::
@@ -39,36 +39,31 @@ def cost_entry(
         sum(seconds.get(name, 0.0) for name in names)
         for names in (_PROJECTOR_STAGES, _CAMERA_STAGES)
     )
-    entry: dict[str, Any] = {
-        "pixels": pixels,
-        "n_cameras_before": n_before,
-        "t4": t4,
-        "t5": t5,
-    }
-    if "render" not in seconds:
-        return entry | {"t1": None, "t2": None, "t3": None, "C": None, "C_before": None}
-    t1, t2 = seconds["render"] / pixels, seconds["decode"] / pixels
-    t3 = seconds["merge"]
-    before = pixels * n_before / len(cameras)
-    return entry | {
-        "t1": t1,
-        "t2": t2,
-        "t3": t3,
-        "C": pixels * (t1 + t2) + t3 + t4 + t5,
-        "C_before": before * (t1 + t2) + t3 + t4 + t5,
-    }
+    times = dict.fromkeys(("t1", "t2", "t3", "C", "C_before"))
+    if "render" in seconds:
+        t1, t2 = seconds["render"] / pixels, seconds["decode"] / pixels
+        t3 = seconds["merge"]
+        before = pixels * n_before / len(cameras)
+        times = {
+            "t1": t1,
+            "t2": t2,
+            "t3": t3,
+            "C": pixels * (t1 + t2) + t3 + t4 + t5,
+            "C_before": before * (t1 + t2) + t3 + t4 + t5,
+        }
+    return CostRecord(pixels=pixels, n_cameras_before=n_before, t4=t4, t5=t5, **times)
 
 
-def cost_lines(cost: Mapping[str, Any]) -> list[str]:
+def cost_lines(cost: CostRecord) -> list[str]:
     """Return eq. (8) with its terms, for a person; nothing where C is unknown."""
-    if cost.get("C") is None:
+    if cost.C is None or cost.C_before is None:
         return []
-    per_pixel = " + ".join(f"{1e6 * cost[name]:.2f}" for name in ("t1", "t2"))
-    once = " + ".join(f"{cost[name]:.1f}" for name in ("t3", "t4", "t5"))
-    n = cost["n_cameras_before"]
+    per_pixel = " + ".join(f"{1e6 * (t or 0.0):.2f}" for t in (cost.t1, cost.t2))
+    once = " + ".join(f"{t or 0.0:.1f}" for t in (cost.t3, cost.t4, cost.t5))
+    n = cost.n_cameras_before
     return [
-        f"COST     eq. (8): {1e-6 * cost['pixels']:.1f} Mpx x ({per_pixel}) us + "
-        f"{once} s = {cost['C']:.1f} s of processor time",
+        f"COST     eq. (8): {1e-6 * cost.pixels:.1f} Mpx x ({per_pixel}) us + "
+        f"{once} s = {cost.C:.1f} s of processor time",
         f"         with the {n} camera{'s' * (n != 1)} of a greedy cover, before D was "
-        f"minimised: {cost['C_before']:.1f} s",
+        f"minimised: {cost.C_before:.1f} s",
     ]

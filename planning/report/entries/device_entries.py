@@ -1,20 +1,34 @@
-"""Writes the plan's JSON document; every number a claim rests on is rounded here."""
+"""Devices as they will be written, and what is said of mesh, target and coverage."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
+from geometry.regions.regions import DominantRegions
 from geometry.repair.hollow import MeshShell
-from planning.model.bodies import body_entry
+from planning.model.document.coverage_records import Coverage, RegionRecord
+from planning.model.document.device_records import (
+    CameraRecord,
+    ProjectorRecord,
+    camera_record,
+    projector_record,
+)
+from planning.model.document.input_records import (
+    MeshRecord,
+    Repair,
+    SelectionRecord,
+    ShellRecord,
+)
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.rounding import DECIMALS, rounded_pose
-from planning.report.claims import Claims
+from planning.report.claims import Claims, Devices
+from planning.rings.ring_shares import ring_shares
+from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
+from planning.scene.scene import Scene
 
 
 def rounded_projector(projector: PlannedProjector, name: str) -> PlannedProjector:
@@ -37,121 +51,108 @@ def rounded_camera(camera: PlannedCamera, name: str) -> PlannedCamera:
     return replace(camera, id=name, world_from_device=pose)
 
 
-def projector_entries(
-    projectors: Sequence[PlannedProjector], claims: Claims
-) -> list[dict[str, Any]]:
-    """Return the plan's `projectors`."""
-    return [
-        {
-            "id": projector.id,
-            "light": projector.light,
-            "world_from_device": projector.world_from_device.tolist(),
-            "world_from_ring": projector.world_from_ring.tolist(),
-            **_optics(projector.device),
-            "ring_radii": projector.ring_radii.tolist(),
-            "min_margin_rad": claims.min_margin_rad[index],
-            "lit_area_m2": claims.lit_area_m2[index],
-            **body_entry(projector.body),
-            **_existing(projector),
-        }
-        for index, projector in enumerate(projectors)
-    ]
+def projector_records(
+    scene: Scene, devices: Devices, rings: RingStage | None, claims: Claims
+) -> tuple[ProjectorRecord, ...]:
+    """Return the plan's `projectors`.
+
+    Args:
+        scene: Surface and requirements, with the bodies of the devices.
+        devices: As written.
+        rings: How the rings were spaced; None: the run was cut before that.
+        claims: Made for these devices.
+    """
+    return tuple(
+        projector_record(
+            projector,
+            min_margin_rad=claims.min_margin_rad[p],
+            lit_area_m2=claims.lit_area_m2[p],
+        ).changed(
+            rings=None if rings is None else rings.reports[p],
+            ring_shares=ring_shares(scene, projector, devices.cameras).to_document(),
+        )
+        for p, projector in enumerate(devices.projectors)
+    )
 
 
-def camera_entries(
+def camera_records(
     cameras: Sequence[PlannedCamera], claims: Claims
-) -> list[dict[str, Any]]:
+) -> tuple[CameraRecord, ...]:
     """Return the plan's `cameras`."""
-    return [
-        {
-            "id": camera.id,
-            "world_from_device": camera.world_from_device.tolist(),
-            "K": camera.device.camera_matrix.tolist(),
-            "distortion": list(camera.device.distortion),
-            "resolution": list(camera.device.resolution),
-            "range_m": list(camera.device.range_m),
-            "seen_area_m2": claims.seen_area_m2[index],
-            "sole_area_m2": claims.sole_area_m2[index],
-            **body_entry(camera.body),
-            **_existing(camera),
-        }
-        for index, camera in enumerate(cameras)
-    ]
+    return tuple(
+        camera_record(
+            camera,
+            seen_area_m2=claims.seen_area_m2[c],
+            sole_area_m2=claims.sole_area_m2[c],
+        )
+        for c, camera in enumerate(cameras)
+    )
 
 
-def mesh_entry(mesh: TriangleMesh, shell: MeshShell) -> dict[str, Any]:
+def mesh_record(mesh: TriangleMesh, shell: MeshShell) -> MeshRecord:
     """Return one entry of the plan's `meshes`."""
     source = mesh.source
-    if source is None:
-        return {
-            "path": None,
-            "sha256": None,
-            "unit": "m",
-            "scale_to_m": 1.0,
-            "n_vertices": len(mesh.vertices),
-            "n_faces": len(mesh.faces),
-            "area_m2": mesh.area,
-            "repairs": [],
-            "shell": asdict(shell),
-        }
-    return {
-        "path": source.path,
-        "sha256": source.sha256,
-        "unit": source.unit,
-        "scale_to_m": source.scale_to_m,
-        "n_vertices": source.n_vertices,
-        "n_faces": source.n_faces,
-        "area_m2": mesh.area,
-        "repairs": [{"kind": r.kind, "count": r.count} for r in source.repairs],
-        "shell": asdict(shell),
-    }
+    return MeshRecord(
+        path=None if source is None else source.path,
+        sha256=None if source is None else source.sha256,
+        unit="m" if source is None else source.unit,
+        scale_to_m=1.0 if source is None else source.scale_to_m,
+        n_vertices=len(mesh.vertices) if source is None else source.n_vertices,
+        n_faces=len(mesh.faces) if source is None else source.n_faces,
+        area_m2=mesh.area,
+        repairs=tuple(
+            Repair(kind=repair.kind, count=repair.count)
+            for repair in (() if source is None else source.repairs)
+        ),
+        shell=ShellRecord(**asdict(shell)),
+    )
 
 
-def selection_entry(
+def selection_record(
     mesh: TriangleMesh, region: NDArray[np.int64], interest: Interest | None
-) -> dict[str, Any]:
+) -> SelectionRecord:
     """Return `surface.selection`: what the faces with a region were chosen by."""
     chosen = region >= 0
-    return {
-        "kind": "curvature" if interest is None else interest.kind,
-        "source": None if interest is None else interest.source,
-        "sha256": None if interest is None else interest.sha256,
-        "n_faces": int(chosen.sum()),
-        "area_m2": float(mesh.face_areas[chosen].sum()),
-        "n_removed_by_repair": 0 if interest is None else interest.n_removed,
-    }
+    return SelectionRecord(
+        kind="curvature" if interest is None else interest.kind,
+        source=None if interest is None else interest.source,
+        sha256=None if interest is None else interest.sha256,
+        n_faces=int(chosen.sum()),
+        area_m2=float(mesh.face_areas[chosen].sum()),
+        n_removed_by_repair=0 if interest is None else interest.n_removed,
+    )
 
 
-def coverage_entry(claims: Claims) -> dict[str, Any]:
-    """Return the plan's `coverage`."""
-    return {
-        "samples": len(claims.target_samples),
-        "surface": claims.surface.to_document(),
-        "target": claims.target.to_document(),
-        "uncovered_by_cause": claims.uncovered_by_cause,
-        "unreachable_by_cause": claims.unreachable_by_cause,
-        "unreachable_inside_m2": claims.unreachable_inside_m2,
-        **_by_body(claims),
-    }
+def region_records(
+    regions: DominantRegions, claims: Claims
+) -> tuple[RegionRecord, ...]:
+    """Return the plan's `regions`."""
+    return tuple(
+        RegionRecord(
+            id=region.id,
+            area_m2=region.area_m2,
+            n_faces=len(region.faces),
+            mean_normal=region.mean_normal.tolist(),
+            cone_angle=region.cone_angle,
+            mean_curvedness=region.mean_curvedness,
+            lit_by=light.lit_by,
+            lit_fraction=light.lit_fraction,
+        )
+        for region, light in zip(regions, claims.regions, strict=True)
+    )
 
 
-def _by_body(claims: Claims) -> dict[str, Any]:
-    """What bodies keep from being measured; nothing where no device has one."""
-    areas = claims.blocked_by_body_m2
-    return {"blocked_by_body_m2": areas} if areas else {}
-
-
-def _existing(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:
-    """Mark a device that stands already; nothing where it is planned."""
-    return {"existing": True, "name": device.existing} if device.existing else {}
-
-
-def _optics(device: PinholeModel | ParallelModel) -> dict[str, Any]:
-    pinhole = isinstance(device, PinholeModel)
-    return {
-        "K": device.camera_matrix.tolist() if pinhole else None,
-        "resolution": list(device.resolution),
-        "pixel_pitch_m": None if pinhole else device.pixel_pitch_m,
-        "range_m": list(device.range_m),
-        "beam_radius": None if pinhole else device.beam_radius,
-    }
+def coverage_record(claims: Claims, lost_to_rings_m2: float) -> Coverage:
+    """Return the plan's `coverage`, without what would help."""
+    coverage = Coverage(
+        samples=len(claims.target_samples),
+        surface=claims.surface,
+        target=claims.target,
+        uncovered_by_cause=claims.uncovered_by_cause,
+        unreachable_by_cause=claims.unreachable_by_cause,
+        unreachable_inside_m2=claims.unreachable_inside_m2,
+        lost_to_rings_m2=lost_to_rings_m2,
+    )
+    if not claims.blocked_by_body_m2:
+        return coverage
+    return coverage.changed(blocked_by_body_m2=claims.blocked_by_body_m2)

@@ -16,11 +16,11 @@ of the graph of overlaps.
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.coverage_records import ExposureSchedule, Overlap
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.claims import N_SAMPLES
@@ -38,27 +38,26 @@ _TARGET_STREAM = 902
 _SURFACE_STREAM = 903
 
 
-def overlap_entries(
+def overlap_records(
     scene: Scene, projectors: Sequence[PlannedProjector]
-) -> dict[str, Any]:
+) -> tuple[tuple[Overlap, ...], ExposureSchedule]:
     """Return the plan's `overlaps` and `firing_schedule`, from fresh samples."""
-    n = len(projectors)
-    shared = {
-        "target_m2": scene.target_samples(N_SAMPLES, _TARGET_STREAM),
-        "surface_m2": scene.surface_samples(N_SAMPLES, _SURFACE_STREAM),
-    }
-    areas = {part: shared_areas(scene, projectors, s) for part, s in shared.items()}
-    overlaps = [
-        {
-            "projectors": [projectors[i].id, projectors[j].id],
-            **{part: float(areas[part][i, j]) for part in areas},
-        }
-        for i, j in combinations(range(n), 2)
-    ]
-    conflicts = (areas["target_m2"] > 0.0) | (areas["surface_m2"] > 0.0)
-    np.fill_diagonal(conflicts, val=False)
+    target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
+    surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
+    on_target = shared_areas(scene, projectors, target)
+    on_surface = shared_areas(scene, projectors, surface)
     names = [projector.id for projector in projectors]
-    return {"overlaps": overlaps, "firing_schedule": firing_schedule(names, conflicts)}
+    overlaps = tuple(
+        Overlap(
+            projectors=(names[i], names[j]),
+            target_m2=on_target[i, j],
+            surface_m2=on_surface[i, j],
+        )
+        for i, j in combinations(range(len(names)), 2)
+    )
+    conflicts = (on_target > 0.0) | (on_surface > 0.0)
+    np.fill_diagonal(conflicts, val=False)
+    return overlaps, firing_schedule(names, conflicts)
 
 
 def shared_areas(

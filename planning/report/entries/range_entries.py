@@ -1,8 +1,7 @@
 """What a plan says of ranges that were estimated: its entry, and rows at two sigma."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,14 @@ from numpy.typing import NDArray
 from geometry.shapes.best_sphere import BestSphere
 from planning.cameras.baselines.baseline_rows import angles_and_fields
 from planning.cameras.baselines.coverage_triangle import largest_baseline
+from planning.model.document.baseline_records import BaselineRow
+from planning.model.document.plan_document import PlanDocument
+from planning.model.document.range_records import (
+    EstimatedSphere,
+    RangePoint,
+    RangesRecord,
+    RefusedPoint,
+)
 from planning.model.planned import PlannedCamera
 from planning.rig.range_guard import Guard
 from planning.scene.ranges.ranged_body import SIGNIFICANCE, RangedBody, told
@@ -20,42 +27,42 @@ _Array = NDArray[np.float64]
 _STEP = 1e-5
 
 
-def ranges_entry(body: RangedBody, guard: Guard) -> dict[str, Any]:
+def ranges_record(body: RangedBody, guard: Guard) -> RangesRecord:
     """Return the plan's `ranges`; `docs/use/ranges.md` defines every key."""
     ball = body.ball
-    return {
-        "path": body.file.path,
-        "sha256": body.file.sha256,
-        "significance": SIGNIFICANCE,
-        "observations": [asdict(o) for o in body.file.observations],
-        "points": [
-            {
-                "point": point.name,
-                "lines": list(point.lines),
-                "position_m": point.found.position.tolist(),
-                "covariance_m2": point.found.covariance.tolist(),
-                "chi_square": point.found.chi_square,
-                "n_free": point.found.n_free,
-                "residual_m": float(residual),
-            }
+    return RangesRecord(
+        path=body.file.path,
+        sha256=body.file.sha256,
+        significance=SIGNIFICANCE,
+        observations=tuple(asdict(o) for o in body.file.observations),
+        points=tuple(
+            RangePoint(
+                point=point.name,
+                lines=point.lines,
+                position_m=point.found.position.tolist(),
+                covariance_m2=point.found.covariance.tolist(),
+                chi_square=point.found.chi_square,
+                n_free=point.found.n_free,
+                residual_m=float(residual),
+            )
             for point, residual in zip(body.points, ball.residuals, strict=True)
-        ],
-        "refused": [
-            {"point": one.name, "lines": list(one.lines), "reason": one.reason}
+        ),
+        refused=tuple(
+            RefusedPoint(point=one.name, lines=one.lines, reason=one.reason)
             for one in body.refused
-        ],
-        "sphere": {
-            "centre_m": ball.centre.tolist(),
-            "radius_m": ball.radius,
-            "covariance_m2": ball.covariance.tolist(),
-            "shape_sigma_m": ball.shape_sigma,
-            "chi_square": ball.chi_square,
-        },
-        "position_sigma_m": guard.sigma_m,
-        "guard_m": guard.length_m,
-        "guard_rad": guard.angle_rad,
-        "stated": guard.stated,
-    }
+        ),
+        sphere=EstimatedSphere(
+            centre_m=ball.centre.tolist(),
+            radius_m=ball.radius,
+            covariance_m2=ball.covariance.tolist(),
+            shape_sigma_m=ball.shape_sigma,
+            chi_square=ball.chi_square,
+        ),
+        position_sigma_m=guard.sigma_m,
+        guard_m=guard.length_m,
+        guard_rad=guard.angle_rad,
+        stated=dict(guard.stated),
+    )
 
 
 def ranges_lines(body: RangedBody) -> list[str]:
@@ -74,38 +81,38 @@ def ranges_lines(body: RangedBody) -> list[str]:
     return lines + [f"  {told(one)}" for one in body.refused]
 
 
-def summary_lines(document: Mapping[str, Any]) -> list[str]:
+def summary_lines(document: PlanDocument) -> list[str]:
     """Return what a plan says of estimated ranges, for a person; nothing of a mesh."""
-    found = document.get("ranges")
-    if found is None:
+    ranges = document.ranges
+    if ranges is None:
         return []
-    ball = found["sphere"]
-    x, y, z = (1e3 * part for part in ball["centre_m"])
-    radius_sigma = 1e3 * ball["covariance_m2"][3][3] ** 0.5
-    rows = [row["covered_at_2_sigma"] for row in document["baselines"]]
+    ball = ranges.sphere
+    x, y, z = (1e3 * part for part in ball.centre_m)
+    radius_sigma = 1e3 * ball.covariance_m2[3][3] ** 0.5
+    covered = [row.covered_at_2_sigma for row in document.baselines]
     lines = [
-        f"RANGES   {len(found['points'])} points: sphere of radius "
-        f"{1e3 * ball['radius_m']:.1f} +- {radius_sigma:.1f} mm about ({x:.1f}, "
+        f"RANGES   {len(ranges.points)} points: sphere of radius "
+        f"{1e3 * ball.radius_m:.1f} +- {radius_sigma:.1f} mm about ({x:.1f}, "
         f"{y:.1f}, {z:.1f}) mm; they stray from it by "
-        f"{1e3 * ball['shape_sigma_m']:.1f} mm",
+        f"{1e3 * ball.shape_sigma_m:.1f} mm",
         f"         kept free of every limit: two sigma of where the surface is, "
-        f"{1e3 * found['guard_m']:.1f} mm or {np.degrees(found['guard_rad']):.2f} deg",
-        f"         {rows.count(True)} of {len(rows)} rows of neighbouring cameras lie "
-        f"within d_max - 2 sigma",
+        f"{1e3 * ranges.guard_m:.1f} mm or {np.degrees(ranges.guard_rad):.2f} deg",
+        f"         {covered.count(True)} of {len(covered)} rows of neighbouring "
+        f"cameras lie within d_max - 2 sigma",
     ]
     return lines + [
-        f"         point {one['point']} (line {', '.join(map(str, one['lines']))}) "
-        f"refused: {one['reason']}"
-        for one in found["refused"]
+        f"         point {one.point} (line {', '.join(map(str, one.lines))}) "
+        f"refused: {one.reason}"
+        for one in ranges.refused
     ]
 
 
 def with_spread(
-    rows: Sequence[dict[str, Any]],
+    rows: Sequence[BaselineRow],
     cameras: Sequence[PlannedCamera],
     ball: BestSphere,
     guard: Guard,
-) -> list[dict[str, Any]]:
+) -> tuple[BaselineRow, ...]:
     """Return rows of `baselines` with what the uncertainty of E makes of d_max.
 
     With theta as the rig states it, not tightened, and S_E the covariance of E::
@@ -121,17 +128,17 @@ def with_spread(
     """
     known = {camera.id: camera for camera in cameras}
     stated = float(guard.stated["camera.max_incidence"])
-    return [row | _spread(row, known, ball, stated) for row in rows]
+    return tuple(row.changed(**_spread(row, known, ball, stated)) for row in rows)
 
 
 def _spread(
-    row: dict[str, Any],
+    row: BaselineRow,
     cameras: dict[str, PlannedCamera],
     ball: BestSphere,
     max_incidence: float,
-) -> dict[str, Any]:
-    one, two = (cameras[name] for name in row["cameras"])
-    point = np.array(row["E"])
+) -> dict[str, float | bool | None]:
+    one, two = (cameras[name] for name in row.cameras)
+    point = np.array(row.E)
     steps = _STEP * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     limit = limits_at(one, two, point + steps, row, max_incidence)
     gradient = (limit[1:4] - limit[4:]) / (2.0 * _STEP)
@@ -145,7 +152,7 @@ def _spread(
     return {
         "d_max_stated": float(limit[0]),
         "d_max_sigma": sigma,
-        "covered_at_2_sigma": bool(row["d"] < limit[0] - 2.0 * sigma),
+        "covered_at_2_sigma": bool(row.d < limit[0] - 2.0 * sigma),
     }
 
 
@@ -153,13 +160,13 @@ def limits_at(
     one: PlannedCamera,
     two: PlannedCamera,
     points: _Array,
-    row: dict[str, Any],
+    row: BaselineRow,
     max_incidence: float,
 ) -> _Array:
     """Return d_max of eq. (9) if the seam of a row were at other points, (n,) [m]."""
-    normals = tuple(np.tile(normal, (len(points), 1)) for normal in row["normals"])
+    normals = tuple(np.tile(normal, (len(points), 1)) for normal in row.normals)
     angles, _, half2 = angles_and_fields(
-        one, two, points, np.array(row["onward"]), (normals[0], normals[1])
+        one, two, points, np.array(row.onward), (normals[0], normals[1])
     )
     reach = [
         np.linalg.norm(points - camera.world_from_device[:3, 3], axis=1)

@@ -1,6 +1,5 @@
 """What a plan's document and its summary say of rings."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -8,7 +7,6 @@ import numpy as np
 
 from planning.model.plan import RigPlan
 from planning.report.claims import Claims, Devices
-from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
@@ -16,30 +14,6 @@ from planning.scene.scene import Scene
 # As many of the chords between rings may err by more than was asked.
 _STRAY = 0.01
 _MM = 1e3
-
-
-def with_rings(
-    entries: Sequence[dict[str, Any]],
-    scene: Scene,
-    devices: Devices,
-    stage: RingStage | None,
-) -> list[dict[str, Any]]:
-    """Return the plan's `projectors` with `rings` and `ring_shares` added.
-
-    Args:
-        entries: What `document.projector_entries` returned.
-        scene: Surface and requirements.
-        devices: As written.
-        stage: How the rings were spaced; None: the run was cut before that.
-    """
-    return [
-        entry
-        | {"rings": None if stage is None else stage.reports[p]}
-        | {"ring_shares": ring_shares(scene, projector, devices.cameras).to_document()}
-        for p, (entry, projector) in enumerate(
-            zip(entries, devices.projectors, strict=True)
-        )
-    ]
 
 
 def evenly_ringed(devices: Devices, stage: RingStage | None) -> Devices:
