@@ -54,7 +54,7 @@ class SurfaceShare(Part):
 
 
 class ReconstructionRecord(Part):
-    """Errors, completeness and verdict; `docs/reconstruction.md` defines every key."""
+    """Errors, completeness and verdict."""
 
     n_points: int
     n_merged: int

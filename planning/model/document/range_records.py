@@ -1,4 +1,4 @@
-"""`ranges`: the body that was estimated from ranges, `docs/ranges.md`."""
+"""`ranges`: the body that was estimated from ranges, `docs/use/ranges.md`."""
 
 from typing import Any
 

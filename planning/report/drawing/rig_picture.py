@@ -250,15 +250,16 @@ def _draw_title(
     pad, middle, headline = 16 * SUPERSAMPLING, size[1] // 2, ", ".join(counts)
     draw.text((pad, middle), headline, INK, font=font(24.0), anchor="lm")
     extent = 1e3 * np.ptp(plan.surface.mesh.bounds, axis=0)
-    name = _shortened(Path(plan.document["meshes"][0]["path"]).name)
-    detail = f"{name}, {' x '.join(f'{side:.0f}' for side in extent)} mm (x, y, z)"
+    name = _shortened(Path(plan.document.meshes[0].path or "").name)
+    size_mm = f"{' x '.join(f'{side:.0f}' for side in extent)} mm (x, y, z)"
+    detail = f"{name}, {size_mm}" if name else size_mm
     left = pad + draw.textlength(headline, font=font(24.0)) + 1.5 * pad
     draw.text((left, middle), detail, PALE, font=font(16.0), anchor="lm")
-    areas = plan.coverage["target"]
+    areas = plan.coverage.target
     claim = (
-        f"measured {1e4 * areas['measured_m2']:.0f} of "
-        f"{1e4 * areas['reachable_by_cameras_m2']:.0f} reachable, "
-        f"{1e4 * areas['area_m2']:.0f} sq cm target"
+        f"measured {1e4 * areas.measured_m2:.0f} of "
+        f"{1e4 * areas.reachable_by_cameras_m2:.0f} reachable, "
+        f"{1e4 * areas.area_m2:.0f} cm² target"
     )
     draw.text((size[0] - pad, middle), claim, INK, font=font(16.0), anchor="rm")
 

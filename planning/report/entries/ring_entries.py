@@ -1,10 +1,14 @@
 """What a plan's document and its summary say of rings."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from planning.model.document.device_records import (
+    ProjectorRecord,
+    RingSharesRecord,
+    RingsRecord,
+)
 from planning.model.plan import RigPlan
 from planning.report.claims import Claims, Devices
 from planning.rings.ring_stage import RingStage
@@ -41,64 +45,64 @@ def lost_to_rings_m2(
 
 def rings_lines(plan: RigPlan) -> list[str]:
     """Return the summary's lines on rings; none for plans that don't speak of them."""
-    entries = plan.to_document()["projectors"]
-    if any(entry.get("ring_shares") is None for entry in entries):
-        return []
-    lines = [_line(entry) for entry in entries]
-    lines += [note for entry in entries for note in _notes(entry)]
-    lost = plan.to_document()["coverage"].get("lost_to_rings_m2", 0.0)
+    records = plan.document.projectors
+    lines: list[str] = []
+    for record in records:
+        if record.ring_shares is None:
+            return []
+        lines.append(_line(record, record.ring_shares))
+    lines += [note for record in records for note in _notes(record)]
+    lost = plan.coverage.lost_to_rings_m2
     if lost > 0.0:
-        share = 100.0 * lost / plan.to_document()["coverage"]["target"]["area_m2"]
+        share = 100.0 * lost / plan.coverage.target.area_m2
         lines.append(f"{share:.2f} % of the target is measured by even rings only")
     return [f"{'RINGS' if k == 0 else '':<9}{line}" for k, line in enumerate(lines)]
 
 
-def _line(entry: dict[str, Any]) -> str:
-    shares, rings = entry["ring_shares"], entry["rings"]
-    n = len(entry["ring_radii"])
-    gap = ""
-    if rings is not None and rings["gap_m"] is not None:
-        low, high = (_MM * value for value in rings["gap_m"])
+def _line(record: ProjectorRecord, shares: RingSharesRecord) -> str:
+    rings, gap = record.rings, ""
+    if rings is not None and rings.gap_m is not None:
+        low, high = (_MM * value for value in rings.gap_m)
         gap = f", {low:.1f} to {high:.1f} mm apart on the object"
     words = ", ".join(
-        f"{100 * np.mean(shares[key]):.0f} % ({100 * min(shares[key]):.0f} %) {name}"
-        for name, key in (
-            ("on the object", "on_object"),
-            ("on the target", "on_target"),
-            ("measured", "measured"),
+        f"{100 * np.mean(values):.0f} % ({100 * min(values):.0f} %) {name}"
+        for name, values in (
+            ("on the object", shares.on_object),
+            ("on the target", shares.on_target),
+            ("measured", shares.measured),
         )
     )
-    missing = sum(share == 0.0 for share in shares["on_object"])
+    missing = sum(share == 0.0 for share in shares.on_object)
     return (
-        f"{entry['id']:<4} {n} rings{gap}, {missing} of them miss it; mean (least) "
-        f"share of a ring: {words}"
+        f"{record.id:<4} {len(record.ring_radii)} rings{gap}, {missing} of them miss "
+        f"it; mean (least) share of a ring: {words}"
     )
 
 
-def _notes(entry: dict[str, Any]) -> list[str]:
-    rings = entry["rings"]
+def _notes(record: ProjectorRecord) -> list[str]:
+    name, rings = record.id, record.rings
     if rings is None:
         return []
-    name, found = entry["id"], []
-    if rings["kept_even"]:
-        found.append(f"{name}: rings stay even, others would lose measured samples")
-    if rings["over_tolerance"] > _STRAY:
-        found.append(
-            f"{name}: between rings {100 * rings['over_tolerance']:.1f} % of the "
-            f"target strays more than {_MM * rings['error_tolerance_m']:g} mm from a "
+    notes: list[str] = []
+    if rings.kept_even:
+        notes.append(f"{name}: rings stay even, others would lose measured samples")
+    if rings.over_tolerance > _STRAY:
+        notes.append(
+            f"{name}: between rings {100 * rings.over_tolerance:.1f} % of the "
+            f"target strays more than {_MM * rings.error_tolerance_m:g} mm from a "
             f"straight line: {_remedy(rings)}"
         )
-    creases = rings["creases"]
-    if creases["length_m"] > 0.0:
-        found.append(
-            f"{name}: {_MM * creases['length_m']:.0f} mm of creases are lit; between "
-            f"rings they are cut by up to {_MM * creases['max_error_m']:.2f} mm"
+    creases = rings.creases
+    if creases.length_m > 0.0:
+        notes.append(
+            f"{name}: {_MM * creases.length_m:.0f} mm of creases are lit; between "
+            f"rings they are cut by up to {_MM * creases.max_error_m:.2f} mm"
         )
-    return found
+    return notes
 
 
-def _remedy(rings: dict[str, Any]) -> str:
-    if rings["limits_cross"] <= _STRAY and rings["spacing"] == "uniform":
+def _remedy(rings: RingsRecord) -> str:
+    if rings.limits_cross <= _STRAY and rings.spacing == "uniform":
         return 'write spacing = "curvature" under [rings]'
     return (
         "finer rings can't be told apart; a longer focal length, more views, or a "

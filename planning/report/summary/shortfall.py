@@ -2,10 +2,13 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
+from planning.model.document.certificates import Certificate
+from planning.model.document.coverage_records import Coverage, Relaxation
+from planning.model.document.plan_document import PlanDocument
+from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
-from planning.model.words import area_words
+from planning.model.words import area_words, percent
 
 # Causes that take less than this share of what is left aren't told.
 _TOLD = 0.01
@@ -39,66 +42,59 @@ def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
     """Return the largest causes with their share of an area, as one line."""
     ranked = sorted(areas.items(), key=lambda pair: -pair[1])[:most]
     return "; ".join(
-        f"{_percent(area / whole)} {cause_words(cause)}" for cause, area in ranked
+        f"{percent(area / whole)} {cause_words(cause)}" for cause, area in ranked
     )
 
 
-def shortfalls(document: dict[str, Any], requirements: Requirements) -> tuple[str, ...]:
-    """Return one sentence for each requirement that a plan misses.
-
-    Args:
-        document: The plan, with its claims and, where it was made, its check.
-        requirements: What was asked.
-    """
+def shortfalls(plan: RigPlan) -> tuple[str, ...]:
+    """Return one sentence for each requirement that a plan misses."""
+    required, check = plan.requirements, plan.document.reconstruction
     return (
-        *_reachable(document, requirements),
-        *_measurable(document, requirements),
-        *_covered(document, requirements),
-        *_check(document),
+        *_reachable(plan.document, required),
+        *_measurable(plan.coverage, required),
+        *_covered(plan.document, required),
+        *(() if check is None or check.passed else check.failures),
     )
 
 
-def _reachable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
-    areas = document["coverage"]["target"]
-    share = areas["reachable_by_projectors_m2"] / areas["area_m2"]
+def _reachable(document: PlanDocument, asked: Requirements) -> tuple[str, ...]:
+    coverage, areas = document.coverage, document.coverage.target
+    share = areas.reachable_by_projectors_m2 / areas.area_m2
     if share >= asked.min_reachable:
         return ()
-    causes = document["coverage"]["unreachable_by_cause"]
-    helps = document["coverage"].get("relaxations", [])
     line = (
-        f"only {_percent(share)} of the target can be lit from anywhere in the "
-        f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
-        f"{area_words(areas['area_m2'] - areas['reachable_by_projectors_m2'])} of "
-        f"{area_words(areas['area_m2'])} can't be reached: "
-        f"{causes_line(causes, areas['area_m2'])}{_inside(document)}"
+        f"only {percent(share)} of the target can be lit from anywhere in the "
+        f"workspace, {percent(asked.min_reachable)} is required (--min-reachable); "
+        f"{area_words(areas.area_m2 - areas.reachable_by_projectors_m2)} of "
+        f"{area_words(areas.area_m2)} can't be reached: "
+        f"{causes_line(coverage.unreachable_by_cause, areas.area_m2)}"
+        f"{_inside(document)}"
     )
-    steps = [
-        f"{step['change']} would reach {_percent(step['reachable_share'])}"
-        for step in helps
-    ]
-    steps.append(f"--min-reachable {_down(share)} accepts what there is")
-    return (f"{line}. What would help: {'; '.join(steps)}",)
+    return (f"{line}. What would help: {_steps(coverage.relaxations, share)}",)
 
 
-def _measurable(document: dict[str, Any], asked: Requirements) -> tuple[str, ...]:
+def _measurable(coverage: Coverage, asked: Requirements) -> tuple[str, ...]:
     """Whether enough of what is lit is within the cameras' reach."""
-    areas = document["coverage"]["target"]
-    lit, reached = areas["lit_m2"], areas["reachable_by_cameras_m2"]
+    lit, reached = coverage.target.lit_m2, coverage.target.reachable_by_cameras_m2
     if not lit > 0.0 or reached >= asked.min_reachable * lit:
         return ()
     share = reached / lit
-    steps = [
-        f"{step['change']} would reach {_percent(step['reachable_share'])}"
-        for step in document["coverage"].get("camera_relaxations", [])
-    ]
-    steps.append(f"--min-reachable {_down(share)} accepts what there is")
     return (
-        f"only {_percent(share)} of what is lit can be measured from anywhere in the "
-        f"workspace, {_percent(asked.min_reachable)} is required (--min-reachable); "
+        f"only {percent(share)} of what is lit can be measured from anywhere in the "
+        f"workspace, {percent(asked.min_reachable)} is required (--min-reachable); "
         f"{area_words(lit - reached)} of {area_words(lit)} can't be: "
-        f"{_areas_line(document['coverage'].get('unmeasurable_by_cause', {}))}. What "
-        f"would help: {'; '.join(steps)}",
+        f"{_areas_line(coverage.unmeasurable_by_cause)}. What "
+        f"would help: {_steps(coverage.camera_relaxations, share)}",
     )
+
+
+def _steps(relaxations: tuple[Relaxation, ...], share: float) -> str:
+    """What each relaxation would reach, and what accepts the share that is reached."""
+    steps = [
+        f"{step.change} would reach {percent(step.reachable_share)}"
+        for step in relaxations
+    ]
+    return "; ".join((*steps, f"--min-reachable {_down(share)} accepts what there is"))
 
 
 def _areas_line(areas: dict[str, float]) -> str:
@@ -108,31 +104,32 @@ def _areas_line(areas: dict[str, float]) -> str:
     return "; ".join(f"{area_words(area)} {cause_words(c)}" for c, area in told)
 
 
-def _inside(document: dict[str, Any]) -> str:
+def _inside(document: PlanDocument) -> str:
     """How much of what can't be reached lies inside the body."""
-    inside = document["coverage"].get("unreachable_inside_m2", 0.0)
+    inside = document.coverage.unreachable_inside_m2
     if not inside > 0.0:
         return ""
-    shell = document["meshes"][0].get("shell", {})
-    hollow = shell.get("kind") == "hollow shell"
+    hollow = document.meshes[0].shell.kind == "hollow shell"
     where = "lies inside the hollow body" if hollow else "lies in cavities"
     return f"; {area_words(inside)} of it {where}"
 
 
-def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
-    areas = document["coverage"]["target"]
-    for kind, part, whole, required, deed in (
+def _covered(document: PlanDocument, asked: Requirements) -> Iterator[str]:
+    areas, proofs = document.coverage.target, document.certificates
+    for kind, proof, part, whole, required, deed in (
         (
             "projectors",
-            areas["lit_m2"],
-            areas["reachable_by_projectors_m2"],
+            proofs.projectors,
+            areas.lit_m2,
+            areas.reachable_by_projectors_m2,
             asked.dominant_coverage,
             "light {} of the reachable target",
         ),
         (
             "cameras",
-            areas["measured_m2"],
-            areas["reachable_by_cameras_m2"],
+            proofs.cameras,
+            areas.measured_m2,
+            areas.reachable_by_cameras_m2,
             asked.coverage,
             "measure {} of what is lit and measurable",
         ),
@@ -140,23 +137,22 @@ def _covered(document: dict[str, Any], asked: Requirements) -> Iterator[str]:
         share = part / whole if whole > 0 else 0.0
         if share >= required:
             continue
-        proof = document["certificates"][kind]
-        devices = kind if proof["count"] > 1 else kind.removesuffix("s")
-        verb = deed if proof["count"] > 1 else deed.replace(" ", "s ", 1)
+        devices = kind if proof.count > 1 else kind.removesuffix("s")
+        verb = deed if proof.count > 1 else deed.replace(" ", "s ", 1)
         yield (
-            f"{proof['count']} {devices} {verb.format(_percent(share))}, "
-            f"{_percent(required)} is required; {area_words(whole - part)} of "
-            f"{area_words(whole)} are left{_bodies(document, proof)}. "
-            f"{_why(kind, document)}What would help: {_more(kind, proof, asked, share)}"
+            f"{proof.count} {devices} {verb.format(percent(share))}, "
+            f"{percent(required)} is required; {area_words(whole - part)} of "
+            f"{area_words(whole)} are left{_bodies(document.coverage, proof)}. "
+            f"{_why(kind, document.coverage)}What would help: {_more(kind, proof, asked, share)}"
         )
 
 
-def _why(kind: str, document: dict[str, Any]) -> str:
+def _why(kind: str, coverage: Coverage) -> str:
     """What keeps devices of a kind from the target, with areas, as a sentence."""
     prefixes = _OF_PROJECTORS if kind == "projectors" else _OF_CAMERAS
     areas = {
         cause: area
-        for cause, area in document["coverage"]["uncovered_by_cause"].items()
+        for cause, area in coverage.uncovered_by_cause.items()
         if cause.startswith(prefixes)
     }
     if not areas:
@@ -165,50 +161,39 @@ def _why(kind: str, document: dict[str, Any]) -> str:
     return f"Of the {of}: {_areas_line(areas)}. "
 
 
-def _bodies(document: dict[str, Any], proof: dict[str, Any]) -> str:
+def _bodies(coverage: Coverage, proof: Certificate) -> str:
     """Whose bodies stand in the way of how much, the largest area first."""
-    areas = document["coverage"].get("blocked_by_body_m2", {})
-    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
+    ranked = sorted(coverage.blocked_by_body_m2.items(), key=lambda pair: -pair[1])
     told = [
         f"{1e6 * area:.0f} mm² blocked by the body of {name}"
         for name, area in ranked
         if area > 0.0
     ]
-    if "but_for_bodies" in proof:
+    if proof.but_for_bodies:
         told.append(
-            f"{proof['but_for_bodies']} would do if their bodies didn't collide or "
+            f"{proof.but_for_bodies} would do if their bodies didn't collide or "
             f"stand in each other's way"
         )
     return f" ({', '.join(told)})" if told else ""
 
 
-def _more(kind: str, proof: dict[str, Any], asked: Requirements, share: float) -> str:
-    needed = proof["needed"]
+def _more(kind: str, proof: Certificate, asked: Requirements, share: float) -> str:
+    needed = proof.needed
     allowed = getattr(asked, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {_down(share)} accepts this plan"
     # Where bodies are in the way, more devices may be no help.
-    in_vain = needed["count"] <= proof.get("but_for_bodies", 0)
-    if allowed is None or needed["count"] <= allowed or in_vain:
+    in_vain = needed.count <= proof.but_for_bodies
+    if allowed is None or needed.count <= allowed or in_vain:
         return accept
     bound = (
         "proved over the candidates"
-        if needed["lower_bound"] == needed["count"]
-        else f"at least {needed['lower_bound']} proved over the candidates"
+        if needed.lower_bound == needed.count
+        else f"at least {needed.lower_bound} proved over the candidates"
     )
-    more = f"--max-{kind} {needed['count']} ({bound})"
-    field = needed.get("wider_field")
-    single = [*needed.get("relaxations", []), *([] if field is None else [field])]
-    return ", ".join([more, *single, f"or {accept}"])
-
-
-def _check(document: dict[str, Any]) -> tuple[str, ...]:
-    check = document["reconstruction"]
-    return () if check is None or check["passed"] else tuple(check["failures"])
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %"
+    more = f"--max-{kind} {needed.count} ({bound})"
+    field = () if needed.wider_field is None else (needed.wider_field,)
+    return ", ".join((more, *needed.relaxations, *field, f"or {accept}"))
 
 
 def _down(share: float) -> str:

@@ -1,14 +1,21 @@
 """The result that a person reads in ten seconds."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.certificates import Certificate
+from planning.model.document.coverage_records import (
+    Areas,
+    CameraMarginal,
+    ProjectorMarginal,
+)
+from planning.model.document.input_records import MeshRecord, SelectionRecord
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
+from planning.model.words import percent
 from planning.report.entries.cost import cost_lines
 from planning.report.entries.firing import schedule_line
 from planning.report.entries.range_entries import summary_lines
@@ -39,7 +46,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *_rings(plan),
         _marginal(plan),
         check_lines(plan),
-        *cost_lines(plan.to_document()["cost"]),
+        *cost_lines(plan.document.cost),
         *(f"MISSED   {line}" for line in missed),
         *(f"files    {name}" for name in files[:1]),
         *(f"         {name}" for name in files[1:]),
@@ -48,20 +55,18 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
 
 
 def _head(plan: RigPlan) -> str:
-    document, workspace = plan.to_document(), plan.requirements.workspace
-    mesh = document["meshes"][0]
+    document, workspace = plan.document, plan.requirements.workspace
+    mesh = document.meshes[0]
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
-    cut = (
-        "; TRUNCATED, not the best that could be found" if document["truncated"] else ""
-    )
+    cut = "; TRUNCATED, not the best that could be found" if document.truncated else ""
     where = _where(workspace)
     return (
         f"PLAN     {_number(plan.projectors, 'projector')}, "
         f"{_number(plan.cameras, 'camera')} for "
-        f"{mesh['path']}{cut}\n"
+        f"{mesh.path}{cut}\n"
         f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
-        f"{_unit(mesh)}, up {_axis(workspace.up)}; rig {document['rig']['name']}, "
-        f"{document['rig']['light']} light\n"
+        f"{_unit(mesh)}, up {_axis(workspace.up)}; rig {document.rig.name}, "
+        f"{document.rig.light} light\n"
         f"{shell_line(mesh)}"
         f"         devices may stand in {where}"
     )
@@ -77,18 +82,18 @@ _EXCLUDED = {
 }
 
 
-def shell_line(mesh: dict[str, Any]) -> str:
+def shell_line(mesh: MeshRecord) -> str:
     """Return what kind of body a mesh of the plan is, as a line; none for a solid."""
-    shell = mesh.get("shell", {"kind": "solid"})
-    if shell["kind"] == "solid":
+    shell = mesh.shell
+    if shell.kind == "solid":
         return ""
-    if shell["wall_m"] is None:
-        return f"         {shell['kind']}\n"
-    share = 100.0 * shell["inside_m2"] / mesh["area_m2"]
-    sealed = 100.0 * shell["sealed_m2"] / mesh["area_m2"]
+    if shell.wall_m is None:
+        return f"         {shell.kind}\n"
+    share = 100.0 * shell.inside_m2 / mesh.area_m2
+    sealed = 100.0 * shell.sealed_m2 / mesh.area_m2
     closed = f", {sealed:.1f} % in sealed cavities" if sealed > 0.05 else ""
     return (
-        f"         {shell['kind']}, wall about {1e3 * shell['wall_m']:.2g} mm; "
+        f"         {shell.kind}, wall about {1e3 * shell.wall_m:.2g} mm; "
         f"{share:.1f} % of the surface lies inside{closed}\n"
     )
 
@@ -127,10 +132,10 @@ def zone_phrases(workspace: Workspace) -> list[str]:
     return found
 
 
-def _unit(mesh: dict[str, Any]) -> str:
-    if mesh["unit"] == "size_mm":
-        return f"scaled to that size ({1e3 * mesh['scale_to_m']:.6g} mm a file unit)"
-    return f"unit {mesh['unit']}"
+def _unit(mesh: MeshRecord) -> str:
+    if mesh.unit == "size_mm":
+        return f"scaled to that size ({1e3 * mesh.scale_to_m:.6g} mm a file unit)"
+    return f"unit {mesh.unit}"
 
 
 def _axis(up: Sequence[float]) -> str:
@@ -195,44 +200,44 @@ def _middle(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
 
 def _proofs(plan: RigPlan) -> str:
     asked = plan.requirements
-    proofs = plan.to_document()["certificates"]
+    proofs = plan.document.certificates
     lines = [
-        _proof("projector", proofs["projectors"], asked.dominant_coverage, "light"),
-        _continuous(proofs["projectors"], _freedom(plan)),
-        _proof("camera", proofs["cameras"], asked.coverage, "measure")
+        _proof("projector", proofs.projectors, asked.dominant_coverage, "light"),
+        _continuous(proofs.projectors, _freedom(plan)),
+        _proof("camera", proofs.cameras, asked.coverage, "measure")
         + " (given these projectors)",
-        _continuous(proofs["cameras"], "position, aim and roll"),
-        *_routes(proofs["cameras"]),
+        _continuous(proofs.cameras, "position, aim and roll"),
+        *_routes(proofs.cameras),
         f"         {_regions(plan)}",
-        *_excluded(proofs["projectors"]),
+        *_excluded(proofs.projectors),
     ]
     return "\n" + "\n".join(lines)
 
 
-def _routes(proof: dict[str, Any]) -> list[str]:
+def _routes(proof: Certificate) -> list[str]:
     """Return how many cameras either route needs and which is taken, in a line."""
-    routes = proof.get("routes")
+    routes = proof.routes
     if routes is None:
         return []
     names = {"cover": "the cover", "paper": "the paper's largest baselines"}
     counts = [
-        f"{'none' if routes[kind] is None else routes[kind]} by {name}"
-        for kind, name in names.items()
-        if routes["asked"] in (kind, "both")
+        f"{'none' if count is None else count} by {names[kind]}"
+        for kind, count in (("cover", routes.cover), ("paper", routes.paper))
+        if routes.asked in (kind, "both")
     ]
     told = f"ROUTES   cameras: {', '.join(counts)}"
-    if routes["asked"] != "both":
+    if routes.asked != "both":
         return [told]
-    return [f"{told}; taken {names[routes['taken']]}: {routes['why']}"]
+    return [f"{told}; taken {names[routes.taken]}: {routes.why}"]
 
 
-def _excluded(proof: dict[str, Any]) -> list[str]:
+def _excluded(proof: Certificate) -> list[str]:
     """Return which limit of eq. (2) took how many pairs of pose and sample, in a line.
 
     A pair counts for the first limit that it fails, in the order in which they stand.
     """
-    pairs = proof["n_samples"] * proof["candidates"]["n_candidates"]
-    excluded = proof.get("excluded_pairs")
+    pairs = proof.n_samples * proof.candidates.n_candidates
+    excluded = proof.excluded_pairs
     if not excluded or not pairs:
         return []
     told = [
@@ -247,32 +252,31 @@ def _excluded(proof: dict[str, Any]) -> list[str]:
     ]
 
 
-def _proof(kind: str, proof: dict[str, Any], share: float, verb: str) -> str:
-    candidates, needed = proof["candidates"], proof["needed"]
-    count = proof["count"]
+def _proof(kind: str, proof: Certificate, share: float, verb: str) -> str:
+    candidates, needed, count = proof.candidates, proof.needed, proof.count
     scope = (
-        f"to {verb} {100 * share:g} % of what the {candidates['n_candidates']} "
-        f"candidate poses reach of {proof['n_samples']} samples{_given(proof)}"
+        f"to {verb} {100 * share:g} % of what the {candidates.n_candidates} "
+        f"candidate poses reach of {proof.n_samples} samples{_given(proof)}"
     )
     name = f"{kind}s"
-    if needed["count"] > count:
-        have = f"at least {needed['lower_bound']} {name} are needed"
-        enough = f"{needed['count']} suffice"
-        if needed["count"] <= proof.get("but_for_bodies", 0):
+    if needed.count > count:
+        have = f"at least {needed.lower_bound} {name} are needed"
+        enough = f"{needed.count} suffice"
+        if needed.count <= proof.but_for_bodies:
             enough += " but for their bodies"
         return f"PROVED   {have}, {enough}, {scope}"
-    if proof["status"] == "optimal":
+    if proof.status == "optimal":
         one = count == 1
         return (
             f"PROVED   {count} {kind if one else name} {'is' if one else 'are'} the "
             f"fewest {scope}"
         )
-    least = candidates["lower_bound"]
+    least = candidates.lower_bound
     return f"BOUND    {count} {name}; at least {least} are needed {scope}"
 
 
-def _given(proof: dict[str, Any]) -> str:
-    return f", given {proof['given']} existing" if "given" in proof else ""
+def _given(proof: Certificate) -> str:
+    return f", given {proof.given} existing" if proof.given else ""
 
 
 def _freedom(plan: RigPlan) -> str:
@@ -281,67 +285,68 @@ def _freedom(plan: RigPlan) -> str:
     return "direction" if parallel else "position and aim"
 
 
-def _continuous(proof: dict[str, Any], poses: str) -> str:
+def _continuous(proof: Certificate, poses: str) -> str:
     """Return what was proved over all poses of the workspace, in a line."""
-    bound = proof["continuous"]
+    bound = proof.continuous
     if bound is None:
         return f"         nothing is proved over every {poses} in the workspace"
     scope = (
-        f"over every {poses} in the workspace, for {bound['n_samples']} samples"
+        f"over every {poses} in the workspace, for {bound.n_samples} samples"
         f"{_given(proof)}"
     )
-    blind = "" if bound["occlusion"] else ", shadows left out"
-    least = bound["lower_bound"]
-    if least >= proof["needed"]["count"]:
+    blind = "" if bound.occlusion else ", shadows left out"
+    least = bound.lower_bound
+    if least >= proof.needed.count:
         return f"PROVED   fewer are too few {scope}{blind}"
     return f"BOUND    at least {least} are needed {scope}{blind}"
 
 
 def _coverage(plan: RigPlan) -> str:
-    coverage = plan.to_document()["coverage"]
-    target, surface = coverage["target"], coverage["surface"]
-    rows = [
-        ("area", "area_m2"),
-        ("reachable by projectors", "reachable_by_projectors_m2"),
-        ("lit", "lit_m2"),
-        ("reachable by cameras", "reachable_by_cameras_m2"),
-        ("measured", "measured_m2"),
-    ]
+    coverage = plan.coverage
+    target, surface = coverage.target, coverage.surface
+    labels = (
+        "area",
+        "reachable by projectors",
+        "lit",
+        "reachable by cameras",
+        "measured",
+    )
+    cells = zip(labels, _cells(target), _cells(surface), strict=True)
     name = _target_name(plan)
     lines = [
         f"\n{'':<9}{'':<25}{'target (' + name + ')':>24}{'whole surface':>24}",
         *(
-            f"{'':<9}{label:<25}{_cell(target, key):>24}{_cell(surface, key):>24}"
-            for label, key in rows
+            f"{'':<9}{label:<25}{of_target:>24}{of_surface:>24}"
+            for label, of_target, of_surface in cells
         ),
     ]
-    lit = _ratio(target["lit_m2"], target["reachable_by_projectors_m2"])
-    measured = _ratio(target["measured_m2"], target["reachable_by_cameras_m2"])
+    lit = _ratio(target.lit_m2, target.reachable_by_projectors_m2)
+    measured = _ratio(target.measured_m2, target.reachable_by_cameras_m2)
     lines.append(
         f"COVERAGE lit / reachable by projectors {lit}, measured / reachable by "
-        f"cameras {measured}, on the target, {coverage['samples']} fresh samples"
+        f"cameras {measured}, on the target, {coverage.samples} fresh samples"
     )
-    left = coverage["uncovered_by_cause"]
+    left = coverage.uncovered_by_cause
     if left:
-        lines.append(f"         not measured: {causes_line(left, target['area_m2'])}")
-    idle = {e["id"] for e in plan.to_document()["cameras"] if e["seen_area_m2"] == 0.0}
-    groups = [g for g in plan.to_document()["camera_groups"] if not idle.issuperset(g)]
+        lines.append(f"         not measured: {causes_line(left, target.area_m2)}")
+    idle = {c.id for c in plan.document.cameras if c.seen_area_m2 == 0.0}
+    groups = [g for g in plan.document.camera_groups if not idle.issuperset(g)]
     if len(groups) > 1:
         names = ", ".join("{" + " ".join(group) + "}" for group in groups)
         lines.append(
             f"         the parts of {names} don't overlap: register them by the "
             f"calibrated poses, not by the surface"
         )
+    areas = (
+        *(("lights", p.id, p.lit_area_m2) for p in plan.document.projectors),
+        *(("measures", c.id, c.seen_area_m2) for c in plan.document.cameras),
+    )
     lines += [
-        f"         {entry['id']} {does} none of the target"
-        for does, kind, area in (
-            ("lights", "projectors", "lit_area_m2"),
-            ("measures", "cameras", "seen_area_m2"),
-        )
-        for entry in plan.to_document()[kind]
-        if entry[area] == 0.0
+        f"         {name} {does} none of the target"
+        for does, name, area in areas
+        if area == 0.0
     ]
-    if firing := schedule_line(plan.to_document()):
+    if firing := schedule_line(plan.document):
         lines.append(firing)
     return "\n".join(lines)
 
@@ -352,38 +357,49 @@ def _target_name(plan: RigPlan) -> str:
 
 def _regions(plan: RigPlan) -> str:
     """Return how many regions there are, and what chose their faces."""
-    regions = plan.to_document()["regions"]
+    regions = plan.document.regions
     many = f"region{'s' * (len(regions) != 1)}"
     own = _own(plan)
     if own is None:
         return f"{len(regions)} dominant {many}"
-    by = "highest weight" if own["kind"] == "vertex_weight" else "selection"
-    source = f" by {own['source']}" if own["source"] else ""
-    removed = own["n_removed_by_repair"]
+    by = "highest weight" if own.kind == "vertex_weight" else "selection"
+    source = f" by {own.source}" if own.source else ""
+    removed = own.n_removed_by_repair
     gone = f" ({removed} chosen ones removed by repair)" if removed else ""
-    return f"{len(regions)} {many} of your {by}{source}: {own['n_faces']} faces{gone}"
+    return f"{len(regions)} {many} of your {by}{source}: {own.n_faces} faces{gone}"
 
 
-def _own(plan: RigPlan) -> dict[str, Any] | None:
+def _own(plan: RigPlan) -> SelectionRecord | None:
     """Return `surface.selection` if the user made it; older plans have none."""
-    found = plan.to_document()["surface"].get("selection")
-    return None if found is None or found["kind"] == "curvature" else found
+    selection = plan.document.surface.selection
+    return None if selection is None or selection.kind == "curvature" else selection
 
 
-def _cell(areas: dict[str, float], key: str) -> str:
-    share = 100.0 * areas[key] / areas["area_m2"]
-    area, unit = 1e4 * areas[key], "cm²"
-    if areas["area_m2"] < _SMALL_M2:
-        area, unit = 1e6 * areas[key], "mm²"
+def _cells(areas: Areas) -> list[str]:
+    parts = (
+        areas.area_m2,
+        areas.reachable_by_projectors_m2,
+        areas.lit_m2,
+        areas.reachable_by_cameras_m2,
+        areas.measured_m2,
+    )
+    return [_cell(part, areas.area_m2) for part in parts]
+
+
+def _cell(area_m2: float, whole_m2: float) -> str:
+    share = 100.0 * area_m2 / whole_m2
+    area, unit = 1e4 * area_m2, "cm²"
+    if whole_m2 < _SMALL_M2:
+        area, unit = 1e6 * area_m2, "mm²"
     return f"{area:9.1f} {unit} {share:6.1f} %"
 
 
 def _ratio(part: float, whole: float) -> str:
-    return f"{100.0 * part / whole:.1f} %" if whole > 0 else "undefined"
+    return percent(part / whole) if whole > 0 else "undefined"
 
 
 def _ranges(plan: RigPlan) -> list[str]:
-    lines = summary_lines(plan.to_document())
+    lines = summary_lines(plan.document)
     return ["\n" + "\n".join(lines)] if lines else []
 
 
@@ -393,22 +409,32 @@ def _rings(plan: RigPlan) -> list[str]:
 
 
 def _marginal(plan: RigPlan) -> str:
-    area = plan.to_document()["coverage"]["target"]["area_m2"]
-    rows = plan.to_document()["marginal"]
-    lines: list[str] = []
-    for kind, key, verb, planned in (
-        ("n_projectors", "lit_target_m2", "lit", len(plan.projectors)),
-        ("n_cameras", "measured_target_m2", "measured", len(plan.cameras)),
-    ):
-        cells = [
-            f"{row[kind]}{'*' if row[kind] == planned else ''}: "
-            f"{100.0 * row[key] / area:.1f} %"
-            for row in rows
-            if kind in row
-        ]
-        label = kind.removeprefix("n_")
-        lines.append(f"         {label:<10} {verb} of the target   {'   '.join(cells)}")
-    return (
-        "\nMARGINAL what one more or fewer would change (* as planned)\n"
-        + "\n".join(lines)
+    rows = plan.document.marginal
+    lit = {
+        row.n_projectors: row.lit_target_m2
+        for row in rows
+        if isinstance(row, ProjectorMarginal)
+    }
+    measured = {
+        row.n_cameras: row.measured_target_m2
+        for row in rows
+        if isinstance(row, CameraMarginal)
+    }
+    return "\n".join(
+        (
+            "\nMARGINAL what one more or fewer would change (* as planned)",
+            _counted("projectors", "lit", lit, len(plan.projectors), plan),
+            _counted("cameras", "measured", measured, len(plan.cameras), plan),
+        )
     )
+
+
+def _counted(
+    kind: str, verb: str, areas: Mapping[int, float], planned: int, plan: RigPlan
+) -> str:
+    whole = plan.coverage.target.area_m2
+    cells = [
+        f"{n}{'*' if n == planned else ''}: {percent(area / whole)}"
+        for n, area in areas.items()
+    ]
+    return f"         {kind:<10} {verb} of the target   {'   '.join(cells)}"
