@@ -14,6 +14,8 @@ from planning.cameras.camera_routes import slide_routes
 from planning.cameras.camera_stage import follow_cameras, place_cameras
 from planning.cameras.proved_cameras import bound_stage
 from planning.cameras.routes import CamerasBy
+from planning.model.document.certificates import Certificate
+from planning.model.document.check_records import ReconstructionRecord
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import InterruptedPlanError, RequirementError
@@ -27,7 +29,7 @@ from planning.proofs.selection import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.what_helps import falls_short
 from planning.report.assemble import write_plan
-from planning.report.entries.cost import cost_entry
+from planning.report.entries.cost import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.range_guard import Guard, guarded
@@ -145,8 +147,8 @@ def plan_rig(
     # BLAS must not split sums differently with another number of threads.
     with threadpool_limits(1):
         plan = _plan(order, clock, check=check)
-    missed = shortfalls(plan.to_document(), plan.requirements)
-    if check and plan.to_document()["reconstruction"] is None:
+    missed = shortfalls(plan)
+    if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
     if missed:
         raise RequirementError(plan, missed)
@@ -177,8 +179,7 @@ def _first_draft(order: PlanRequest, clock: Stopwatch) -> PartialPlan:
         stage = prove_fewest(
             ready.scene, stage, ready.template, effort, ring_offset=ready.ring_offset
         )
-        proof = stage.certificate["continuous"]
-        clock.say(f"  projectors: at least {proof['lower_bound']}, {proof['proof']}")
+        clock.say(f"  projectors: {_bound_words(stage.certificate)}")
     projectors, cameras = _placed(order, ready.scene, stage, ready.tilt, clock)
     return PartialPlan(
         order,
@@ -219,7 +220,7 @@ def _placed(
         cameras = solution.stage
         clock.say(
             f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "
-            f"least {cameras.certificate['candidates']['lower_bound']} are needed"
+            f"least {cameras.certificate.candidates.lower_bound} are needed"
         )
     return solution.projectors, cameras
 
@@ -231,16 +232,14 @@ def _one_more(
 
     The proved bound stays what it is; the count is then above it, and says so.
     """
-    asked, areas = plan.requirements, plan.to_document()["coverage"]["target"]
+    asked, areas = plan.requirements, plan.coverage.target
     if falls_short(
-        areas, "lit_m2", "reachable_by_projectors_m2", asked.dominant_coverage
+        areas.lit_m2, areas.reachable_by_projectors_m2, asked.dominant_coverage
     ):
         stage = larger(draft.stage, draft.stage.projectors, asked.max_projectors)
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
-            stage = replace(
-                stage, projectors=stage.by_count[stage.certificate["count"]]
-            )
+            stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
             projectors, cameras = _placed(
                 draft.order, draft.scene, stage, draft.tilt, clock
             )
@@ -252,11 +251,11 @@ def _one_more(
                 camera_stage=cameras,
                 cameras=cameras.cameras,
             )
-    if falls_short(areas, "measured_m2", "reachable_by_cameras_m2", asked.coverage):
+    if falls_short(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage):
         cameras = larger(draft.camera_stage, draft.cameras, asked.max_cameras)
         if cameras is not None:
             clock.say("  fresh samples fall short: one camera more")
-            chosen = cameras.by_count[cameras.certificate["count"]]
+            chosen = cameras.by_count[cameras.certificate.count]
             cameras = replace(cameras, cameras=chosen)
             return replace(draft, camera_stage=cameras, cameras=chosen, rings=None)
     return None
@@ -309,13 +308,12 @@ def _bounded(draft: PartialPlan, clock: Stopwatch) -> PartialPlan:
     with another certificate.
     """
     stage = draft.camera_stage
-    if stage.certificate["continuous"] is not None:
+    if stage.certificate.continuous is not None:
         return draft
     with clock.stage("camera_bounds", "bounds over all poses of the cameras"):
         effort = camera_bound.PROVE if draft.order.prove else camera_bound.DEFAULT
         stage = bound_stage(draft.scene, stage, draft.order.rig.camera_device(), effort)
-        proof = stage.certificate["continuous"]
-        clock.say(f"  cameras: at least {proof['lower_bound']}, {proof['proof']}")
+        clock.say(f"  cameras: {_bound_words(stage.certificate)}")
     return replace(draft, camera_stage=stage)
 
 
@@ -337,20 +335,28 @@ def _checked(plan: RigPlan, draft: PartialPlan, clock: Stopwatch) -> RigPlan:
             plan, threads=draft.order.threads, progress=clock.say_in_time
         )
     found = verification.reconstruction
-    entry = None if found is None else found.to_document()
-    if entry is not None:
-        false = list(verification.audit.failures)
-        entry["failures"] = [*false, *entry["failures"]]
-        entry["passed"] = entry["passed"] and not false
-    greedy = draft.camera_stage.certificate["greedy_count"]
+    record = None
+    if found is not None:
+        false = verification.audit.failures
+        record = ReconstructionRecord(**found.to_document())
+        record = record.changed(
+            failures=(*false, *record.failures), passed=record.passed and not false
+        )
+    greedy = draft.camera_stage.certificate.greedy_count
     seconds = clock.processor | ({} if found is None else found.seconds)
-    document = plan.to_document() | {
-        "reconstruction": entry,
-        "members": [plan.to_document()["members"][0] | {"reconstruction": entry}],
-        "timings_s": dict(clock.seconds),
-        "cost": cost_entry(plan.cameras, greedy, seconds),
-    }
-    return RigPlan.from_document(document, plan.surface)
+    (member,) = plan.document.members
+    document = plan.document.changed(
+        reconstruction=record,
+        members=(member.changed(reconstruction=record),),
+        timings_s=dict(clock.seconds),
+        cost=cost_record(plan.cameras, greedy, seconds),
+    )
+    return RigPlan(document, plan.surface)
+
+
+def _bound_words(proof: Certificate) -> str:
+    bound = proof.continuous
+    return "" if bound is None else f"at least {bound.lower_bound}, {bound.proof}"
 
 
 def _whole(target: str | None, unselected: bool) -> Literal["surface"]:

@@ -111,7 +111,7 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
         clock.say(
             f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
-            f"{stage.certificate['candidates']['lower_bound']} are needed"
+            f"{stage.certificate.candidates.lower_bound} are needed"
         )
     return stage
 

@@ -74,7 +74,7 @@ def _reconstruct(
     report: Report | None,
 ) -> Reconstruction:
     seed = options["seed"]
-    seed = int(plan.to_document()["seed"]) if seed is None else seed
+    seed = plan.document.seed if seed is None else seed
     threads = options["threads"] or cores()
     mounted = options["calibration"]
     mounted = None if mounted is None else calibrated(scanner, mounted)

@@ -115,7 +115,7 @@ def verify_plan(
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
     say = progress or _silent
-    seed = int(plan.to_document()["seed"]) if seed is None else seed
+    seed = plan.document.seed if seed is None else seed
     say("audit: recomputing every claim on fresh samples")
     audit = audit_plan(plan, seed=seed, threads=threads)
     failures = list(audit.failures)
@@ -192,7 +192,7 @@ def _with_mesh(plan: RigPlan, mesh: TriangleMesh) -> RigPlan:
         region=np.full(n, -1, dtype=np.int64),
         steep=np.zeros((n, 3)),
     )
-    return RigPlan.from_document(plan.to_document(), surface)
+    return RigPlan(plan.document, surface)
 
 
 def _silent(line: str) -> None:

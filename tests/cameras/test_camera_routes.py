@@ -289,15 +289,17 @@ def test_a_plan_by_the_papers_route_alone_bears_the_audit(planned):
     assert areas["measured_m2"] >= 0.95 * areas["reachable_by_cameras_m2"]
 
 
-def test_the_summary_tells_both_counts_and_why():
-    told = Routes("both", 3, 4, "cover", "fewer; so").entry()
-    (line,) = _routes({"routes": told})
+def test_the_summary_tells_both_counts_and_why(handmade):
+    told = Routes("both", 3, 4, "cover", "fewer; so").counts()
+    proof = handmade.build_plan().document.certificates.cameras
+    (line,) = _routes(proof.changed(routes=told))
     assert re.search(
         r"3 by the cover, 4 by the paper.*taken the cover.*fewer; so", line
     )
-    (alone,) = _routes({"routes": Routes("paper", None, 4, "paper", "").entry()})
+    told = Routes("paper", None, 4, "paper", "").counts()
+    (alone,) = _routes(proof.changed(routes=told))
     assert alone.endswith("4 by the paper's largest baselines")
-    assert _routes({}) == []
+    assert _routes(proof) == []
 
 
 def _failures(routes, **proof):

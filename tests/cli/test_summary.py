@@ -9,7 +9,7 @@ from geometry.devices import PinholeModel
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.report.entries.cost import cost_entry, cost_lines
+from planning.report.entries.cost import cost_lines, cost_record
 from planning.report.summary.summary import aim_angles
 from planning.scene.workspace.candidates import aimed_poses
 
@@ -94,7 +94,7 @@ def test_eq_8_before_and_after_the_number_of_cameras_was_minimised():
         "claims": 90,
         "check": 90,
     }
-    cost = cost_entry(cameras, 3, seconds)
+    cost = cost_record(cameras, 3, seconds).to_document()
     assert cost["pixels"] == 2 * 2000 * 1500
     assert cost["t1"] * cost["pixels"] == pytest.approx(6.0)
     assert cost["t2"] * cost["pixels"] == pytest.approx(3.0)
@@ -113,16 +113,16 @@ def test_eq_8_is_told_with_its_terms_in_microseconds_a_pixel():
         "cameras": 4,
     }
     cameras = [looking([0.0, -1.0, 0.0]), looking([1.0, 0.0, 0.0])]
-    now, before = cost_lines(cost_entry(cameras, 3, seconds))
+    now, before = cost_lines(cost_record(cameras, 3, seconds))
     assert "6.0 Mpx x (1.00 + 0.50) us + 0.5 + 2.0 + 4.0 s = 15.5 s" in now
     assert "the 3 cameras of a greedy cover" in before
     assert before.endswith("20.0 s")
 
 
 def test_eq_8_is_unknown_without_a_check():
-    cost = cost_entry([looking([0.0, -1.0, 0.0])], 1, {"projectors": 2, "cameras": 4})
-    assert cost["C"] is None
-    assert cost["t4"] == 2
+    cost = cost_record([looking([0.0, -1.0, 0.0])], 1, {"projectors": 2, "cameras": 4})
+    assert cost.C is None
+    assert cost.t4 == 2
     assert cost_lines(cost) == []
 
 

@@ -13,6 +13,15 @@ from geometry.shapes.primitives import sphere
 from planning.cameras.baselines.coverage_triangle import round_body_limit
 from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
 from planning.cameras.proved_cameras import bound_stage
+from planning.model.document.certificates import (
+    BestArea,
+    CandidateBound,
+    Certificate,
+    ContinuousProof,
+    CountArea,
+    NeededCount,
+    OneFewer,
+)
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing
 from planning.model.ring_frame import ring_frame
@@ -504,42 +513,48 @@ def test_cameras_that_stand_already_and_are_enough_need_no_cells():
 
 
 def test_a_bound_over_all_poses_raises_that_over_candidates_and_lowers_areas():
-    rows = [
-        {"count": 1, "value_m2": 1.0, "upper_bound_m2": 2.0},
-        {"count": 2, "value_m2": 2.0, "upper_bound_m2": 3.0},
-        {"count": 3, "value_m2": 3.0, "upper_bound_m2": 3.0},
-    ]
-    proof = {
-        "count": 3,
-        "status": "feasible",
-        "n_samples": 100,
-        "needed": {"count": 3, "lower_bound": 2},
-        "candidates": {"lower_bound": 2, "proof": "before"},
-        "by_count": rows,
-        "one_fewer": {"upper_bound_m2": 3.0, "scope": "candidates"},
-        "best_area": {"upper_bound_m2": 3.0, "scope": "candidates"},
-    }
-    bound = {
-        "lower_bound": 3,
-        "proof": "cells",
-        "n_samples": 100,
-        "one_fewer_upper_bound_m2": 2.5,
-    }
-    joined_ = all_poses.joined(proof, bound)
-    assert joined_["needed"]["lower_bound"] == 3
-    assert joined_["candidates"]["lower_bound"] == 3
-    assert joined_["status"] == "optimal"
-    assert joined_["one_fewer"]["upper_bound_m2"] == 2.5
-    assert [row["upper_bound_m2"] for row in joined_["by_count"]] == [2.0, 2.5, 3.0]
-    assert joined_["best_area"]["upper_bound_m2"] == 3.0
+    proof = Certificate(
+        count=3,
+        status="feasible",
+        required_m2=1.0,
+        n_samples=100,
+        candidates=CandidateBound(lower_bound=2, n_candidates=9, proof="before"),
+        continuous=None,
+        greedy_count=3,
+        needed=NeededCount(count=3, lower_bound=2),
+        by_count=[
+            CountArea(count=1, value_m2=1.0, upper_bound_m2=2.0),
+            CountArea(count=2, value_m2=2.0, upper_bound_m2=3.0),
+            CountArea(count=3, value_m2=3.0, upper_bound_m2=3.0),
+        ],
+        best_area=BestArea(value_m2=3.0, upper_bound_m2=3.0),
+        one_fewer=OneFewer(upper_bound_m2=3.0),
+    )
+    bound = ContinuousProof(
+        lower_bound=3,
+        status="proved",
+        proof="cells",
+        occlusion=True,
+        n_samples=100,
+        n_reached=90,
+        n_cells=5,
+        one_fewer_upper_bound_m2=2.5,
+    )
+    raised = all_poses.joined(proof, bound)
+    assert raised.needed.lower_bound == 3
+    assert raised.candidates.lower_bound == 3
+    assert raised.status == "optimal"
+    assert raised.one_fewer.upper_bound_m2 == 2.5
+    assert [row.upper_bound_m2 for row in raised.by_count] == [2.0, 2.5, 3.0]
+    assert raised.best_area.upper_bound_m2 == 3.0
     # Fewer are allowed than are needed: their best area is bounded as well.
-    short = all_poses.joined(proof | {"count": 2, "status": "infeasible"}, bound)
-    assert short["best_area"]["upper_bound_m2"] == 2.5
-    assert (short["status"], short["candidates"]["lower_bound"]) == ("infeasible", 2)
+    short = all_poses.joined(proof.changed(count=2, status="infeasible"), bound)
+    assert short.best_area.upper_bound_m2 == 2.5
+    assert (short.status, short.candidates.lower_bound) == ("infeasible", 2)
     # What speaks of other samples stays beside it.
-    apart = all_poses.joined(proof, bound | {"n_samples": 90})
-    assert apart["needed"]["lower_bound"] == 2
-    assert apart["by_count"] == rows
+    apart = all_poses.joined(proof, bound.changed(n_samples=90))
+    assert apart.needed.lower_bound == 2
+    assert apart.by_count == proof.by_count
 
 
 def test_more_is_spent_where_a_proof_is_asked_for():

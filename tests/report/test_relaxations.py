@@ -129,7 +129,7 @@ def test_too_few_beams_for_a_plate_say_how_many_or_how_wide_they_must_be(
     assert needed["count"] >= 5
     left = 1e4 * (areas["reachable_by_projectors_m2"] - areas["lit_m2"])
     written = RigPlan.load(tmp_path / "plan" / "plan.json")
-    missed = "".join(shortfalls(written.to_document(), written.requirements))
+    missed = "".join(shortfalls(written))
     assert f"{left:.1f} cm² of 400.0 cm² are left" in missed
     assert f"--max-projectors {needed['count']} (" in missed
     radius = re.search(r"a beam of (\d+) mm about its axis", missed)

@@ -1,9 +1,9 @@
 """Each missed requirement: how much, why, and the smallest relaxation that helps."""
 
-import dataclasses
-
 import pytest
 
+from planning.model.document.check_records import ReconstructionRecord
+from planning.model.plan import RigPlan
 from planning.model.words import area_words
 from planning.report.summary.shortfall import shortfalls
 from planning.report.summary.summary import _cell
@@ -40,10 +40,12 @@ def missed(plan, *, blocked=None, **areas):
         "needed": {"count": 3, "lower_bound": 3},
     }
     document["reconstruction"] = None
-    asked = dataclasses.replace(
-        plan.requirements, coverage=0.95, dominant_coverage=0.9, min_reachable=0.9
-    )
-    return shortfalls(document, asked)
+    document["requirements"] |= {
+        "coverage": 0.95,
+        "dominant_coverage": 0.9,
+        "min_reachable": 0.9,
+    }
+    return shortfalls(RigPlan.from_document(document, plan.surface))
 
 
 def test_nothing_is_missed_where_everything_is_covered(plan):
@@ -93,18 +95,32 @@ def test_bodies_that_are_in_the_way_are_named(plan):
     proof = document["certificates"]["projectors"]
     proof |= {"count": 2, "needed": {"count": 3, "lower_bound": 3}}
     proof["but_for_bodies"] = 3
-    asked = dataclasses.replace(plan.requirements, dominant_coverage=1.0)
+    document["requirements"]["dominant_coverage"] = 1.0
     target = document["coverage"]["target"]
     target["lit_m2"] = 0.5 * target["reachable_by_projectors_m2"]
-    line = next(s for s in shortfalls(document, asked) if "2 projectors light" in s)
+    short = shortfalls(RigPlan.from_document(document, plan.surface))
+    line = next(s for s in short if "2 projectors light" in s)
     assert "3 would do if their bodies didn't collide" in line
     assert "--max-projectors" not in line
 
 
 def test_a_failed_check_lists_its_own_sentences(plan):
-    document = plan.to_document()
-    document["reconstruction"] = {"passed": False, "failures": ["rms too large"]}
-    assert "rms too large" in shortfalls(document, plan.requirements)
+    check = ReconstructionRecord(
+        n_points=0,
+        n_merged=0,
+        redundant_fraction=0.0,
+        accuracy_rms_m=None,
+        accuracy_p95_m=None,
+        accuracy_bias_m=None,
+        completeness=(),
+        predicted_missing=0.0,
+        pixel_noise=None,
+        ambient=None,
+        passed=False,
+        failures=("rms too large",),
+    )
+    document = plan.document.changed(reconstruction=check)
+    assert "rms too large" in shortfalls(RigPlan(document, plan.surface))
 
 
 def test_areas_of_tiny_parts_are_told_in_square_millimetres():

@@ -413,7 +413,7 @@ def test_the_plan_carries_points_sphere_and_guard(plan, body):
     least, most = plan.requirements.workspace.camera_radius_m
     width = 0.1 - 4.0 * body.position_sigma_m
     assert most - least == pytest.approx(width, abs=1e-9)
-    text = "\n".join(summary_lines(plan.to_document()))
+    text = "\n".join(summary_lines(plan.document))
     assert "14 points" in text
     rows = plan.to_document()["baselines"]
     assert f"{len(rows)} of {len(rows)} rows" in text
@@ -423,37 +423,37 @@ def test_rows_keep_two_sigma_of_d_max(plan, body):
     """Against d_max of spheres drawn from the estimate's own covariance."""
     rng = np.random.default_rng(0)
     cameras = {camera.id: camera for camera in plan.cameras}
-    assert plan.to_document()["baselines"]
-    for row in plan.to_document()["baselines"]:
-        assert row["covered_at_2_sigma"] is True
-        assert row["d"] < row["d_max_stated"] - 2.0 * row["d_max_sigma"]
-        assert row["d_max_stated"] >= row["d_max"]
-        at = np.array(row["E"])
+    assert plan.document.baselines
+    for row in plan.document.baselines:
+        assert row.covered_at_2_sigma is True
+        assert row.d < row.d_max_stated - 2.0 * row.d_max_sigma
+        assert row.d_max_stated >= row.d_max
+        at = np.array(row.E)
         outward = (at - body.ball.centre) / np.linalg.norm(at - body.ball.centre)
         state = rng.multivariate_normal(np.zeros(4), body.ball.covariance, 3000)
         bumps = body.ball.shape_sigma * rng.normal(size=(3000, 1))
         moved = at + state[:, :3] + (state[:, 3:] + bumps) * outward
-        one, two = (cameras[name] for name in row["cameras"])
+        one, two = (cameras[name] for name in row.cameras)
         drawn = limits_at(one, two, moved, row, np.radians(70.0))
-        assert row["d_max_sigma"] == pytest.approx(np.std(drawn), rel=0.1)
+        assert row.d_max_sigma == pytest.approx(np.std(drawn), rel=0.1)
 
 
 def test_d_max_of_a_row_is_that_of_the_incidence_as_stated(plan, body):
-    row = plan.to_document()["baselines"][0]
+    row = plan.document.baselines[0]
     _, guard = guarded(load_rig("default"), body)
-    stated = {"camera.max_incidence": row["iota"][1] + 0.05}
+    stated = {"camera.max_incidence": row.iota[1] + 0.05}
     (found,) = with_spread(
         [row], plan.cameras, body.ball, replace(guard, stated=stated)
     )
-    d1, d2 = row["D1"], row["D2"]
-    square = d1**2 + d2**2 - 2.0 * d1 * d2 * np.cos(row["phi"] + 0.05)
-    assert found["d_max_stated"] == pytest.approx(np.sqrt(square), rel=1e-9)
-    stated = {"camera.max_incidence": row["iota"][1] + 1e-5}
+    d1, d2 = row.D1, row.D2
+    square = d1**2 + d2**2 - 2.0 * d1 * d2 * np.cos(row.phi + 0.05)
+    assert found.d_max_stated == pytest.approx(np.sqrt(square), rel=1e-9)
+    stated = {"camera.max_incidence": row.iota[1] + 1e-5}
     (tight,) = with_spread(
         [row], plan.cameras, body.ball, replace(guard, stated=stated)
     )
-    assert row["d"] < tight["d_max_stated"]
-    assert tight["covered_at_2_sigma"] is False
+    assert row.d < tight.d_max_stated
+    assert tight.covered_at_2_sigma is False
 
 
 def audited(plan, document):
@@ -532,7 +532,7 @@ def test_the_audit_finds_a_surface_that_is_not_the_sphere(plan):
 def test_a_plan_of_a_mesh_has_no_such_claims(plan):
     document = {k: v for k, v in plan.to_document().items() if k != "ranges"}
     assert audited(plan, document) == ()
-    assert summary_lines(document) == []
+    assert summary_lines(RigPlan.from_document(document, plan.surface).document) == []
 
 
 def test_documented_columns_are_those_that_are_read():

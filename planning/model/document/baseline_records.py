@@ -6,8 +6,8 @@ from .part import Part, Vector3
 class BaselineRow(Part):
     """The tightest seam point of a pair; lengths in [m], angles in [rad].
 
-    `docs/method/baselines.md` defines every key; the last three are known only where ranges
-    were estimated (`docs/use/ranges.md`).
+    `docs/method/baselines.md` defines every key; the last three are known only where
+    ranges were estimated (`docs/use/ranges.md`).
     """
 
     cameras: tuple[str, str]

@@ -27,7 +27,7 @@ VERSION = 1
 
 
 class CostRecord(Part):
-    """Eq. (8); `docs/method/cost.md` defines every key. None where no check was made."""
+    """Eq. (8); `docs/method/cost.md` defines every key. None: no check was made."""
 
     pixels: int
     n_cameras_before: int

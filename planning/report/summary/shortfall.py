@@ -143,7 +143,8 @@ def _covered(document: PlanDocument, asked: Requirements) -> Iterator[str]:
             f"{proof.count} {devices} {verb.format(percent(share))}, "
             f"{percent(required)} is required; {area_words(whole - part)} of "
             f"{area_words(whole)} are left{_bodies(document.coverage, proof)}. "
-            f"{_why(kind, document.coverage)}What would help: {_more(kind, proof, asked, share)}"
+            f"{_why(kind, document.coverage)}What would help: "
+            f"{_more(kind, proof, asked, share)}"
         )
 
 

@@ -11,8 +11,9 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 from geometry.repair.hollow import MeshShell, measure_shell
 from geometry.shapes.primitives import sphere
+from planning.model.plan import RigPlan
 from planning.model.surface import Surface
-from planning.report.entries.device_entries import mesh_entry
+from planning.report.entries.device_entries import mesh_record
 from planning.report.summary.shortfall import shortfalls
 from planning.report.summary.summary import shell_line
 from planning.verify.audit.audit_samples import draw_samples
@@ -58,7 +59,7 @@ def shell_of(mesh: TriangleMesh) -> MeshShell:
 
 
 def claims(mesh: TriangleMesh, inside_m2: float, dark_m2: float) -> dict[str, Any]:
-    entry = mesh_entry(mesh, shell_of(mesh))
+    entry = mesh_record(mesh, shell_of(mesh)).to_document()
     entry["shell"]["inside_m2"] = inside_m2
     return {"meshes": [entry], "coverage": {"unreachable_inside_m2": dark_m2}}
 
@@ -93,12 +94,12 @@ def test_one_claim_alone_is_not_enough() -> None:
 
 
 def test_the_shell_is_told_with_wall_and_share() -> None:
-    line = shell_line(mesh_entry(HOLLOW, shell_of(HOLLOW)))
+    line = shell_line(mesh_record(HOLLOW, shell_of(HOLLOW)))
     share = 100.0 * INNER.area / HOLLOW.area
     assert "hollow shell, wall about 4 mm" in line
     assert f"{share:.1f} % of the surface lies inside" in line
     assert f"{share:.1f} % in sealed cavities" in line
-    assert shell_line(mesh_entry(OUTER, shell_of(OUTER))) == ""
+    assert shell_line(mesh_record(OUTER, shell_of(OUTER))) == ""
 
 
 @pytest.mark.parametrize(
@@ -112,13 +113,14 @@ def test_target_out_of_reach_is_said_to_lie_inside(
     handmade: Any, kind: str, words: str
 ) -> None:
     plan = handmade.build_plan()
-    document = dict(plan.to_document())
+    document = plan.to_document()
     target = document["coverage"]["target"] | {"reachable_by_projectors_m2": 1e-4}
     coverage = {"target": target, "unreachable_inside_m2": 12.5e-4}
     document["coverage"] = document["coverage"] | coverage
     document["meshes"] = [document["meshes"][0] | {"shell": {"kind": kind}}]
     document["reconstruction"] = None
-    assert words in shortfalls(document, plan.requirements)[0]
+    assert words in shortfalls(RigPlan.from_document(document, plan.surface))[0]
     coverage["unreachable_inside_m2"] = 0.0
     document["coverage"] |= coverage
-    assert "lies in" not in shortfalls(document, plan.requirements)[0]
+    plan = RigPlan.from_document(document, plan.surface)
+    assert "lies in" not in shortfalls(plan)[0]

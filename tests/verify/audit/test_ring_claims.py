@@ -14,9 +14,10 @@ import trimesh
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
 from planning.report.claims import Devices
-from planning.report.entries.ring_entries import lost_to_rings_m2, with_rings
+from planning.report.entries.ring_entries import lost_to_rings_m2
 from planning.rings.ring_creases import find_creases
 from planning.rings.ring_limits import ring_beam
+from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage, _report
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
@@ -70,7 +71,12 @@ def with_claims(plan: RigPlan, light: str) -> RigPlan:
     )
     document = plan.to_document()
     document["rig"]["rings"] = {"spacing": "curvature"}
-    document["projectors"] = with_rings(document["projectors"], scene, devices, stage)
+    for p, projector in enumerate(plan.projectors):
+        shares = ring_shares(scene, projector, plan.cameras)
+        document["projectors"][p] |= {
+            "rings": stage.reports[p],
+            "ring_shares": shares.to_document(),
+        }
     document["coverage"]["lost_to_rings_m2"] = lost_to_rings_m2(
         scene, devices, stage, claims
     )
