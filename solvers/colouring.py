@@ -14,6 +14,7 @@ listed; above, HiGHS decides, up to a number of nodes::
 
 from dataclasses import dataclass
 from itertools import combinations, product
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ _LISTED = 8
 _MAX_NODES = 20_000
 # Of `scipy.optimize.milp`.
 _INFEASIBLE = 2
+
+
+Proof = Literal["clique", "exhaustion", "none"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +50,7 @@ class Colouring:
     n_colours: int
     lower_bound: int
     clique: tuple[int, ...]
-    proof: str
+    proof: Proof
     status: SolveStatus
 
     @property
@@ -88,7 +92,9 @@ def fewest_colours(
         count += 1
         least = count if proved else least
     count = int(np.unique(colours).size)
-    proof = "clique" if count == len(clique) else "exhaustion" if proved else "none"
+    proof: Proof = (
+        "clique" if count == len(clique) else "exhaustion" if proved else "none"
+    )
     status = SolveStatus.OPTIMAL if count == least else SolveStatus.FEASIBLE
     _, first, same = np.unique(colours, return_index=True, return_inverse=True)
     named = np.argsort(np.argsort(first))[same.reshape(n)]

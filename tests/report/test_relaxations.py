@@ -100,7 +100,7 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
     # A cap holds a tenth: four are too few for half of the ball, were they apart.
     assert share == pytest.approx(0.5 * (1 - np.sqrt(1 - 0.36)), abs=0.03)
     assert 5 <= len(stage.projectors) <= 7
-    assert stage.certificate["status"] != "infeasible"
+    assert stage.certificate.status != "infeasible"
 
 
 @pytest.mark.usefixtures("few_samples")
