@@ -126,7 +126,7 @@ def _save(plan: RigPlan, found: Reconstruction, path: Path) -> CloudFile | None:
     if not found.n_merged:
         remove_cloud(path)
         return None
-    file = CloudFile.of(found.merged, LengthUnit.of(plan.to_document()["meshes"]))
+    file = CloudFile.of(found.merged, LengthUnit.of(plan.document.meshes[0]))
     file.save(path)
     return file
 

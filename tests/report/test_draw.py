@@ -12,7 +12,6 @@ from geometry.poses import look_at, transform
 from geometry.rays.rays import RayCaster
 from geometry.shapes.sample_head.geodesic import geodesic_grid
 from geometry.shapes.sample_head.sample_head import sample_head
-from planning.experiments.bare_plan import bare_plan
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
 from planning.report.drawing.face_colours import region_colours
@@ -35,6 +34,7 @@ from planning.report.drawing.rig_picture import (
     save_rig_picture,
 )
 from planning.report.drawing.shader import Shader, draw_mesh
+from tests.support.bare_plan import bare_plan
 from tests.support.reconstruction_rigs import MESH_TABLE
 
 K_PROJECTOR = [[2100.0, 0, 639.5], [0, 2100.0, 399.5], [0, 0, 1]]

@@ -8,9 +8,9 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning.experiments.bare_plan import bare_plan
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
+from tests.support.bare_plan import bare_plan
 
 MESH_TABLE = {
     "path": None,

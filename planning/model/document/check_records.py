@@ -64,7 +64,7 @@ class ReconstructionRecord(Part):
     accuracy_bias_m: float | None
     accuracy_max_m: float | None = None
     completeness: tuple[CompletenessRecord, ...]
-    predicted_missing: float
+    predicted_missing: float | None
     pixel_noise: float | None
     ambient: float | None
     confusion: ConfusionRecords | None = None

@@ -73,6 +73,32 @@ class SurfaceRecord(Part):
     selection: SelectionRecord | None = None
 
 
+class FocusFigures(Part):
+    """A lens set to one distance."""
+
+    distance_mm: float
+    f_number: float
+    blur_px: float
+
+
+class FiguresRecord(Part):
+    """Figures of a device as its rig file writes them, of either light."""
+
+    body: dict[str, list[float]] | None = None
+    resolution_px: Resolution | None = None
+    focal_px: Interval | None = None
+    focal_mm: float | None = None
+    throw_ratio: float | None = None
+    principal_point_px: Interval | None = None
+    vertical_offset_percent: float | None = None
+    distortion: tuple[float, ...] | None = None
+    pixel_um: float | None = None
+    pixel_pitch_mm: float | None = None
+    range_mm: Interval | None = None
+    beam_radius_mm: float | None = None
+    focus: FocusFigures | None = None
+
+
 class ModelRecord(Part):
     """A device model of the rig: optics, figures as written, and their sources."""
 
@@ -83,7 +109,7 @@ class ModelRecord(Part):
     range_m: Interval
     pixel_pitch_m: float | None = None
     beam_radius: float | None = None
-    figures: dict[str, Any] = Field(default={})
+    figures: FiguresRecord = FiguresRecord()
     sources: dict[str, str] = Field(default={})
     body: Body | None = None
     light: str = ""

@@ -27,7 +27,7 @@ def check_lines(plan: RigPlan) -> str:
         f"({1e3 * limits.max_p95_m:g}), bias {1e3 * bias:+.3f} "
         f"({1e3 * limits.max_bias_m:g})\n"
         f"         of the target predicted measured: {', '.join(whole)}; "
-        f"{100 * check.predicted_missing:.2f} % missing "
+        f"{100 * (check.predicted_missing or 0.0):.2f} % missing "
         f"({100 * limits.max_predicted_missing:g} %){_agreement(check)}"
     )
 

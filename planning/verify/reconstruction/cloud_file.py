@@ -6,11 +6,12 @@ any viewer; the header's comments say so and give the scale to metres.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.input_records import MeshRecord
 from planning.model.files import write_atomically
 from planning.verify.reconstruction.check.merge import Merged
 
@@ -39,10 +40,10 @@ class LengthUnit:
     in_m: float
 
     @classmethod
-    def of(cls, meshes: list[dict[str, Any]]) -> "LengthUnit":
-        """Return the unit of a plan's first mesh; of a scaled one, a file unit."""
-        unit, scale = meshes[0]["unit"], float(meshes[0]["scale_to_m"])
-        return cls("file units" if unit == "size_mm" else str(unit), scale)
+    def of(cls, mesh: MeshRecord) -> "LengthUnit":
+        """Return the unit of a plan's mesh; of a scaled one, a file unit."""
+        unit = "file units" if mesh.unit == "size_mm" else mesh.unit
+        return cls(unit, mesh.scale_to_m)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,6 @@
 """Blur of what lies off the plane that a lens is focused on."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,10 +41,10 @@ def defocus_of(plan: RigPlan, role: str) -> Defocus | None:
         plan: With the published figures of its rig.
         role: `projector` or `camera`.
     """
-    device: Mapping[str, Any] = plan.to_document().get("rig", {}).get(role, {})
-    figures = device.get("figures", {})
-    focus, pixel_um = figures.get("focus"), figures.get("pixel_um")
-    if not focus or not pixel_um or device.get("K") is None:
+    rig = plan.document.rig
+    device = rig.projector if role == "projector" else rig.camera
+    focus, pixel_um = device.figures.focus, device.figures.pixel_um
+    if focus is None or pixel_um is None or device.K is None:
         return None
-    focal_m = device["K"][0][0] * pixel_um * 1e-6
-    return Defocus(focus["distance_mm"] * 1e-3, focal_m / focus["f_number"])
+    focal_m = device.K[0][0] * pixel_um * 1e-6
+    return Defocus(focus.distance_mm * 1e-3, focal_m / focus.f_number)

@@ -93,7 +93,7 @@ class Scanner:
     def of(cls, plan: RigPlan) -> Self:
         """Return what a plan says."""
         document, wanted = plan.document, plan.requirements
-        schedule = document.get("firing_schedule") or {}
+        schedule = document.firing_schedule
         return cls(
             tuple(calibrate_projector(projector) for projector in plan.projectors),
             tuple(calibrate_camera(camera) for camera in plan.cameras),
@@ -108,11 +108,11 @@ class Scanner:
             ),
             defocus_of(plan, "projector"),
             defocus_of(plan, "camera"),
-            tuple(frozenset(group) for group in schedule.get("groups", ())),
+            tuple(frozenset(group) for group in (schedule.groups if schedule else ())),
             tuple(
-                BaselineLimit(frozenset(row["cameras"]), row["d"], row["d_max"])
-                for row in document.get("baselines") or ()
-                if row["d_max"] is not None
+                BaselineLimit(frozenset(row.cameras), row.d, row.d_max)
+                for row in document.baselines
+                if row.d_max is not None
             ),
         )
 

@@ -1,6 +1,5 @@
 """Captured images: read by name, held against each other, never a wrong cloud."""
 
-import copy
 import re
 import shutil
 from collections.abc import Callable
@@ -59,8 +58,7 @@ def small_plan(rigs, light: str) -> RigPlan:
         entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
         entry["resolution"] = [320, 240]
     body = rigs.bumpy_sphere(0.05, subdivisions=4)
-    plan = rigs.plan_of(body, projectors, cameras)
-    plan.document["requirements"]["check"] = rigs.CHECK | {"tau_m": 6.2e-3}
+    plan = rigs.plan_of(body, projectors, cameras, check=rigs.CHECK | {"tau_m": 6.2e-3})
     return plan
 
 
@@ -135,7 +133,8 @@ def lit_job(request, rigs, job) -> Job:
 def saved(rigs, tmp_path_factory) -> tuple[RigPlan, Expected, CaptureFolder]:
     """Images of one projector and two cameras, in files."""
     plan = small_plan(rigs, "diverging")
-    del plan.document["projectors"][1]
+    document = plan.document.changed(projectors=plan.document.projectors[:1])
+    plan = RigPlan(document, plan.surface)
     expected = expected_of(plan)
     folder = CaptureFolder(
         tmp_path_factory.mktemp("saved") / "captures", Scanner.of(plan)
@@ -360,11 +359,11 @@ def test_images_of_two_projectors_exchanged(job):
 
 def stood_there(job: Job, change, *, mesh=None) -> Reconstruction:
     """Images of a rig that isn't the plan, and of an object that perhaps isn't."""
-    document = copy.deepcopy(job.plan.document)
+    document = job.plan.to_document()
     change(document)
     surface = job.plan.surface
     surface = surface if mesh is None else replace(surface, mesh=mesh)
-    truth = Scanner.of(RigPlan(document, surface))
+    truth = Scanner.of(RigPlan.from_document(document, surface))
     return reconstruct_rendered(
         job.scanner, job.expected, seed=0, threads=1, truth=truth
     )

@@ -32,7 +32,10 @@ def figures(role, **changes):
         "K": [[1536.0, 0, 0], [0, 1536.0, 0], [0, 0, 1]],
         "figures": {"pixel_um": 12.5, "focus": focus},
     }
-    return {"rig": {role: device | changes}}
+    optics = {"resolution": [1, 1], "range_m": [0.0, 1.0]}
+    dark = optics | {"K": None}
+    devices = {"projector": dark, "camera": dark} | {role: optics | device | changes}
+    return {"rig": {"light": "diverging"} | devices}
 
 
 def test_a_point_in_focus_is_a_disc_elsewhere():

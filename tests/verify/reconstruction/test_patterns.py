@@ -200,7 +200,7 @@ def test_what_an_earlier_plan_left_is_removed_and_nothing_else(rigs, tmp_path):
     place = write_patterns(Scanner.of(plan), tmp_path)
     mine = place / "P1" / "note.txt"
     mine.write_text("kept")
-    document = plan.document | {"cameras": plan.document["cameras"][:1]}
+    document = plan.document.changed(cameras=plan.document.cameras[:1])
     write_patterns(Scanner.of(replace(plan, document=document)), tmp_path)
     assert not (place / "P1" / "18-root-C2.png").exists()
     assert not list(place.rglob("*root-C2*"))

@@ -1,4 +1,4 @@
-"""A plan of devices and limits that claims nothing (until rendering takes those)."""
+"""A plan of devices and limits that claims nothing."""
 
 from typing import Any
 
@@ -95,7 +95,7 @@ def bare_plan(
     return RigPlan.from_document(_plain(document | sections), surface)
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401 - any JSON value, or an array
+def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _plain(part) for key, part in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):
