@@ -90,11 +90,11 @@ class WorkBudget:
         return "time limit" if self.out_of_time else "work budget"
 
 
-def _amount(name: str, given: object) -> float:
+def _amount(name: str, number: object) -> float:
     try:
-        return float(given)  # type: ignore[arg-type]
+        return float(number)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be a number, got {given!r}") from None
+        raise ValueError(f"{name} must be a number, got {number!r}") from None
 
 
 @contextmanager

@@ -13,6 +13,10 @@ own, by the interpreter named; one that isn't installed there is reported as abs
 They get the problem as it is, and with `--reduced` ours after its reduction as well.
 Every selection is checked here. `2 / 1.50 (60 s)` reads: cover of 2, bound 1.5, 60 s.
 Returns 1 if a selection misses its share, or a bound exceeds what somebody found.
+
+The comparison at the planner's own size, 2,000 samples x 500 poses at 90 %, is
+`--sizes 2000x500 --shares 0.9 --peers HiGHS CP-SAT`: there ours took 0.3 s with proof,
+plain HiGHS 25 s and CP-SAT 36 s without one when it was first made.
 """
 
 import argparse

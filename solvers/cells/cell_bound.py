@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.bit_rows import BitSum, pack_rows
-from solvers.given_numbers import whole_number
+from solvers.checked_numbers import whole_number
 from solvers.one_thread import on_one_thread
 from solvers.status import WorkBudget
 

@@ -106,15 +106,15 @@ class MultiplierSearch:
                     continue
                 if final:
                     return False
-            dear = frontier[np.argsort(-prices, kind="stable")[:_SPLIT]]
-            return self._split(np.union1d(proposal.used, dear))
+            costly = frontier[np.argsort(-prices, kind="stable")[:_SPLIT]]
+            return self._split(np.union1d(proposal.used, costly))
         return False
 
     def _record(
-        self, given: NDArray[np.float64], frontier: NDArray[np.int64]
+        self, proposed: NDArray[np.float64], frontier: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         """Evaluate multipliers, keep them if they are the best; return the prices."""
-        multipliers = self._whole.multipliers(given)
+        multipliers = self._whole.multipliers(proposed)
         prices = self._store.prices(frontier, multipliers)
         need = self._whole.least_cost(multipliers)
         dearest = int(prices.max(initial=0))

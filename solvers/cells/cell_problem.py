@@ -25,7 +25,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solvers.given_numbers import real_numbers
+from solvers.checked_numbers import real_numbers
 
 # Of rows; the tables of row weights take 256 bytes a row.
 MAX_ROWS = 1_000_000
@@ -116,13 +116,13 @@ class WholeRows:
         """Integer weight of all rows."""
         return int(self.weights.sum())
 
-    def multipliers(self, given: ArrayLike) -> NDArray[np.int64]:
+    def multipliers(self, numbers: ArrayLike) -> NDArray[np.int64]:
         """Return integers in proportion to any numbers; what isn't positive counts 0.
 
         Integers of a small enough sum stay as they are.
         """
         cost = np.maximum(self.needs, 1).astype(np.float64)
-        values = np.clip(np.nan_to_num(real_numbers("multipliers", given)), 0.0, None)
+        values = np.clip(np.nan_to_num(real_numbers("multipliers", numbers)), 0.0, None)
         if values.shape != self.weights.shape:
             raise ValueError(
                 f"multipliers must be {self.weights.shape}, got {values.shape}"
@@ -243,10 +243,10 @@ def _non_negative(name: str, values: NDArray[np.float64]) -> None:
         raise ValueError(f"{name} must be finite, of a finite sum, and at least 0")
 
 
-def _counts(name: str, given: object, n: int, default: int) -> NDArray[np.int64]:
-    if given is None:
+def _counts(name: str, numbers: object, n: int, default: int) -> NDArray[np.int64]:
+    if numbers is None:
         return np.full(n, default, dtype=np.int64)
-    values = np.array(cast("ArrayLike", given))
+    values = np.array(cast("ArrayLike", numbers))
     if values.shape != (n,) or values.dtype.kind not in "iu":
         raise ValueError(
             f"{name} must be integers of shape ({n},), got {values.dtype} of shape "

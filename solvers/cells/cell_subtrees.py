@@ -25,7 +25,7 @@ class Subtrees:
 
     Attributes:
         floor: What the cells of a tuple must cost together.
-        root: The twig of all remaining roots, `VOID` if none remain.
+        root: The subtree of all remaining roots, `VOID` if none remain.
     """
 
     def __init__(
@@ -53,56 +53,56 @@ class Subtrees:
 
     @property
     def costs(self) -> NDArray[np.int64]:
-        """lambda(S) of each twig."""
+        """lambda(S) of each subtree."""
         return self._cost.values
 
     @property
     def rows(self) -> NDArray[np.uint64]:
-        """Bit row of each twig, over what remains of it."""
+        """Bit row of each subtree, over what remains of it."""
         return self._bits.values
 
     @property
     def coarseness(self) -> NDArray[np.int64]:
-        """Rank of each twig: split the smallest first."""
+        """Rank of each subtree: split the smallest first."""
         return self._coarseness.values
 
-    def cell(self, twig: int) -> int:
-        """Return the cell that a twig which can't be split consists of."""
-        return int(self._groups[twig][0])
+    def cell(self, subtree: int) -> int:
+        """Return the cell that a subtree which can't be split consists of."""
+        return int(self._groups[subtree][0])
 
-    def halves(self, twigs: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the two halves of each twig, shape (n, 2).
+    def halves(self, subtrees: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the two halves of each subtree, shape (n, 2).
 
-        A half is `VOID` where nothing remains of it; of a twig that can't be split the
-        first half is the twig itself.
+        A half is `VOID` where nothing remains of it; of a subtree that can't be split
+        the first half is the subtree itself.
         """
         halves = self._halves.values
-        new = np.unique(twigs[halves[twigs, 0] == _UNKNOWN])
+        new = np.unique(subtrees[halves[subtrees, 0] == _UNKNOWN])
         single = [int(t) for t in new if self._groups[t].size == 1]
         self._ask(np.array([self.cell(t) for t in single], dtype=np.int64))
         parts: list[NDArray[np.int64]] = []
-        for twig in new:
-            parts += self._parts(int(twig))
+        for subtree in new:
+            parts += self._parts(int(subtree))
         made = np.array(self._make(parts), dtype=np.int64).reshape(-1, 2)
         halves = self._halves.values
         halves[new] = made
-        for twig in single:
-            if not self._store.is_split(self._groups[twig])[0]:
-                halves[twig] = twig, VOID
-        return halves[twigs]
+        for subtree in single:
+            if not self._store.is_split(self._groups[subtree])[0]:
+                halves[subtree] = subtree, VOID
+        return halves[subtrees]
 
     def _remaining(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
         return cells[self._kept.values[cells]]
 
-    def _parts(self, twig: int) -> list[NDArray[np.int64]]:
-        group = self._groups[twig]
+    def _parts(self, subtree: int) -> list[NDArray[np.int64]]:
+        group = self._groups[subtree]
         if group.size == 1:
             group = self._remaining(self._store.children(int(group[0])))
         middle = (group.size + 1) // 2
         return [group[:middle], group[middle:]]
 
     def _make(self, groups: list[NDArray[np.int64]]) -> list[int]:
-        """Add a twig for each group that isn't empty."""
+        """Add a subtree for each group that isn't empty."""
         filled = [g for g in groups if g.size]
         first = len(self._groups)
         self._groups += filled

@@ -136,8 +136,8 @@ class ArrayTree:
         return CellBatch(found, of, self.rows[found])
 
 
-def _parents(given: NDArray[np.int64]) -> NDArray[np.int64]:
-    parents = np.array(given)
+def _parents(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    parents = np.array(numbers)
     if parents.ndim != 1 or parents.dtype.kind not in "iu":
         raise ValueError(
             f"parents must be a vector of integers, got {parents.dtype} of shape "

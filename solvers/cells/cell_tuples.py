@@ -59,24 +59,24 @@ def refute_tuples(
         multipliers: Any non-negative integers of the store's rows; good ones prune.
         budget: Counted work.
     """
-    twigs = Subtrees(whole, store, n_poses, multipliers)
-    if twigs.root == VOID:
+    subtrees = Subtrees(whole, store, n_poses, multipliers)
+    if subtrees.root == VOID:
         return TupleAnswer(refuted=True, survivor=None, met=0)
     enough = Enough(whole, n_poses)
-    start, _ = _weigh(np.full((1, n_poses), twigs.root), twigs, enough)
+    start, _ = _weigh(np.full((1, n_poses), subtrees.root), subtrees, enough)
     stack = [start] if len(start) else []
     met = 0
     while stack:
-        nodes, ended = _split(stack.pop(), twigs)
+        nodes, ended = _split(stack.pop(), subtrees)
         # With the store full, what could be split looks as if it couldn't.
         if budget.exhausted or store.full:
             return TupleAnswer(refuted=False, survivor=None, met=met)
         if ended is not None:
-            cells = np.array(sorted(twigs.cell(int(t)) for t in ended))
+            cells = np.array(sorted(subtrees.cell(int(t)) for t in ended))
             return TupleAnswer(refuted=False, survivor=cells, met=met)
         met += len(nodes)
         budget.spend(len(nodes) * (enough.units + _UNITS_PER_NODE) + 1e5)
-        nodes, weights = _weigh(nodes, twigs, enough)
+        nodes, weights = _weigh(nodes, subtrees, enough)
         # The heaviest last, so that what may survive comes first.
         nodes = nodes[np.argsort(weights, kind="stable")]
         stack += [nodes[part] for part in parts(len(nodes), _BATCH)]
@@ -102,7 +102,7 @@ class Enough:
         self.batch = max(1, _WORDS // (words * (1 + n_poses + self._planes)))
 
     def served(self, rows: NDArray[np.uint64]) -> NDArray[np.uint64]:
-        """Return the rows that enough of K cells serve; shape (n, K, n_words) given."""
+        """Return the rows that enough of K cells serve; of (n, K, n_words)."""
         if self._simple:
             return np.bitwise_or.reduce(rows, axis=1)
         n, n_poses, words = rows.shape
@@ -129,32 +129,32 @@ class Enough:
 
 
 def _weigh(
-    nodes: NDArray[np.int64], twigs: Subtrees, enough: Enough
+    nodes: NDArray[np.int64], subtrees: Subtrees, enough: Enough
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the multisets that remain, and what they serve at most."""
     nodes = nodes[np.all(nodes != VOID, axis=1)]
-    nodes = nodes[twigs.costs[nodes].sum(axis=1) >= twigs.floor]
+    nodes = nodes[subtrees.costs[nodes].sum(axis=1) >= subtrees.floor]
     weights = np.zeros(len(nodes), dtype=np.int64)
     meets = np.zeros(len(nodes), dtype=bool)
     for part in parts(len(nodes), enough.batch):
-        meets[part], weights[part] = enough(twigs.rows[nodes[part]])
+        meets[part], weights[part] = enough(subtrees.rows[nodes[part]])
     return nodes[meets], weights[meets]
 
 
 def _split(
-    nodes: NDArray[np.int64], twigs: Subtrees
+    nodes: NDArray[np.int64], subtrees: Subtrees
 ) -> tuple[NDArray[np.int64], NDArray[np.int64] | None]:
-    """Split each multiset's coarsest twig; or return one that can't be split."""
+    """Split each multiset's coarsest subtree; or return one that can't be split."""
     final = np.zeros(nodes.shape, dtype=bool)
     settled: list[NDArray[np.int64]] = []
     while len(nodes):
-        ranks = np.where(final, _NEVER, twigs.coarseness[nodes])
+        ranks = np.where(final, _NEVER, subtrees.coarseness[nodes])
         which = np.argmin(ranks, axis=1)
         if np.any(np.take_along_axis(final, which[:, None], axis=1)):
             ended = np.take_along_axis(final, which[:, None], axis=1).ravel()
             return nodes[:0], nodes[int(np.argmax(ended))]
         chosen = np.take_along_axis(nodes, which[:, None], axis=1).ravel()
-        halves = twigs.halves(chosen)
+        halves = subtrees.halves(chosen)
         leaf = halves[:, 0] == chosen
         settled += _uses(nodes[~leaf], chosen[~leaf], halves[~leaf])
         final = (final | (nodes == chosen[:, None]))[leaf]
@@ -165,7 +165,7 @@ def _split(
 def _uses(
     nodes: NDArray[np.int64], chosen: NDArray[np.int64], halves: NDArray[np.int64]
 ) -> list[NDArray[np.int64]]:
-    """Replace m uses of a twig by (m, 0), (m - 1, 1), ... (0, m) uses of its halves."""
+    """Replace m uses of a subtree by (m, 0), (m - 1, 1), ... uses of its halves."""
     found: list[NDArray[np.int64]] = []
     at = nodes == chosen[:, None]
     uses = at.sum(axis=1)

@@ -89,19 +89,11 @@ class CountLedger:
                 break
             self.selected = prune(self.cover, fewer)
 
-    def by_exact_search(
-        self, exhaust: TupleSearch, budget: WorkBudget, share: float = 1.0
-    ) -> None:
-        """Exhaust few sets, then leave a small program to HiGHS.
-
-        Args:
-            exhaust: Search over K sets.
-            budget: Work.
-            share: Part of what is left that each of them may spend.
-        """
-        self._by_tuples(exhaust, budget.part(share * budget.remaining))
+    def by_exact_search(self, exhaust: TupleSearch, budget: WorkBudget) -> None:
+        """Exhaust few sets, then leave a small program to HiGHS."""
+        self._by_tuples(exhaust, budget)
         if not self.settled:
-            self._by_integers(budget.part(share * budget.remaining))
+            self._by_integers(budget)
 
     def _by_tuples(self, tuples: TupleSearch, budget: WorkBudget) -> None:
         """Exhaust the tuples of as many sets as the bound, then of one more."""

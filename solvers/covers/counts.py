@@ -28,8 +28,6 @@ _FIRST_MOVES = 60
 _MOVES_A_SET = 50
 # Pairs are exhausted by a matrix product; groups are for more sets.
 _LEAST_GROUPED = 3
-# Share of what is left that exact search may spend before HiGHS.
-_EXHAUSTED = 0.95
 # Work after which the first bounds are asked whether more search is worth it.
 _FIRST_UNITS = 4e8
 
@@ -91,7 +89,7 @@ def fewest_sets(
         )
         return found.selected, proof if found.complete else None
 
-    ledger.by_exact_search(exhaust, budget, share=_EXHAUSTED)
+    ledger.by_exact_search(exhaust, budget)
     again = seed
     while not ledger.settled and not budget.exhausted:
         again += 1

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from solvers.checked_numbers import set_names, whole_number
 from solvers.covers.bounds.reductions import ReducedCover, forgiven, reduce_problem
 from solvers.covers.multi.multicover import fewest_multicover, heaviest_of
 from solvers.covers.search.neighbourhood import greedy, prune
-from solvers.given_numbers import set_names, whole_number
 from solvers.one_thread import on_one_thread
 from solvers.status import SolveStatus, WorkBudget
 
@@ -190,8 +190,8 @@ def solve_max_coverage(
     n_sets = whole_number("n_sets", n_sets, least=0)
     if not n_sets >= fixed.size:
         raise ValueError(f"n_sets is {n_sets}, but {fixed.size} sets are fixed")
-    given = () if warm_start is None else warm_start
-    start = set_names("warm_start", given, problem.costs.size)
+    warm_start = () if warm_start is None else warm_start
+    start = set_names("warm_start", warm_start, problem.costs.size)
     if start.size > n_sets:
         raise ValueError(f"warm_start must name at most {n_sets} sets of the problem")
     free = n_sets - fixed.size
@@ -235,15 +235,15 @@ def reduced_problem(problem: CoverProblem) -> ReducedCover:
 
 def _or_reduce(
     problem: CoverProblem,
-    given: ReducedCover | None,
+    reduced: ReducedCover | None,
     *,
     costs: NDArray[np.float64] | None = None,
 ) -> ReducedCover:
-    if given is None:
+    if reduced is None:
         return reduce_problem(problem, costs=costs)
-    if given.problem is not problem:
+    if reduced.problem is not problem:
         raise ValueError("reduced must be made from this problem")
-    return given
+    return reduced
 
 
 def _unreachable(

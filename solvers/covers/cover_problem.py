@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from solvers.given_numbers import real_numbers, set_names, whole_numbers
+from solvers.checked_numbers import real_numbers, set_names, whole_numbers
 
 # Limits of one problem, checked before anything is allocated.
 MAX_ENTRIES = 200_000_000
@@ -154,9 +154,9 @@ def _sums(
     return np.bincount(row_sets, weights=values, minlength=max(n, 1)).astype(np.float64)
 
 
-def _boolean(given: object) -> sparse.csr_array:
+def _boolean(numbers: object) -> sparse.csr_array:
     """Return a boolean CSR matrix, or say what is wrong with the one given."""
-    matrix = given if sparse.issparse(given) else np.asarray(given)
+    matrix = numbers if sparse.issparse(numbers) else np.asarray(numbers)
     shape = matrix.shape  # type: ignore[union-attr]
     if len(shape) != 2:
         raise ValueError(f"covers must be a matrix, got shape {shape}")
@@ -187,15 +187,15 @@ def _boolean(given: object) -> sparse.csr_array:
     return rows
 
 
-def _vector(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
-    values = np.ones(n) if given is None else real_numbers(name, given)
+def _vector(name: str, numbers: ArrayLike | None, n: int) -> NDArray[np.float64]:
+    values = np.ones(n) if numbers is None else real_numbers(name, numbers)
     if values.shape != (n,):
         raise ValueError(f"{name} must be ({n},), got {values.shape}")
     return values
 
 
-def _needs(given: ArrayLike, n: int) -> NDArray[np.int64]:
-    needs = whole_numbers("needs", given)
+def _needs(numbers: ArrayLike, n: int) -> NDArray[np.int64]:
+    needs = whole_numbers("needs", numbers)
     if needs.shape not in ((), (n,)):
         raise ValueError(f"needs must be one number or ({n},), got {needs.shape}")
     if not np.all((needs >= 1) & (needs <= _MAX_NEED)):
@@ -203,11 +203,11 @@ def _needs(given: ArrayLike, n: int) -> NDArray[np.int64]:
     return np.broadcast_to(needs, (n,)).copy()
 
 
-def _row_sets(given: ArrayLike | None, n: int) -> NDArray[np.int64]:
+def _row_sets(numbers: ArrayLike | None, n: int) -> NDArray[np.int64]:
     row_sets = (
         np.zeros(n, dtype=np.int64)
-        if given is None
-        else whole_numbers("row_sets", given)
+        if numbers is None
+        else whole_numbers("row_sets", numbers)
     )
     if row_sets.shape != (n,):
         raise ValueError(f"row_sets must be ({n},), got {row_sets.shape}")
@@ -217,10 +217,10 @@ def _row_sets(given: ArrayLike | None, n: int) -> NDArray[np.int64]:
 
 
 def _required(
-    given: ArrayLike | None, share: ArrayLike, totals: NDArray[np.float64]
+    numbers: ArrayLike | None, share: ArrayLike, totals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the weight that each row set asks for, shape (n_g,)."""
-    if given is None:
+    if numbers is None:
         shares = real_numbers("min_coverage", share)
         if not np.all((shares > 0.0) & (shares <= 1.0)):
             raise ValueError(f"min_coverage must be in (0, 1], got {share}")
@@ -230,9 +230,11 @@ def _required(
                 f"row set, got {shares.shape}"
             )
         return shares * totals
-    required = np.atleast_1d(real_numbers("required_weight", given))
+    required = np.atleast_1d(real_numbers("required_weight", numbers))
     if not np.all((required >= 0.0) & np.isfinite(required)):
-        raise ValueError(f"required_weight must be finite and at least 0, got {given}")
+        raise ValueError(
+            f"required_weight must be finite and at least 0, got {numbers}"
+        )
     if required.shape != totals.shape:
         raise ValueError(
             f"required_weight must be ({totals.size},), one for each row set, got "

@@ -61,10 +61,10 @@ def count_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> int:
         cover: The cover.
         multipliers: Any numbers, shape (n_e,); negative ones count as 0.
     """
-    given, _ = _usable(multipliers)
-    paid = np.concatenate([[0.0], np.cumsum(np.sort(cover.by_set @ given)[::-1])])
-    slack = rounding(given.size)
-    enough = paid * (1.0 + slack) >= least_service(cover, given) * (1.0 - slack)
+    usable, _ = _usable(multipliers)
+    paid = np.concatenate([[0.0], np.cumsum(np.sort(cover.by_set @ usable)[::-1])])
+    slack = rounding(usable.size)
+    enough = paid * (1.0 + slack) >= least_service(cover, usable) * (1.0 - slack)
     return int(np.argmax(enough)) if np.any(enough) else cover.n_sets + 1
 
 
@@ -81,9 +81,9 @@ def cost_bound(
         multipliers: Any numbers, shape (n_e,), in cost; negative ones count as 0.
         max_sets: Sets allowed.
     """
-    given, unit = _usable(multipliers)
-    prices = cover.by_set @ given
-    asked = least_service(cover, given)
+    usable, unit = _usable(multipliers)
+    prices = cover.by_set @ usable
+    asked = least_service(cover, usable)
     fit = float(
         np.min((cover.costs / np.maximum(prices, 1e-200))[prices > 0], initial=np.inf)
     )
@@ -91,7 +91,7 @@ def cost_bound(
     for scale in (unit, fit if np.isfinite(fit) else 0.0):
         gains = np.sort(np.minimum(cover.costs - scale * prices, 0.0))[:max_sets]
         # Both sums may be off by a share of their own size.
-        error = rounding(given.size + prices.size) * (scale * asked - gains.sum())
+        error = rounding(usable.size + prices.size) * (scale * asked - gains.sum())
         best = max(best, float(scale * asked + gains.sum() - error))
     return best * (1.0 - 1e-9)
 
@@ -132,9 +132,9 @@ def _usable(multipliers: NDArray[np.float64]) -> tuple[NDArray[np.float64], floa
 
     Near the least and the largest numbers there are, sums would lose their digits.
     """
-    given = np.clip(np.nan_to_num(multipliers), 0.0, 1e200)
-    _, exponent = np.frexp(given.max(initial=0.0))
-    return np.ldexp(given, -exponent), float(np.ldexp(1.0, exponent))
+    usable = np.clip(np.nan_to_num(multipliers), 0.0, 1e200)
+    _, exponent = np.frexp(usable.max(initial=0.0))
+    return np.ldexp(usable, -exponent), float(np.ldexp(1.0, exponent))
 
 
 @dataclass(frozen=True, eq=False)

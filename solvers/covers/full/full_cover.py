@@ -88,7 +88,7 @@ def fewest_full(
     if best is not None and best.size < start.size:
         start = np.sort(columns[best])
     if bound <= lower:
-        bound, proof = lower, "bound given"
+        bound, proof = lower, "bound known before"
     status = SolveStatus.OPTIMAL if bound >= start.size else SolveStatus.FEASIBLE
     return CountAnswer(status, start, float(min(bound, start.size)), proof)
 
@@ -227,7 +227,7 @@ class _Search:
                 return True
             if np.count_nonzero(kept) > _FEWER * kept.size:
                 break
-            # Without the dear sets more rows include others.
+            # Without sets of large reduced cost more rows include others.
             rows, fewer = essential(left, budget.part(0.2 * budget.remaining))
             part, columns = left[np.ix_(rows, fewer)], columns[kept][fewer]
         linear = linear_cover(part, budget)

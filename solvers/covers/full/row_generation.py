@@ -51,9 +51,9 @@ def by_multipliers(
     covers: NDArray[np.bool_], multipliers: NDArray[np.float64]
 ) -> tuple[float, NDArray[np.float64]]:
     """Return the bound by multipliers, not rounded up, and the reduced costs."""
-    given = np.clip(np.nan_to_num(multipliers), 0.0, 1.0)
-    reduced = 1.0 - given @ covers.astype(np.float64)
-    return needed_sets(given, reduced), reduced
+    usable = np.clip(np.nan_to_num(multipliers), 0.0, 1.0)
+    reduced = 1.0 - usable @ covers.astype(np.float64)
+    return needed_sets(usable, reduced), reduced
 
 
 def needed_sets(

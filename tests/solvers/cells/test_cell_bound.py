@@ -183,17 +183,17 @@ def test_every_multiset_of_leaves_is_met_once(n_poses):
     for seed in range(3):
         tree, leaves, problem = random_case(seed)
         store = CellStore(tree, WorkBudget(PLENTY))
-        twigs = Subtrees(
+        subtrees = Subtrees(
             whole_rows(problem), store, n_poses, np.zeros(tree.n_rows, dtype=np.int64)
         )
-        stack, ends = [np.full((1, n_poses), twigs.root)], []
+        stack, ends = [np.full((1, n_poses), subtrees.root)], []
         while stack:
             node = stack.pop()
-            parts, ended = _split(node, twigs)
+            parts, ended = _split(node, subtrees)
             if ended is None:
                 stack += [part[None] for part in parts if np.all(part >= 0)]
             else:
-                ends.append(tuple(sorted(twigs.cell(int(t)) for t in ended)))
+                ends.append(tuple(sorted(subtrees.cell(int(t)) for t in ended)))
         names = np.sort(store.names[np.unique(ends)])
         np.testing.assert_array_equal(names, leaves_of(tree.parents))
         assert len(set(ends)) == len(ends)

@@ -1,4 +1,4 @@
-"""Numbers that callers give, checked before anything is computed from them."""
+"""Numbers that callers hand over, checked before anything is computed from them."""
 
 import operator
 
@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
-def real_numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
+def real_numbers(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
     """Return a copy in float64.
 
     Raises:
         ValueError: If they aren't real numbers.
     """
     try:
-        values = np.array(given)
+        values = np.array(numbers)
         if values.dtype.kind in "biuf":
             return values.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -21,42 +21,44 @@ def real_numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
     raise ValueError(f"{name} must be real numbers")
 
 
-def whole_numbers(name: str, given: ArrayLike) -> NDArray[np.int64]:
+def whole_numbers(name: str, numbers: ArrayLike) -> NDArray[np.int64]:
     """Return a copy in int64.
 
     Raises:
         ValueError: If they aren't whole numbers of at most 52 bits.
     """
-    values = real_numbers(name, given) if np.size(given) else np.empty(np.shape(given))
+    values = (
+        real_numbers(name, numbers) if np.size(numbers) else np.empty(np.shape(numbers))
+    )
     if not np.all((np.abs(values) <= 2.0**52) & (values == np.rint(values))):
         raise ValueError(f"{name} must be whole numbers")
     return values.astype(np.int64)
 
 
-def whole_number(name: str, given: object, *, least: int) -> int:
+def whole_number(name: str, numbers: object, *, least: int) -> int:
     """Return an integer.
 
     Raises:
         ValueError: If it isn't one, or less than the least.
     """
     try:
-        value = operator.index(given)  # type: ignore[arg-type]
+        value = operator.index(numbers)  # type: ignore[arg-type]
     except TypeError:
-        raise ValueError(f"{name} must be a whole number, got {given!r}") from None
+        raise ValueError(f"{name} must be a whole number, got {numbers!r}") from None
     if value < least:
-        raise ValueError(f"{name} must be at least {least}, got {given}")
+        raise ValueError(f"{name} must be at least {least}, got {numbers}")
     return value
 
 
-def set_names(name: str, given: ArrayLike, n: int) -> NDArray[np.int64]:
+def set_names(name: str, numbers: ArrayLike, n: int) -> NDArray[np.int64]:
     """Return the sets that are named, increasing, each once.
 
     Raises:
         ValueError: If they aren't whole numbers from 0 to n - 1; a mask isn't.
     """
-    if np.asarray(given).dtype == bool:
+    if np.asarray(numbers).dtype == bool:
         raise ValueError(f"{name} must name sets by number, not by a mask")
-    names = np.unique(whole_numbers(name, given))
+    names = np.unique(whole_numbers(name, numbers))
     if not np.all((names >= 0) & (names < n)):
         raise ValueError(f"{name} must name sets from 0 to {n - 1}")
     return names
