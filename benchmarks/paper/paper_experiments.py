@@ -157,7 +157,7 @@ def prior_labels() -> None:
             )
             count = judged_labels(plan, shots)
             cloud = Cloud.join([Cloud.empty(), *(s.decoded.cloud for s in shots)])
-            far = measure_accuracy(cloud, experiment.mesh, threads=1).distances
+            far = measure_accuracy(cloud, experiment.mesh).distances
             shares = (
                 f"{100 * part / count.n:.2f} %"
                 for part in (
@@ -199,7 +199,7 @@ def nuisances() -> None:
         found = reconstruct(
             straight.scanner, seed=0, threads=1, photometry=DARK, truth=bent.scanner
         )
-        far = measure_accuracy(found.everything, straight.mesh, threads=1).distances
+        far = measure_accuracy(found.everything, straight.mesh).distances
         rows.append([f"k1 = {k1:g}, taken for 0", *numbers(Errors.of(far)), "", ""])
     table(["what", *CLOUD], rows)
 

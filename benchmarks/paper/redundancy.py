@@ -148,7 +148,7 @@ def removal(plan: RigPlan, photometry: Photometry, *, seed: int = 0) -> Removal:
         near = nearest_distance(cloud, samples, 2.01 * GAP)
         half, one, two = (float(np.mean(near <= limit)) for limit in thresholds)
         shares.append((half, one, two))
-    rms = [measure_accuracy(c, plan.surface.mesh, threads=2).rms_m for c in clouds]
+    rms = [measure_accuracy(c, plan.surface.mesh).rms_m for c in clouds]
     return Removal(found.redundant_fraction, shares[0], shares[1], (rms[0], rms[1]))
 
 

@@ -73,7 +73,7 @@ def _print_points(
     seen = RIGS.camera("C1", RIGS.direction(*CAMERAS[light]), focal=focal)
     plan = RIGS.plan_of(mesh, [source], [seen])
     cloud = reconstruct_plan(plan, seed=0, photometry=lens).everything
-    error = measure_accuracy(cloud, mesh, threads=2)
+    error = measure_accuracy(cloud, mesh)
     kind = "realistic" if lens.noisy else "ideal"
     print(
         f"| {name} | {light} | {focal:g} | {kind} | {len(cloud)} | "

@@ -148,7 +148,7 @@ def measured(
 def _of_camera(
     mesh: TriangleMesh, cloud: Cloud, source: PlannedProjector, camera: PlannedCamera
 ) -> _Array:
-    near = closest_points(mesh, cloud.points, threads=1)
+    near = closest_points(mesh, cloud.points)
     normals = mesh.face_normals[near.faces]
     samples = SurfaceSamples(cloud.points, normals, near.faces, 1.0)
     target = Target(samples, np.zeros(normals.shape))

@@ -14,13 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 _Array = NDArray[np.float64]
 
 _UNKNOWNS = 4
 _ROUNDS = 200
 _SETTLED = 1e-12
-_HALVINGS = 60
+# Beyond this no digit of tau matters [m].
+_TAU = 1e-15
 # Spread of the points about their best plane, as a share of their extent, below which
 # rounding decides on which side of it the centre lies.
 _FLAT = 1e-6
@@ -79,16 +81,16 @@ def fit_sphere(points: _Array, covariances: _Array) -> BestSphere:
     start = _algebraic(points)
     n_free = len(points) - _UNKNOWNS
     fitted = _weighted(points, covariances, start, 0.0)
-    low, high = 0.0, 0.0
-    if fitted.chi_square > n_free:
-        high = float(np.abs(fitted.residuals).max())
-        while _weighted(points, covariances, start, high).chi_square > n_free:
-            low, high = high, 2.0 * high
-    for _ in range(_HALVINGS if high > 0.0 else 0):
-        middle = 0.5 * (low + high)
-        trial = _weighted(points, covariances, start, middle)
-        low, high = (middle, high) if trial.chi_square > n_free else (low, middle)
-    return fitted if high == 0.0 else _weighted(points, covariances, start, high)
+    if fitted.chi_square <= n_free:
+        return fitted
+
+    def excess(shape_sigma: float) -> float:
+        return _weighted(points, covariances, start, shape_sigma).chi_square - n_free
+
+    high = float(np.abs(fitted.residuals).max())
+    while excess(high) > 0.0:
+        high *= 2.0
+    return _weighted(points, covariances, start, brentq(excess, 0.0, high, xtol=_TAU))
 
 
 def _algebraic(points: _Array) -> _Array:

@@ -120,7 +120,7 @@ def verify_plan(
     audit = audit_plan(plan, seed=seed, threads=threads)
     failures = list(audit.failures)
     if mesh is not None:
-        differs = compare_meshes(mesh, plan.surface.mesh, threads=threads)
+        differs = compare_meshes(mesh, plan.surface.mesh)
         failures += differs
         if differs and _comparable(mesh, plan.surface.mesh):
             truth = _with_mesh(truth or plan, mesh)
@@ -139,9 +139,7 @@ def verify_plan(
     return Verification((*failures, *found.failures, *false), audit, found)
 
 
-def compare_meshes(
-    mesh: TriangleMesh, surface: TriangleMesh, *, threads: int = 2
-) -> list[str]:
+def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh) -> list[str]:
     """Return why a mesh isn't the surface of a plan; nothing if it is.
 
     Equal vertices and faces settle it. Otherwise random points of either must lie on
@@ -161,7 +159,7 @@ def compare_meshes(
             f"mesh: its bounding box ({sizes[0].tolist()} mm) isn't that of "
             f"surface.npz ({sizes[1].tolist()} mm); check file, unit and axes"
         ]
-    apart = max(_apart(mesh, surface, threads), _apart(surface, mesh, threads))
+    apart = max(_apart(mesh, surface), _apart(surface, mesh))
     if not apart <= slack:
         return [
             f"mesh: lies up to {_MM * apart:.3g} mm off surface.npz "
@@ -255,7 +253,7 @@ def _bare(samples: AuditSamples) -> SurfaceSamples:
     return SurfaceSamples(samples.points, samples.normals, samples.faces, weight)
 
 
-def _apart(mesh: TriangleMesh, other: TriangleMesh, threads: int) -> float:
+def _apart(mesh: TriangleMesh, other: TriangleMesh) -> float:
     """Largest distance of random points of one mesh from the other in [m]."""
     from geometry.rays.proximity import closest_points
 
@@ -264,7 +262,7 @@ def _apart(mesh: TriangleMesh, other: TriangleMesh, threads: int) -> float:
     faces = rng.choice(len(areas), size=_MESH_SAMPLES, p=areas / areas.sum())
     shares = rng.dirichlet((1.0, 1.0, 1.0), size=_MESH_SAMPLES)
     points = np.einsum("nk,nkd->nd", shares, mesh.corners[faces])
-    return float(np.abs(closest_points(other, points, threads=threads).distances).max())
+    return float(np.abs(closest_points(other, points).distances).max())
 
 
 def _areas_line(name: str, areas: Mapping[str, float]) -> str:

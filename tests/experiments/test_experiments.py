@@ -385,7 +385,7 @@ def test_single_images_are_labelled_by_a_prior_that_is_roughly_right(of_face):
     assert labels.stray < 0.01 * labels.n
     (shot,) = shots
     assert len(shot.decoded.cloud) == pytest.approx(len(of_face.single.cloud), rel=0.15)
-    far = measure_accuracy(shot.decoded.cloud, experiment.mesh, threads=1).distances
+    far = measure_accuracy(shot.decoded.cloud, experiment.mesh).distances
     # Lines aren't edges: fewer steps of depth look like one.
     assert Errors.of(far).outliers < 0.6 * of_face.single.errors.outliers
 

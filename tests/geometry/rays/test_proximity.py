@@ -76,14 +76,14 @@ def test_the_sign_holds_at_edges_and_corners_sharper_than_a_right_angle() -> Non
     )
 
 
-def test_far_from_the_origin_it_is_as_precise_and_threads_change_nothing() -> None:
+def test_far_from_the_origin_it_is_as_precise_and_the_same_again() -> None:
     mesh = sphere(0.1, subdivisions=3)
     away = TriangleMesh(mesh.vertices + 1e3, mesh.faces)
     points = 0.11 * directions(40_000)
-    here = closest_points(mesh, points, threads=1)
-    there = closest_points(away, points + 1e3, threads=2)
+    here = closest_points(mesh, points)
+    there = closest_points(away, points + 1e3)
     np.testing.assert_allclose(there.distances, here.distances, atol=1e-12)
-    again = closest_points(mesh, points, threads=2)
+    again = closest_points(mesh, points)
     np.testing.assert_array_equal(again.faces, here.faces)
     np.testing.assert_array_equal(again.distances, here.distances)
 
@@ -95,15 +95,12 @@ def test_no_points_give_no_answers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "threads", "message"),
+    ("points", "message"),
     [
-        (np.zeros(3), 1, r"points must be \(n, 3\), got \(3,\)"),
-        (np.full((1, 3), np.nan), 1, "finite"),
-        (np.zeros((1, 3)), 0, "threads must be at least 1, got 0"),
+        (np.zeros(3), r"points must be \(n, 3\), got \(3,\)"),
+        (np.full((1, 3), np.nan), "finite"),
     ],
 )
-def test_bad_queries_are_refused(
-    points: np.ndarray, threads: int, message: str
-) -> None:
+def test_bad_queries_are_refused(points: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        closest_points(grid(1.0, 1.0, divisions=(1, 1)), points, threads=threads)
+        closest_points(grid(1.0, 1.0, divisions=(1, 1)), points)

@@ -114,7 +114,6 @@ def reconstruct_rendered(
         inspection,
         expected,
         spent,
-        threads=threads,
         photometry=light,
     )
 
@@ -157,9 +156,7 @@ def reconstruct_captured(
 
     pairs = over_pairs(plan, measure, threads=threads, progress=progress)
     inspection.require_some()
-    return _concluded(
-        believed or plan, pairs, inspection, expected, spent, threads=threads
-    )
+    return _concluded(believed or plan, pairs, inspection, expected, spent)
 
 
 class _Inspection:
@@ -267,7 +264,6 @@ def _concluded(
     expected: Expected,
     spent: Spent,
     *,
-    threads: int,
     photometry: Photometry | None = None,
 ) -> Reconstruction:
     """Leave out what nothing confirms, merge, judge, and say what is missing."""
@@ -276,13 +272,11 @@ def _concluded(
         plan.mesh,
         plan.cameras,
         limit_m=plan.limits.check.max_rms_m,
-        threads=threads,
     )
     found = conclude(
         plan,
         confirmed.pairs,
         seed=0,
-        threads=threads,
         samples=expected.samples,
         predicted=expected.measured,
         photometry=photometry,

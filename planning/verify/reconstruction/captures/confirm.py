@@ -66,7 +66,6 @@ def confirm(
     cameras: Sequence[CameraCalibration],
     *,
     limit_m: float,
-    threads: int,
 ) -> Confirmed:
     """Leave out the pairs that neither the mesh nor a confirmed pair confirms.
 
@@ -81,10 +80,9 @@ def confirm(
         mesh: Of the plan.
         cameras: By the index of the cloud.
         limit_m: Largest root mean square distance from the mesh [m].
-        threads: Worker threads of the closest points.
     """
     errors = {
-        key: np.abs(_distances(mesh, pair.cloud.thinned(_LOOKED_AT), threads))
+        key: np.abs(_distances(mesh, pair.cloud.thinned(_LOOKED_AT)))
         for key, pair in pairs
         if len(pair.cloud)
     }
@@ -105,7 +103,7 @@ def confirm(
             kept.append((key, _left(pair, nothing)))
             continue
         if key in good and np.mean(errors[key] > _STRAY * limit_m) > _FEW_STRAYS:
-            far = np.abs(_distances(mesh, pair.cloud, threads)) > _STRAY * limit_m
+            far = np.abs(_distances(mesh, pair.cloud)) > _STRAY * limit_m
             others = {one: clouds[one] for one in sorted(good - {key})}
             camera = cameras[key[1]]
             taken = pair.cloud.take(far)
@@ -118,8 +116,8 @@ def confirm(
     )
 
 
-def _distances(mesh: TriangleMesh, cloud: Cloud, threads: int) -> NDArray[np.float64]:
-    return closest_points(mesh, cloud.points, threads=threads).distances
+def _distances(mesh: TriangleMesh, cloud: Cloud) -> NDArray[np.float64]:
+    return closest_points(mesh, cloud.points).distances
 
 
 def _left(pair: Decoded, kept: NDArray[np.bool_]) -> Decoded:

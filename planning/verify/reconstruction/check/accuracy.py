@@ -66,9 +66,9 @@ class Completeness:
     missing: NDArray[np.bool_]
 
 
-def measure_accuracy(cloud: Cloud, mesh: TriangleMesh, *, threads: int) -> Accuracy:
+def measure_accuracy(cloud: Cloud, mesh: TriangleMesh) -> Accuracy:
     """Return the distances of a cloud from the full mesh."""
-    nearest = closest_points(mesh, cloud.points, threads=threads)
+    nearest = closest_points(mesh, cloud.points)
     return Accuracy(nearest.distances, nearest.faces)
 
 

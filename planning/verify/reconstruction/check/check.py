@@ -94,7 +94,6 @@ def reconstruct(
         plan,
         decoded,
         seed=seed,
-        threads=threads,
         samples=samples,
         predicted=predicted,
         photometry=light,
@@ -107,7 +106,6 @@ def conclude(
     decoded: Pairs,
     *,
     seed: int,
-    threads: int = 2,
     samples: SurfaceSamples | None = None,
     predicted: NDArray[np.bool_] | None = None,
     photometry: Photometry | None = None,
@@ -119,7 +117,6 @@ def conclude(
         plan: As in `reconstruct`.
         decoded: Projector, camera and what they gave, of every pair.
         seed: Of the samples, where none are given.
-        threads: As in `reconstruct`.
         samples: Likewise.
         predicted: Likewise.
         photometry: Of the simulation; None: the images were taken.
@@ -140,7 +137,7 @@ def conclude(
     accuracy, why = None, rejection(pairs) or "no ring edge was decoded"
     failures: tuple[str, ...] = (f"no point was measured: {why}",)
     if len(merged.cloud):
-        accuracy = measure_accuracy(merged.cloud, plan.mesh, threads=threads)
+        accuracy = measure_accuracy(merged.cloud, plan.mesh)
         failures = judge(accuracy, completeness, limits)
     if accuracy is not None and failures:
         measured = MeasuredClouds(

@@ -100,7 +100,6 @@ def reconstruct_single_shot(
         plan,
         decoded_pairs(shots),
         seed=seed,
-        threads=threads,
         samples=samples,
         predicted=predicted,
         photometry=light,
