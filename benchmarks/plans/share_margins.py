@@ -128,8 +128,7 @@ def _margins(
         return None
     posed = widen_margins(scene, stage)
     seconds = time.perf_counter() - begin
-    rows = stage.rows
-    reached = np.any(stage.stages == projector_limits.LIT, axis=1)
+    rows, reached = stage.candidates.samples, stage.candidates.reached
     required = required_samples(reached, scene.requirements.dominant_coverage)
 
     def margin(projectors: tuple[PlannedProjector, ...]) -> float:

@@ -15,8 +15,8 @@ from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import moved_to
 from planning.scene.existing import movable
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import projectors_around
 
+from .candidate_set import CandidateSource
 from .share_margin import widest_selection
 
 # How far out poses are offered, in spacings of the lattice.
@@ -31,40 +31,32 @@ def widest_between(
     required: int,
     n_lattice: int,
 ) -> tuple[PlannedProjector, ...]:
-    """Return as many projectors at poses of larger margin, as far as some are found.
+    """Return as many projectors at poses of larger margin, where there are any.
 
     Args:
         scene: Surface and requirements.
-        projectors: As chosen, without bodies; those that stand already come first.
+        projectors: As chosen, without bodies; existing ones come first.
         margins: Margin of each sample and projector, -inf where unlit, (n, k).
         required: Samples that count.
         n_lattice: Poses of the lattice from which they were chosen.
     """
-    given = len(projectors) - len(movable(projectors))
-    own, last = margins(projectors), projectors[-1]
+    n_existing = len(projectors) - len(movable(projectors))
+    margin, last = margins(projectors), projectors[-1]
+    source = CandidateSource(scene, last)
     for scale in _SCALES:
-        between = projectors_around(
-            movable(projectors),
-            scene.requirements.workspace,
-            n_lattice,
-            ring_offset=(0.0, 0.0),
-            scale=scale,
-            site=scene.site("projector", projectors[0].device),
-        )
+        between = source.around(projectors, n_lattice, scale)
         if not between:
             break
-        offered = (
-            *projectors,
-            *(moved_to(last, p.world_from_device) for p in between),
-        )
-        every = np.concatenate([own, margins(offered[len(projectors) :])], axis=1)
+        moved = tuple(moved_to(last, p.world_from_device) for p in between)
+        margin = np.concatenate([margin, margins(moved)], axis=1)
         chosen = widest_selection(
-            every,
+            margin,
             np.arange(len(projectors)),
             required,
             seed=scene.seed,
-            given=given,
+            n_existing=n_existing,
         )
-        projectors = tuple(offered[i] for i in chosen)
-        own = every[:, chosen]
+        candidates = (*projectors, *moved)
+        projectors = tuple(candidates[i] for i in chosen)
+        margin = margin[:, chosen]
     return projectors

@@ -46,20 +46,20 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     What counts are the samples that have the margin at the required share
     (`share_margin`). First poses between the candidates are offered
     (`margin_search`). Then each projector in turn solves the pose program over those
-    of them that it serves. Occlusion isn't part of that program, so rays decide after
-    every move: the whole way is tried, then half, then a quarter, and a move that
-    lowers the margin at the share isn't taken, nor one that leaves too few samples lit,
+    of them that are assigned to it. Occlusion isn't part of that program, so rays
+    decide after every move: the whole way is tried, then half, then a quarter, and a
+    move that lowers the margin at the share isn't taken, nor one that leaves too few
+    samples lit,
     nor one that reaches what no candidate does: what is required, and was proved, is a
     share of what they reach.
 
     Args:
         scene: Surface and requirements.
-        stage: Projectors from the cover, and its rows.
+        stage: Projectors from the cover, and its samples.
     """
-    rows = stage.rows
-    reached = np.any(stage.stages == projector_limits.LIT, axis=1)
-    state = _Lit(scene, rows, list(stage.projectors), reached)
-    lit = int(np.isfinite(state.margin).any(axis=1).sum())
+    samples, reached = stage.candidates.samples, stage.candidates.reached
+    state = _Lit(scene, samples, list(stage.projectors), reached)
+    lit = state.n_lit
     required = required_samples(reached, scene.requirements.dominant_coverage)
     # With too few devices, what they light is what counts.
     required = min(required, lit)
@@ -81,14 +81,13 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
 
 def _between(state: "_Lit", required: int, lit: int, n_lattice: int) -> "_Lit":
     """Projectors at poses between the candidates, if what counts has more margin."""
-    some = np.arange(0, len(state.rows), -(-len(state.rows) // _SEARCHED))
-    part = state.on(some)
-    among = int(np.isfinite(part.margin).any(axis=1).sum())
+    n = len(state.samples)
+    few = state.on(np.arange(0, n, -(-n // _SEARCHED)))
     offered = widest_between(
         state.scene,
         tuple(state.projectors),
-        part.margins,
-        max(1, min(among, required * len(some) // len(state.rows))),
+        few.margins,
+        max(1, min(few.n_lit, required * len(few.samples) // n)),
         n_lattice,
     )
     moved = state.with_all(list(offered))
@@ -104,37 +103,42 @@ class _Lit:
     def __init__(
         self,
         scene: Scene,
-        rows: Target,
+        samples: Target,
         projectors: list[PlannedProjector],
         reached: NDArray[np.bool_],
     ) -> None:
-        self.scene, self.rows, self.projectors = scene, rows, projectors
-        self._reached = reached
+        self.scene, self.samples, self.projectors = scene, samples, projectors
+        self.reached = reached
         self.margin = self._margins(projectors)
 
+    @property
+    def n_lit(self) -> int:
+        """Samples that any of them lights."""
+        return int(np.isfinite(self.margin).any(axis=1).sum())
+
+    def on(self, chosen: NDArray[np.int64]) -> "_Lit":
+        """The same projectors, on some of the samples."""
+        samples, reached = self.samples.take(chosen), self.reached[chosen]
+        return _Lit(self.scene, samples, self.projectors, reached)
+
+    def with_all(self, projectors: list[PlannedProjector]) -> "_Lit":
+        """Other projectors, on the same samples."""
+        return _Lit(self.scene, self.samples, projectors, self.reached)
+
     def margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
-        """Margin of each row and projector in [rad], -inf where unlit.
+        """Margin of each sample and projector in [rad], -inf where unlit.
 
         Those that stray light nothing.
         """
         margin = self._margins(projectors)
-        beyond = np.isfinite(margin[~self._reached]).sum(axis=0)
-        margin[:, beyond > _STRAY * self._reached.sum()] = -np.inf
+        beyond = np.isfinite(margin[~self.reached]).sum(axis=0)
+        margin[:, beyond > _STRAY * self.reached.sum()] = -np.inf
         return margin
-
-    def on(self, some: NDArray[np.int64]) -> "_Lit":
-        """The same projectors, on some of the rows."""
-        rows, reached = self.rows.take(some), self._reached[some]
-        return _Lit(self.scene, rows, self.projectors, reached)
-
-    def with_all(self, projectors: list[PlannedProjector]) -> "_Lit":
-        """Other projectors, on the same rows."""
-        return _Lit(self.scene, self.rows, projectors, self._reached)
 
     def _margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
         scene = self.scene.among(projectors)
-        lit = lit_stages(scene, projectors, self.rows) == projector_limits.LIT
-        return lit_margins(scene, projectors, self.rows, lit)
+        lit = lit_stages(scene, projectors, self.samples) == projector_limits.LIT
+        return lit_margins(scene, projectors, self.samples, lit)
 
     def with_moved(
         self, p: int, offered: PlannedProjector
@@ -153,14 +157,14 @@ class _Lit:
 
 
 def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
-    """Move one projector to where what it serves of the share has more margin."""
+    """Move one projector to where what it is assigned of the share has more margin."""
     level = margin_at_share(state.margin, required)
     best = state.margin.max(axis=1)
-    served = (best >= level) & (np.argmax(state.margin, axis=1) == p)
-    if not served.any():
+    assigned = (best >= level) & (np.argmax(state.margin, axis=1) == p)
+    if not assigned.any():
         return False
     projector = state.projectors[p]
-    program = pose_program(state.scene, projector, state.rows.take(served))
+    program = pose_program(state.scene, projector, state.samples.take(assigned))
     solution = solve_pose(program)
     if not solution.moved:
         return False
@@ -185,18 +189,18 @@ def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
 
 
 def pose_program(
-    scene: Scene, projector: PlannedProjector, served: Target
+    scene: Scene, projector: PlannedProjector, assigned: Target
 ) -> PoseProgram:
-    """State the pose program of one projector over the samples that it serves."""
+    """State the pose program of one projector over the samples assigned to it."""
     required, device = scene.requirements, projector.device
     workspace = scene.safe_workspace
     pinhole = isinstance(device, PinholeModel)
     up = np.array(workspace.up)
     centre = np.array(workspace.centre)
     return PoseProgram(
-        points=served.samples.points,
-        normals=served.samples.normals,
-        steep=served.steep,
+        points=assigned.samples.points,
+        normals=assigned.samples.normals,
+        steep=assigned.steep,
         light=projector.light,
         world_from_device=projector.world_from_device,
         max_incidence=required.projector.max_incidence,

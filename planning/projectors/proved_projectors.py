@@ -9,11 +9,9 @@ from planning.proofs.all_poses import ContinuousBound, joined
 from planning.proofs.existing_bound import enough, given_on
 from planning.proofs.projector_bound import Effort, bound_projectors
 from planning.proofs.selection import required_samples
-from planning.scene.clearance import with_clearance
-from planning.scene.limits.projector_limits import LIT
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import projectors_towards
 
+from .candidate_set import CandidateSource
 from .projector_stage import ProjectorStage, with_more
 
 
@@ -37,22 +35,15 @@ def prove_fewest(
         effort: What to spend on a bound.
         ring_offset: Of candidates, as `projector_candidates` takes it.
     """
-    workspace = scene.requirements.workspace
+    source = CandidateSource(scene, template, ring_offset)
     while stage.certificate.needed.count > stage.certificate.given:
         bound = _bound_of(scene, stage, template, effort)
-        found = projectors_towards(
-            template,
-            workspace,
-            bound.directions,
-            ring_offset=ring_offset,
-            site=scene.site("projector", template.device),
-        )
-        found = with_clearance(scene, found)
-        better = with_more(scene, stage, found) if found else stage
+        found = source.towards(bound.directions)
+        better = with_more(stage, found) if found else stage
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.proof()))
         stage = better
-    entry = enough(stage.certificate, np.any(stage.stages == LIT, axis=1))
+    entry = enough(stage.certificate, stage.candidates.reached)
     return replace(stage, certificate=stage.certificate.changed(continuous=entry))
 
 
@@ -60,19 +51,20 @@ def _bound_of(
     scene: Scene, stage: ProjectorStage, template: PlannedProjector, effort: Effort
 ) -> ContinuousBound:
     # The first samples are a draw of their own; the others came where it overfitted.
-    n = min(len(stage.rows), effort.most_samples or len(stage.rows))
-    reached = np.any(stage.stages[:n] == LIT, axis=1)
-    given = given_on(scene, template, stage.rows.take(np.arange(n)))
+    samples = stage.candidates.samples
+    n = min(len(samples), effort.most_samples or len(samples))
+    reached = stage.candidates.reached[:n]
+    given = given_on(scene, template, samples.take(np.arange(n)))
     free = reached & given.lit
     required = required_samples(reached, scene.requirements.dominant_coverage)
     found = bound_projectors(
         scene,
         template,
-        stage.rows.take(np.flatnonzero(reached & ~free)),
+        samples.take(np.flatnonzero(reached & ~free)),
         max(required - int(free.sum()), 0),
         stage.certificate.needed.count - given.count,
         effort,
         n_samples=n,
-        row_area_m2=stage.rows.samples.weight * len(stage.rows) / n,
+        row_area_m2=samples.samples.weight * len(samples) / n,
     )
     return replace(found, given=given.count, n_free=int(free.sum()))

@@ -58,7 +58,7 @@ def widest_selection(
     required: int,
     *,
     seed: int,
-    given: int = 0,
+    n_existing: int = 0,
 ) -> NDArray[np.int64]:
     """Return as many candidates as chosen, with the largest margin at the share found.
 
@@ -70,7 +70,7 @@ def widest_selection(
         chosen: Candidates that light what is required.
         required: Samples that count.
         seed: Of the search.
-        given: First candidates that are taken whatever they light.
+        n_existing: First candidates that are taken whatever they light.
     """
     lit_before = int(np.isfinite(margin[:, chosen]).any(axis=1).sum())
     best, low = chosen, margin_at_share(margin[:, chosen], required)
@@ -78,14 +78,13 @@ def widest_selection(
     step = 2.0 * _STEP_RAD
     while high - low > _STEP_RAD:
         level = min(0.5 * (low + high), low + step)
-        problem = cover_problem(margin >= level, required, given)
-        offered = solve_max_coverage(
+        problem = cover_problem(margin >= level, required, n_existing)
+        selected = solve_max_coverage(
             problem, len(chosen), warm_start=best, seed=seed, budget=_BUDGET
         ).selected
-        own = margin[:, offered]
-        found = margin_at_share(own, required)
-        if found >= level and enough_lit(own, required, lit_before):
-            best, low, step = offered, found, 2.0 * step
+        reached = margin_at_share(margin[:, selected], required)
+        if reached >= level and enough_lit(margin[:, selected], required, lit_before):
+            best, low, step = selected, reached, 2.0 * step
         else:
             high = level
     return best

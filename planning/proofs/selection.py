@@ -118,6 +118,11 @@ class CandidateCover:
         """Return how many samples candidates cover together."""
         return int(self.covers[:, chosen].any(axis=1).sum())
 
+    def confirms(self, chosen: NDArray[np.int64]) -> bool:
+        """Return whether candidates cover the share; of samples that are fresh."""
+        reached = self.covers.any(axis=1).sum()
+        return bool(self.n_covered(chosen) >= self.share * reached)
+
     def most_covering(
         self,
         count: int,

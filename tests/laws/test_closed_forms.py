@@ -185,7 +185,7 @@ def test_facing_plates_are_lit_through_the_gap_from_four_sides(share, count):
 
 def served_normals(found, projectors):
     """Normals of the rows that each projector serves."""
-    rows = found.stage.rows
+    rows = found.stage.candidates.samples
     lit = lit_stages(found.scene, projectors, rows) == LIT
     server = assigned_projectors(lit, margins_of(found.scene, projectors, rows))
     return [rows.samples.normals[server == p] for p in range(len(projectors))]
@@ -235,7 +235,11 @@ def test_widest_margins_are_those_of_closed_form_and_of_the_cone_program(case):
     found = planned(mesh, 1.0)
     assert found.count == found.least == (2 if case == "box" else 1)
     projectors = widen_margins(found.scene, found.stage)
-    least = margins_of(found.scene, projectors, found.stage.rows).max(axis=1).min()
+    least = (
+        margins_of(found.scene, projectors, found.stage.candidates.samples)
+        .max(axis=1)
+        .min()
+    )
     assert np.degrees(least) == pytest.approx(margin, abs=0.1)
     served = served_normals(found, projectors)
     for projector, normals in zip(projectors, served, strict=True):
@@ -251,7 +255,7 @@ def test_in_diverging_light_a_patch_is_lit_from_far_over_its_middle():
     assert (found.count, found.least) == (1, 1)
     (projector,) = widen_margins(found.scene, found.stage)
     far = found.scene.safe_workspace.projector_radius_m[1]
-    rows = found.stage.rows
+    rows = found.stage.candidates.samples
     reach = np.hypot(*rows.samples.points[:, :2].T).max()
     assert degrees_between(away(projector), [0, 0, 1]) < 0.1
     margin = margins_of(found.scene, [projector], rows).min()

@@ -12,10 +12,11 @@ import pytest
 
 from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
+from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.margin_search import widest_between
-from planning.projectors.one_fewer import Offer, one_fewer
+from planning.projectors.one_fewer import one_fewer
 from planning.projectors.share_margin import margin_at_share
-from planning.proofs.selection import CandidateCover, select_fewest
+from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_margins, lit_stages
@@ -50,35 +51,24 @@ def lattice(ball):
     poses = projector_candidates(
         template, scene.requirements.workspace, 40, ring_offset=OFFSET
     )
-    rows = scene.target_samples(2000, 100)
-
-    def stages_of(projectors):
-        return lit_stages(scene, projectors, rows)
-
-    return scene, Offer(poses, stages_of(poses)), stages_of
+    samples = scene.target_samples(2000, 100)
+    return CandidateSource(scene, template), CandidateSet.over(scene, samples, poses)
 
 
-def moved(lattice, n_projectors, given=0):
-    scene, offer, stages_of = lattice
+def moved(lattice, n_projectors, n_existing=0):
+    source, offer = lattice
+    offer = replace(offer, n_existing=n_existing)
     return one_fewer(
-        scene,
-        offer,
-        n_projectors,
-        finer=lambda: offer,
-        reached=(offer.stages == projector_limits.LIT).any(axis=1),
-        stages_of=stages_of,
-        given=given,
-        ring_offset=OFFSET,
+        source, offer, n_projectors, finer=lambda: offer, reached=offer.reached
     )
 
 
 def test_six_caps_are_found_where_the_lattice_needs_seven(lattice):
-    lit = lattice[1].stages == projector_limits.LIT
-    alone = select_fewest(CandidateCover(lit, 0.875))
+    alone = select_fewest(lattice[1].cover)
     assert alone.needed == alone.lower_bound == 7
     found = moved(lattice, 6)
     assert found is not None
-    assert (found.stages == projector_limits.LIT).any(axis=1).sum() >= 1750
+    assert found.reached.sum() >= 1750
     axes = np.array([p.world_from_device[:3, 2] for p in found.projectors])
     apart = np.degrees(np.arccos(np.clip(axes @ axes.T, -1.0, 1.0)))
     assert np.min(apart + 360 * np.eye(6)) > 80.0
@@ -86,12 +76,11 @@ def test_six_caps_are_found_where_the_lattice_needs_seven(lattice):
 
 def test_what_stands_already_counts_and_is_not_offered_again(lattice):
     offer = lattice[1]
-    found = moved(lattice, 6, given=1)
+    found = moved(lattice, 6, n_existing=1)
     assert found is not None
     assert len(found.projectors) == 5
     assert all(p is not offer.projectors[0] for p in found.projectors)
-    both = np.concatenate([offer.stages[:, :1], found.stages], axis=1)
-    assert (both == projector_limits.LIT).any(axis=1).sum() >= 1750
+    assert (offer.lit[:, 0] | found.reached).sum() >= 1750
 
 
 def test_what_no_poses_can_do_is_given_up(lattice):
@@ -104,48 +93,35 @@ def test_a_finer_lattice_is_asked_for_where_it_comes_near(
 ):
     # So coarse a lattice begins farther off than those that are planned with.
     monkeypatch.setattr("planning.projectors.one_fewer._SHORT", 0.1)
-    scene, offer, stages_of = lattice
-    reached = (offer.stages == projector_limits.LIT).any(axis=1)
+    source, offer = lattice
     # Six caps light 0.879 of the ball, about 1,800 of these; five light far less.
-    share = 1815 / int(reached.sum())
-    beyond = replace(scene.requirements, dominant_coverage=share)
+    share = 1815 / int(offer.reached.sum())
+    beyond = replace(offer.scene.requirements, dominant_coverage=share)
+    offer = replace(offer, scene=replace(offer.scene, requirements=beyond))
     asked = []
     found = one_fewer(
-        replace(scene, requirements=beyond),
+        source,
         offer,
         count,
         finer=lambda: asked.append(count) or offer,
-        reached=reached,
-        stages_of=stages_of,
-        given=0,
-        ring_offset=OFFSET,
+        reached=offer.reached,
     )
     assert found is None
     assert bool(asked) is near
 
 
 def test_what_any_known_pose_reaches_is_asked_for(lattice):
-    scene, offer, stages_of = lattice
+    source, offer = lattice
     # One pose reaches what it lights, and 0.875 of that is lit by it alone.
     one = offer.take(np.arange(1))
-    lit = (one.stages == projector_limits.LIT).any(axis=1)
-    for reached, enough in ((lit, True), (np.ones_like(lit), False)):
-        found = one_fewer(
-            scene,
-            one,
-            1,
-            finer=lambda: one,
-            reached=reached,
-            stages_of=stages_of,
-            given=0,
-            ring_offset=OFFSET,
-        )
+    for reached, enough in ((one.reached, True), (np.ones_like(one.reached), False)):
+        found = one_fewer(source, one, 1, finer=lambda: one, reached=reached)
         assert (found is not None) is enough
 
 
 def test_margins_grow_between_the_poses_of_a_lattice(lattice):
-    scene, offer, _ = lattice
-    rows = scene.target_samples(2000, 100)
+    offer = lattice[1]
+    scene, rows = offer.scene, offer.samples
 
     def margins(projectors):
         lit = lit_stages(scene, projectors, rows) == projector_limits.LIT

@@ -10,6 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import ring_frame
+from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_poses import _between, widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
@@ -55,14 +56,15 @@ def shaded():
         uniform_radii(0.6, 0.0035),
     )
     rows = scene.target_samples(800, 1)
-    stages = lit_stages(scene, [start], rows)
-    stage = ProjectorStage((start,), (start,), rows, stages, {}, {}, (start,))
-    return scene, stage
+    candidates = CandidateSet.over(scene, rows, (start,))
+    return scene, ProjectorStage((start,), candidates, {}, {}, (start,))
 
 
 def margins(scene, stage, projectors):
-    lit = lit_stages(scene, projectors, stage.rows) == projector_limits.LIT
-    return lit_margins(scene, projectors, stage.rows, lit)
+    lit = (
+        lit_stages(scene, projectors, stage.candidates.samples) == projector_limits.LIT
+    )
+    return lit_margins(scene, projectors, stage.candidates.samples, lit)
 
 
 def test_no_move_ends_in_shadow(shaded):
@@ -100,7 +102,7 @@ def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     moved = widen_margins(scene, stage)
     before = margins(scene, stage, stage.projectors)
     after = margins(scene, stage, moved)
-    reached = (stage.stages == projector_limits.LIT).any(axis=1)
+    reached = stage.candidates.reached
     beyond = np.isfinite(after[~reached]).sum(axis=0)
     assert np.all(beyond <= 0.002 * reached.sum())
     share = int(np.ceil(0.85 * reached.sum()))
@@ -122,10 +124,11 @@ def test_poses_between_are_taken_if_wider_with_light_to_spare(
     class State:
         """Margins of 1,000 samples by one projector."""
 
-        scene, projectors, rows, margins = None, ["P"], np.arange(1000), None
+        scene, projectors, samples, margins = None, ["P"], np.arange(1000), None
 
         def __init__(self, margin):
             self.margin = margin[:, None]
+            self.n_lit = np.isfinite(margin).sum()
 
         def on(self, some):
             return State(self.margin[some, 0])

@@ -13,7 +13,6 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.rig import load_rig
-from planning.scene.limits.projector_limits import LIT
 from planning.scene.scene import Scene
 
 
@@ -96,7 +95,7 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
     eye, radii = np.eye(4), np.array([0.1, 0.3])
     template = PlannedProjector("", "parallel", eye, eye, beam, radii)
     stage = plan_projectors(scene, template, 200, ring_offset=(0.0, 0.0), rounds=1)
-    share = (stage.stages == LIT).mean(axis=0)
+    share = stage.candidates.lit.mean(axis=0)
     # A cap holds a tenth: four are too few for half of the ball, were they apart.
     assert share == pytest.approx(0.5 * (1 - np.sqrt(1 - 0.36)), abs=0.03)
     assert 5 <= len(stage.projectors) <= 7

@@ -17,7 +17,8 @@ from planning.model.requirements import Requirements
 from planning.model.ring_frame import ring_frame
 from planning.model.zones import Box
 from planning.prepare import prepared
-from planning.projectors.one_fewer import Offer, one_fewer
+from planning.projectors.candidate_set import CandidateSet, CandidateSource
+from planning.projectors.one_fewer import one_fewer
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
@@ -117,7 +118,7 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
     if light == "parallel":
         return
     monkeypatch.setattr("planning.projectors.projector_poses._SWEEPS", 1)
-    rows = stage.rows
+    rows = stage.candidates.samples
     moved = widen_margins(scene, stage)
     lit = lit_stages(scene, moved, rows) == LIT
     assert lit.any(axis=1).mean() >= 0.98
@@ -148,22 +149,19 @@ def test_two_beams_that_leave_a_gap_are_moved_together():
         pose[:3, :3], pose[:3, 3] = turn, (x, 0.0, 1.2)
         frame = ring_frame(pose, template.device, *offset)
         apart.append(replace(template, world_from_device=pose, world_from_ring=frame))
-    lattice = Offer(tuple(apart), lit_stages(scene, apart, rows))
-    dark = ~np.any((lattice.stages == LIT)[:, [0, 2]], axis=1)
+    lattice = CandidateSet.over(scene, rows, tuple(apart))
+    dark = ~np.any(lattice.lit[:, [0, 2]], axis=1)
     assert dark.mean() == pytest.approx(0.061 / 1.4, abs=0.01)
     found = one_fewer(
-        scene,
+        CandidateSource(scene, template, offset),
         lattice,
         2,
         finer=lambda: lattice,
-        reached=np.any(lattice.stages == LIT, axis=1),
-        stages_of=lambda projectors: lit_stages(scene, projectors, rows),
-        given=0,
-        ring_offset=offset,
+        reached=lattice.reached,
     )
     assert found is not None
     assert len(found.projectors) == 2
-    assert np.any(found.stages == LIT, axis=1).mean() >= 0.99
+    assert found.reached.mean() >= 0.99
 
 
 def test_offers_towards_a_direction_look_beside_the_centre_too():
@@ -202,7 +200,7 @@ def test_one_beam_too_few_says_how_wide_two_must_be():
     )
     stage = plan_projectors(scene, template, 60, ring_offset=offset, rounds=1)
     said = wider_field(scene, stage, 1)
-    points = stage.rows.samples.points[:2000, :2]
+    points = stage.candidates.samples.samples.points[:2000, :2]
     upright = 1e3 * np.hypot(*points.T).max()
     aslant = 1e3 * np.hypot(points[:, 0] * np.cos(np.radians(15)), points[:, 1]).max()
     radius = int(said.removeprefix("a beam of ").split(" mm")[0])
@@ -217,7 +215,7 @@ def test_one_image_too_few_is_wide_enough_from_as_far_as_it_is_sharp():
     stage = plan_projectors(scene, template, 60, ring_offset=offset, rounds=1)
     said = wider_field(scene, stage, 1)
     degrees = int(said.removeprefix("an image that reaches ").split(" degrees")[0])
-    off = np.hypot(*stage.rows.samples.points[:2000, :2].T)
+    off = np.hypot(*stage.candidates.samples.samples.points[:2000, :2].T)
     reach = np.quantile(off, 0.95)
     least = np.degrees(np.arcsin(reach / template.device.range_m[1]))
     assert np.floor(least) <= degrees <= least + 4.0

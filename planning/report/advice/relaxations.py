@@ -16,7 +16,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
-from planning.projectors.projector_stage import NothingLitError
+from planning.projectors.candidate_set import NothingLitError
 from planning.scene import lighting
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
@@ -103,8 +103,9 @@ def nothing_lit(scene: Scene, error: NothingLitError) -> str:
         scene: Surface and requirements.
         error: What was offered, and which limits forbid it.
     """
-    dark = error.rows.take(np.arange(min(len(error.rows), _DARK_ROWS)))
-    helps = list(least_relaxations(scene, error.candidates, dark, 1))
+    offered = error.candidates
+    dark = offered.samples.take(np.arange(min(len(offered.samples), _DARK_ROWS)))
+    helps = list(least_relaxations(scene, offered.projectors, dark, 1))
     if helps:
         return f"the least that lights any of it: {'; or '.join(helps)}"
     return (

@@ -77,8 +77,8 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
     site = scene.site("projector", stage.reference[0].device)
     if site is None:
         return None
-    n = min(len(stage.rows), _ROWS)
-    rows = stage.rows.take(np.arange(n))
+    n = min(len(stage.candidates.samples), _ROWS)
+    rows = stage.candidates.samples.take(np.arange(n))
     field = field_limit(scene, stage.reference[0])
     poses = [field.projector(pose) for pose in stage.reference]
     poses += _over_larger_tiles(site, stage.reference[0])
@@ -87,7 +87,7 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
     for column, pose in enumerate(poses):
         own = np.flatnonzero(lit[:, column])
         asked[own, column] = field.asks(pose, rows.take(own))
-    reached = np.any(stage.stages[:n] == LIT, axis=1)
+    reached = stage.candidates.reached[:n]
     required = required_samples(reached, scene.requirements.dominant_coverage)
     given = len(scene.requirements.existing_of("projector"))
     fields = _Fields(asked, required, count, given, scene.seed)

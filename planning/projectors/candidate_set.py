@@ -1,0 +1,210 @@
+"""Candidate poses of a projector: where they come from, and what each lights."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.planned import PlannedProjector
+from planning.proofs.selection import CandidateCover
+from planning.scene.clearance import candidates_with_clearance, with_clearance
+from planning.scene.existing import existing_projectors, movable
+from planning.scene.lighting import lit_stages
+from planning.scene.limits import projector_limits
+from planning.scene.samples import Target, merged
+from planning.scene.scene import Scene
+from planning.scene.workspace.candidates import (
+    projector_candidates,
+    projectors_around,
+    projectors_towards,
+)
+from planning.scene.workspace.view_tiles import Site
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateSource:
+    """Gives poses whose bodies are clear of what stands already.
+
+    Attributes:
+        scene: Surface and requirements.
+        template: Optics and rings of the projector.
+        ring_offset: Tilt and azimuth of the ring axis until the cameras are known.
+    """
+
+    scene: Scene
+    template: PlannedProjector
+    ring_offset: tuple[float, float] = (0.0, 0.0)
+
+    @cached_property
+    def site(self) -> Site | None:
+        """What projectors stand over in tiled placement; None where the object fits."""
+        return self.scene.site("projector", self.template.device)
+
+    def lattice(self, n: int) -> tuple[PlannedProjector, ...]:
+        """Return existing projectors, and n candidates or more over the workspace."""
+        required = self.scene.requirements
+
+        def offer(n: int) -> tuple[PlannedProjector, ...]:
+            return projector_candidates(
+                self.template,
+                required.workspace,
+                n,
+                ring_offset=self.ring_offset,
+                site=self.site,
+            )
+
+        existing = existing_projectors(required, self.template, self.ring_offset)
+        return existing + candidates_with_clearance(self.scene, n, offer)
+
+    def around(
+        self, chosen: Sequence[PlannedProjector], n_lattice: int, scale: float = 1.0
+    ) -> tuple[PlannedProjector, ...]:
+        """Return poses close around those chosen, existing ones excepted.
+
+        Args:
+            chosen: Projectors.
+            n_lattice: Poses of the lattice that they are from.
+            scale: How far out, as a share of the lattice's spacing.
+        """
+        between = projectors_around(
+            movable(chosen),
+            self.scene.requirements.workspace,
+            n_lattice,
+            ring_offset=self.ring_offset,
+            scale=scale,
+            site=self.site,
+        )
+        return with_clearance(self.scene, between)
+
+    def towards(self, directions: NDArray[np.float64]) -> tuple[PlannedProjector, ...]:
+        """Return poses in directions from the centre of the workspace, shape (k, 3)."""
+        found = projectors_towards(
+            self.template,
+            self.scene.requirements.workspace,
+            directions,
+            ring_offset=self.ring_offset,
+            site=self.site,
+        )
+        return with_clearance(self.scene, found)
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateSet:
+    """Candidate poses, and what forbids each of them at each sample.
+
+    Attributes:
+        scene: Surface and requirements.
+        samples: Samples of the target.
+        projectors: The poses.
+        stages: First violated limit of each sample and pose, shape (n, k).
+        n_existing: First poses that are taken whatever they light, and stay.
+    """
+
+    scene: Scene
+    samples: Target
+    projectors: tuple[PlannedProjector, ...]
+    stages: NDArray[np.int8]
+    n_existing: int
+
+    @classmethod
+    def over(
+        cls, scene: Scene, samples: Target, projectors: tuple[PlannedProjector, ...]
+    ) -> "CandidateSet":
+        """Return what poses light; those of existing projectors come first."""
+        stages = lit_stages(scene, projectors, samples)
+        n_existing = len(scene.requirements.existing_of("projector"))
+        return cls(scene, samples, projectors, stages, n_existing)
+
+    @cached_property
+    def lit(self) -> NDArray[np.bool_]:
+        """Which pose lights which sample, shape (n, k)."""
+        return self.stages == projector_limits.LIT
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Which samples any pose lights, shape (n,)."""
+        return np.any(self.lit, axis=1)
+
+    @cached_property
+    def cover(self) -> CandidateCover:
+        """What the poses light, with what is required of them."""
+        required = self.scene.requirements
+        return CandidateCover(
+            self.lit,
+            required.dominant_coverage,
+            seed=self.scene.seed,
+            max_count=required.max_projectors,
+            n_existing=self.n_existing,
+        )
+
+    def extended(self, more: tuple[PlannedProjector, ...]) -> "CandidateSet":
+        """Return these poses and more."""
+        stages = lit_stages(self.scene, more, self.samples)
+        return self.joined(replace(self, projectors=more, stages=stages))
+
+    def joined(self, other: "CandidateSet") -> "CandidateSet":
+        """Return both sets of poses, which are of the same samples, as one."""
+        stages = np.concatenate([self.stages, other.stages], axis=1)
+        return replace(
+            self, projectors=self.projectors + other.projectors, stages=stages
+        )
+
+    def take(self, chosen: NDArray[np.int64]) -> "CandidateSet":
+        """Return some of the poses, the existing ones among them."""
+        return replace(self, projectors=self.of(chosen), stages=self.stages[:, chosen])
+
+    def of(self, chosen: NDArray[np.int64]) -> tuple[PlannedProjector, ...]:
+        """Return the projectors of some poses."""
+        return tuple(self.projectors[i] for i in chosen)
+
+    def on(self, samples: Target) -> "CandidateSet":
+        """Return what the same poses light of other samples."""
+        return CandidateSet.over(self.scene, samples, self.projectors)
+
+    def with_samples(self, fresh: "CandidateSet") -> "CandidateSet":
+        """Return the same poses on the samples of both."""
+        return replace(
+            self,
+            samples=merged(self.samples, fresh.samples),
+            stages=np.concatenate([self.stages, fresh.stages]),
+        )
+
+    def refuse_dark(self) -> None:
+        """Refuse candidates that light nothing.
+
+        Raises:
+            NothingLitError: It names the limits that stop most pairs.
+        """
+        if not self.lit.any():
+            raise NothingLitError(self)
+
+
+class NothingLitError(InfeasibleLimitsError):
+    """No candidate lights any sample.
+
+    Attributes:
+        candidates: The poses, the samples, and what forbids each.
+    """
+
+    def __init__(self, candidates: CandidateSet) -> None:
+        n_causes = len(projector_limits.CAUSES)
+        stages = candidates.stages.ravel()
+        counts = np.bincount(stages, minlength=n_causes)[:n_causes]
+        share = 100.0 * counts / counts.sum()
+        named = ", ".join(
+            f"{cause} {percent:.0f} %"
+            for cause, percent in sorted(
+                zip(projector_limits.CAUSES, share, strict=True),
+                key=lambda pair: -pair[1],
+            )
+            if percent >= 1.0
+        )
+        super().__init__(
+            f"no projector of {len(candidates.projectors)} poses lights any part of "
+            f"the target; of all pairs of pose and sample, the first limit that fails "
+            f"is {named}"
+        )
+        self.candidates = candidates
