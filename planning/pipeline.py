@@ -9,8 +9,12 @@ from threadpoolctl import threadpool_limits
 
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
-from planning.cameras.camera_cover import CameraStage, NothingMeasuredError
-from planning.cameras.camera_routes import slide_routes
+from planning.cameras.camera_cover import (
+    CameraStage,
+    NothingMeasuredError,
+    camera_candidate_views,
+)
+from planning.cameras.camera_routes import widest_route
 from planning.cameras.camera_stage import follow_cameras, place_cameras
 from planning.cameras.proved_cameras import bound_stage
 from planning.cameras.routes import CamerasBy
@@ -180,7 +184,7 @@ def _first_draft(order: PlanRequest, clock: Stopwatch) -> PartialPlan:
             ready.scene, stage, ready.template, effort, ring_offset=ready.ring_offset
         )
         clock.say(f"  projectors: {_bound_words(stage.certificate)}")
-    projectors, cameras = _placed(order, ready.scene, stage, ready.tilt, clock)
+    projectors, cameras = _placed(order, ready.scene, stage, clock)
     return PartialPlan(
         order,
         ready.scene,
@@ -198,7 +202,6 @@ def _placed(
     order: PlanRequest,
     scene: Scene,
     stage: ProjectorStage,
-    tilt: float,
     clock: Stopwatch,
 ) -> tuple[tuple[PlannedProjector, ...], CameraStage]:
     """Poses of widest margin for chosen projectors, and the cameras for them."""
@@ -210,12 +213,12 @@ def _placed(
         camera = PlannedCamera(
             "", np.eye(4), rig.camera_device(), body=rig.camera_body()
         )
+        scene = scene.among(projectors)
+        candidates = camera_candidate_views(scene, camera, n_cameras)
         try:
-            solution = place_cameras(
-                scene, projectors, camera, n_cameras, tilt, order.cameras_by
-            )
+            solution = place_cameras(scene, projectors, candidates, order.cameras_by)
         except NothingMeasuredError as error:
-            helps = nothing_measured(scene.among(projectors), rig, error)
+            helps = nothing_measured(scene, rig, error)
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
         cameras = solution.stage
         clock.say(
@@ -240,9 +243,7 @@ def _one_more(
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
             stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
-            projectors, cameras = _placed(
-                draft.order, draft.scene, stage, draft.tilt, clock
-            )
+            projectors, cameras = _placed(draft.order, draft.scene, stage, clock)
             return replace(
                 draft,
                 stage=stage,
@@ -265,7 +266,7 @@ def _polish(draft: PartialPlan, clock: Stopwatch) -> PartialPlan:
     """Section VI: cameras slide apart while the coverage holds; then their rings."""
     with clock.stage("baselines", "baselines: cameras slide apart"):
         ranges = draft.order.ranges
-        stage, moved = slide_routes(
+        stage, moved = widest_route(
             draft.scene,
             draft.projectors,
             draft.camera_stage,
@@ -290,7 +291,7 @@ def _polish(draft: PartialPlan, clock: Stopwatch) -> PartialPlan:
             final.projectors,
             moved.cameras,
             draft.order.rig.ring_spacing,
-            final.stage.rows,
+            final.stage.cover.samples,
         )
     return replace(
         draft,

@@ -26,6 +26,7 @@ from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
+from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_stage import place_cameras
 from planning.cameras.proved_cameras import bound_stage
 from planning.model.errors import InfeasibleLimitsError
@@ -95,7 +96,9 @@ def _case(
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
     n = rig.n_camera_poses
     try:
-        stage = place_cameras(ready.scene, projectors, camera, n, ready.tilt).stage
+        scene = ready.scene.among(projectors)
+        candidates = camera_candidate_views(scene, camera, n)
+        stage = place_cameras(scene, projectors, candidates).stage
     except InfeasibleLimitsError:
         return len(projectors), "nothing measured", 0
     begin = time.process_time()

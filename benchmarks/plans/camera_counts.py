@@ -32,7 +32,8 @@ from support import shared_meshes
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig, verify_plan
-from planning.cameras.camera_routes import slide_routes
+from planning.cameras.camera_cover import camera_candidate_views
+from planning.cameras.camera_routes import widest_route
 from planning.cameras.camera_stage import CameraSolution, place_cameras
 from planning.cameras.routes import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -151,9 +152,9 @@ class Job:
         camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=body)
         n = rig.n_camera_poses
         with self.clock.stage("cameras", "cameras"):
-            return place_cameras(
-                ready.scene, self.projectors, camera, n, ready.tilt, by
-            )
+            scene = ready.scene.among(self.projectors)
+            candidates = camera_candidate_views(scene, camera, n)
+            return place_cameras(scene, self.projectors, candidates, by)
 
 
 def _job(mesh: TriangleMesh, up: str | None) -> Job:
@@ -172,7 +173,7 @@ def _by_default(job: Job) -> Found:
     """The better route, as far as the slides."""
     scene, solution = job.ready.scene, job.place("both")
     before = solution.stage
-    after, slid = slide_routes(scene, solution.projectors, before)
+    after, slid = widest_route(scene, solution.projectors, before)
     routes, proof = after.routes, after.certificate
     assert routes is not None
     rows = lit_samples(
@@ -206,7 +207,7 @@ def _by_default(job: Job) -> Found:
 def _smallest(scene: Scene, solution: CameraSolution) -> float | None:
     """Smallest baseline of the cover's cameras before they slide."""
     stage = replace(solution.stage, routes=None)
-    return slide_routes(scene, solution.projectors, stage)[1].smallest_before_m
+    return widest_route(scene, solution.projectors, stage)[1].smallest_before_m
 
 
 def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:

@@ -32,8 +32,8 @@ from benchmarks.bounds.continuous_bounds import jobs, ready_for
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
-from planning.cameras.camera_cover import offered_cameras, plan_cameras
-from planning.cameras.camera_stage import choose_cameras, move_axes
+from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
+from planning.cameras.camera_stage import move_axes
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
@@ -170,20 +170,20 @@ def _axes(ready: Prepared) -> tuple[list[str], str, list[float]]:
     posed = widen_margins(scene, stage)
     camera = PlannedCamera("", np.eye(4), rig.camera_device())
     n_cameras = rig.n_camera_poses
-    offered = offered_cameras(scene, camera, n_cameras)
+    offered = camera_candidate_views(scene, camera, n_cameras)
     middle = tuple(
         replace(p, world_from_ring=ring_frame(p.world_from_device, p.device, 0.0, 0.0))
         for p in posed
     )
     first = plan_cameras(scene, middle, offered)
     begin = time.process_time()
-    turned, cover = choose_cameras(scene, posed, offered, ready.tilt)
+    cover = plan_cameras(scene, posed, offered)
     between = time.process_time()
-    moved, last = move_axes(scene, turned, cover)
+    moved, last = move_axes(scene, posed, cover)
     seconds = [between - begin, time.process_time() - between]
     cells = [
         _quality(scene, projectors, of.cameras)
-        for projectors, of in ((middle, first), (turned, cover), (moved, last))
+        for projectors, of in ((middle, first), (posed, cover), (moved, last))
     ]
     return cells, f"{len(moved)}, {len(last.cameras)}", seconds
 

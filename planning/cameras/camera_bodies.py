@@ -29,32 +29,32 @@ class CameraInterference:
         scene: With the bodies of the projectors.
         projectors: As planned.
         devices: The candidates.
-        rows: Samples that the projectors light, were there no cameras.
+        samples: Samples that the projectors light, were there no cameras.
         measured: Which candidate measures which, but for bodies of others, (n, m).
     """
 
     scene: Scene
     projectors: tuple[PlannedProjector, ...]
     devices: Sequence[PlannedCamera]
-    rows: LitSamples
+    samples: LitSamples
     measured: NDArray[np.bool_]
 
     @property
     def bodied(self) -> bool:
-        """Whether any candidate that isn't given has a body."""
+        """Whether any candidate that doesn't exist yet has a body."""
         return moves_bodies(self.devices)
 
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]
     ) -> NDArray[np.bool_]:
-        """Return which rows candidates measure among the bodies of others."""
+        """Return which samples candidates measure among the bodies of others."""
         chosen = [self.devices[i] for i in standing]
         bodies = bodies_of(device for device in chosen if not device.existing)
         scene = self.scene.among((*self.projectors, *chosen))
-        lit = lit_among(self.projectors, self.rows, chosen)
-        changed = np.flatnonzero((lit != self.rows.lit).any(axis=1))
-        dimmed = taken(self.rows, changed, lit)
-        points = self.rows.target.samples.points
+        lit = lit_among(self.projectors, self.samples, chosen)
+        changed = np.flatnonzero((lit != self.samples.lit).any(axis=1))
+        dimmed = taken(self.samples, changed, lit)
+        points = self.samples.target.samples.points
         measured = self.measured[:, columns]
         for k, column in enumerate(columns):
             device = self.devices[column]
@@ -62,9 +62,9 @@ class CameraInterference:
             if collide(device, bodies) or (others and self._shades[column]):
                 measured[:, k] = False
                 continue
-            own = np.flatnonzero(measured[:, k])
-            blocked = blocked_by(bodies, device, points[own]).any(axis=1)
-            measured[own[blocked], k] = False
+            seen = np.flatnonzero(measured[:, k])
+            blocked = blocked_by(bodies, device, points[seen]).any(axis=1)
+            measured[seen[blocked], k] = False
             if len(changed):
                 measured[changed, k] = measured_by(scene, [device], dimmed)[:, 0]
         return measured
@@ -90,31 +90,31 @@ class CameraInterference:
         )
 
     def _darkens(self, cameras: Sequence[PlannedCamera]) -> bool:
-        lit = lit_among(self.projectors, self.rows, cameras)
+        lit = lit_among(self.projectors, self.samples, cameras)
         return not lit.any(axis=1).all()
 
 
 def lit_among(
     projectors: Sequence[PlannedProjector],
-    rows: LitSamples,
+    samples: LitSamples,
     cameras: Sequence[PlannedCamera],
 ) -> NDArray[np.bool_]:
     """Return which projector lights which sample past the bodies of planned cameras.
 
     Args:
         projectors: As planned.
-        rows: Samples lit without these cameras.
-        cameras: As they stand; those that stand already were in the way before.
+        samples: Lit without these cameras.
+        cameras: As they stand; existing ones were in the way before.
 
     Returns:
         Shape (n, n_projectors).
     """
     bodies = bodies_of(camera for camera in cameras if not camera.existing)
-    lit = rows.lit.copy()
+    lit = samples.lit.copy()
     for p, projector in enumerate(projectors):
-        own = np.flatnonzero(lit[:, p])
-        points = rows.target.samples.points[own]
-        lit[own[blocked_by(bodies, projector, points).any(axis=1)], p] = False
+        mine = np.flatnonzero(lit[:, p])
+        points = samples.target.samples.points[mine]
+        lit[mine[blocked_by(bodies, projector, points).any(axis=1)], p] = False
     return lit
 
 
@@ -133,16 +133,16 @@ def resolved_cover(
     Raises:
         InfeasibleLimitsError: If the body of every camera is in the way.
     """
-    crowd = CameraInterference(
-        scene, projectors, cover.offered.cameras, cover.rows, cover.measured
+    interference = CameraInterference(
+        scene, projectors, cover.candidates.cameras, cover.samples, cover.measured
     )
     selection = resolve_conflicts(
-        crowd, candidate_cover(scene, cover.measured), cover.selection
+        interference, candidate_cover(scene, cover.measured), cover.selection
     )
     if not len(selection.chosen):
         raise InfeasibleLimitsError(
-            f"each of {len(cover.offered.cameras)} camera bodies collides, or keeps "
+            f"each of {len(cover.candidates.cameras)} camera bodies collides, or keeps "
             f"something dark that the projectors light; make [camera.body] smaller, or "
             f"let cameras stand elsewhere"
         )
-    return replace(cover, selection=selection, crowd=crowd)
+    return replace(cover, selection=selection, interference=interference)

@@ -1,6 +1,6 @@
 """Section VI of the paper: the fewest cameras that measure what is lit."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,9 +36,9 @@ from planning.scene.workspace.candidates import camera_candidates
 
 from .routes import Routes
 
-_ROWS = 2000
-_CHECK_ROWS = 4000
-ROUNDS = 3
+_SAMPLES = 2000
+_FRESH_SAMPLES = 4000
+_ROUNDS = 3
 _STREAM = 200
 
 
@@ -47,14 +47,14 @@ class NothingMeasuredError(InfeasibleLimitsError):
 
     Attributes:
         cameras: The candidates.
-        rows: The lit samples.
+        samples: The lit samples.
     """
 
     def __init__(
-        self, message: str, cameras: tuple[PlannedCamera, ...], rows: LitSamples
+        self, message: str, cameras: tuple[PlannedCamera, ...], samples: LitSamples
     ) -> None:
         super().__init__(message)
-        self.cameras, self.rows = cameras, rows
+        self.cameras, self.samples = cameras, samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,41 +62,51 @@ class CameraCover:
     """Cameras chosen for projectors as they are.
 
     Attributes:
-        offered: Candidates, which are the reference set, and what they see.
-        rows: Lit samples that the cover was solved on.
+        candidates: The reference set, and what it sees; existing cameras first.
+        samples: Lit samples that the cover was solved on.
         measured: Which candidate measures which sample, shape (n, m).
         selection: Candidates taken, and what was proved of their number.
-        crowd: The candidates among each other's bodies, where they have any.
-        by_count: Candidates for each number of them, where a route of its own found
+        interference: The candidates among each other's bodies, where they have any.
+        by_count: Candidates for each number of them, where the paper's route passed
             them; None: the best there are.
     """
 
-    offered: CandidateViews
-    rows: LitSamples
+    candidates: CandidateViews
+    samples: LitSamples
     measured: NDArray[np.bool_]
     selection: Selection
-    crowd: Interference | None = None
+    interference: Interference | None = None
     by_count: Mapping[int, NDArray[np.int64]] | None = None
 
     @property
     def cameras(self) -> tuple[PlannedCamera, ...]:
         """The cameras taken."""
-        return tuple(self.offered.cameras[i] for i in self.selection.chosen)
+        return self.among_candidates(self.selection.chosen)
+
+    @property
+    def has_bodies(self) -> bool:
+        """Whether the body of any candidate may be in the way of another."""
+        return self.interference is not None and self.interference.bodied
+
+    def among_candidates(self, chosen: NDArray[np.int64]) -> tuple[PlannedCamera, ...]:
+        """Return candidates by their index."""
+        return tuple(self.candidates.cameras[i] for i in chosen)
 
 
 @dataclass(frozen=True, eq=False)
 class CameraStage:
-    """What the camera stage found; the attributes are those of `ProjectorStage`.
+    """Cameras with what was proved of their number.
 
-    `offered` keeps what the reference cameras see, to prove the count again after ring
-    axes have moved; `measured`, which of them measures which row, (n, m); `routes` says
-    what either route needs.
+    Attributes:
+        cameras: As they stand.
+        cover: Candidates and samples, to prove the count again under other ring axes.
+        by_count: Best cameras found for each number of them.
+        certificate: What was proved, as the plan says it.
+        routes: What either route needs; None where none was compared.
     """
 
     cameras: tuple[PlannedCamera, ...]
-    offered: CandidateViews
-    rows: LitSamples
-    measured: NDArray[np.bool_]
+    cover: CameraCover
     by_count: dict[int, tuple[PlannedCamera, ...]]
     certificate: Certificate
     routes: Routes | None = None
@@ -104,34 +114,33 @@ class CameraStage:
     @property
     def reference(self) -> tuple[PlannedCamera, ...]:
         """The candidates."""
-        return self.offered.cameras
+        return self.cover.candidates.cameras
 
 
-def offered_cameras(
+def camera_candidate_views(
     scene: Scene, template: PlannedCamera, n_candidates: int
 ) -> CandidateViews:
-    """Return the candidates, those that stand already first: they are in every cover.
+    """Return the candidates, existing cameras first: they are in every cover.
 
     Args:
         scene: Surface and requirements.
         template: Optics of the camera.
-        n_candidates: Poses offered.
+        n_candidates: Poses wanted.
     """
     required = scene.requirements
-    candidates = existing_cameras(required, template)
     site = scene.site("camera", template.device)
 
-    def lattice(n: int) -> tuple[PlannedCamera, ...]:
+    def poses(n: int) -> tuple[PlannedCamera, ...]:
         return camera_candidates(template, required.workspace, n, site)
 
-    candidates += candidates_with_clearance(scene, n_candidates, lattice)
-    return CandidateViews(scene, candidates)
+    free = candidates_with_clearance(scene, n_candidates, poses)
+    return CandidateViews(scene, existing_cameras(required, template) + free)
 
 
 def plan_cameras(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    offered: CandidateViews,
+    candidates: CandidateViews,
     known: NDArray[np.int64] | None = None,
 ) -> CameraCover:
     """Choose the fewest cameras that measure the required share of what is lit.
@@ -139,126 +148,116 @@ def plan_cameras(
     Args:
         scene: Surface and requirements.
         projectors: As planned, with their rings.
-        offered: Candidates, from `offered_cameras`; what they saw they see again.
+        candidates: What they saw they see again.
         known: Candidates that may do with fewer than the search finds.
 
     Raises:
         NothingMeasuredError: If no candidate measures any lit sample.
     """
-    required = scene.requirements
-    target = first_target(scene)
-    rows, measured = rows_for(scene, projectors, offered, target)
-    refuse_unmeasured(scene, offered, rows, measured)
-    attempt = 0
-    while True:
-        attempt += 1
+
+    def choose(samples: LitSamples, measured: NDArray[np.bool_]) -> CameraCover:
         selection = select_fewest(candidate_cover(scene, measured), known=known)
-        fresh = fresh_target(scene, attempt)
-        _, seen = rows_for(scene, projectors, offered, fresh)
-        if (
-            selection.status == "infeasible"
-            or confirms(seen, selection.chosen, required.coverage)
-            or attempt == ROUNDS
-        ):
-            break
-        target = merged(target, fresh)
-        rows = lit_samples(scene, projectors, target)
-        measured = np.concatenate([measured, seen])
-    return CameraCover(offered, rows, measured, selection)
+        return CameraCover(candidates, samples, measured, selection)
+
+    return confirmed_cover(scene, projectors, candidates, choose)
 
 
-def first_target(scene: Scene) -> Target:
-    """Return the samples of the target to plan cameras on."""
-    return scene.target_samples(_ROWS, _STREAM)
-
-
-def fresh_target(scene: Scene, attempt: int) -> Target:
-    """Return samples that no attempt, counted from 1, has seen before."""
-    return scene.target_samples(_CHECK_ROWS, _STREAM + attempt)
-
-
-def rows_for(
+def confirmed_cover(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    offered: CandidateViews,
-    target: Target,
+    candidates: CandidateViews,
+    choose: Callable[[LitSamples, NDArray[np.bool_]], CameraCover],
+) -> CameraCover:
+    """Choose cameras until fresh samples confirm that they measure enough.
+
+    Samples that don't confirm it join those that the next choice is made on.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As planned, with their rings.
+        candidates: They say what is reachable.
+        choose: Cameras for lit samples, of which the candidates measure these.
+
+    Raises:
+        NothingMeasuredError: If no candidate measures any lit sample.
+    """
+    target = scene.target_samples(_SAMPLES, _STREAM)
+    samples, measured = measured_samples(scene, projectors, candidates, target)
+    for attempt in range(1, _ROUNDS):
+        cover = choose(samples, measured)
+        if cover.selection.status == "infeasible":
+            return cover
+        fresh = scene.target_samples(_FRESH_SAMPLES, _STREAM + attempt)
+        _, seen = _measured(scene, projectors, cover.candidates, fresh)
+        covered = seen[:, cover.selection.chosen].any(axis=1).sum()
+        if covered >= scene.requirements.coverage * seen.any(axis=1).sum():
+            return cover
+        target = merged(target, fresh)
+        samples = lit_samples(scene, projectors, target)
+        measured = np.concatenate([measured, seen[:, : len(candidates.cameras)]])
+    return choose(samples, measured)
+
+
+def measured_samples(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    candidates: CandidateViews,
+    target: Target | None = None,
 ) -> tuple[LitSamples, NDArray[np.bool_]]:
     """Return the samples that are lit, and which candidate measures which.
 
     Args:
         scene: Surface and requirements.
         projectors: As planned, with their rings.
-        offered: Candidates.
-        target: Samples.
-    """
-    rows = lit_samples(scene, projectors, target)
-    return rows, measured_by(scene, offered.cameras, rows, offered.on(rows.target))
-
-
-def refuse_unmeasured(
-    scene: Scene, offered: CandidateViews, rows: LitSamples, measured: NDArray[np.bool_]
-) -> None:
-    """Refuse to plan where no candidate measures any lit sample.
-
-    Args:
-        scene: Surface and requirements.
-        offered: Candidates.
-        rows: Lit samples.
-        measured: Which candidate measures which, shape (n, m).
+        candidates: They say what is reachable.
+        target: Samples; None: those that every cover begins with.
 
     Raises:
-        NothingMeasuredError: It names the limits that stop most samples.
+        NothingMeasuredError: If no candidate measures any; it names the limits that
+            stop most samples.
     """
+    target = target or scene.target_samples(_SAMPLES, _STREAM)
+    samples, measured = _measured(scene, projectors, candidates, target)
     if not measured.any():
-        said = _nothing_measured(scene, offered.cameras, rows)
-        raise NothingMeasuredError(said, offered.cameras, rows)
+        message = _nothing_measured(scene, candidates.cameras, samples)
+        raise NothingMeasuredError(message, candidates.cameras, samples)
+    return samples, measured
 
 
-def confirms(seen: NDArray[np.bool_], chosen: NDArray[np.int64], share: float) -> bool:
-    """Return whether candidates measure a share of what all of them do.
+def _measured(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    candidates: CandidateViews,
+    target: Target,
+) -> tuple[LitSamples, NDArray[np.bool_]]:
+    samples = lit_samples(scene, projectors, target)
+    views = candidates.on(samples.target)
+    return samples, measured_by(scene, candidates.cameras, samples, views)
 
-    Args:
-        seen: Which candidate measures which fresh sample, shape (n, m).
-        chosen: Candidates taken.
-        share: In (0, 1].
-    """
-    covered = seen[:, chosen].any(axis=1).sum()
-    return bool(covered >= share * seen.any(axis=1).sum())
 
-
-def camera_stage(scene: Scene, cover: CameraCover) -> CameraStage:
-    """Return what the stage found, with the best cameras for every other count."""
-    given = n_fixed(scene)
-    candidate = candidate_cover(scene, cover.measured)
-    others = marginals(candidate, cover.selection)
+def camera_stage(
+    scene: Scene, cover: CameraCover, routes: Routes | None = None
+) -> CameraStage:
+    """Return the cameras of a cover, with the best ones for every other count."""
+    candidates = candidate_cover(scene, cover.measured)
+    others = marginals(candidates, cover.selection)
     if cover.by_count is not None:
-        others = others_instead(others, cover.by_count, candidate)
-    bodied = cover.crowd is not None and cover.crowd.bodied
-    if cover.crowd is not None:
+        others = others_instead(others, cover.by_count, candidates)
+    if cover.interference is not None:
         n = len(cover.selection.chosen)
-        others = resolve_others(cover.crowd, candidate, others, n)
-    target, candidates = cover.rows.target, cover.offered.cameras
+        others = resolve_others(cover.interference, candidates, others, n)
     proof = certificate(
         cover.selection,
         others,
-        n_rows=len(target),
-        row_area_m2=target.samples.weight,
-        n_candidates=len(candidates),
-        given=given,
+        n_rows=len(cover.samples.target),
+        row_area_m2=cover.samples.target.samples.weight,
+        n_candidates=len(cover.candidates.cameras),
+        given=candidates.n_existing,
     )
-    if bodied:
+    if cover.has_bodies:
         proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
-    return CameraStage(
-        cover.cameras,
-        cover.offered,
-        cover.rows,
-        cover.measured,
-        {
-            number: tuple(candidates[i] for i in chosen)
-            for number, chosen in others.by_count.items()
-        },
-        proof,
-    )
+    by_count = {n: cover.among_candidates(of) for n, of in others.by_count.items()}
+    return CameraStage(cover.cameras, cover, by_count, proof, routes)
 
 
 def candidate_cover(scene: Scene, measured: NDArray[np.bool_]) -> CandidateCover:
@@ -279,14 +278,14 @@ def candidate_cover(scene: Scene, measured: NDArray[np.bool_]) -> CandidateCover
 
 
 def n_fixed(scene: Scene) -> int:
-    """Return how many cameras stand already."""
+    """Return how many existing cameras there are."""
     return len(scene.requirements.existing_of("camera"))
 
 
 def _nothing_measured(
-    scene: Scene, candidates: Sequence[PlannedCamera], rows: LitSamples
+    scene: Scene, candidates: Sequence[PlannedCamera], samples: LitSamples
 ) -> str:
-    causes = furthest_failure(scene, candidates, rows)
+    causes = furthest_failure(scene, candidates, samples)
     if len(causes) == 0:
         return (
             "the projectors that were chosen light none of the target's fresh samples, "
@@ -294,7 +293,7 @@ def _nothing_measured(
         )
     counts = np.bincount(causes, minlength=pair_limits.MEASURED)
     order = np.argsort(-counts, kind="stable")
-    weight = rows.target.samples.weight
+    weight = samples.target.samples.weight
     named = ", ".join(
         f"{pair_limits.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} % "
         f"({area_words(float(weight * counts[i]))})"

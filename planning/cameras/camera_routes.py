@@ -1,23 +1,24 @@
 """Which route to the cameras is taken: the cover's, the paper's, or the better of both.
 
-Both are given the same projectors and ring axes. Where the paper's route, or poses at
-the limit (10) of the cover's own cameras, need fewer, they join the candidates and the
-cover is solved again, so that what is proved is proved over a pool that holds them.
-Where both need as many, the cover's cameras stay, unless the paper's stand clearly
-farther apart and measure no less.
+Both get the same projectors and ring axes. Where the paper's route, or poses at the
+limit (10) of the cover's own cameras, need fewer, they join the candidates and the
+cover is solved again, so that what is proved is proved over a set that holds them.
+Where both need as many, the cover's cameras stay, unless the baselines of the paper's
+are clearly larger and they measure no less.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.baselines.camera_spread import CameraSpread
-from planning.cameras.baselines.limit_poses import Parts, limit_poses
-from planning.cameras.baselines.seams import adjacency, overlap_components
+from planning.cameras.baselines.limit_poses import limit_poses
+from planning.cameras.baselines.seams import SampledSurface, overlap_components
+from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.paper.paper_cameras import (
-    Routed,
+    RouteCameras,
+    again_by_paper,
     cover_by_paper,
     cover_of,
     route_among,
@@ -27,9 +28,15 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
 from planning.scene.camera_views import CandidateViews
 from planning.scene.clearance import with_clearance
-from planning.scene.measured import measured_by, taken
+from planning.scene.measured import measured_by
 from planning.scene.scene import Scene
 
+from .camera_baselines import (
+    baseline_limits,
+    baseline_samples,
+    held_to_candidates,
+    widen_baselines,
+)
 from .camera_bodies import resolved_cover
 from .camera_cover import (
     CameraCover,
@@ -38,181 +45,146 @@ from .camera_cover import (
     n_fixed,
     plan_cameras,
 )
-from .camera_slides import (
-    reached_by_candidates,
-    rows_to_slide_on,
-    slide_cameras,
-    spread_limits,
-)
 from .routes import CamerasBy, Routes
 
-# Of a scene, projectors, candidates, and those that a route passed under other axes.
-ByCount = Mapping[int, NDArray[np.int64]]
-Chooser = Callable[
-    [Scene, tuple[PlannedProjector, ...], CandidateViews, ByCount | None], CameraCover
-]
+_Projectors = tuple[PlannedProjector, ...]
 
 # A smallest baseline counts as clearly larger from this ratio on.
 _CLEARLY = 1.1
 # Samples on which seams are looked for.
-_ROWS = 2000
+_SAMPLES = 2000
 
 
 def cover_by_cover(
     scene: Scene,
-    projectors: tuple[PlannedProjector, ...],
-    offered: CandidateViews,
+    projectors: _Projectors,
+    candidates: CandidateViews,
     known: NDArray[np.int64] | None = None,
 ) -> CameraCover:
-    """Choose the fewest candidates for these ring axes that bear each other's bodies.
+    """Choose the fewest candidates for these ring axes whose bodies are compatible.
 
     The arguments are those of `plan_cameras`.
     """
-    cover = plan_cameras(scene, projectors, offered, known)
+    cover = plan_cameras(scene, projectors, candidates, known)
     return resolved_cover(scene, projectors, cover)
 
 
-def chooser(by: CamerasBy) -> Chooser:
-    """Return what chooses cameras for projectors: the cover, or the paper's route."""
-    return cover_by_paper if by == "paper" else _chosen_anew
-
-
-def _chosen_anew(
-    scene: Scene,
-    projectors: tuple[PlannedProjector, ...],
-    offered: CandidateViews,
-    by_count: ByCount | None = None,
+def cover_for(
+    scene: Scene, projectors: _Projectors, candidates: CandidateViews, by: CamerasBy
 ) -> CameraCover:
-    """The cover; a cover leaves nothing to keep."""
-    return cover_by_cover(scene, projectors, offered)
+    """Choose cameras for projectors: by the cover, or by the paper's route."""
+    choose = cover_by_paper if by == "paper" else cover_by_cover
+    return choose(scene, projectors, candidates)
 
 
-def passed_by(stage: CameraStage) -> ByCount:
-    """Return the candidates for each number of cameras of a stage."""
-    place = {id(camera): i for i, camera in enumerate(stage.offered.cameras)}
-    return {
-        n: np.array([place[id(camera)] for camera in cameras], dtype=np.int64)
-        for n, cameras in stage.by_count.items()
-    }
+def cover_again(
+    scene: Scene, projectors: _Projectors, cover: CameraCover, by: CamerasBy
+) -> CameraCover:
+    """Choose cameras for moved ring axes; the paper's stay and are measured anew."""
+    if by == "paper":
+        return again_by_paper(scene, projectors, cover)
+    return cover_by_cover(scene, projectors, cover.candidates)
 
 
 def better_route(
-    scene: Scene,
-    projectors: tuple[PlannedProjector, ...],
-    cover: CameraCover,
-    by: CamerasBy,
+    scene: Scene, projectors: _Projectors, cover: CameraCover, by: CamerasBy
 ) -> tuple[CameraCover, Routes]:
     """Return the cover that needs fewest cameras, and what either route needs.
 
     Args:
         scene: With the bodies of the projectors.
         projectors: As planned, ring axes as the cameras were chosen for.
-        cover: By the chooser of what was asked.
-        by: What was asked.
+        cover: From `cover_for` or `cover_again`.
+        by: The route that the user wants.
     """
     if by == "paper":
-        cover = _once_more(scene, projectors, cover)
-        needed = cover.selection.needed
-        met = cover.selection.n_covered >= cover.selection.required
-        count = needed if met or needed > len(cover.cameras) else None
-        return cover, Routes(
-            by, None, count, "paper", "the paper's route was asked for"
-        )
-    routed = _routed(scene, projectors, cover) if by == "both" else None
-    again = _with_more(scene, projectors, cover, routed)
-    if routed is not None:
-        return again, _compared(scene, cover, again, routed)
+        return _by_paper_alone(scene, projectors, cover)
+    route: RouteCameras | None = None
     why = "the cover was asked for"
     if by == "both":
         why = "the paper's route found no camera that measures anything"
-    return again, Routes(by, again.selection.needed, None, "cover", why)
+        try:
+            route = route_among(
+                scene, projectors, cover.candidates, cover.samples, cover.measured
+            )
+        except InfeasibleLimitsError:
+            pass
+    after = _with_more(scene, projectors, cover, route)
+    if route is not None:
+        return after, _compared(scene, cover, after, route)
+    return after, Routes(by, after.selection.needed, None, "cover", why)
 
 
-def _once_more(
-    scene: Scene, projectors: tuple[PlannedProjector, ...], cover: CameraCover
-) -> CameraCover:
-    """Take the paper's route under the final ring axes, if fewer aren't ruled out."""
-    if cover.selection.lower_bound >= cover.selection.needed:
-        return cover
-    again = cover_by_paper(scene, projectors, cover.offered)
-    return again if again.selection.needed < cover.selection.needed else cover
+def _by_paper_alone(
+    scene: Scene, projectors: _Projectors, cover: CameraCover
+) -> tuple[CameraCover, Routes]:
+    """Take the route once more under the final axes, if fewer aren't ruled out."""
+    if cover.selection.lower_bound < cover.selection.needed:
+        again = cover_by_paper(scene, projectors, cover.candidates)
+        if again.selection.needed < cover.selection.needed:
+            cover = again
+    needed = cover.selection.needed
+    met = cover.selection.n_covered >= cover.selection.required
+    count = needed if met or needed > len(cover.cameras) else None
+    why = "the paper's route was asked for"
+    return cover, Routes("paper", None, count, "paper", why)
 
 
-def slide_routes(
+def widest_route(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     stage: CameraStage,
     *,
     spare_field: float = 0.0,
-) -> tuple[CameraStage, CameraSpread]:
-    """Slide the cameras apart, or take the paper's where they stand clearly farther.
+) -> tuple[CameraStage, WidestBaselines]:
+    """Maximise baselines, or take the paper's cameras where theirs are clearly larger.
 
     Args:
         scene: Surface and requirements.
         projectors: As planned, with even rings.
         stage: Cameras, and those of the paper's route if it needs as many.
         spare_field: What is kept free of the half fields beyond seams [rad]; the
-            paper's cameras slid without, so they aren't taken where there is any.
+            paper's cameras moved without, so they aren't taken where there is any.
     """
-    scene = scene.among(projectors)
-    rows = rows_to_slide_on(scene, projectors)
-    reached = reached_by_candidates(scene, stage, rows)
-    slid = slide_cameras(
-        scene,
-        projectors,
-        stage.cameras,
-        rows,
-        spare_field=spare_field,
-        confirmed=True,
-        reached=reached,
+    samples = held_to_candidates(
+        baseline_samples(scene.among(projectors), projectors),
+        stage.reference,
+        stage.cover.samples,
+        stage.cover.measured,
+    )
+    widest = widen_baselines(
+        samples, stage.cameras, spare_field=spare_field, confirmed=True
     )
     routes = stage.routes
     if spare_field or routes is None or len(routes.rival) != len(stage.cameras):
-        return stage, slid
-    rival = slide_cameras(
-        scene,
-        projectors,
-        routes.rival,
-        rows,
-        max_evaluations=1,
-        max_programs=0,
-        reached=reached,
-    )
-    if not _clearly_wider(rival, slid):
-        return stage, slid
-    why = f"as many, {_apart(rival)} instead of {_apart(slid)} apart at the least"
+        return stage, widest
+    rival = widen_baselines(samples, routes.rival, max_evaluations=1, max_programs=0)
+    if not _clearly_wider(rival, widest):
+        return stage, widest
+    why = f"as many, {_apart(rival)} instead of {_apart(widest)} apart at the least"
     routes = replace(routes, taken="paper", why=why)
     return replace(stage, cameras=rival.cameras, routes=routes), rival
 
 
-def _apart(found: CameraSpread) -> str:
-    return f"{1e3 * (found.smallest_after_m or 0.0):.0f} mm"
+def _apart(baselines: WidestBaselines) -> str:
+    return f"{1e3 * (baselines.smallest_after_m or 0.0):.0f} mm"
 
 
-def _clearly_wider(rival: CameraSpread, slid: CameraSpread) -> bool:
+def _clearly_wider(rival: WidestBaselines, widest: WidestBaselines) -> bool:
     """Whether baselines are larger and nothing is lost: neither area nor overlap."""
-    theirs, ours = rival.smallest_after_m, slid.smallest_after_m
+    theirs, ours = rival.smallest_after_m, widest.smallest_after_m
     if theirs is None or ours is None or not theirs >= _CLEARLY * ours:
         return False
-    rows = [int(s.measured_by.any(axis=1).sum()) for s in (rival, slid)]
-    groups = [len(overlap_components(s.measured_by, 1.0)) for s in (rival, slid)]
-    return rows[0] >= rows[1] and groups[0] <= groups[1]
-
-
-def _routed(
-    scene: Scene, projectors: tuple[PlannedProjector, ...], cover: CameraCover
-) -> Routed | None:
-    try:
-        return route_among(scene, projectors, cover.offered, cover.rows, cover.measured)
-    except InfeasibleLimitsError:
-        return None
+    counts = [int(s.measured_by.any(axis=1).sum()) for s in (rival, widest)]
+    groups = [len(overlap_components(s.measured_by)) for s in (rival, widest)]
+    return counts[0] >= counts[1] and groups[0] <= groups[1]
 
 
 def _with_more(
     scene: Scene,
-    projectors: tuple[PlannedProjector, ...],
+    projectors: _Projectors,
     cover: CameraCover,
-    routed: Routed | None,
+    route: RouteCameras | None,
 ) -> CameraCover:
     """Return the cover over more candidates where they save a camera, else as it was.
 
@@ -222,47 +194,43 @@ def _with_more(
     needed = cover.selection.needed
     if needed <= n_fixed(scene) + 1:
         return cover
-    offered = cover.offered if routed is None else routed.offered
-    measured = cover.measured if routed is None else routed.measured
+    wider = cover if route is None else route
+    candidates, measured = wider.candidates, wider.measured
     limit = _at_limit(scene, cover)
     if limit:
-        theirs = measured_by(scene, limit, cover.rows)
+        theirs = measured_by(scene, limit, cover.samples)
         measured = np.concatenate([measured, theirs], axis=1)
-        offered = offered.joined(limit)
+        candidates = candidates.joined(limit)
     known = None
-    if routed is not None and (routed.needed or needed) < needed:
-        known = routed.by_count[routed.needed or 0]
-    if known is None:
-        if fewest_count(candidate_cover(scene, measured)) >= needed:
-            return cover
-    again = cover_by_cover(scene, projectors, offered, known)
+    if route is not None and route.needed is not None and route.needed < needed:
+        known = route.by_count[route.needed]
+    elif needed <= fewest_count(candidate_cover(scene, measured)):
+        return cover
+    again = cover_by_cover(scene, projectors, candidates, known)
     if again.selection.needed < needed:
         return again
-    bodied = again.crowd is not None and again.crowd.bodied
-    if bodied and routed is not None and known is not None:
+    if again.has_bodies and route is not None and known is not None:
         # Completed from the cover's side they were in each other's way, but not so.
-        return cover_of(scene, projectors, cover.rows, routed)
+        return cover_of(scene, projectors, cover.samples, route)
     return cover
 
 
 def _at_limit(scene: Scene, cover: CameraCover) -> tuple[PlannedCamera, ...]:
     """Poses at d_max from each neighbour among the cover's cameras."""
-    some = np.arange(0, len(cover.rows.target), -(-len(cover.rows.target) // _ROWS))
-    samples = taken(cover.rows, some, cover.rows.lit).target.samples
-    chosen = cover.selection.chosen
-    parts = Parts(
-        samples.points,
-        samples.normals,
-        adjacency(samples.points, samples.normals),
-        cover.measured[np.ix_(some, chosen)],
+    n = len(cover.samples.target)
+    some = np.arange(0, n, -(-n // _SAMPLES))
+    samples = cover.samples.target.take(some).samples
+    poses = limit_poses(
+        cover.cameras,
+        SampledSurface(samples.points, samples.normals),
+        cover.measured[np.ix_(some, cover.selection.chosen)],
+        baseline_limits(scene),
     )
-    return with_clearance(
-        scene, limit_poses(cover.cameras, parts, spread_limits(scene))
-    )
+    return with_clearance(scene, poses)
 
 
 def _compared(
-    scene: Scene, before: CameraCover, after: CameraCover, routed: Routed
+    scene: Scene, before: CameraCover, after: CameraCover, route: RouteCameras
 ) -> Routes:
     """Say what either route needs, and why one of them is taken.
 
@@ -270,13 +238,14 @@ def _compared(
         scene: Surface and requirements.
         before: Cover over its own candidates.
         after: Cover as it is kept.
-        routed: The paper's route.
+        route: The paper's route.
     """
-    cover, kept, paper = before.selection.needed, after.selection.needed, routed.needed
+    cover, kept, paper = before.selection.needed, after.selection.needed, route.needed
+    required = f"{100.0 * scene.requirements.coverage:g} % is asked"
     if paper is None:
         why = (
-            f"the paper's route ended with {_percent(routed.reached)} of what is "
-            f"reachable, {_asked(scene)}"
+            f"the paper's route ended with {_percent(route.reached)} of what is "
+            f"reachable, {required}"
         )
         return Routes("both", kept, None, "cover", why)
     if paper == kept < cover:
@@ -288,16 +257,12 @@ def _compared(
     if paper > kept:
         why = (
             f"fewer; without one of its {paper} the paper's route was found to measure "
-            f"{_percent(routed.best_without_one)} of what is reachable, {_asked(scene)}"
+            f"{_percent(route.best_without_one)} of what is reachable, {required}"
         )
         return Routes("both", kept, paper, "cover", why)
     why = "as many, and the paper's don't stand clearly farther apart"
-    rival = routed.cameras if len(after.cameras) == paper else ()
+    rival = route.cameras if len(after.cameras) == paper else ()
     return Routes("both", kept, paper, "cover", why, rival)
-
-
-def _asked(scene: Scene) -> str:
-    return f"{100.0 * scene.requirements.coverage:g} % is asked"
 
 
 def _percent(share: float) -> str:

@@ -9,12 +9,11 @@ from planning.model.document.certificates import Certificate
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
-from planning.rings.ring_axes import turn_ring_axes
 from planning.scene.camera_views import CandidateViews
 from planning.scene.scene import Scene
 
-from .camera_cover import CameraCover, CameraStage, camera_stage, offered_cameras
-from .camera_routes import better_route, chooser, passed_by
+from .camera_cover import CameraCover, CameraStage, camera_stage
+from .camera_routes import better_route, cover_again, cover_for
 from .routes import CamerasBy
 
 _ROUNDS = 3
@@ -24,7 +23,7 @@ _SPARE = 0.002
 
 @dataclass(frozen=True, eq=False)
 class CameraSolution:
-    """Cameras as placed, and the projectors with their ring axes turned for them.
+    """Cameras as placed, and the projectors with their ring axes moved for them.
 
     Attributes:
         projectors: With the ring axes that the cameras were chosen for.
@@ -38,61 +37,21 @@ class CameraSolution:
 def place_cameras(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    template: PlannedCamera,
-    n_candidates: int,
-    tilt: float,
+    candidates: CandidateViews,
     by: CamerasBy = "both",
 ) -> CameraSolution:
-    """Choose cameras and ring axes: azimuths of one tilt first, then any axis.
-
-    Args:
-        scene: Surface and requirements.
-        projectors: As planned.
-        template: Optics of the camera.
-        n_candidates: Poses offered.
-        tilt: Tilt of the ring axes, or their shift, to search azimuths of.
-        by: Route to the cameras.
-    """
-    scene = scene.among(projectors)
-    offered = offered_cameras(scene, template, n_candidates)
-    turned, cover = choose_cameras(scene, projectors, offered, tilt, by)
-    moved, cover = move_axes(scene, turned, cover, by)
-    cover, routes = better_route(scene, moved, cover, by)
-    stage = replace(camera_stage(scene, cover), routes=routes)
-    return CameraSolution(moved, stage)
-
-
-def choose_cameras(
-    scene: Scene,
-    projectors: Sequence[PlannedProjector],
-    offered: CandidateViews,
-    tilt: float,
-    by: CamerasBy = "cover",
-) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
-    """Choose cameras, turn the ring axes for them, and choose again until it settles.
-
-    A later round counts only if it needs no more cameras and measures no less, so the
-    certificate always belongs to the ring axes that are kept.
+    """Choose cameras, move the ring axes for them, and see which route is better.
 
     Args:
         scene: With the bodies of the projectors.
         projectors: As planned.
-        offered: Candidates, from `offered_cameras`.
-        tilt: Tilt of the ring axes, or their shift.
+        candidates: From `camera_candidate_views`.
         by: Route to the cameras.
     """
-    kept = tuple(projectors)
-    choose = chooser(by)
-    best = choose(scene, kept, offered, None)
-    for _ in range(_ROUNDS):
-        turned = turn_ring_axes(scene, kept, best.cameras, best.rows, tilt)
-        if not _differ(turned, kept):
-            break
-        cover = choose(scene, turned, best.offered, best.by_count)
-        if not _better(cover, best):
-            break
-        kept, best = turned, cover
-    return kept, best
+    cover = cover_for(scene, tuple(projectors), candidates, by)
+    moved, cover = move_axes(scene, projectors, cover, by)
+    cover, routes = better_route(scene, moved, cover, by)
+    return CameraSolution(moved, camera_stage(scene, cover, routes))
 
 
 def move_axes(
@@ -116,10 +75,10 @@ def move_axes(
     kept = tuple(projectors)
     for _ in range(_ROUNDS):
         among = scene.among((*kept, *cover.cameras))
-        moved = move_ring_axes(among, kept, cover.cameras, cover.rows)
+        moved = move_ring_axes(among, kept, cover.cameras, cover.samples)
         if not _differ(moved, kept):
             break
-        again = chooser(by)(scene, moved, cover.offered, cover.by_count)
+        again = cover_again(scene, moved, cover, by)
         if _better(cover, again):
             break
         as_chosen = with_cameras(again, cover)
@@ -133,15 +92,15 @@ def with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
     """Return a cover with the cameras of one before; None where that loses too much."""
     selection, chosen = cover.selection, before.selection.chosen
     measured = cover.measured[:, chosen]
-    if cover.crowd is not None and cover.crowd.bodied:
+    if cover.interference is not None and cover.has_bodies:
         each = chosen.tolist()
-        measured = cover.crowd.covers(each, each)
-    rows = int(measured.any(axis=1).sum())
+        measured = cover.interference.covers(each, each)
+    count = int(measured.any(axis=1).sum())
     least = min(selection.required, selection.n_covered)
     least = max(least, int(np.ceil((1.0 - _SPARE) * selection.n_covered)))
-    if len(chosen) != len(selection.chosen) or rows < least:
+    if len(chosen) != len(selection.chosen) or count < least:
         return None
-    return replace(cover, selection=replace(selection, chosen=chosen, n_covered=rows))
+    return replace(cover, selection=replace(selection, chosen=chosen, n_covered=count))
 
 
 def follow_cameras(
@@ -165,12 +124,12 @@ def follow_cameras(
         by: Route to the cameras.
     """
     among = scene.among((*projectors, *cameras))
-    moved = move_ring_axes(among, projectors, cameras, stage.rows)
+    moved = move_ring_axes(among, projectors, cameras, stage.cover.samples)
     if _differ(moved, projectors):
         scene = scene.among(projectors)
-        cover = chooser(by)(scene, moved, stage.offered, passed_by(stage))
+        cover = cover_again(scene, moved, stage.cover, by)
         if proves_as_much(cover.selection, stage.certificate, len(cameras)):
-            proved = replace(camera_stage(scene, cover), routes=stage.routes)
+            proved = camera_stage(scene, cover, stage.routes)
             return CameraSolution(moved, proved)
     return CameraSolution(tuple(projectors), stage)
 
@@ -200,7 +159,7 @@ def _better(new: CameraCover, old: CameraCover) -> bool:
     if new.selection.needed != old.selection.needed:
         return new.selection.needed < old.selection.needed
     a, b = (
-        cover.selection.n_covered * cover.rows.target.samples.weight
+        cover.selection.n_covered * cover.samples.target.samples.weight
         for cover in (new, old)
     )
     return a > b

@@ -26,25 +26,27 @@ def bound_stage(
         device: Optics of the cameras.
         effort: What to spend.
     """
-    proof = stage.certificate
+    proof, cover = stage.certificate, stage.cover
+    samples, measured = cover.samples, cover.measured
+    n_samples = len(samples.target)
     given = proof.given
-    n = min(len(stage.rows.target), effort.most_samples or len(stage.rows.target))
-    reached = np.any(stage.measured[:n], axis=1)
-    free = np.any(stage.measured[:n, :given], axis=1)
+    n = min(n_samples, effort.most_samples or n_samples)
+    reached = np.any(measured[:n], axis=1)
+    free = np.any(measured[:n, :given], axis=1)
     rest = np.flatnonzero(reached & ~free)
     if proof.needed.count <= given or not rest.size:
-        entry = enough(proof, np.any(stage.measured, axis=1))
+        entry = enough(proof, np.any(measured, axis=1))
         return replace(stage, certificate=proof.changed(continuous=entry))
     required = required_samples(reached, scene.requirements.coverage)
     bound = bound_cameras(
         scene,
         device,
-        taken(stage.rows, rest, stage.rows.lit),
+        taken(samples, rest, samples.lit),
         max(required - int(free.sum()), 0),
         proof.needed.count - given,
         effort,
         n_samples=n,
-        row_area_m2=stage.rows.target.samples.weight * len(stage.rows.target) / n,
+        row_area_m2=samples.target.samples.weight * n_samples / n,
     )
     bound = replace(bound, given=given, n_free=int(free.sum()))
     return replace(stage, certificate=joined(proof, bound.proof()))

@@ -20,7 +20,8 @@ class Routes:
             short of what is required.
         taken: Whose cameras stand.
         why: A sentence: what decided, and where the counts come from if they differ.
-        rival: As many cameras of the paper's route as the cover has, slid apart.
+        rival: As many cameras of the paper's route as the cover has, at their largest
+            baselines.
     """
 
     asked: CamerasBy

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
-from planning.cameras.baselines.seams import overlap_components
+from planning.cameras.baselines.seams import SampledSurface, overlap_components
 from planning.model.document.baseline_records import BaselineRow
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import (
@@ -29,7 +29,7 @@ from planning.report.entries.cost import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.report.entries.ring_entries import evenly_ringed, lost_to_rings_m2
-from planning.rings.ring_axes import widest_gap
+from planning.rings.ring_pitch import widest_gap
 
 from .claims import Claims, Devices, make_claims
 from .entries import device_entries as entries
@@ -179,10 +179,8 @@ def _baselines(
         BaselineRow(**row)
         for row in baseline_rows(
             devices.cameras,
-            samples.points,
-            samples.normals,
+            SampledSurface(samples.points, samples.normals),
             claims.measured_by,
-            samples.weight,
             requirements.camera.max_incidence,
         )
     )
@@ -193,8 +191,7 @@ def _baselines(
 
 
 def _camera_groups(devices: Devices, claims: Claims) -> tuple[tuple[str, ...], ...]:
-    weight = claims.target_samples.samples.weight
     return tuple(
         tuple(devices.cameras[c].id for c in group)
-        for group in overlap_components(claims.measured_by, weight)
+        for group in overlap_components(claims.measured_by)
     )

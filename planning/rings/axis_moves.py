@@ -24,7 +24,7 @@ from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.patterns.ring_pattern import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
-from solvers.poses.axis_program import best_start, solve_axis
+from solvers.poses.axis_program import better_starts, solve_axis
 
 from .ring_radii import ring_axis, ring_frame_of_axis
 
@@ -143,14 +143,19 @@ def _move(
 
 
 def proposals(program: AxisProgram) -> list[NDArray[np.float64]]:
-    """Axes to try, the one of largest value first: near, partly there, and far."""
-    here, elsewhere = program.start, best_start(program)
+    """Axes to try: the best near the start and partly there, the best far from it.
+
+    Of these the one of largest value comes first. Then follow the better ones of a grid
+    of starts as they are: where the program gives up a few samples for smaller errors
+    elsewhere, one of them may give up none.
+    """
+    here, starts = program.start, better_starts(program)
     near = solve_axis(program)
-    offers = [here + step * (near.axis - here) for step in _STEPS] if near.moved else []
-    if not np.array_equal(here, elsewhere):
-        far = solve_axis(replace(program, start=elsewhere))
-        offers.insert(0 if far.value > near.value else len(offers), far.axis)
-    return offers
+    axes = [here + step * (near.axis - here) for step in _STEPS] if near.moved else []
+    if starts:
+        far = solve_axis(replace(program, start=starts[0]))
+        axes.insert(0 if far.value > near.value else len(axes), far.axis)
+    return axes + starts
 
 
 def better(

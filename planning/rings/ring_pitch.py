@@ -10,8 +10,9 @@ from geometry.poses import inverse
 from planning.model.planned import PlannedProjector
 from planning.scene.lighting import assigned_projectors, margins_of
 from planning.scene.limits.camera_limits import ViewedSamples
-from planning.scene.measured import LitSamples, pairs_of
+from planning.scene.measured import LitSamples, lit_samples, pairs_of
 from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 MIN_PROJECTOR_PX = 3.0
@@ -121,3 +122,23 @@ def projector_gaps(
     least = rate.min(axis=1)
     # A ring that misses the panel altogether isn't drawn.
     return np.where(np.isfinite(least), _ROOM * MIN_PROJECTOR_PX / least, 0.0)
+
+
+def widest_gap(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> float:
+    """Return the largest ring spacing h on samples that are lit, in [m].
+
+    It is the distance tau within which a check must find a point. Where nothing is
+    lit, the spacing over all samples stands in.
+    """
+    rows = lit_samples(scene, projectors, target)
+    if not len(rows.target):
+        rings = [code_surfaces(p, target.samples.points) for p in projectors]
+        return float(max(ring.spacing.max() for ring in rings))
+    return float(
+        max(
+            ring.spacing[rows.lit[:, p]].max(initial=0.0)
+            for p, ring in enumerate(rows.rings)
+        )
+    )

@@ -166,22 +166,22 @@ def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSoluti
     return AxisSolution(program, status, best, best_value, best_slack)
 
 
-def best_start(program: AxisProgram) -> NDArray[np.float64]:
-    """Return the best of a polar grid of axes about the middle, shape (2,).
+def better_starts(program: AxisProgram) -> list[NDArray[np.float64]]:
+    """Return the axes of a polar grid that are better than the start, best first.
 
     Blind curves make the program many-peaked, and its two variables cheap to look
-    through. It is the program's own start where no axis of the grid is better.
+    through.
     """
-    best = program.start
-    value, slack = _figures(program, best)
     angle = 2.0 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
-    for reach in _REACHES:
-        size = reach * program.ring_radius
-        for axis in size * np.column_stack([np.cos(angle), np.sin(angle)]):
-            found, room = _figures(program, axis)
-            if room >= 0.0 and (found > value or not slack >= 0.0):
-                best, value, slack = axis, found, room
-    return best
+    ways = np.column_stack([np.cos(angle), np.sin(angle)])
+    sizes = np.array(_REACHES) * program.ring_radius
+    axes = (sizes[:, None, None] * ways).reshape(-1, 2)
+    value, slack = _figures(program, program.start)
+    least = value if slack >= 0.0 else -np.inf
+    figures = [_figures(program, axis) for axis in axes]
+    values = np.array([v if inside >= 0.0 else -np.inf for v, inside in figures])
+    order = np.argsort(-values, kind="stable")
+    return [axes[i] for i in order if values[i] > least]
 
 
 def _figures(program: AxisProgram, axis: NDArray[np.float64]) -> tuple[float, float]:

@@ -1,7 +1,6 @@
 """Seams, neighbours and the rows of eqs. (9)-(10), on surfaces of known answer."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +15,10 @@ from planning.cameras.baselines.baseline_rows import (
     half_field,
 )
 from planning.cameras.baselines.seams import (
+    SampledSurface,
     Seam,
     adjacency,
+    both_orders,
     find_seam,
     neighbouring_pairs,
     overlap_components,
@@ -29,6 +30,8 @@ RESOLUTION = (640, 480)
 RANGE = (0.3, 3.0)
 UP = np.array([0.0, 1.0, 0.0])
 THETA = np.radians(70.0)
+
+POINT = SampledSurface(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
 
 
 def _device(**changes):
@@ -65,10 +68,9 @@ def _facing(separation, z=(1.0, 1.0)):
     )
 
 
-def _rows(cameras, points, normals, **kind):
+def _rows(cameras, points, normals):
     measured = np.stack([_in_image(camera, points) for camera in cameras], axis=1)
-    weight = 1.0 / len(points)
-    return baseline_rows(cameras, points, normals, measured, weight, THETA, **kind)
+    return baseline_rows(cameras, SampledSurface(points, normals), measured, THETA)
 
 
 def test_a_row_can_be_recomputed_from_the_poses_and_itself():
@@ -123,9 +125,7 @@ def test_flat_wall_parts_at_the_sum_of_half_extents(z, beyond):
     one = _camera("C1", (-c1, 0.0, z[0]), (-c1, 0.0, 0.0))
     two = _camera("C2", (limit - c1 + beyond, 0.0, z[1]), (limit - c1 + beyond, 0, 0))
     seam = Seam((0, 1), np.array([0]), np.array([0]), np.array([1.0, 0.0, 0.0]), True)
-    test = check_seam(
-        (one, two), np.zeros((1, 3)), np.array([[0, 0, 1.0]]), seam, THETA
-    )
+    test = check_seam((one, two), POINT, seam, THETA)
     assert test.half_field1[0] == pytest.approx(test.angles.beta1[0])
     assert (test.slack[0] > 0) == (beyond < 0)
     assert test.slack[0] == pytest.approx(0.0, abs=1e-5)
@@ -142,7 +142,7 @@ def test_each_camera_counts_the_side_of_its_field_that_faces_the_other(beyond):
         for i, at in enumerate(x, 1)
     ]
     seam = Seam((0, 1), np.array([0]), np.array([0]), np.array([1.0, 0.0, 0.0]), True)
-    test = check_seam(cameras, np.zeros((1, 3)), np.array([[0, 0, 1.0]]), seam, THETA)
+    test = check_seam(cameras, POINT, seam, THETA)
     assert np.tan(test.half_field1[0]) == pytest.approx(540 / 800)
     assert np.tan(test.half_field2[0]) == pytest.approx(100 / 800)
     assert (test.slack[0] > 0) == (beyond < 0)
@@ -162,7 +162,7 @@ def test_the_field_beyond_an_edge_of_a_box():
     points = np.array([[-1e-3, 0.0, 0.0], [0.0, 0.0, -1e-3]])
     normals = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     seam = Seam((0, 1), np.array([0]), np.array([1]), points[1] - points[0], True)
-    test = check_seam((one, two), points, normals, seam, THETA)
+    test = check_seam((one, two), SampledSurface(points, normals), seam, THETA)
     assert test.angles.delta_surface[0] == pytest.approx(np.pi / 2)
     iota = np.arctan(0.3)
     assert test.angles.iota1[0] == pytest.approx(iota, abs=2e-3)
@@ -231,10 +231,9 @@ def test_a_rigid_motion_keeps_every_length_and_angle_of_a_row():
     moved = [
         PlannedCamera(c.id, motion @ c.world_from_device, c.device) for c in cameras
     ]
-    still = baseline_rows(cameras, points, normals, measured, 1.0, THETA)
-    there = baseline_rows(
-        moved, points @ turn.T + motion[:3, 3], normals @ turn.T, measured, 1.0, THETA
-    )
+    still = baseline_rows(cameras, SampledSurface(points, normals), measured, THETA)
+    surface = SampledSurface(points @ turn.T + motion[:3, 3], normals @ turn.T)
+    there = baseline_rows(moved, surface, measured, THETA)
     for a, b in zip(still, there, strict=True):
         for key in ("standoff1", "C2", "D1", "phi", "phi_max", "d_lateral", "d_axial"):
             assert b[key] == pytest.approx(a[key], abs=1e-9), key
@@ -244,8 +243,7 @@ def test_seam_samples_are_shared_and_border_on_the_other_stretch():
     points, normals = _wall()
     cameras = _facing(0.6)
     measured = np.stack([_in_image(camera, points) for camera in cameras], axis=1)
-    adjacent = adjacency(points, normals)
-    seam = find_seam(0, 1, points, measured, adjacent)
+    seam = find_seam((0, 1), SampledSurface(points, normals), measured)
     assert seam.shares_border
     assert np.all(measured[seam.points])
     assert np.all(~measured[seam.beyond, 0] & measured[seam.beyond, 1])
@@ -256,12 +254,12 @@ def test_seam_samples_are_shared_and_border_on_the_other_stretch():
 
 def test_seam_samples_are_in_camera_2s_reach_unless_the_parts_only_touch():
     points, normals = _wall(1500)
-    adjacent = adjacency(points, normals)
+    surface = SampledSurface(points, normals)
     for separation, shared in ((0.785, True), (0.8, False)):
         measured = np.stack(
             [_in_image(camera, points) for camera in _facing(separation)], axis=1
         )
-        seam = find_seam(0, 1, points, measured, adjacent)
+        seam = find_seam((0, 1), surface, measured)
         assert np.all(measured[seam.points, 0])
         assert np.all(measured[seam.points, 1] == shared)
 
@@ -273,17 +271,16 @@ def test_every_pair_has_a_seam_in_both_orders_whatever_is_measured():
         points = rng.uniform(0, 1, (n, 3)) * [1.0, 1.0, 0.0]
         normals = np.tile([0.0, 0.0, 1.0], (n, 1))
         measured = rng.random((n, 3)) < rng.uniform(0.05, 0.9)
-        adjacent = adjacency(points, normals)
-        for a, b in neighbouring_pairs(measured, np.ones(n), adjacent):
-            assert len(find_seam(a, b, points, measured, adjacent).points), trial
-            assert len(find_seam(b, a, points, measured, adjacent).points), trial
+        surface = SampledSurface(points, normals)
+        for order in both_orders(neighbouring_pairs(measured, surface.adjacent)):
+            assert len(find_seam(order, surface, measured).points), trial
 
 
 def test_a_part_inside_another_is_tested_where_both_measure():
     points, normals = _wall(500)
     measured = np.ones((500, 2), dtype=bool)
     measured[:, 1] = np.abs(points[:, 0]) < 0.2
-    seam = find_seam(0, 1, points, measured, adjacency(points, normals))
+    seam = find_seam((0, 1), SampledSurface(points, normals), measured)
     assert not seam.shares_border
     np.testing.assert_array_equal(seam.points, np.flatnonzero(measured[:, 1]))
 
@@ -294,14 +291,16 @@ def test_two_sides_of_a_thin_wall_are_not_beside_each_other():
     normals = np.concatenate([normals, -normals])
     measured = np.zeros((1600, 2), dtype=bool)
     measured[:800, 0] = measured[800:, 1] = True
-    assert not neighbouring_pairs(measured, np.ones(1600), adjacency(both, normals))
+    assert not neighbouring_pairs(measured, adjacency(both, normals))
     edge = adjacency(points, normals[:800])
     assert neighbouring_pairs(
-        np.stack([points[:, 0] < 0, points[:, 0] >= 0], axis=1), np.ones(800), edge
+        np.stack([points[:, 0] < 0, points[:, 0] >= 0], axis=1), edge
     ) == [(0, 1)]
 
 
-def test_one_percent_of_the_target_makes_neighbours_where_no_border_is_shared():
+def test_one_percent_of_the_target_makes_neighbours_where_no_border_is_shared(
+    monkeypatch,
+):
     """Two patches far apart: both cameras measure one, each its own rest."""
     rng = np.random.default_rng(0)
     shared = np.column_stack([rng.uniform(0, 0.1, (20, 2)), np.zeros(20)])
@@ -315,10 +314,10 @@ def test_one_percent_of_the_target_makes_neighbours_where_no_border_is_shared():
     measured[:20] = measured[20:510, :1] = True
     measured[510:, 1] = True
     adjacent = adjacency(points, normals)
-    weights = np.ones(1000)
-    assert neighbouring_pairs(measured, weights, adjacent) == [(0, 1)]
-    assert not neighbouring_pairs(measured, weights, adjacent, target_weight=2001.0)
-    assert not neighbouring_pairs(measured, weights, adjacent, min_overlap_share=0.0201)
+    assert neighbouring_pairs(measured, adjacent) == [(0, 1)]
+    for share, pairs in ((0.02, [(0, 1)]), (0.0201, [])):
+        monkeypatch.setattr("planning.cameras.baselines.seams.MIN_OVERLAP_SHARE", share)
+        assert neighbouring_pairs(measured, adjacent) == pairs
 
 
 def test_groups_of_parts_that_can_be_registered():
@@ -326,23 +325,20 @@ def test_groups_of_parts_that_can_be_registered():
     measured[:300, 0] = measured[280:600, 1] = True
     measured[600:800, 2] = True
     measured[791:, 3] = True  # 9 samples shared: 0.9 % of the target.
-    assert overlap_components(measured, 1.0) == [[0, 1], [2], [3]]
-    assert len(overlap_components(measured, 1.0)) > 1
+    assert overlap_components(measured) == [[0, 1], [2], [3]]
     measured[570:620, 2] = measured[785:, 3] = True
-    assert overlap_components(measured, np.ones(1000)) == [[0, 1, 2, 3]]
-    assert len(overlap_components(measured, np.ones(1000))) == 1
-    assert len(overlap_components(measured[:, :1], 1.0)) == 1
+    assert overlap_components(measured) == [[0, 1, 2, 3]]
+    assert overlap_components(measured[:, :1]) == [[0]]
 
 
 def test_nothing_measured_gives_no_rows():
     points, normals = _wall(50)
     cameras = _facing(0.6)
     nothing = np.zeros((50, 2), dtype=bool)
-    assert baseline_rows(cameras, points, normals, nothing, 1.0, THETA) == []
-    none = np.zeros((0, 3))
-    assert baseline_rows(cameras, none, none, nothing[:0], 1.0, THETA) == []
-    single = SimpleNamespace(points=points[:1], normals=normals[:1])
-    rows = baseline_rows(
-        cameras, single.points, single.normals, np.ones((1, 2), bool), 1.0, THETA
-    )
+    surface = SampledSurface(points, normals)
+    assert baseline_rows(cameras, surface, nothing, THETA) == []
+    none = SampledSurface(np.zeros((0, 3)), np.zeros((0, 3)))
+    assert baseline_rows(cameras, none, nothing[:0], THETA) == []
+    single = SampledSurface(points[:1], normals[:1])
+    rows = baseline_rows(cameras, single, np.ones((1, 2), bool), THETA)
     assert len(rows) == 2

@@ -14,15 +14,15 @@ from support.plain_shapes import box
 
 from geometry.shapes.primitives import sphere
 from planning import RigPlan
-from planning.cameras.baselines.camera_spread import CameraSpread
-from planning.cameras.camera_cover import camera_stage, offered_cameras
+from planning.cameras.baselines.widest_baselines import WidestBaselines
+from planning.cameras.camera_baselines import baseline_samples, held_to_candidates
+from planning.cameras.camera_cover import camera_candidate_views, camera_stage
 from planning.cameras.camera_routes import (
     _clearly_wider,
     better_route,
     cover_by_cover,
-    slide_routes,
+    widest_route,
 )
-from planning.cameras.camera_slides import reached_by_candidates, rows_to_slide_on
 from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
 from planning.cameras.routes import Routes
 from planning.model.bodies import Body
@@ -47,8 +47,8 @@ RADIUS = 0.1
 def _few_rows():
     """Fewer samples than a plan rests on: the questions here aren't of exactness."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planning.cameras.camera_cover._ROWS", 800)
-        patch.setattr("planning.cameras.camera_cover._CHECK_ROWS", 1500)
+        patch.setattr("planning.cameras.camera_cover._SAMPLES", 800)
+        patch.setattr("planning.cameras.camera_cover._FRESH_SAMPLES", 1500)
         yield
 
 
@@ -77,7 +77,7 @@ def ball():
 def coarse(ball):
     """A cover of sixteen candidates, and what the default makes of it."""
     scene, projectors, camera = ball
-    offered = offered_cameras(scene, camera, 16)
+    offered = camera_candidate_views(scene, camera, 16)
     cover = cover_by_cover(scene, projectors, offered)
     return cover, *better_route(scene, projectors, cover, "both")
 
@@ -86,7 +86,9 @@ def coarse(ball):
 def fine(ball):
     """The same of 160 candidates, which hold as small a cover."""
     scene, projectors, camera = ball
-    cover = cover_by_cover(scene, projectors, offered_cameras(scene, camera, 160))
+    cover = cover_by_cover(
+        scene, projectors, camera_candidate_views(scene, camera, 160)
+    )
     return cover, *better_route(scene, projectors, cover, "both")
 
 
@@ -102,13 +104,13 @@ def test_fewer_by_the_paper_join_the_candidates_and_the_proof(ball, coarse):
     proof = camera_stage(scene, better).certificate.to_document()
     assert proof["count"] == proof["needed"]["count"] == 3
     assert proof["candidates"]["lower_bound"] <= 3
-    assert proof["candidates"]["n_candidates"] == len(better.offered.cameras) > 16
+    assert proof["candidates"]["n_candidates"] == len(better.candidates.cameras) > 16
     # The three are among what was proved over, and measure what is asked of all of it.
     rows = lit_samples(scene, projectors, scene.target_samples(6000, 901))
-    held = measured_by(scene, better.offered.cameras, rows)
+    held = measured_by(scene, better.candidates.cameras, rows)
     share = held[:, better.selection.chosen].any(axis=1).sum() / held.any(axis=1).sum()
     assert share >= 0.94
-    ids = {id(camera) for camera in better.offered.cameras}
+    ids = {id(camera) for camera in better.candidates.cameras}
     assert all(id(camera) in ids for camera in better.cameras)
 
 
@@ -123,18 +125,18 @@ def test_the_route_is_the_same_on_every_run_and_with_two_threads(ball, coarse):
     scene, projectors, _ = ball
     cover = coarse[0]
     found = [
-        route_among(one, projectors, cover.offered, cover.rows, cover.measured)
+        route_among(one, projectors, cover.candidates, cover.samples, cover.measured)
         for one in (scene, replace(scene, threads=2))
     ]
     poses = [
-        np.stack([c.world_from_device for c in one.offered.cameras]) for one in found
+        np.stack([c.world_from_device for c in one.candidates.cameras]) for one in found
     ]
     np.testing.assert_array_equal(*poses)
 
 
 def test_the_route_alone_is_bounded_over_candidates_and_itself(ball):
     scene, projectors, camera = ball
-    offered = offered_cameras(scene, camera, 40)
+    offered = camera_candidate_views(scene, camera, 40)
     cover = cover_by_paper(scene, projectors, offered)
     found = cover.selection
     assert found.needed == 3
@@ -154,7 +156,7 @@ def test_the_route_alone_is_bounded_over_candidates_and_itself(ball):
 def test_too_few_allowed_are_the_best_of_the_route_and_say_what_is_needed(ball):
     scene, projectors, camera = ball
     few = replace(scene, requirements=replace(scene.requirements, max_cameras=2))
-    cover = cover_by_paper(few, projectors, offered_cameras(few, camera, 40))
+    cover = cover_by_paper(few, projectors, camera_candidate_views(few, camera, 40))
     assert cover.selection.status == "infeasible"
     assert (len(cover.cameras), cover.selection.needed) == (2, 3)
     _, routes = better_route(few, projectors, cover, "paper")
@@ -165,11 +167,11 @@ def test_bodies_of_the_routes_cameras_keep_off_each_other(ball):
     """Bodies so deep that cameras less than 1 m apart collide before the ball."""
     scene, projectors, camera = ball
     bulky = replace(camera, body=Body((0.0, 0.0, -0.2), (0.2, 0.2, 0.2)))
-    cover = cover_by_paper(scene, projectors, offered_cameras(scene, bulky, 40))
-    assert cover.crowd is not None
+    cover = cover_by_paper(scene, projectors, camera_candidate_views(scene, bulky, 40))
+    assert cover.interference is not None
     chosen = cover.selection.chosen.tolist()
-    assert cover.crowd.stand_together(chosen)
-    rows = cover.crowd.covers(chosen, chosen).any(axis=1).sum()
+    assert cover.interference.stand_together(chosen)
+    rows = cover.interference.covers(chosen, chosen).any(axis=1).sum()
     assert rows >= cover.selection.required
     assert camera_stage(scene, cover).certificate.bounds_leave_out
 
@@ -179,13 +181,13 @@ def test_what_no_camera_sees_is_refused(ball):
     blind = replace(camera.device, range_m=(5.0, 6.0))
     far = replace(camera, device=blind)
     with pytest.raises(InfeasibleLimitsError, match="no camera of 40 poses"):
-        cover_by_paper(scene, projectors, offered_cameras(scene, far, 40))
+        cover_by_paper(scene, projectors, camera_candidate_views(scene, far, 40))
 
 
 def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
     ball, fine, monkeypatch
 ):
-    monkeypatch.setattr("planning.cameras.camera_slides._ROWS", 600)
+    monkeypatch.setattr("planning.cameras.camera_baselines._SAMPLES", 600)
     scene, projectors, _ = ball
     cover, _, routes = fine
     stage = camera_stage(scene, cover)
@@ -193,7 +195,7 @@ def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
     fixed = tuple(replace(c, existing="old") for c in _beside(stage.cameras))
     close = replace(stage, cameras=fixed)
     rivals = replace(close, routes=replace(routes, rival=stage.cameras))
-    taken, slid = slide_routes(scene, projectors, rivals)
+    taken, slid = widest_route(scene, projectors, rivals)
     assert taken.routes.taken == "paper"
     assert "instead of" in taken.routes.why
     assert slid.cameras is taken.cameras
@@ -202,7 +204,7 @@ def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
     ]
     # Other numbers than the cover's are no rivals.
     fewer = replace(rivals, routes=replace(routes, rival=stage.cameras[:2]))
-    assert slide_routes(scene, projectors, fewer)[0] is fewer
+    assert widest_route(scene, projectors, fewer)[0] is fewer
 
 
 def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
@@ -210,17 +212,18 @@ def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
 
     Cameras that slid to where more is measured would owe 95 % of that, too.
     """
-    monkeypatch.setattr("planning.cameras.camera_slides._ROWS", 1500)
+    monkeypatch.setattr("planning.cameras.camera_baselines._SAMPLES", 1500)
     scene, projectors, camera = ball
     short = replace(camera, device=replace(camera.device, range_m=(1.0, 1.03)))
-    cover = cover_by_cover(scene, projectors, offered_cameras(scene, short, 12))
+    cover = cover_by_cover(scene, projectors, camera_candidate_views(scene, short, 12))
     stage = camera_stage(scene, cover)
-    rows = rows_to_slide_on(scene.among(projectors), projectors)
-    reached = reached_by_candidates(scene.among(projectors), stage, rows)
-    assert reached.mean() < 0.95 * rows.lit.any(axis=1).mean()
-    _, slid = slide_routes(scene, projectors, stage)
-    beyond = slid.measured_by.any(axis=1) & ~reached
-    assert beyond.sum() <= 0.002 * reached.sum()
+    samples = baseline_samples(scene.among(projectors), projectors)
+    held = held_to_candidates(samples, stage.reference, cover.samples, cover.measured)
+    covered = held.covered
+    assert covered.mean() < 0.95 * samples.lit.lit.any(axis=1).mean()
+    _, slid = widest_route(scene, projectors, stage)
+    beyond = slid.measured_by.any(axis=1) & ~covered
+    assert beyond.sum() <= 0.002 * covered.sum()
     assert slid.n_evaluations > 1
 
 
@@ -237,7 +240,7 @@ def _slid(apart_m, parts):
     measured = np.zeros((10, 2), dtype=bool)
     for column, part in enumerate(parts):
         measured[list(part), column] = True
-    return CameraSpread((), measured, apart_m, apart_m, 0, 1)
+    return WidestBaselines((), measured, apart_m, apart_m, 0, 1)
 
 
 @pytest.mark.parametrize(

@@ -8,17 +8,17 @@ from support.closed_forms import cylinder_limit, sphere_band_limit
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
-from planning.cameras.baselines.camera_spread import spread_cameras
+from planning.cameras.baselines.baseline_terms import BaselineLimits
 from planning.cameras.baselines.coverage_triangle import (
     round_body_limit,
 )
-from planning.cameras.baselines.limit_poses import Parts, limit_poses
-from planning.cameras.baselines.seams import adjacency
-from planning.cameras.baselines.spread_problem import SpreadLimits
+from planning.cameras.baselines.limit_poses import limit_poses
+from planning.cameras.baselines.seams import SampledSurface
+from planning.cameras.baselines.widest_baselines import maximise_baselines
+from planning.cameras.paper.camera_rings import camera_rings
 from planning.cameras.paper.paper_route import paper_route
-from planning.cameras.paper.paper_seeds import grown
-from planning.cameras.paper.ring_seeds import ring_seeds
 from planning.cameras.paper.route_problem import CameraSet, RouteProblem
+from planning.cameras.paper.route_starts import grown
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
@@ -70,7 +70,7 @@ class Body:
 
     def __init__(self, points, normals):
         self.points, self.normals = points, normals
-        self.near = adjacency(points, normals)
+        self.surface = SampledSurface(points, normals)
 
     def measure(self, cameras):
         found = np.zeros((len(self.points), len(cameras)), dtype=bool)
@@ -80,14 +80,11 @@ class Body:
             found[:, column] = facing >= np.cos(THETA) * np.linalg.norm(ray, axis=1)
         return found
 
-    def parts(self, cameras):
-        return Parts(self.points, self.normals, self.near, self.measure(cameras))
+    def problem(self, share=1.0, space=None, **changes):
+        limits = BaselineLimits(THETA, 0.0, space or workspace())
 
-    def ground(self, share=1.0, space=None, **changes):
-        limits = SpreadLimits(THETA, 0.0, space or workspace())
-
-        def slide(cameras):
-            return spread_cameras(
+        def widen(cameras):
+            return maximise_baselines(
                 cameras,
                 lambda poses: self.measure(
                     [
@@ -95,21 +92,18 @@ class Body:
                         for c, p in zip(cameras, poses, strict=True)
                     ]
                 ),
-                points=self.points,
-                normals=self.normals,
-                weights=1.0,
-                limits=limits,
+                self.surface,
+                limits,
                 max_evaluations=12,
                 max_programs=3,
             )
 
         values = {
-            "points": self.points,
-            "normals": self.normals,
+            "surface": self.surface,
             "measure": self.measure,
             "together": self.measure,
             "stand": lambda directions: tuple(camera_at(d) for d in directions),
-            "slide": slide,
+            "widen": widen,
             "device": DEVICE,
             "ring_radius": RING,
             "limits": limits,
@@ -145,27 +139,27 @@ def test_a_sphere_band_takes_as_many_as_its_closed_form_says(latitude, count):
     latitude = np.radians(latitude)
     assert sphere_band_limit(RADIUS, RING, THETA, latitude).n_min == count
     body = band(latitude)
-    route = paper_route(body.ground())
+    route = paper_route(body.problem())
     assert route.met
-    assert len(route.stand.cameras) == count
-    assert body.measure(route.stand.cameras).any(axis=1).all()
+    assert len(route.cameras.cameras) == count
+    assert body.measure(route.cameras.cameras).any(axis=1).all()
     assert route.best_without_one < len(body.points)
 
 
 @pytest.mark.parametrize(("half_height", "count"), [(0.02, 4), (0.9, 5)])
 def test_an_upright_cylinder_takes_as_many_as_its_closed_form_says(half_height, count):
     assert cylinder_limit(RADIUS, RING, THETA, half_height).n_min == count
-    route = paper_route(side(half_height).ground())
+    route = paper_route(side(half_height).problem())
     assert route.met
-    assert len(route.stand.cameras) == count
+    assert len(route.cameras.cameras) == count
 
 
 def test_a_part_of_the_turn_lets_cameras_go_and_the_rest_slide_to_the_limit():
     """Two of the ring's four do for 200 degrees, at most 2 eta = 110 degrees apart."""
     body = band(np.radians(5.0), span=np.radians(100.0))
-    route = paper_route(body.ground())
+    route = paper_route(body.problem())
     assert route.met
-    first, last = azimuths(route.stand.cameras)
+    first, last = azimuths(route.cameras.cameras)
     assert 2.0 * (np.radians(100.0) - ETA) < last - first < 2.0 * ETA
     assert 2.0 * np.sin((last - first) / 2) == pytest.approx(
         round_body_limit(RADIUS, RING, THETA).d_max, rel=0.04
@@ -178,9 +172,9 @@ def test_a_part_of_the_turn_lets_cameras_go_and_the_rest_slide_to_the_limit():
 
 def test_half_of_the_turn_takes_half_of_the_ring():
     """A share of the requirement is what must be measured, no more."""
-    route = paper_route(band(np.radians(5.0)).ground(share=0.58))
+    route = paper_route(band(np.radians(5.0)).problem(share=0.58))
     assert route.met
-    assert len(route.stand.cameras) == 2
+    assert len(route.cameras.cameras) == 2
 
 
 def test_a_ring_that_misses_a_part_grows_a_camera_over_it():
@@ -191,40 +185,40 @@ def test_a_ring_that_misses_a_part_grows_a_camera_over_it():
         np.concatenate([ring.points, RADIUS * several]),
         np.concatenate([ring.normals, several]),
     )
-    ground = body.ground()
+    problem = body.problem()
     level = tuple(at(azimuth) for azimuth in np.arange(4) * np.pi / 2)
     short = CameraSet(level, body.measure(level))
-    assert short.rows == len(ring.points)
-    more = grown(ground, short)
+    assert short.count == len(ring.points)
+    more = grown(problem, short)
     assert len(more.cameras) == 5
-    assert more.rows == len(body.points)
+    assert more.count == len(body.points)
     outwards = more.cameras[4].world_from_device[:3, 3]
     assert outwards[2] > np.cos(ETA)
 
 
 def test_what_no_camera_can_measure_ends_the_route_short():
     body = band(np.radians(5.0))
-    route = paper_route(body.ground(required=len(body.points) + 1))
+    route = paper_route(body.problem(required=len(body.points) + 1))
     assert not route.met
-    assert route.stand.rows == len(body.points)
-    nothing = body.ground(stand=lambda directions: ())
+    assert route.cameras.count == len(body.points)
+    nothing = body.problem(stand=lambda directions: ())
     assert paper_route(nothing).by_count == {}
 
 
 def test_cameras_that_stand_already_stay_and_count():
     body = band(np.radians(5.0))
     given = replace(at(0.3), existing="old")
-    route = paper_route(body.ground(given=(given,)))
+    route = paper_route(body.problem(fixed=(given,)))
     assert route.met
-    assert len(route.stand.cameras) == 4
+    assert len(route.cameras.cameras) == 4
     np.testing.assert_array_equal(
-        route.stand.cameras[0].world_from_device, given.world_from_device
+        route.cameras.cameras[0].world_from_device, given.world_from_device
     )
 
 
-def test_ring_seeds_stand_at_the_pitch_of_the_section():
+def test_rings_stand_at_the_spacing_of_the_section():
     body = band(np.radians(20.0))
-    rings = list(ring_seeds(body.points, workspace(), DEVICE, RING, THETA))
+    rings = list(camera_rings(body.points, workspace(), DEVICE, RING, THETA))
     upright = [ring for ring in rings if np.allclose(ring.axis, UP)]
     assert [len(ring.directions) for ring in upright] == [4, 4, 5, 5, 6, 6]
     for ring in rings:
@@ -238,17 +232,19 @@ def test_ring_seeds_stand_at_the_pitch_of_the_section():
         (640, 480),
         (0, 3),
     )
-    more = next(ring_seeds(body.points, workspace(), narrow, RING, THETA))
+    more = next(camera_rings(body.points, workspace(), narrow, RING, THETA))
     assert more.limit.n_min > 4
 
 
 def test_a_pose_at_the_limit_just_reaches_the_seam():
     """d = 2 S sin(eta) on a round body; a degree beyond leaves a gap, within none."""
     body = band(np.radians(2.0), n=1441, span=np.radians(110.0))
-    limits = SpreadLimits(THETA, 0.0, workspace())
+    limits = BaselineLimits(THETA, 0.0, workspace())
     for apart in (1.2, 1.7):
         pair = [at(-apart / 2), at(apart / 2)]
-        found = limit_poses(pair, body.parts(pair), limits, only=1, given_up=(0.0,))
+        found = limit_poses(
+            pair, body.surface, body.measure(pair), limits, only=1, shares_past=(0.0,)
+        )
         (moved,) = found
         d = np.linalg.norm((moved.world_from_device - pair[0].world_from_device)[:3, 3])
         assert d == pytest.approx(2.0 * np.sin(ETA), rel=3e-3)
@@ -262,14 +258,14 @@ def test_a_pose_at_the_limit_just_reaches_the_seam():
 def test_a_pose_at_the_limit_keeps_the_workspace_and_what_stands_already():
     body = band(np.radians(2.0), span=np.radians(110.0))
     pair = [at(-0.6), at(0.6)]
-    parts = body.parts(pair)
+    seen = (body.surface, body.measure(pair))
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     wall = Box("wall", (0.0, 1.0, 0.0), (2.0, 0.3, 2.0), axes)
-    barred = SpreadLimits(THETA, 0.0, workspace(keep_out=(wall,)))
-    free = SpreadLimits(THETA, 0.0, workspace())
-    assert len(limit_poses(pair, parts, free, given_up=(0.0,))) == 2
-    (one,) = limit_poses(pair, parts, barred, given_up=(0.0,))
+    barred = BaselineLimits(THETA, 0.0, workspace(keep_out=(wall,)))
+    free = BaselineLimits(THETA, 0.0, workspace())
+    assert len(limit_poses(pair, *seen, free, shares_past=(0.0,))) == 2
+    (one,) = limit_poses(pair, *seen, barred, shares_past=(0.0,))
     assert azimuths([one])[0] < 0.0
     fixed = [replace(pair[0], existing="old"), pair[1]]
-    (other,) = limit_poses(fixed, parts, free, given_up=(0.0,))
+    (other,) = limit_poses(fixed, *seen, free, shares_past=(0.0,))
     assert azimuths([other])[0] > 0.0

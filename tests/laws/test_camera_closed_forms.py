@@ -23,6 +23,7 @@ from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.coverage_triangle import (
     round_body_limit,
 )
+from planning.cameras.baselines.seams import SampledSurface
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
 from planning.scene.limits.camera_limits import SEEN
@@ -62,7 +63,8 @@ class Shape:
     def rows(self, cameras):
         """The plan's rows of `baselines` for these cameras."""
         seen = self.seen(cameras)
-        return baseline_rows(cameras, self.points, self.normals, seen, 1.0, self.theta)
+        surface = SampledSurface(self.points, self.normals)
+        return baseline_rows(cameras, surface, seen, self.theta)
 
 
 def camera(name, position, aim, device):

@@ -11,7 +11,11 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.baselines.coverage_triangle import round_body_limit
-from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
+from planning.cameras.camera_cover import (
+    camera_candidate_views,
+    camera_stage,
+    plan_cameras,
+)
 from planning.cameras.proved_cameras import bound_stage
 from planning.model.document.certificates import (
     BestArea,
@@ -471,7 +475,7 @@ def staged(existing=()):
     scene = scene_of(ball, existing=existing, coverage=0.97, limits=limits)
     projectors = projectors_at((0.3, -1.0, 0.4), (-0.6, 0.2, 0.9))
     camera = PlannedCamera("", np.eye(4), load_rig("default").camera_device())
-    cover = plan_cameras(scene, projectors, offered_cameras(scene, camera, 200))
+    cover = plan_cameras(scene, projectors, camera_candidate_views(scene, camera, 200))
     return scene, camera_stage(scene, cover)
 
 
@@ -489,14 +493,17 @@ def test_a_certificate_says_what_holds_over_all_poses(given):
     assert entry["lower_bound"] >= needed["count"] - 1
     proved = entry["lower_bound"] == needed["count"]
     assert entry["status"] == ("proved" if proved else "survived")
-    assert entry["n_samples"] == proof["n_samples"] == len(stage.rows.target)
-    assert entry["n_reached"] == np.count_nonzero(stage.measured.any(axis=1))
+    assert entry["n_samples"] == proof["n_samples"] == len(stage.cover.samples.target)
+    assert entry["n_reached"] == np.count_nonzero(stage.cover.measured.any(axis=1))
     # No candidates do better than poses anywhere.
     values = {row["count"]: row["value_m2"] for row in proof["by_count"]}
     assert entry["one_fewer_upper_bound_m2"] >= values.get(needed["count"] - 1, 0.0)
-    free = stage.measured[:, :given].any(axis=1).sum() if given else 0
+    free = stage.cover.measured[:, :given].any(axis=1).sum() if given else 0
     assert entry["n_cells"] > 0
-    assert entry["one_fewer_upper_bound_m2"] >= free * stage.rows.target.samples.weight
+    assert (
+        entry["one_fewer_upper_bound_m2"]
+        >= free * stage.cover.samples.target.samples.weight
+    )
 
 
 def test_cameras_that_stand_already_and_are_enough_need_no_cells():

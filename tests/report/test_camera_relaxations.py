@@ -12,7 +12,7 @@ from support.plain_shapes import grid
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import CameraStage
+from planning.cameras.camera_cover import CameraCover, CameraStage
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
@@ -366,7 +366,8 @@ def test_one_camera_is_enough_at_what_is_told_and_not_below(rig, world):
     scene = replace(scene, requirements=replace(scene.requirements, coverage=0.6))
     offered = CandidateViews(scene, cameras)
     measured = measured_by(scene, cameras, rows)
-    stage = CameraStage(tuple(cameras[:1]), offered, rows, measured, {}, {})
+    cover = CameraCover(offered, rows, measured, None)
+    stage = CameraStage(tuple(cameras[:1]), cover, {}, {})
     told = " ".join(for_so_many(scene, rig, stage, 1))
     value = int(re.search(r"camera_max_incidence_deg = (\d+) \(now 40\)", told)[1])
 

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
+from planning.cameras.camera_cover import (
+    camera_candidate_views,
+    camera_stage,
+    plan_cameras,
+)
 from planning.cameras.camera_stage import (
     follow_cameras,
     move_axes,
@@ -64,7 +68,7 @@ def ball(request):
     wanted = np.array([[0.88, -0.46, 0.1], [0.92, 0.38, 0.1]])
     projectors = tuple(offered[i] for i in np.argmax(wanted @ stands.T, axis=1))
     camera = PlannedCamera("", eye, rig.camera_device())
-    cover = plan_cameras(scene, projectors, offered_cameras(scene, camera, 60))
+    cover = plan_cameras(scene, projectors, camera_candidate_views(scene, camera, 60))
     return scene, projectors, cover
 
 
@@ -80,12 +84,12 @@ def errors(scene, projectors, cameras, target):
 @pytest.fixture(scope="module")
 def moved(ball):
     scene, projectors, cover = ball
-    return move_ring_axes(scene, projectors, cover.cameras, cover.rows)
+    return move_ring_axes(scene, projectors, cover.cameras, cover.samples)
 
 
 def test_errors_fall_and_nothing_is_lost(ball, moved):
     scene, projectors, cover = ball
-    for target in (cover.rows.target, scene.target_samples(3000, 77)):
+    for target in (cover.samples.target, scene.target_samples(3000, 77)):
         (kept, before, lit), (now, after, still_lit) = (
             errors(scene, p, cover.cameras, target) for p in (projectors, moved)
         )
@@ -106,7 +110,7 @@ def test_errors_fall_and_nothing_is_lost(ball, moved):
 def test_on_the_rows_no_fewer_are_measured(ball, moved):
     scene, projectors, cover = ball
     counts = [
-        np.count_nonzero(errors(scene, p, cover.cameras, cover.rows.target)[0])
+        np.count_nonzero(errors(scene, p, cover.cameras, cover.samples.target)[0])
         for p in (projectors, moved)
     ]
     assert counts[1] >= counts[0]
@@ -129,13 +133,13 @@ def test_a_move_that_loses_a_sample_is_not_taken():
 def test_no_axis_leaves_lit_samples_outside_the_last_ring(ball):
     """Rings that end just behind the farthest lit sample: any axis but theirs loses."""
     scene, projectors, cover = ball
-    points = cover.rows.target.samples.points
+    points = cover.samples.target.samples.points
     tight = [
-        _with_last_ring(p, points[cover.rows.lit[:, i]])
+        _with_last_ring(p, points[cover.samples.lit[:, i]])
         for i, p in enumerate(projectors)
     ]
-    rows = lit_samples(scene, tight, cover.rows.target)
-    assert np.array_equal(rows.lit, cover.rows.lit)
+    rows = lit_samples(scene, tight, cover.samples.target)
+    assert np.array_equal(rows.lit, cover.samples.lit)
     views = AxisJudge(scene, tight, cover.cameras, rows).views
     program = axis_program(scene, tight, 0, rows, views)
     coordinate = ring_coordinate(tight[0], points[rows.lit[:, 0]])
@@ -150,7 +154,7 @@ def test_no_axis_leaves_lit_samples_outside_the_last_ring(ball):
 def test_fresh_samples_stay_inside_the_last_ring_too(ball):
     """A dozen rows reach less far than all that is lit: they would let the axis go."""
     scene, projectors, cover = ball
-    few = cover.rows.target.take(np.arange(0, len(cover.rows.target), 150))
+    few = cover.samples.target.take(np.arange(0, len(cover.samples.target), 150))
     every = scene.target_samples(4000, 250)
     lit = lit_samples(scene, projectors, every)
     points = lit.target.samples.points
@@ -182,10 +186,10 @@ def test_what_is_lit_beside_the_target_stays_lit_too(ball):
 def test_the_best_proposal_is_tried_first(ball):
     """Near or far: from a start that blind curves close in, far is better."""
     scene, projectors, cover = ball
-    views = AxisJudge(scene, projectors, cover.cameras, cover.rows).views
+    views = AxisJudge(scene, projectors, cover.cameras, cover.samples).views
     offered = []
     for p in range(len(projectors)):
-        program = axis_program(scene, projectors, p, cover.rows, views)
+        program = axis_program(scene, projectors, p, cover.samples, views)
         for factor in (1.0, 0.0, -0.5):
             tried = replace(program, start=factor * program.start)
             axes = proposals(tried)
@@ -219,7 +223,7 @@ def test_the_program_scores_pairs_as_the_exact_predicate_does(ball):
     scene = replace(
         scene, requirements=replace(scene.requirements, triangulation=limits)
     )
-    rows = lit_samples(scene, fine, cover.rows.target)
+    rows = lit_samples(scene, fine, cover.samples.target)
     views = AxisJudge(scene, fine, cover.cameras, rows).views
     program = axis_program(scene, fine, 1, rows, views)
     scores = pair_scores(program, program.start)
@@ -265,8 +269,9 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
     followed = follow_cameras(scene, projectors, cover.cameras, stage)
     for new, expected in zip(followed.projectors, moved, strict=True):
         assert np.array_equal(new.world_from_ring, expected.world_from_ring)
-    points = followed.stage.rows.target.samples.points
-    for p, rings in zip(followed.projectors, followed.stage.rows.rings, strict=True):
+    samples = followed.stage.cover.samples
+    points = samples.target.samples.points
+    for p, rings in zip(followed.projectors, samples.rings, strict=True):
         own = code_surfaces(p, points)
         assert np.array_equal(own.normals, rings.normals)
     count = len(cover.cameras)

@@ -1,23 +1,22 @@
-"""Ring axes turn where the blind curves do least harm; claims and reach follow."""
-
-from dataclasses import replace
+"""A ball's rings: how many devices its caps take, the widest gap, claims and reach."""
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import camera_stage, offered_cameras, plan_cameras
+from planning.cameras.camera_cover import (
+    camera_candidate_views,
+    camera_stage,
+    plan_cameras,
+)
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.ring_frame import ring_frame
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.advice.relaxations import reachability_relaxations
 from planning.report.claims import Devices, make_claims
 from planning.rig.rig import load_rig
-from planning.rings.ring_axes import turn_ring_axes, widest_gap
+from planning.rings.ring_pitch import widest_gap
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_stages, margins_of
-from planning.scene.measured import lit_samples, measured_by
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
@@ -51,7 +50,7 @@ def stages(scene):
     template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
     projectors = plan_projectors(made, template, 200, ring_offset=(tilt, -np.pi / 2))
     camera = PlannedCamera("", eye, rig.camera_device())
-    offered = offered_cameras(made, camera, 160)
+    offered = camera_candidate_views(made, camera, 160)
     cover = plan_cameras(made, projectors.projectors, offered)
     cameras = camera_stage(made, cover)
     return made, projectors, cameras, tilt
@@ -63,54 +62,6 @@ def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
     least = projectors.certificate["candidates"]["lower_bound"]
     assert 3 <= least <= len(projectors.projectors) <= 4
     assert len(cameras.cameras) >= 2
-
-
-def test_turned_axes_measure_no_less_and_light_the_same(stages):
-    made, projectors, cameras, tilt = stages
-    before = projectors.projectors
-    after = turn_ring_axes(made, before, cameras.cameras, cameras.rows, tilt)
-    target = made.target_samples(3000, 7)
-    rows = [lit_samples(made, p, target) for p in (before, after)]
-    assert np.array_equal(rows[0].lit, rows[1].lit)
-    counts = [measured_by(made, cameras.cameras, lit).any(axis=1).sum() for lit in rows]
-    assert counts[1] >= 0.995 * counts[0]
-    for old, new in zip(before, after, strict=True):
-        assert np.array_equal(old.world_from_device, new.world_from_device)
-
-
-def test_no_axis_is_offered_that_leaves_lit_samples_outside_the_last_ring(stages):
-    """Rings about the ball, no wider than it: about any other axis they miss it."""
-    made, projectors, cameras, tilt = stages
-    target = made.target_samples(500, 9)
-    tight = [_rings_about_the_ball(p, tilt) for p in projectors.projectors]
-    rows = lit_samples(made, tight, target)
-    assert len(rows.target) > 100
-    after = turn_ring_axes(made, tight, cameras.cameras, rows, tilt)
-    assert np.array_equal(lit_samples(made, after, rows.target).lit, rows.lit)
-    assert all(old is new for old, new in zip(tight, after, strict=True))
-
-
-def _rings_about_the_ball(projector, tilt):
-    """Turned (parallel: shifted) until the ring axis meets the ball's centre."""
-    pose = projector.world_from_device
-    frame = ring_frame(pose, projector.device, tilt, -np.pi / 2)
-    moved = np.eye(4)
-    if projector.light == "parallel":
-        aside = -frame[:3, 3]
-        moved[:3, 3] = aside - (aside @ frame[:3, 2]) * frame[:3, 2]
-        outer = RADIUS
-    else:
-        towards = -frame[:3, 3] / np.linalg.norm(frame[:3, 3])
-        turn = Rotation.align_vectors(towards[None], frame[None, :3, 2])[0].as_matrix()
-        moved[:3, :3] = turn
-        moved[:3, 3] = frame[:3, 3] - turn @ frame[:3, 3]
-        outer = np.tan(np.arcsin(RADIUS / np.linalg.norm(frame[:3, 3])))
-    return replace(
-        projector,
-        world_from_device=moved @ pose,
-        world_from_ring=moved @ frame,
-        ring_radii=uniform_radii(1.001 * outer, projector.ring_radii[0]),
-    )
 
 
 def test_widest_gap_is_that_of_the_farthest_lit_sample(stages):

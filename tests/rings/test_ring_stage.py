@@ -15,9 +15,8 @@ from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
 from planning.rings import ring_pitch
 from planning.rings.beam_profile import cast_beam
-from planning.rings.ring_axes import widest_gap
 from planning.rings.ring_creases import crease_errors, find_creases
-from planning.rings.ring_pitch import best_pitch, projector_gaps
+from planning.rings.ring_pitch import best_pitch, projector_gaps, widest_gap
 from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings

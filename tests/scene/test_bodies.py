@@ -18,9 +18,9 @@ from geometry.shapes.boxes import (
     triangles_touch,
 )
 from planning import load_rig
+from planning.cameras.camera_baselines import BaselineSamples
 from planning.cameras.camera_bodies import CameraInterference, resolved_cover
 from planning.cameras.camera_cover import CameraCover
-from planning.cameras.camera_slides import measured_among
 from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -467,9 +467,11 @@ def test_moves_into_anothers_body_or_beam_are_refused(scene):
     lamps = lamps[:1]
     lit = lit_samples(scene, lamps, rows)
 
-    def measure(x, y, spared):
+    samples = BaselineSamples(scene.among(lamps), tuple(lamps), lit)
+
+    def measure(x, y, least_lit):
         eyes = [camera(x, y, 0.8), camera(-0.5, 0.5, 0.8)]
-        return measured_among(scene.among(lamps), tuple(lamps), eyes, lit, spared)
+        return samples.measured(eyes, least_lit)
 
     n = len(lit.target)
     eyes = [camera(0.5, 0.5, 0.8), camera(-0.5, 0.5, 0.8)]

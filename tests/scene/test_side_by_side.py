@@ -10,7 +10,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import offered_cameras
+from planning.cameras.camera_cover import camera_candidate_views
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
@@ -384,7 +384,7 @@ def test_cameras_stand_side_by_side_over_what_only_they_are_too_narrow_for():
     assert space.camera_standoff_m == 1.0
     device = load_rig("default", "parallel").camera_device()
     template = PlannedCamera("", np.eye(4), device)
-    few = offered_cameras(scene, template, 60).cameras
+    few = camera_candidate_views(scene, template, 60).cameras
     assert 60 < len(few) <= 6 * 60
     places = np.stack([c.world_from_device[:3, 3] for c in few])
     assert outside_by(places, space.camera_radius_m, space).max() <= 1e-9

@@ -17,7 +17,7 @@ from geometry.devices import PinholeModel
 from planning.model.planned import PlannedCamera
 
 from .coverage_triangle import SeamAngles, baseline_parts, largest_baseline, seam_angles
-from .seams import Seam, adjacency, find_seam, neighbouring_pairs
+from .seams import SampledSurface, Seam, both_orders, find_seams, neighbouring_pairs
 
 _Array = NDArray[np.float64]
 
@@ -34,8 +34,8 @@ class SeamTest:
     Attributes:
         seam: Where it was tested.
         points: E in [m].
-        normals1: Unit normals at E.
-        normals2: Unit normals on camera 2's side: those of E, or beyond a crease.
+        normals: Unit normals at E on camera 1's and camera 2's side: the same, or
+            apart beyond a crease.
         angles: The signed angles.
         half_field1: b_1, half field of camera 1 beyond E in the plane [rad].
         half_field2: b_2 of camera 2.
@@ -44,8 +44,7 @@ class SeamTest:
 
     seam: Seam
     points: _Array
-    normals1: _Array
-    normals2: _Array
+    normals: tuple[_Array, _Array]
     angles: SeamAngles
     half_field1: _Array
     half_field2: _Array
@@ -59,76 +58,51 @@ class SeamTest:
 
 def baseline_rows(
     cameras: Sequence[PlannedCamera],
-    points: _Array,
-    normals: _Array,
+    surface: SampledSurface,
     measured_by: NDArray[np.bool_],
-    sample_weight: _Array | float,
     camera_max_incidence: float,
-    *,
-    min_overlap_share: float = 0.01,
-    target_weight: float | None = None,
 ) -> list[dict[str, Any]]:
     """Return one row for each order of each neighbouring pair of cameras.
 
     Args:
         cameras: As planned.
-        points: Samples of the target in [m], shape (n, 3).
-        normals: Unit face normals, shape (n, 3).
+        surface: Samples of the target.
         measured_by: Whether camera c measures sample i with some projector,
             shape (n, n_cameras).
-        sample_weight: Weight of each sample in [m^2], shape (n,) or one number.
         camera_max_incidence: theta, incidence that cameras accept [rad].
-        min_overlap_share: Overlap or contact that makes neighbours, of the target.
-        target_weight: Area of the target in [m^2]; None: that of the samples.
 
     Returns:
         Rows of the plan's `baselines`, JSON values only; `docs/method/baselines.md`
         defines every key.
     """
-    weights = np.broadcast_to(np.asarray(sample_weight, np.float64), (len(points),))
-    adjacent = adjacency(points, normals)
-    pairs = neighbouring_pairs(
-        measured_by,
-        weights,
-        adjacent,
-        min_overlap_share=min_overlap_share,
-        target_weight=target_weight,
-    )
-    rows: list[dict[str, Any]] = []
-    for pair in pairs:
-        for first, second in (pair, pair[::-1]):
-            seam = find_seam(first, second, points, measured_by, adjacent)
-            if len(seam.points):
-                test = check_seam(cameras, points, normals, seam, camera_max_incidence)
-                rows.append(_row(cameras, test, camera_max_incidence))
-    return rows
+    pairs = neighbouring_pairs(measured_by, surface.adjacent)
+    return [
+        _row(
+            cameras,
+            check_seam(cameras, surface, seam, camera_max_incidence),
+            camera_max_incidence,
+        )
+        for seam in find_seams(both_orders(pairs), surface, measured_by)
+    ]
 
 
 def check_seam(
     cameras: Sequence[PlannedCamera],
-    points: _Array,
-    normals: _Array,
+    surface: SampledSurface,
     seam: Seam,
     camera_max_incidence: float,
 ) -> SeamTest:
     """Return eqs. (9)-(10) at every sample of a seam."""
     one, two = (cameras[index] for index in seam.cameras)
-    here, beyond = normals[seam.points], normals[seam.beyond]
+    points = surface.points[seam.points]
+    here, beyond = surface.normals[seam.points], surface.normals[seam.beyond]
     smooth = np.einsum("ij,ij->i", here, beyond) > _CREASE_COSINE
     beyond = np.where(smooth[:, None], here, beyond)
     angles, half1, half2 = angles_and_fields(
-        one, two, points[seam.points], seam.onward, (here, beyond)
+        one, two, points, seam.onward, (here, beyond)
     )
-    return SeamTest(
-        seam,
-        points[seam.points],
-        here,
-        beyond,
-        angles,
-        half1,
-        half2,
-        angles.largest(half2, camera_max_incidence),
-    )
+    phi_max = angles.largest(half2, camera_max_incidence)
+    return SeamTest(seam, points, (here, beyond), angles, half1, half2, phi_max)
 
 
 def angles_and_fields(
@@ -288,7 +262,7 @@ def _row(
         "max_incidence": max_incidence,
         "delta_axes": float(angles.delta_axes[i]),
         "delta_surface": float(angles.delta_surface[i]),
-        "normals": [test.normals1[i].tolist(), test.normals2[i].tolist()],
+        "normals": [side[i].tolist() for side in test.normals],
         "onward": angles.onward[i].tolist(),
         "shares_border": test.seam.shares_border,
         "n_seam": len(test.points),

@@ -6,25 +6,26 @@ the centre of the workspace, until phi = phi_max at the seam, which is d = d_max
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
+from planning.model.requirements import Workspace
 from planning.scene.workspace.zone_positions import admissible
 
 from .baseline_rows import check_seam
-from .camera_spread import aims_of, rolls_of
-from .seams import Adjacency, Seam, find_seam, neighbouring_pairs
-from .spread_problem import SpreadLimits
+from .baseline_terms import BaselineLimits
+from .seams import SampledSurface, Seam, both_orders, find_seams, neighbouring_pairs
+from .widest_baselines import aims_of, rolls_of
 
 _Array = NDArray[np.float64]
 
 # Share of the seam that may be past the limit: on a rough surface the tightest samples
 # are past it wherever the camera stands.
-GIVEN_UP = (0.0, 0.1, 0.3)
+SHARES_PAST = (0.0, 0.1, 0.3)
 BISECTIONS = 14
 # Samples of a seam that are looked at, at most.
 _SEAM = 64
@@ -32,63 +33,54 @@ _SEAM = 64
 _LEAST_TURN = np.radians(2.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Parts:
-    """Samples of the target, and which camera measures which.
-
-    Attributes:
-        points: In [m], shape (n, 3).
-        normals: Unit face normals, shape (n, 3).
-        adjacent: Near samples of each.
-        measured_by: Which camera measures which, shape (n, k).
-    """
-
-    points: _Array
-    normals: _Array
-    adjacent: Adjacency
-    measured_by: NDArray[np.bool_]
-
-
 def limit_poses(
     cameras: Sequence[PlannedCamera],
-    parts: Parts,
-    limits: SpreadLimits,
+    surface: SampledSurface,
+    measured_by: NDArray[np.bool_],
+    limits: BaselineLimits,
     *,
     only: int | None = None,
-    given_up: Sequence[float] = GIVEN_UP,
+    shares_past: Sequence[float] = SHARES_PAST,
     bisections: int = BISECTIONS,
 ) -> list[PlannedCamera]:
     """Return cameras at d_max from a neighbour, in both orders of every pair.
 
-    A camera keeps the point that it looks at, and its roll. Those that stand already
-    stay; positions that aren't admissible are left out.
+    A camera keeps the point that it looks at, and its roll. Existing ones stay;
+    positions that aren't admissible are left out.
 
     Args:
         cameras: As they stand.
-        parts: What they measure.
+        surface: The samples.
+        measured_by: Which camera measures which sample, shape (n, k).
         limits: What binds.
         only: The camera to move; None: every one.
-        given_up: Shares of the seam that may be past the limit, a pose for each.
+        shares_past: Shares of the seam that may be past the limit, a pose for each.
         bisections: Halvings of the angle between the cameras.
     """
-    weights = np.ones(len(parts.points))
-    pairs = neighbouring_pairs(parts.measured_by, weights, parts.adjacent)
+    space = limits.workspace
     poses = np.stack([camera.world_from_device for camera in cameras])
-    aims = aims_of(poses, parts.measured_by, parts.points, limits.workspace)
-    rolls = rolls_of(poses, aims, np.array(limits.workspace.up))
-    found: list[PlannedCamera] = []
-    for first, second in [order for pair in pairs for order in (pair, pair[::-1])]:
-        if cameras[second].existing or only not in (None, second):
+    aims = aims_of(poses, measured_by, surface.points, space)
+    rolls = rolls_of(poses, aims, np.array(space.up))
+    orders = [
+        (first, second)
+        for first, second in both_orders(
+            neighbouring_pairs(measured_by, surface.adjacent)
+        )
+        if not cameras[second].existing and only in (None, second)
+    ]
+    limit: list[PlannedCamera] = []
+    for seam in find_seams(orders, surface, measured_by):
+        if not seam.shares_border:
             continue
-        seam = find_seam(first, second, parts.points, parts.measured_by, parts.adjacent)
-        seam = _thinned(seam)
-        if len(seam.points) and seam.shares_border:
-            arc = _Arc.through(cameras, first, second, limits)
-            moved = arc.camera(aims[second], float(rolls[second]))
-            found += _at_limit(
-                cameras, parts, seam, arc, moved, limits, given_up, bisections
-            )
-    return found
+        one, two = (cameras[i] for i in seam.cameras)
+        aim, roll = aims[seam.cameras[1]], float(rolls[seam.cameras[1]])
+        moved, now = _along_arc(one, two, aim, roll, space)
+        slack = _slack_along(cameras, surface, _thinned(seam), moved, limits)
+        for share in shares_past:
+            turn = _last_turn(lambda at, s=share, f=slack: f(at, s), now, bisections)
+            if turn is not None and _may_stand(moved(turn), space):
+                limit.append(moved(turn))
+    return limit
 
 
 def _thinned(seam: Seam) -> Seam:
@@ -96,80 +88,51 @@ def _thinned(seam: Seam) -> Seam:
     return replace(seam, points=seam.points[::step], beyond=seam.beyond[::step])
 
 
-@dataclass(frozen=True, eq=False)
-class _Arc:
-    """The great circle through two cameras, from the first on."""
-
-    camera2: PlannedCamera
-    centre: _Array
-    start: _Array
-    across: _Array
-    radius: float
-    turn: float
-    up: _Array
-
-    @classmethod
-    def through(
-        cls,
-        cameras: Sequence[PlannedCamera],
-        first: int,
-        second: int,
-        limits: SpreadLimits,
-    ) -> "_Arc":
-        centre = np.array(limits.workspace.centre)
-        one, two = (
-            cameras[i].world_from_device[:3, 3] - centre for i in (first, second)
-        )
-        radius = float(np.linalg.norm(two))
-        start, end = one / np.linalg.norm(one), two / radius
-        across = end - (end @ start) * start
-        sine = float(np.linalg.norm(across))
-        across = across / sine if sine > 0.0 else across
-        turn = float(np.arctan2(sine, end @ start))
-        up = np.array(limits.workspace.up)
-        return cls(cameras[second], centre, start, across, radius, turn, up)
-
-    def camera(self, aim: _Array, roll: float) -> Callable[[float], PlannedCamera]:
-        """Return camera 2 as a function of its angle from camera 1."""
-
-        def at(turn: float) -> PlannedCamera:
-            towards = np.cos(turn) * self.start + np.sin(turn) * self.across
-            pose = look_at(self.centre + self.radius * towards, aim, self.up, roll=roll)
-            return replace(self.camera2, world_from_device=pose)
-
-        return at
+def _may_stand(camera: PlannedCamera, space: Workspace) -> bool:
+    offset = camera.world_from_device[:3, 3] - np.array(space.centre)
+    return bool(admissible(space, space.camera_radius_m, offset[None])[0])
 
 
-def _at_limit(
+def _along_arc(
+    one: PlannedCamera,
+    two: PlannedCamera,
+    aim: _Array,
+    roll: float,
+    space: Workspace,
+) -> tuple[Callable[[float], PlannedCamera], float]:
+    """Camera 2 by its angle from camera 1 about the centre; that angle now [rad]."""
+    centre, up = np.array(space.centre), np.array(space.up)
+    start, end = (c.world_from_device[:3, 3] - centre for c in (one, two))
+    radius = float(np.linalg.norm(end))
+    start, end = start / np.linalg.norm(start), end / radius
+    across = end - (end @ start) * start
+    sine = float(np.linalg.norm(across))
+    across = across / sine if sine > 0.0 else across
+
+    def at(turn: float) -> PlannedCamera:
+        towards = np.cos(turn) * start + np.sin(turn) * across
+        pose = look_at(centre + radius * towards, aim, up, roll=roll)
+        return replace(two, world_from_device=pose)
+
+    return at, float(np.arctan2(sine, end @ start))
+
+
+def _slack_along(
     cameras: Sequence[PlannedCamera],
-    parts: Parts,
+    surface: SampledSurface,
     seam: Seam,
-    arc: _Arc,
     moved: Callable[[float], PlannedCamera],
-    limits: SpreadLimits,
-    given_up: Sequence[float],
-    bisections: int,
-) -> list[PlannedCamera]:
-    """Camera 2 where it reaches all of the seam just so, and where most of it."""
+    limits: BaselineLimits,
+) -> Callable[[float, float], float]:
+    """Slack of (10) by camera 2's angle, with a share of the seam past the limit."""
     pair = list(cameras)
 
-    def slack(turn: float) -> _Array:
+    def slack(turn: float, share: float) -> float:
         pair[seam.cameras[1]] = moved(turn)
-        test = check_seam(pair, parts.points, parts.normals, seam, limits.max_incidence)
-        return np.sort(test.slack)
+        test = check_seam(pair, surface, seam, limits.max_incidence)
+        return float(np.sort(test.slack)[int(share * (len(seam.points) - 1))])
 
-    found: list[PlannedCamera] = []
-    for share in given_up:
-        rank = int(share * (len(seam.points) - 1))
-        turn = _last_turn(lambda at, k=rank: float(slack(at)[k]), arc.turn, bisections)
-        if turn is None:
-            continue
-        camera = moved(turn)
-        offset = camera.world_from_device[:3, 3] - arc.centre
-        space = limits.workspace
-        if admissible(space, space.camera_radius_m, offset[None])[0]:
-            found.append(camera)
-    return found
+    return slack
 
 
 def _last_turn(

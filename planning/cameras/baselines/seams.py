@@ -5,7 +5,9 @@ their borders are known on samples only, so a border is where a sample of one pa
 near samples outside it. `docs/method/baselines.md` gives the definitions in words.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -16,6 +18,8 @@ from scipy.spatial import KDTree
 
 _Array = NDArray[np.float64]
 
+# Parts that share less of the target can't be registered with each other.
+MIN_OVERLAP_SHARE = 0.01
 _NEAREST = 8
 # Farther than this many typical distances of the nearest samples is another patch.
 _REACH = 2.0
@@ -68,6 +72,24 @@ def adjacency(points: _Array, normals: _Array) -> Adjacency:
 
 
 @dataclass(frozen=True, eq=False)
+class SampledSurface:
+    """Area-true samples of the target.
+
+    Attributes:
+        points: In [m], shape (n, 3).
+        normals: Unit face normals, shape (n, 3).
+    """
+
+    points: _Array
+    normals: _Array
+
+    @cached_property
+    def adjacent(self) -> Adjacency:
+        """Near samples of each."""
+        return adjacency(self.points, self.normals)
+
+
+@dataclass(frozen=True, eq=False)
 class Seam:
     """The border of camera 1's part inside camera 2's reach, on samples.
 
@@ -92,22 +114,17 @@ class Seam:
 
 
 def find_seam(
-    first: int,
-    second: int,
-    points: _Array,
-    measured_by: NDArray[np.bool_],
-    adjacent: Adjacency,
+    pair: tuple[int, int], surface: SampledSurface, measured_by: NDArray[np.bool_]
 ) -> Seam:
     """Return the seam of a pair in one order; it may be empty.
 
     Args:
-        first: Index of camera 1.
-        second: Index of camera 2.
-        points: Samples in [m], shape (n, 3).
+        pair: Indices of cameras 1 and 2.
+        surface: The samples.
         measured_by: Which camera measures which sample, shape (n, n_cameras).
-        adjacent: Of the same samples.
     """
-    part1, part2 = measured_by[:, first], measured_by[:, second]
+    points, adjacent = surface.points, surface.adjacent
+    part1, part2 = measured_by[:, pair[0]], measured_by[:, pair[1]]
     here, there = adjacent.first, adjacent.second
     out = part1[here] & (part2 & ~part1)[there]
     count = np.bincount(here[out], minlength=len(points))
@@ -115,12 +132,29 @@ def find_seam(
     shared = np.flatnonzero(part1 & part2)
     border = _border(count, part2)
     if not len(border):
-        return Seam((first, second), shared, shared, onward, False)
+        return Seam(pair, shared, shared, onward, False)
     # Edges are sorted by distance, so the first one of a sample leads to the nearest.
     _, nearest = np.unique(here[out], return_index=True)
     beyond = np.zeros(len(points), dtype=np.int64)
     beyond[here[out][nearest]] = there[out][nearest]
-    return Seam((first, second), border, beyond[border], onward, True)
+    return Seam(pair, border, beyond[border], onward, True)
+
+
+def find_seams(
+    orders: Sequence[tuple[int, int]],
+    surface: SampledSurface,
+    measured_by: NDArray[np.bool_],
+) -> Iterator[Seam]:
+    """Yield the seams of pairs in the orders named, those that aren't empty."""
+    for order in orders:
+        seam = find_seam(order, surface, measured_by)
+        if len(seam.points):
+            yield seam
+
+
+def both_orders(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return each pair, and right after it the same the other way round."""
+    return [order for pair in pairs for order in (pair, pair[::-1])]
 
 
 def _border(count: NDArray[np.int64], reach: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -132,41 +166,28 @@ def _border(count: NDArray[np.int64], reach: NDArray[np.bool_]) -> NDArray[np.in
 
 
 def neighbouring_pairs(
-    measured_by: NDArray[np.bool_],
-    weights: _Array,
-    adjacent: Adjacency,
-    *,
-    min_overlap_share: float = 0.01,
-    target_weight: float | None = None,
+    measured_by: NDArray[np.bool_], adjacent: Adjacency
 ) -> list[tuple[int, int]]:
     """Return the pairs of cameras whose parts overlap or touch by enough of the target.
 
-    Parts overlap by enough if the samples that both measure weigh at least
-    `min_overlap_share` of the target. They touch by enough if the line along which
-    they meet is at least as long as the side of a square of that area: on samples, at
-    least sqrt(min_overlap_share n) of either part have a near one in the other only.
+    Parts overlap by enough if both measure at least `MIN_OVERLAP_SHARE` of the n
+    samples. They touch by enough if the line along which they meet is at least as long
+    as the side of a square of that area: on samples, at least sqrt(MIN_OVERLAP_SHARE n)
+    of either part have a near one in the other only.
 
     Args:
         measured_by: Which camera measures which sample, shape (n, n_cameras).
-        weights: Weight of each sample, shape (n,).
         adjacent: Of the same samples.
-        min_overlap_share: Least share of the target.
-        target_weight: Weight of the whole target; None: that of the samples.
 
     Returns:
         Pairs (a, b) with a < b, in increasing order.
     """
-    total = float(weights.sum()) if target_weight is None else target_weight
-    n_target = total / float(weights.mean()) if len(weights) else 0.0
-    least = max(1.0, np.sqrt(min_overlap_share * n_target))
+    least = MIN_OVERLAP_SHARE * len(measured_by)
     pairs: list[tuple[int, int]] = []
     for a, b in combinations(range(measured_by.shape[1]), 2):
         part1, part2 = measured_by[:, a], measured_by[:, b]
-        overlap = float(weights[part1 & part2].sum())
-        if (
-            overlap >= min_overlap_share * total > 0.0
-            or _contact(part1, part2, adjacent) >= least
-        ):
+        overlaps = np.count_nonzero(part1 & part2) >= least > 0.0
+        if overlaps or _contact(part1, part2, adjacent) >= max(1.0, np.sqrt(least)):
             pairs.append((a, b))
     return pairs
 
@@ -181,31 +202,25 @@ def _contact(
     return min(len(np.unique(here[into2])), len(np.unique(here[into1])))
 
 
-def overlap_components(
-    measured_by: NDArray[np.bool_],
-    weights: _Array | float,
-    *,
-    min_overlap_share: float = 0.01,
-    target_weight: float | None = None,
-) -> list[list[int]]:
+def overlap_components(measured_by: NDArray[np.bool_]) -> list[list[int]]:
     """Return the groups of cameras whose parts can be registered with each other.
 
-    Two parts can be registered if the samples that both measure weigh at least
-    `min_overlap_share` of the target; to touch is not enough.
+    Two parts can be registered if both measure at least `MIN_OVERLAP_SHARE` of the
+    samples; to touch is not enough.
+
+    Args:
+        measured_by: Which camera measures which sample, shape (n, n_cameras).
 
     Returns:
         Groups of camera indices, each increasing, ordered by their first camera.
     """
-    n, k = measured_by.shape
-    weights = np.broadcast_to(np.asarray(weights, dtype=np.float64), (n,))
-    total = float(weights.sum()) if target_weight is None else target_weight
     part = measured_by.astype(np.float64)
-    shared = part.T @ (part * weights[:, None])
-    linked = coo_array((shared >= min_overlap_share * total) & (shared > 0.0))
-    _, label = connected_components(linked, directed=False)
+    shared = part.T @ part
+    linked = (shared >= MIN_OVERLAP_SHARE * len(part)) & (shared > 0.0)
+    _, label = connected_components(coo_array(linked), directed=False)
     groups: dict[int, list[int]] = {}
-    for camera in range(k):
-        groups.setdefault(int(label[camera]), []).append(camera)
+    for camera, group in enumerate(label.tolist()):
+        groups.setdefault(group, []).append(camera)
     return list(groups.values())
 
 

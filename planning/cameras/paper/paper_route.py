@@ -1,19 +1,19 @@
 """The paper's route to the cameras: the largest baselines first, their number follows.
 
-1. Seed: cameras on a ring, at the pitch of the closed forms (`ring_seeds`), about
-   several axes; the seed grows while rays say that too little is measured.
-2. Neighbours slide apart to the limit (10).
-3. A camera whose loss the rest can bear goes, or can once they have closed the gap to
-   that limit. Again from 2, until none can go.
+1. Start: cameras on a ring, at the spacing of the closed forms (`camera_rings`), about
+   several axes; the ring grows while rays say that too little is measured.
+2. The baselines of neighbours are maximised, to the limit (10).
+3. A camera whose loss the others make up for goes, or can once they have closed the
+   hole to that limit. Again from 2, until none can go.
 
 Source: Lee and Krim, 2014, section VI; `docs/method/baselines.md`, *The two routes*.
 """
 
 from dataclasses import dataclass
 
-from .paper_moves import one_fewer, swept
-from .paper_seeds import one_more, rank, rank_by_spare, seeds
+from .one_fewer_camera import one_fewer, swept
 from .route_problem import Cameras, CameraSet, RouteProblem
+from .route_starts import one_more, rank, rank_without_one, starts
 
 # Counts beyond the final one for which cameras are wanted.
 _MORE = 2
@@ -24,87 +24,90 @@ class PaperRoute:
     """Where the route ended.
 
     Attributes:
-        stand: The cameras, and what they measure.
+        cameras: The cameras, and what they measure.
         by_count: Cameras for 1, 2, ... of them, on the way and beyond; those of the
-            final count slid apart.
+            final count at their largest baselines.
         met: Whether they measure what is required.
-        best_without_one: Most samples that one camera fewer was found to measure.
+        best_without_one: Most samples that one camera fewer was seen to measure.
     """
 
-    stand: CameraSet
+    cameras: CameraSet
     by_count: dict[int, Cameras]
     met: bool
     best_without_one: int
 
 
-def paper_route(ground: RouteProblem) -> PaperRoute:
+def paper_route(problem: RouteProblem) -> PaperRoute:
     """Plan cameras by the largest baselines alone.
 
     Args:
-        ground: Samples, rays and limits.
+        problem: Samples, rays and limits.
 
     Returns:
-        Cameras that measure the required samples; as many as could be found where
-        nothing more helps.
+        Cameras that measure the required samples; as many as help where nothing more
+        does.
     """
     by_count: dict[int, Cameras] = {}
-    stand, best_without_one = _best_start(ground, by_count)
-    while len(stand.cameras) > len(ground.given):
-        slid = ground.slide(stand.cameras)
-        stand = CameraSet(slid.cameras, slid.measured_by)
-        by_count[len(stand.cameras)] = stand.cameras
-        fewer = one_fewer(ground, stand, most=1)
-        best_without_one = max(best_without_one, 0 if fewer is None else fewer.rows)
-        if fewer is None or fewer.rows < ground.required:
+    placed, best_without_one = _best_start(problem, by_count)
+    while len(placed.cameras) > len(problem.fixed):
+        widest = problem.widen(placed.cameras)
+        placed = CameraSet(widest.cameras, widest.measured_by)
+        by_count[len(placed.cameras)] = placed.cameras
+        fewer = one_fewer(problem, placed, most=1)
+        best_without_one = max(best_without_one, 0 if fewer is None else fewer.count)
+        if fewer is None or fewer.count < problem.required:
             break
-        stand, best_without_one = _fewest(ground, fewer, by_count)
-        stand = swept(ground, stand)
-    _fill(ground, stand, by_count)
+        placed, best_without_one = _fewest(problem, fewer, by_count)
+        placed = swept(problem, placed)
+    _fill(problem, placed, by_count)
     by_count.pop(0, None)
-    met = stand.rows >= ground.required
-    return PaperRoute(stand, by_count, met, best_without_one)
+    met = placed.count >= problem.required
+    return PaperRoute(placed, by_count, met, best_without_one)
 
 
 def _best_start(
-    ground: RouteProblem, by_count: dict[int, Cameras]
+    problem: RouteProblem, by_count: dict[int, Cameras]
 ) -> tuple[CameraSet, int]:
     """What is left of the best ring, when none can go; and what one fewer measured.
 
     The ring that measures most isn't always the one that can spare a camera.
     """
-    offered = seeds(ground)
-    most = min(offered, key=lambda seed: rank(ground, seed))
-    spare = min(offered, key=lambda seed: rank_by_spare(ground, seed))
-    found, trail = _fewest(ground, most, by_count), {}
+    rings = starts(problem)
+    most = min(rings, key=lambda ring: rank(problem, ring))
+    spare = min(rings, key=lambda ring: rank_without_one(problem, ring))
+    placed, without_one = _fewest(problem, most, by_count)
     if spare is not most:
-        other = _fewest(ground, spare, trail)
-        if rank(ground, other[0])[:2] < rank(ground, found[0])[:2]:
+        trail: dict[int, Cameras] = {}
+        other, without_other = _fewest(problem, spare, trail)
+        if rank(problem, other)[:2] < rank(problem, placed)[:2]:
             by_count.update(trail)
-            found = other
-    return swept(ground, found[0]), found[1]
+            placed, without_one = other, without_other
+    return swept(problem, placed), without_one
 
 
 def _fewest(
-    ground: RouteProblem, stand: CameraSet, by_count: dict[int, Cameras]
+    problem: RouteProblem, placed: CameraSet, by_count: dict[int, Cameras]
 ) -> tuple[CameraSet, int]:
     """Let cameras go as long as one can; and what was measured without one more."""
     while True:
-        by_count[len(stand.cameras)] = stand.cameras
-        fewer = one_fewer(ground, stand)
-        if fewer is None or fewer.rows < ground.required:
-            return stand, 0 if fewer is None else fewer.rows
-        stand = fewer
+        by_count[len(placed.cameras)] = placed.cameras
+        fewer = one_fewer(problem, placed)
+        if fewer is None or fewer.count < problem.required:
+            return placed, 0 if fewer is None else fewer.count
+        placed = fewer
 
 
-def _fill(ground: RouteProblem, stand: CameraSet, by_count: dict[int, Cameras]) -> None:
+def _fill(
+    problem: RouteProblem, placed: CameraSet, by_count: dict[int, Cameras]
+) -> None:
     """Note cameras for every count up to some more than the final one."""
-    fewer = stand
-    while len(fewer.cameras) > max(1, len(ground.given)):
-        fewer = fewer.without(fewer.least_missed(len(ground.given))[0])
+    fewer, n_fixed = placed, len(problem.fixed)
+    while len(fewer.cameras) > max(1, n_fixed):
+        fewer = fewer.without(fewer.least_missed(n_fixed)[0])
         by_count[len(fewer.cameras)] = fewer.cameras
     for _ in range(_MORE):
-        more = one_more(ground, stand)
+        more = one_more(problem, placed)
         if more is None:
             break
-        stand = more
-        by_count[len(stand.cameras)] = stand.cameras
+        placed = more
+        by_count[len(placed.cameras)] = placed.cameras

@@ -1,17 +1,15 @@
-"""What the paper's route stands on: lit samples, rays, and cameras as they stand."""
+"""What the paper's route is taken on: lit samples, rays, and sets of cameras."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.cameras.baselines.camera_spread import CameraSpread
-from planning.cameras.baselines.limit_poses import Parts
-from planning.cameras.baselines.seams import Adjacency, adjacency
-from planning.cameras.baselines.spread_problem import SpreadLimits
+from planning.cameras.baselines.baseline_terms import BaselineLimits
+from planning.cameras.baselines.seams import SampledSurface
+from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.model.planned import PlannedCamera
 
 _Array = NDArray[np.float64]
@@ -21,47 +19,40 @@ Cameras = tuple[PlannedCamera, ...]
 
 @dataclass(frozen=True, eq=False)
 class RouteProblem:
-    """What the route stands on: samples, rays, and places to stand.
+    """Samples, rays, and where cameras may stand.
 
     Attributes:
-        points: Lit samples in [m], shape (n, 3).
-        normals: Unit face normals, shape (n, 3).
+        surface: Lit samples.
         measure: Which camera measures which sample, but for each other's bodies.
         together: The same with all their bodies in place; nothing where they don't fit.
-        stand: Cameras in directions (k, 3) from the centre, where some may stand.
-        slide: Slides cameras apart to the limit (10), losing nothing.
+        stand: Cameras in directions (k, 3) from the centre, where they may stand.
+        widen: Maximises the baselines of cameras to the limit (10), losing nothing.
         device: Optics of a camera.
-        ring_radius: Distance from the centre at which cameras are offered [m].
+        ring_radius: Distance from the centre at which cameras stand [m].
         limits: What binds a camera.
         required: Samples that must be measured.
-        given: Cameras that stand already.
+        fixed: Existing cameras.
     """
 
-    points: _Array
-    normals: _Array
+    surface: SampledSurface
     measure: Callable[[Sequence[PlannedCamera]], _Measured]
     together: Callable[[Sequence[PlannedCamera]], _Measured]
     stand: Callable[[_Array], Cameras]
-    slide: Callable[[Sequence[PlannedCamera]], CameraSpread]
+    widen: Callable[[Sequence[PlannedCamera]], WidestBaselines]
     device: PinholeModel
     ring_radius: float
-    limits: SpreadLimits
+    limits: BaselineLimits
     required: int
-    given: Cameras = ()
+    fixed: Cameras = ()
 
-    @cached_property
-    def adjacent(self) -> Adjacency:
-        """Near samples of each."""
-        return adjacency(self.points, self.normals)
-
-    def parts(self, measured_by: _Measured) -> Parts:
-        """Return the samples with what cameras measure of them."""
-        return Parts(self.points, self.normals, self.adjacent, measured_by)
+    def placed(self, cameras: Sequence[PlannedCamera]) -> "CameraSet":
+        """Return cameras with what they measure among each other's bodies."""
+        return CameraSet(tuple(cameras), self.together(cameras))
 
 
 @dataclass(frozen=True, eq=False)
 class CameraSet:
-    """Cameras as they stand, given ones first.
+    """Cameras, existing ones first.
 
     Attributes:
         cameras: The cameras.
@@ -72,22 +63,24 @@ class CameraSet:
     measured: _Measured
 
     @property
-    def rows(self) -> int:
+    def count(self) -> int:
         """Samples that any of them measures."""
         return int(self.measured.any(axis=1).sum())
 
-    def least_missed(self, n_given: int) -> list[int]:
+    def least_missed(self, n_fixed: int) -> list[int]:
         """Return the cameras that may go, the one that measures least alone first.
 
         Args:
-            n_given: First cameras, which stay.
+            n_fixed: First cameras, which stay.
         """
         alone = self.measured.sum(axis=1) == 1
         sole = self.measured[alone].sum(axis=0)
         order = [int(i) for i in np.argsort(sole, kind="stable")]
-        return [i for i in order if i >= n_given]
+        return [i for i in order if i >= n_fixed]
 
     def without(self, camera: int) -> "CameraSet":
         """Return the others, as far as bodies don't count."""
-        rest = [i for i in range(len(self.cameras)) if i != camera]
-        return CameraSet(tuple(self.cameras[i] for i in rest), self.measured[:, rest])
+        others = [i for i in range(len(self.cameras)) if i != camera]
+        return CameraSet(
+            tuple(self.cameras[i] for i in others), self.measured[:, others]
+        )

@@ -99,7 +99,7 @@ def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str
         rig: As written.
         error: With poses, none of which measures a sample.
     """
-    rows = error.rows
+    rows = error.samples
     if not len(rows.target):
         return "no limit of a camera helps"
     table = _Least(knobs(rig, scene.requirements), len(rows.target))
@@ -130,8 +130,8 @@ def for_so_many(
         stage: Candidates, and lit samples.
         count: Cameras that are allowed.
     """
-    n = min(len(stage.rows.target), _ROWS)
-    rows = taken(stage.rows, np.arange(n), stage.rows.lit)
+    n = min(len(stage.cover.samples.target), _ROWS)
+    rows = taken(stage.cover.samples, np.arange(n), stage.cover.samples.lit)
     turned = knobs(rig, scene.requirements)
     asked = np.stack(
         [demands(scene, camera, rows, turned).asked for camera in stage.reference],

@@ -1,7 +1,7 @@
 """States the baseline program of `solvers` for cameras as they stand.
 
-Seams and kept samples are drawn from what is measured now; samples that a trial move
-lost come back as kept ones, so that the next proposal knows of them.
+Seams and kept samples are drawn from what is measured now; samples that a proposal lost
+come back as kept ones, so that the next one knows of them.
 """
 
 from collections.abc import Sequence
@@ -23,12 +23,12 @@ from solvers.poses.baseline_problem import (
 )
 
 from .baseline_rows import check_seam, half_field
-from .seams import Adjacency, find_seam
+from .seams import SampledSurface, both_orders, find_seams
 
 _Array = NDArray[np.float64]
 
-# Few, since a step of the program costs what its rows cost, and what they don't hold
-# is demanded when a trial loses it: 16 and 24 end no higher, in three times the time.
+# Few, since each costs time in every step of the program, and what they don't hold is
+# demanded when a proposal loses it: 16 and 24 end no higher, in three times the time.
 _SEAM_POINTS = 6
 _KEPT_POINTS = 8
 # Proposals stay this far inside the limits, since the samples between the kept ones
@@ -42,7 +42,7 @@ _EASE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class RingsOnTarget:
+class RingsOnSurface:
     """The rings of every projector on n samples.
 
     Attributes:
@@ -59,27 +59,8 @@ class RingsOnTarget:
 
 
 @dataclass(frozen=True, eq=False)
-class SampledTarget:
-    """Samples that cameras measure, and the rings on them.
-
-    Attributes:
-        points: In [m], shape (n, 3).
-        normals: Unit face normals, shape (n, 3).
-        weights: Area behind each sample in [m^2], shape (n,).
-        adjacent: Near samples of each.
-        rings: What each projector draws on them; None: no rings.
-    """
-
-    points: _Array
-    normals: _Array
-    weights: _Array
-    adjacent: Adjacency
-    rings: RingsOnTarget | None
-
-
-@dataclass(frozen=True, eq=False)
-class SpreadLimits:
-    """What binds a camera that slides.
+class BaselineLimits:
+    """What binds a camera whose baselines grow.
 
     Attributes:
         max_incidence: theta in [rad].
@@ -99,25 +80,14 @@ class SpreadLimits:
     spare_field: float = 0.0
 
 
-def camera_shell(workspace: Workspace) -> PositionShell:
-    """Return where camera centres may stand."""
-    return PositionShell(
-        np.array(workspace.centre),
-        workspace.camera_radius_m,
-        np.array(workspace.axis),
-        workspace.half_angle,
-        np.array(workspace.up),
-        workspace.floor_m,
-    )
-
-
-def spread_problem(
+def state_baselines(
     cameras: Sequence[PlannedCamera],
     aims: _Array,
     measured_by: NDArray[np.bool_],
     pairs: Sequence[tuple[int, int]],
-    target: SampledTarget,
-    limits: SpreadLimits,
+    surface: SampledSurface,
+    rings: RingsOnSurface | None,
+    limits: BaselineLimits,
     *,
     demanded: NDArray[np.int64],
     max_step: float,
@@ -129,29 +99,35 @@ def spread_problem(
         aims: Points that they look at in [m], shape (k, 3).
         measured_by: Which camera measures which sample now, shape (n, k).
         pairs: Neighbours.
-        target: The samples.
+        surface: The samples.
+        rings: What each projector draws on them; None: no rings.
         limits: What binds.
         demanded: (camera, sample) pairs that must be kept besides the drawn ones,
             shape (q, 2).
         max_step: Farthest that a centre may move in [m].
     """
-    centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras])
-    kept = [
-        np.column_stack([np.full(len(rows), c), rows])
-        for c, rows in enumerate(_sole_samples(cameras, measured_by, target, limits))
-    ]
+    space = limits.workspace
+    drawn = _sole_samples(cameras, measured_by, surface, rings, limits)
+    kept = np.unique(np.concatenate([drawn, demanded]), axis=0)
     return BaselineProblem(
-        centres=centres,
+        centres=np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
         aims=aims,
         pairs=np.array(pairs, dtype=np.int64),
-        shell=camera_shell(limits.workspace),
-        seams=_seam_points(cameras, measured_by, pairs, target, limits),
-        kept=_kept_points(cameras, np.concatenate([*kept, demanded]), target, limits),
+        shell=PositionShell(
+            np.array(space.centre),
+            space.camera_radius_m,
+            np.array(space.axis),
+            space.half_angle,
+            np.array(space.up),
+            space.floor_m,
+        ),
+        seams=_seam_points(cameras, measured_by, pairs, surface, limits),
+        kept=_kept_points(cameras, kept, surface, rings, limits),
         max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
         range_m=cameras[0].device.range_m,
         min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
         max_step=max_step,
-        half_spaces=_held_in(limits.workspace, cameras),
+        half_spaces=_held_in(space, cameras),
         fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
     )
 
@@ -177,89 +153,82 @@ def _seam_points(
     cameras: Sequence[PlannedCamera],
     measured_by: NDArray[np.bool_],
     pairs: Sequence[tuple[int, int]],
-    target: SampledTarget,
-    limits: SpreadLimits,
+    surface: SampledSurface,
+    limits: BaselineLimits,
 ) -> SeamPoints:
-    parts: list[SeamPoints] = []
-    for pair in pairs:
-        for first, second in (pair, pair[::-1]):
-            seam = find_seam(first, second, target.points, measured_by, target.adjacent)
-            if not (len(seam.points) and seam.shares_border):
-                continue
-            test = check_seam(
-                cameras, target.points, target.normals, seam, limits.max_incidence
+    spare, none = max(_SPARE_FIELD, limits.spare_field), np.zeros((0, 3))
+    pair = np.zeros((0, 2))
+    seams = [(pair.astype(np.int64), none, none, none, np.zeros(0), pair)]
+    for seam in find_seams(both_orders(pairs), surface, measured_by):
+        if not seam.shares_border:
+            continue
+        test = check_seam(cameras, surface, seam, limits.max_incidence)
+        some = _tight_and_apart(test.slack, test.points, _SEAM_POINTS)
+        fields = np.column_stack([test.half_field1, test.half_field2])
+        seams.append(
+            (
+                np.tile(np.array(seam.cameras), (len(some), 1)),
+                test.points[some],
+                test.angles.outward[some],
+                test.angles.onward[some],
+                test.angles.delta_surface[some],
+                fields[some] - spare,
             )
-            rows = _tight_and_spread(test.slack, test.points, _SEAM_POINTS)
-            fields = np.column_stack([test.half_field1, test.half_field2])
-            parts.append(
-                SeamPoints(
-                    np.tile(np.array([first, second]), (len(rows), 1)),
-                    test.points[rows],
-                    test.angles.outward[rows],
-                    test.angles.onward[rows],
-                    test.angles.delta_surface[rows],
-                    fields[rows] - max(_SPARE_FIELD, limits.spare_field),
-                )
-            )
-    if not parts:
-        none = np.zeros((0, 3))
-        pair = np.zeros((0, 2))
-        return SeamPoints(pair.astype(np.int64), none, none, none, np.zeros(0), pair)
-    names = ("cameras", "points", "outward", "onward", "turn", "half_fields")
-    return SeamPoints(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+        )
+    return SeamPoints(*(np.concatenate(column) for column in zip(*seams, strict=True)))
 
 
 def _sole_samples(
     cameras: Sequence[PlannedCamera],
     measured_by: NDArray[np.bool_],
-    target: SampledTarget,
-    limits: SpreadLimits,
-) -> list[NDArray[np.int64]]:
+    surface: SampledSurface,
+    rings: RingsOnSurface | None,
+    limits: BaselineLimits,
+) -> NDArray[np.int64]:
     """Some of what each camera alone measures, the most oblique and well apart.
 
     Samples right at the limit are left out: on a noisy surface they lie everywhere and
     would hold the cameras where they are. What a move really loses is demanded later.
+
+    Returns:
+        (camera, sample) pairs, shape (q, 2).
     """
     sole = measured_by.sum(axis=1) == 1
     least = np.cos(limits.max_incidence - _COMFORT)
-    chosen: list[NDArray[np.int64]] = []
+    pairs = [np.zeros((0, 2), dtype=np.int64)]
     for c, camera in enumerate(cameras):
-        rows = np.flatnonzero(sole & measured_by[:, c])
-        ray = target.points[rows] - camera.world_from_device[:3, 3]
-        facing = -np.einsum("ij,ij->i", ray, target.normals[rows])
+        alone = np.flatnonzero(sole & measured_by[:, c])
+        ray = surface.points[alone] - camera.world_from_device[:3, 3]
+        facing = -np.einsum("ij,ij->i", ray, surface.normals[alone])
         facing /= np.linalg.norm(ray, axis=1)
         eased = facing >= least
-        if target.rings is not None and len(rows):
-            eased &= best_rings(camera, rows, target, target.rings, limits)[3] >= _EASE
-        rows, facing = rows[eased], facing[eased]
-        chosen.append(
-            rows[_tight_and_spread(facing, target.points[rows], _KEPT_POINTS)]
-        )
-    return chosen
+        if rings is not None and len(alone):
+            eased &= best_rings(camera, alone, surface, rings, limits)[3] >= _EASE
+        alone, facing = alone[eased], facing[eased]
+        some = alone[_tight_and_apart(facing, surface.points[alone], _KEPT_POINTS)]
+        pairs.append(np.column_stack([np.full(len(some), c), some]))
+    return np.concatenate(pairs)
 
 
 def _kept_points(
     cameras: Sequence[PlannedCamera],
     kept: NDArray[np.int64],
-    target: SampledTarget,
-    limits: SpreadLimits,
+    surface: SampledSurface,
+    rings: RingsOnSurface | None,
+    limits: BaselineLimits,
 ) -> KeptPoints:
-    kept = np.unique(kept.astype(np.int64).reshape(-1, 2), axis=0)
-    index, rows = kept[:, 0], kept[:, 1]
-    points = target.points[rows]
+    index, samples = kept[:, 0], kept[:, 1]
+    points, normals = surface.points[samples], surface.normals[samples]
     cosine, sigma, pitch = (np.zeros(len(kept)) for _ in range(3))
-    rings = np.zeros((len(kept), 3))
-    for c, camera in enumerate(cameras):
+    across = np.zeros((len(kept), 3))
+    for c in np.unique(index):
         mine = np.flatnonzero(index == c)
-        if not len(mine):
-            continue
-        cosine[mine] = _field_cosines(camera, points[mine])
-        if target.rings is not None:
-            rings[mine], sigma[mine], pitch[mine], _ = best_rings(
-                camera, rows[mine], target, target.rings, limits
+        cosine[mine] = _field_cosines(cameras[c], points[mine])
+        if rings is not None:
+            across[mine], sigma[mine], pitch[mine], _ = best_rings(
+                cameras[c], samples[mine], surface, rings, limits
             )
-    normals = target.normals[rows]
-    return KeptPoints(index, points, normals, cosine, rings, sigma, pitch)
+    return KeptPoints(index, points, normals, cosine, across, sigma, pitch)
 
 
 def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
@@ -279,10 +248,10 @@ def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
 
 def best_rings(
     camera: PlannedCamera,
-    rows: NDArray[np.int64],
-    target: SampledTarget,
-    rings: RingsOnTarget,
-    limits: SpreadLimits,
+    samples: NDArray[np.int64],
+    surface: SampledSurface,
+    rings: RingsOnSurface,
+    limits: BaselineLimits,
 ) -> tuple[_Array, _Array, _Array, _Array]:
     """Return the ring normals that measure samples best, and what s_N and pitch ask.
 
@@ -292,8 +261,8 @@ def best_rings(
 
     Args:
         camera: As it stands.
-        rows: Samples, shape (q,).
-        target: All samples.
+        samples: Which of them, shape (q,).
+        surface: All samples.
         rings: On all samples.
         limits: What binds.
 
@@ -302,10 +271,10 @@ def best_rings(
         bind; what the tightest of these limits leaves, in units of a cosine; (q,) each.
     """
     pose = camera.world_from_device
-    ray = target.points[rows] - pose[:3, 3]
+    ray = surface.points[samples] - pose[:3, 3]
     distance = np.linalg.norm(ray, axis=1)
-    r, normal = ray / distance[:, None], target.normals[rows]
-    m = rings.normals[:, rows]
+    r, normal = ray / distance[:, None], surface.normals[samples]
+    m = rings.normals[:, samples]
     along = np.einsum("ij,pij->pi", r, m)
     facing = -np.einsum("ij,ij->i", r, normal)
     v = normal * along[..., None] + m * facing[:, None]
@@ -314,16 +283,16 @@ def best_rings(
     per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
     sigma, pitch = np.zeros(along.shape), np.zeros(along.shape)
     if limits.max_sigma_m is not None:
-        sigma = rings.noise_px[:, rows] * per_length / limits.max_sigma_m
+        sigma = rings.noise_px[:, samples] * per_length / limits.max_sigma_m
     if limits.min_ring_pitch_px is not None:
-        pitch = limits.min_ring_pitch_px * per_length / rings.spacing[:, rows]
-    spread = distance * np.linalg.norm(v, axis=2)
+        pitch = limits.min_ring_pitch_px * per_length / rings.spacing[:, samples]
+    reach = distance * np.linalg.norm(v, axis=2)
     spare = np.minimum(
-        np.abs(along) - np.maximum(limits.min_conditioning, sigma * spread),
-        facing - pitch * spread,
+        np.abs(along) - np.maximum(limits.min_conditioning, sigma * reach),
+        facing - pitch * reach,
     )
-    best = np.argmax(np.where(rings.lit[rows].T, spare, -np.inf), axis=0)
-    each = np.arange(len(rows))
+    best = np.argmax(np.where(rings.lit[samples].T, spare, -np.inf), axis=0)
+    each = np.arange(len(samples))
     sign = np.where(along[best, each] < 0.0, -1.0, 1.0)
     spared = 1.0 + _SPARE_RINGS
     return (
@@ -334,7 +303,7 @@ def best_rings(
     )
 
 
-def _tight_and_spread(tightness: _Array, points: _Array, n: int) -> NDArray[np.int64]:
+def _tight_and_apart(tightness: _Array, points: _Array, n: int) -> NDArray[np.int64]:
     """Half of n the tightest (least), half farthest from each other; all if fewer."""
     if len(points) <= n:
         return np.arange(len(points))

@@ -3,7 +3,7 @@
 About an axis through the centre of the workspace, the target's section is taken for a
 disc of radius rho, that of its farthest sample from the axis. Cameras on a ring of
 radius S that face the centre then cover eta to either side of themselves, so n_min of
-them stand at a pitch of at most 2 eta, neighbours d_max = 2 S sin(eta) apart at most
+them stand at a spacing of at most 2 eta, neighbours d_max = 2 S sin(eta) apart at most
 (`round_body_limit`, `docs/method/baselines.md`).
 """
 
@@ -21,11 +21,11 @@ from planning.model.requirements import Workspace
 _Array = NDArray[np.float64]
 
 _AXES = 16
-# More cameras than the section asks for, at a closer pitch: ends and hollows are
+# More cameras than the section asks for, at a closer spacing: ends and hollows are
 # steeper than the disc.
 _MORE = 2
 _PHASES = 2
-# Rings of more cameras than this are no seeds but floods: the field is too narrow.
+# Rings of more cameras than this promise nothing: the field is too narrow.
 _MOST = 36
 
 
@@ -44,7 +44,7 @@ class Ring:
     directions: _Array
 
 
-def ring_seeds(
+def camera_rings(
     points: _Array,
     workspace: Workspace,
     device: PinholeModel,
@@ -71,9 +71,9 @@ def ring_seeds(
         limit = round_body_limit(rho, ring_radius, max_incidence, alpha)
         e2 = np.cross(axis, e1)
         for n in range(limit.n_min, min(limit.n_min + _MORE, _MOST) + 1):
-            pitch = 2.0 * np.pi / n
+            spacing = 2.0 * np.pi / n
             for phase in range(_PHASES):
-                azimuth = pitch * (np.arange(n) + phase / _PHASES)
+                azimuth = spacing * (np.arange(n) + phase / _PHASES)
                 directions = (
                     np.cos(azimuth)[:, None] * e1 + np.sin(azimuth)[:, None] * e2
                 )
@@ -81,15 +81,15 @@ def ring_seeds(
 
 
 def _axes(workspace: Workspace) -> Iterator[tuple[_Array, _Array]]:
-    """Axes and unit vectors across them: the vertical, then a lattice of half of all.
+    """Axes and unit vectors across them: the vertical, then some over half of all.
 
     Azimuth 0 lies in the plane of the ring's axis and the workspace's: where that is a
     cone, one camera stands as near to the middle of it as the ring does.
     """
     towards = np.array(workspace.axis)
     start = None if workspace.bearing is None else np.array(workspace.bearing)
-    lattice = fibonacci_cap(_AXES, towards, np.pi / 2, start=start)
-    for axis in (np.array(workspace.up), *lattice):
+    axes = fibonacci_cap(_AXES, towards, np.pi / 2, start=start)
+    for axis in (np.array(workspace.up), *axes):
         across = towards - (towards @ axis) * axis
         if not np.linalg.norm(across) > 1e-6:
             spare = np.eye(3)[np.argmin(np.abs(axis))] if start is None else start

@@ -1,9 +1,8 @@
-"""Slides neighbouring cameras apart to the largest baselines that coverage allows.
+"""Moves neighbouring cameras to the largest baselines that coverage allows.
 
 `solvers.poses.baseline_program` proposes by eqs. (9)-(10); rays decide: a move counts
-only if the measured area stays at least what it was, and the parts stay registered.
-Samples that a proposal lost are demanded of the next one; steps are halved where that
-doesn't help.
+only if as much is measured as before, and the parts stay registered. Samples that a
+proposal lost are demanded of the next one; steps are halved where that doesn't help.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,18 +17,12 @@ from planning.model.requirements import Workspace
 from planning.scene.workspace.zone_limits import stands
 from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
 
-from .seams import adjacency, neighbouring_pairs, overlap_components
-from .spread_problem import (
-    RingsOnTarget,
-    SampledTarget,
-    SpreadLimits,
-    at_poses,
-    spread_problem,
-)
+from .baseline_terms import BaselineLimits, RingsOnSurface, at_poses, state_baselines
+from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]
 Measure = Callable[[_Array], NDArray[np.bool_]]
-Confirm = Callable[[_Array], float]
+Confirm = Callable[[_Array], int]
 
 _STEPS = (1.0, 0.5, 0.25)
 # Reach of the first proposals, as a share of the largest radius of the shell.
@@ -44,8 +37,8 @@ _GAIN = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
-class CameraSpread:
-    """Cameras slid apart.
+class WidestBaselines:
+    """Cameras moved to larger baselines.
 
     Attributes:
         cameras: As moved.
@@ -65,113 +58,86 @@ class CameraSpread:
     n_evaluations: int
 
 
-def spread_cameras(
+def maximise_baselines(
     cameras: Sequence[PlannedCamera],
     measure: Measure,
+    surface: SampledSurface,
+    limits: BaselineLimits,
     *,
-    points: _Array,
-    normals: _Array,
-    weights: _Array | float,
-    limits: SpreadLimits,
+    rings: RingsOnSurface | None = None,
     confirm: Confirm | None = None,
-    required: float = 0.0,
-    rings: RingsOnTarget | None = None,
-    min_overlap_share: float = 0.01,
     max_evaluations: int = 48,
-    max_programs: int | None = None,
-) -> CameraSpread:
+    max_programs: float = np.inf,
+) -> WidestBaselines:
     """Raise the smallest baseline of neighbouring cameras without losing coverage.
 
-    A move is taken iff the measured weight is at least max(required, the weight at the
-    start), `confirm` finds no less than at the start either, the overlap graph falls
-    into no more groups, and the smallest baseline of neighbours rises, or their mean
-    does while the smallest stays.
+    A move is taken iff as many samples are measured as at the start, `confirm` doesn't
+    find less than at the start either, the overlap graph falls into no more groups, and
+    the smallest baseline of neighbours rises, or their mean does while the smallest
+    stays.
 
     Args:
         cameras: As chosen; each keeps the point that it looks at, and its roll.
         measure: Maps poses (k, 4, 4) to which camera measures which sample, (n, k), by
             rays and every limit of the plan.
-        points: Samples in [m], shape (n, 3).
-        normals: Unit face normals, shape (n, 3).
-        weights: Weight of each sample in [m^2], shape (n,) or one number.
+        surface: The samples.
         limits: What binds a camera.
-        confirm: Maps poses to the weight measured of more samples, on which no proposal
-            rests: of many moves, those pass that samples happen to favour.
-        required: Weight that must be measured [m^2].
         rings: Rings of each projector on the samples; None: no rings.
-        min_overlap_share: Overlap or contact that makes neighbours.
+        confirm: Maps poses to how many of more samples are measured, on which no
+            proposal rests: of many moves, those pass that samples happen to favour.
         max_evaluations: Calls of `measure` at most.
-        max_programs: Programs solved at most; None: no limit of their own.
+        max_programs: Programs solved at most.
     """
-    n = len(points)
-    target = SampledTarget(
-        points,
-        normals,
-        np.broadcast_to(np.asarray(weights, np.float64), (n,)),
-        adjacency(points, normals),
-        rings,
-    )
-    search = _Search(
-        list(cameras),
-        measure,
-        confirm,
-        target,
-        limits,
-        min_overlap_share,
-        max_evaluations,
-    )
-    return search.run(required, max_programs)
+    search = _Search(cameras, measure, surface, limits, rings, confirm)
+    return search.run(max_evaluations, max_programs)
 
 
 class _Search:
-    """The state of one spread: poses, what they measure, and the budget."""
+    """The state of one search: poses, what they measure, and the budget."""
 
     def __init__(
         self,
-        cameras: list[PlannedCamera],
+        cameras: Sequence[PlannedCamera],
         measure: Measure,
+        surface: SampledSurface,
+        limits: BaselineLimits,
+        rings: RingsOnSurface | None,
         confirm: Confirm | None,
-        target: SampledTarget,
-        limits: SpreadLimits,
-        share: float,
-        max_evaluations: int,
     ) -> None:
-        self.cameras, self.target, self.limits = cameras, target, limits
-        self._measure, self._share, self._budget = measure, share, max_evaluations
-        self._confirm = confirm
-        self._confirmed: float | None = None
+        self.cameras, self.surface, self.limits = cameras, surface, limits
+        self._measure, self._rings, self._confirm = measure, rings, confirm
+        self._confirmed: int | None = None
         self.spent = self.accepted = self.solved = 0
         self.poses = np.stack([camera.world_from_device for camera in cameras])
         self.measured = self._evaluate(self.poses)
-        self.aims = aims_of(self.poses, self.measured, target.points, limits.workspace)
+        self._floor = _count(self.measured)
+        self.aims = aims_of(self.poses, self.measured, surface.points, limits.workspace)
         self.rolls = rolls_of(self.poses, self.aims, np.array(limits.workspace.up))
-        self.pairs = self._neighbours(self.measured)
-        self._groups = self._count_groups(self.measured)
+        self.pairs = neighbouring_pairs(self.measured, surface.adjacent)
+        self._groups = len(overlap_components(self.measured))
         self._free = np.array([not camera.existing for camera in cameras])
 
-    def run(self, required: float, max_programs: int | None) -> CameraSpread:
-        before = self._smallest(self.poses)
-        self._programs = np.inf if max_programs is None else max_programs
-        self._floor = max(required, self._weight(self.measured))
-        reach = _REACH * self.limits.workspace.camera_radius_m[1]
-        least = _MIN_REACH * self.limits.workspace.camera_radius_m[1]
-        while self.pairs and self._affords() and reach >= least:
-            if not self._free.any():
-                break
+    def run(self, max_evaluations: int, max_programs: float) -> WidestBaselines:
+        self._evaluations, self._programs = max_evaluations, max_programs
+        before = self._smallest()
+        radius = self.limits.workspace.camera_radius_m[1]
+        reach = _REACH * radius
+        movable = bool(self.pairs) and bool(self._free.any())
+        while movable and self._affords() and reach >= _MIN_REACH * radius:
             taken, proposed = self._improve(reach)
             if not taken:
                 reach = _SHRINK * min(reach, proposed)
-        return CameraSpread(
+        return WidestBaselines(
             tuple(at_poses(self.cameras, self.poses)),
             self.measured,
             before,
-            self._smallest(self.poses),
+            self._smallest(),
             self.accepted,
             self.spent,
         )
 
     def _affords(self) -> bool:
-        return self.spent < self._budget and self.solved < self._programs
+        return self.spent < self._evaluations and self.solved < self._programs
 
     def _improve(self, reach: float) -> tuple[bool, float]:
         """Whether a proposal within reach was taken, whole or in part; its reach."""
@@ -184,7 +150,7 @@ class _Search:
             if not self._affords():
                 break
             self.solved += 1
-            solution = solve_baseline(self._problem(demanded, reach))
+            solution = solve_baseline(self._stated(demanded, reach))
             if not (solution.status.has_point and self._gains(solution.centres)):
                 break
             proposals.append(solution.centres)
@@ -217,7 +183,7 @@ class _Search:
     def _attempt(self, centres: _Array) -> tuple[bool, NDArray[np.int64]]:
         """Take a move if rays allow it; else which samples it loses."""
         none = np.zeros(0, dtype=np.int64)
-        if self.spent >= self._budget or not self._admissible(centres):
+        if self.spent >= self._evaluations or not self._admissible(centres):
             return False, none
         up = np.array(self.limits.workspace.up)
         poses = np.stack(
@@ -231,14 +197,16 @@ class _Search:
         poses[~self._free] = self.poses[~self._free]
         measured = self._evaluate(poses)
         lost = np.flatnonzero(self.measured.any(axis=1) & ~measured.any(axis=1))
-        if not self._weight(measured) >= self._floor:
+        if _count(measured) < self._floor:
             return False, lost
-        pairs = sorted({*self.pairs, *self._neighbours(measured)})
+        pairs = sorted(
+            {*self.pairs, *neighbouring_pairs(measured, self.surface.adjacent)}
+        )
         index = np.array(pairs, dtype=np.int64)
         held = smallest_baseline(centres, index) >= smallest_baseline(
             self.poses[:, :3, 3], index
         )
-        if not held or self._count_groups(measured) > self._groups:
+        if not held or len(overlap_components(measured)) > self._groups:
             return False, none
         if not self._is_confirmed(poses):
             return False, none
@@ -261,8 +229,8 @@ class _Search:
         """(camera, sample) pairs that would hold some of the lost samples."""
         if len(lost) > _DEMANDS:
             lost = lost[np.linspace(0, len(lost) - 1, _DEMANDS).astype(np.int64)]
-        ray = self.target.points[lost][:, None] - centres[None]
-        facing = -np.einsum("ikj,ij->ik", ray, self.target.normals[lost])
+        ray = self.surface.points[lost][:, None] - centres[None]
+        facing = -np.einsum("ikj,ij->ik", ray, self.surface.normals[lost])
         facing = facing / np.linalg.norm(ray, axis=2)
         holder = np.argmax(np.where(self.measured[lost], facing, -2.0), axis=1)
         pairs = np.column_stack([holder, lost]).astype(np.int64)
@@ -270,13 +238,14 @@ class _Search:
         fresh = [p for p in pairs if (int(p[0]), int(p[1])) not in seen]
         return np.array(fresh, dtype=np.int64).reshape(-1, 2)
 
-    def _problem(self, demanded: NDArray[np.int64], reach: float) -> BaselineProblem:
-        return spread_problem(
+    def _stated(self, demanded: NDArray[np.int64], reach: float) -> BaselineProblem:
+        return state_baselines(
             at_poses(self.cameras, self.poses),
             self.aims,
             self.measured,
             self.pairs,
-            self.target,
+            self.surface,
+            self._rings,
             self.limits,
             demanded=demanded,
             max_step=reach,
@@ -333,29 +302,15 @@ class _Search:
         self.spent += 1
         return self._measure(poses)
 
-    def _weight(self, measured: NDArray[np.bool_]) -> float:
-        return float(self.target.weights[measured.any(axis=1)].sum())
-
-    def _neighbours(self, measured: NDArray[np.bool_]) -> list[tuple[int, int]]:
-        return neighbouring_pairs(
-            measured,
-            self.target.weights,
-            self.target.adjacent,
-            min_overlap_share=self._share,
-        )
-
-    def _count_groups(self, measured: NDArray[np.bool_]) -> int:
-        return len(
-            overlap_components(
-                measured, self.target.weights, min_overlap_share=self._share
-            )
-        )
-
-    def _smallest(self, poses: _Array) -> float | None:
+    def _smallest(self) -> float | None:
         if not self.pairs:
             return None
         index = np.array(self.pairs, dtype=np.int64)
-        return smallest_baseline(poses[:, :3, 3], index)
+        return smallest_baseline(self.poses[:, :3, 3], index)
+
+
+def _count(measured: NDArray[np.bool_]) -> int:
+    return int(measured.any(axis=1).sum())
 
 
 def aims_of(

@@ -1,0 +1,205 @@
+"""Maximises a plan's baselines on its scene: rays, bodies and rings decide."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.cameras.baselines.baseline_terms import (
+    BaselineLimits,
+    RingsOnSurface,
+    at_poses,
+)
+from planning.cameras.baselines.seams import SampledSurface
+from planning.cameras.baselines.widest_baselines import (
+    WidestBaselines,
+    maximise_baselines,
+)
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.scene.clearance import lacks_clearance
+from planning.scene.measured import LitSamples, lit_samples, measured_by
+from planning.scene.scene import Scene
+from planning.scene.standing import moves_bodies
+
+from .camera_bodies import lit_among
+
+_SAMPLES = 6000
+_STREAM = 300
+# Samples that confirm a move which those did not forbid.
+_CONFIRMING = 16_000
+# What candidates cover is the measure of all claims: cameras may measure this share of
+# it more, no further. Where candidates cover nearly all that is lit none can.
+_BEYOND, _NEARLY = 0.002, 0.97
+
+
+@dataclass(frozen=True, eq=False)
+class BaselineSamples:
+    """Lit samples on which baselines are maximised.
+
+    Attributes:
+        scene: With the bodies of the projectors.
+        projectors: As planned, with their rings.
+        lit: The samples, lit were there no cameras.
+        covered: Samples that any candidate measures, shape (n,); None: any may be.
+    """
+
+    scene: Scene
+    projectors: tuple[PlannedProjector, ...]
+    lit: LitSamples
+    covered: NDArray[np.bool_] | None = None
+
+    @cached_property
+    def surface(self) -> SampledSurface:
+        """The samples as the seams take them."""
+        samples = self.lit.target.samples
+        return SampledSurface(samples.points, samples.normals)
+
+    @cached_property
+    def rings(self) -> RingsOnSurface:
+        """The rings of every projector on the samples."""
+        noise = self.scene.requirements.triangulation.noise_px
+        return RingsOnSurface(
+            np.stack([rings.normals for rings in self.lit.rings]),
+            np.stack([rings.spacing for rings in self.lit.rings]),
+            np.stack(
+                [noise / np.maximum(x.incidence_cos, 1e-9) for x in self.lit.lights]
+            ),
+            self.lit.lit,
+        )
+
+    def count_lit(self, cameras: Sequence[PlannedCamera]) -> int:
+        """Return how many samples stay lit past the bodies of cameras."""
+        return int(lit_among(self.projectors, self.lit, cameras).any(axis=1).sum())
+
+    def measured(
+        self, cameras: Sequence[PlannedCamera], least_lit: int
+    ) -> NDArray[np.bool_]:
+        """Return which camera measures which sample, (n, k); none where that can't be.
+
+        It can't be where bodies collide or leave too little lit, nor where more is
+        measured that no candidate covers than is spoken of as nothing.
+
+        Args:
+            cameras: As they are to stand.
+            least_lit: How many samples must stay lit.
+        """
+        none = np.zeros((len(self.lit.target), len(cameras)), dtype=bool)
+        scene, rows = self.scene, self.lit
+        if moves_bodies(cameras):
+            scene = scene.among((*self.projectors, *cameras))
+            lit = lit_among(self.projectors, rows, cameras)
+            fits = not any(lacks_clearance(scene, camera) for camera in cameras)
+            if not fits or lit.any(axis=1).sum() < least_lit:
+                return none
+            rows = replace(rows, lit=lit)
+        measured = measured_by(scene, cameras, rows)
+        if self.covered is not None:
+            beyond = np.count_nonzero(measured.any(axis=1) & ~self.covered)
+            if beyond > _BEYOND * np.count_nonzero(self.covered):
+                return none
+        return measured
+
+
+def baseline_samples(
+    scene: Scene, projectors: Sequence[PlannedProjector]
+) -> BaselineSamples:
+    """Return lit samples that no cover ever saw.
+
+    On a cover's samples, to which its cameras are fitted, a move seems to lose less
+    than it does.
+
+    Args:
+        scene: With the bodies of the projectors.
+        projectors: As planned, with their rings.
+    """
+    lit = lit_samples(scene, projectors, scene.target_samples(_SAMPLES, _STREAM))
+    return BaselineSamples(scene, tuple(projectors), lit)
+
+
+def held_to_candidates(
+    samples: BaselineSamples,
+    candidates: Sequence[PlannedCamera],
+    cover: LitSamples,
+    measured: NDArray[np.bool_],
+) -> BaselineSamples:
+    """Return the samples with which of them any candidate covers.
+
+    Args:
+        samples: For the baselines.
+        candidates: Over which the number of cameras was proved.
+        cover: Samples of the cover.
+        measured: Which candidate measures which of those, shape (n, m).
+    """
+    if measured[cover.lit.any(axis=1)].any(axis=1).mean() >= _NEARLY:
+        return samples
+    covered = measured_by(samples.scene, candidates, samples.lit).any(axis=1)
+    return replace(samples, covered=np.asarray(covered))
+
+
+def widen_baselines(
+    samples: BaselineSamples,
+    cameras: Sequence[PlannedCamera],
+    *,
+    max_evaluations: int = 48,
+    max_programs: float = np.inf,
+    spare_field: float = 0.0,
+    confirmed: bool = False,
+) -> WidestBaselines:
+    """Maximise the baselines of cameras; no move is taken that loses coverage.
+
+    Args:
+        samples: On which coverage is held.
+        cameras: As they stand.
+        max_evaluations: Times that coverage is evaluated, at most.
+        max_programs: Baseline programs at most.
+        spare_field: What is kept free of the half fields beyond seams [rad].
+        confirmed: Whether more samples must agree to each move.
+    """
+    least_lit = samples.count_lit(cameras)
+    return maximise_baselines(
+        cameras,
+        lambda poses: samples.measured(at_poses(cameras, poses), least_lit),
+        samples.surface,
+        baseline_limits(samples.scene, spare_field),
+        rings=samples.rings,
+        confirm=_confirming(samples, cameras) if confirmed else None,
+        max_evaluations=max_evaluations,
+        max_programs=max_programs,
+    )
+
+
+def _confirming(
+    samples: BaselineSamples, cameras: Sequence[PlannedCamera]
+) -> Callable[[NDArray[np.float64]], int]:
+    """Count what is measured of further samples, drawn when they are first needed."""
+
+    @cache
+    def drawn() -> tuple[BaselineSamples, int]:
+        scene, projectors = samples.scene, samples.projectors
+        target = scene.target_samples(_CONFIRMING, _STREAM + 1)
+        more = BaselineSamples(
+            scene, projectors, lit_samples(scene, projectors, target)
+        )
+        return more, more.count_lit(cameras)
+
+    def count(poses: NDArray[np.float64]) -> int:
+        more, least_lit = drawn()
+        measured = more.measured(at_poses(cameras, poses), least_lit)
+        return int(measured.any(axis=1).sum())
+
+    return count
+
+
+def baseline_limits(scene: Scene, spare_field: float = 0.0) -> BaselineLimits:
+    """Return what binds a camera; `spare_field` as for `widen_baselines`."""
+    required = scene.requirements
+    return BaselineLimits(
+        required.camera.max_incidence,
+        required.triangulation.min_conditioning,
+        scene.safe_workspace,
+        required.triangulation.min_ring_pitch_px,
+        required.triangulation.max_sigma_m,
+        spare_field,
+    )
