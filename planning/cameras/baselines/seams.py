@@ -154,7 +154,7 @@ def find_seams(
 
 def both_orders(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return each pair, and right after it the same the other way round."""
-    return [order for pair in pairs for order in (pair, pair[::-1])]
+    return [order for a, b in pairs for order in ((a, b), (b, a))]
 
 
 def _border(count: NDArray[np.int64], reach: NDArray[np.bool_]) -> NDArray[np.int64]:
