@@ -1,6 +1,7 @@
 """Ring axes move only where the exact predicate agrees, and the proof follows them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -275,7 +276,7 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
         own = code_surfaces(p, points)
         assert np.array_equal(own.normals, rings.normals)
     count = len(cover.cameras)
-    assert followed.stage.certificate["count"] == count
+    assert followed.stage.certificate.count == count
     # Another number of cameras than is proved: axes and proof stay.
     more = follow_cameras(scene, projectors, (*cover.cameras, cover.cameras[0]), stage)
     assert more.stage is stage
@@ -295,7 +296,9 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
 def test_axes_that_cost_the_proof_are_dropped(ball, changes, enough):
     _, _, cover = ball
     three = {"chosen": np.array([1, 2, 3]), "lower_bound": 3, "status": "optimal"}
-    old = {"status": "feasible", "candidates": {"lower_bound": 3}}
+    old = SimpleNamespace(
+        status="feasible", candidates=SimpleNamespace(lower_bound=3)
+    )
     assert proves_as_much(replace(cover.selection, **three | changes), old, 3) == enough
 
 

@@ -59,7 +59,7 @@ def stages(scene):
 def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
     """Caps of 60 degrees (parallel) hold a quarter of the area: 0.6 takes 3 or more."""
     _, projectors, cameras, _ = stages
-    least = projectors.certificate["candidates"]["lower_bound"]
+    least = projectors.certificate.candidates.lower_bound
     assert 3 <= least <= len(projectors.projectors) <= 4
     assert len(cameras.cameras) >= 2
 
