@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.highs import run_highs
+from solvers.highs import quiet_highs, run_highs, seconds_left
 from solvers.status import WorkBudget
 
 from .cell_problem import WholeRows
@@ -94,7 +94,9 @@ class MultiplierProgram:
         if steps < 1 or self._budget.exhausted:
             return None
         self._solver.setOptionValue("simplex_iteration_limit", steps)
-        self._solver.setOptionValue("time_limit", self._clock())
+        # HiGHS' time counts from when the model was made.
+        clock = float(self._solver.getRunTime()) + seconds_left(self._budget)
+        self._solver.setOptionValue("time_limit", clock)
         run_highs(self._solver)
         taken = self._solver.getInfo().simplex_iteration_count
         self._budget.spend(max(0, int(taken)) * cost + 1e5)
@@ -110,22 +112,9 @@ class MultiplierProgram:
         value = float(self._solver.getInfo().objective_function_value)
         return Proposal(multipliers, value, self.cells[used])
 
-    def _clock(self) -> float:
-        """Return HiGHS' time limit, which counts from when the model was made."""
-        left = max(0.01, min(self._budget.time_left, 1e7))
-        return float(self._solver.getRunTime()) + left
-
     def _model(self) -> Any:  # noqa: ANN401
         n, n_sets = self._live.size, self._slack.size
-        solver: Any = self._highs.Highs()
-        for name, value in (
-            ("output_flag", False),
-            ("threads", 1),
-            ("parallel", "off"),
-            ("random_seed", 0),
-            ("solver", "simplex"),
-        ):
-            solver.setOptionValue(name, value)
+        solver = quiet_highs(solver="simplex")
         infinity = self._highs.kHighsInf
         lower = np.zeros(n + 1 + n_sets)
         upper = np.concatenate([np.ones(n), [infinity], np.ones(n_sets)])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from solvers.status import interruptible
 
 from .axis_problem import INSET, PITCH_POWER, AxisProgram
-from .ipopt import strict_solver
+from .ipopt import Nlp, strict_solver
 from .light import Light
 from .slots import slots_for
 
@@ -42,17 +42,7 @@ class AxisOutcome:
     multipliers: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class AxisNlp:
-    """The program as CasADi expressions: minimise f(x, p) subject to g(x, p) >= 0."""
-
-    x: Any
-    p: Any
-    f: Any
-    g: Any
-
-
-def build_axis_nlp(light: Light, n: int, n_held: int) -> AxisNlp:
+def build_axis_nlp(light: Light, n: int, n_held: int) -> Nlp:
     """State a round for n pairs and n_held points.
 
     Returns:
@@ -82,7 +72,7 @@ def build_axis_nlp(light: Light, n: int, n_held: int) -> AxisNlp:
     c = ca.sum2(rays * d) ** 2 / damped
     k = (ca.sum2(slope_u * d) ** 2 + ca.sum2(slope_v * d) ** 2) / damped
     score = c / (c * (1.0 + (crowding * k) ** PITCH_POWER) + fixed + noise * k)
-    return AxisNlp(x, p, -ca.dot(weight, score), g)
+    return Nlp(x, p, -ca.dot(weight, score), g)
 
 
 def axis_parameters(

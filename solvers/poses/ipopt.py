@@ -1,32 +1,19 @@
 """IPOPT as the smooth programs run it: exact derivatives, strict limits, silent."""
 
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
 
-class Nlp(Protocol):
-    """A program in CasADi: minimise f(x, p) subject to limits on g(x, p)."""
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """A program as CasADi expressions: minimise f(x, p) subject to g(x, p) >= 0."""
 
-    @property
-    def x(self) -> Any:  # noqa: ANN401
-        """Variables."""
-        ...
-
-    @property
-    def p(self) -> Any:  # noqa: ANN401
-        """Parameters."""
-        ...
-
-    @property
-    def f(self) -> Any:  # noqa: ANN401
-        """What is minimised."""
-        ...
-
-    @property
-    def g(self) -> Any:  # noqa: ANN401
-        """What is limited."""
-        ...
+    x: Any
+    p: Any
+    f: Any
+    g: Any
 
 
 def strict_solver(name: str, nlp: Nlp, max_iterations: int) -> Any:  # noqa: ANN401

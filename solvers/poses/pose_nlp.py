@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from solvers.status import interruptible
 
-from .ipopt import strict_solver
+from .ipopt import Nlp, strict_solver
 from .light import Light
 from .pose_problem import INSET, PoseProgram, pose_margins
 from .slots import slots_for
@@ -57,17 +57,7 @@ class IpoptOutcome:
     bound_multipliers: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class PoseNlp:
-    """The program as CasADi expressions: minimise f(x, p) subject to g(x, p) >= 0."""
-
-    x: Any
-    p: Any
-    f: Any
-    g: Any
-
-
-def build_pose_nlp(light: Light, n: int, n_planes: int = 0) -> PoseNlp:
+def build_pose_nlp(light: Light, n: int, n_planes: int = 0) -> Nlp:
     """State the program for n samples.
 
     Args:
@@ -138,7 +128,7 @@ def build_pose_nlp(light: Light, n: int, n_planes: int = 0) -> PoseNlp:
         planes = ca.reshape(c[_N_SCALARS:], n_planes, 4)
         g = ca.vertcat(g, planes[:, :3] @ q - planes[:, 3])
     f = -t + RIDGE * (ca.sumsqr(q) + ca.sumsqr(s))
-    return PoseNlp(x, p, f, g)
+    return Nlp(x, p, f, g)
 
 
 def pose_parameters(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.highs import run_highs
+from solvers.highs import quiet_highs, row_program, run_highs
 from solvers.status import WorkBudget
 
 from .reductions import ReducedCover
@@ -197,15 +197,7 @@ def _model(
         ones[0, :n_s] = 1.0
         link = _stack([[link], [sparse.csr_array(ones)]])
         lower, upper = np.append(lower, 0.0), np.append(upper, float(max_sets))
-    lp: Any = highspy.HighsLp()
-    lp.num_col_, lp.num_row_ = cost.size, lower.size
-    lp.col_cost_ = cost
-    lp.col_lower_, lp.col_upper_ = np.zeros(cost.size), np.ones(cost.size)
-    lp.row_lower_, lp.row_upper_ = lower, upper
-    lp.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
-    lp.a_matrix_.start_ = link.indptr.astype(np.int32)
-    lp.a_matrix_.index_ = link.indices.astype(np.int32)
-    lp.a_matrix_.value_ = link.data.astype(np.float64)
+    lp = row_program(cost, link, lower, upper)
     if integer:
         whole, free = highspy.HighsVarType.kInteger, highspy.HighsVarType.kContinuous
         kinds = [whole] * n_s
@@ -213,17 +205,11 @@ def _model(
             # Half of the service is no half of a row.
             kinds += [whole if need > 1 else free for need in cover.needs]
         lp.integrality_ = kinds
-    solver = highspy.Highs()
-    for name, value in (
-        ("output_flag", False),
-        ("threads", 1),
-        ("parallel", "off"),
-        ("random_seed", 0),
-        ("mip_rel_gap", 0.0),
-        ("mip_abs_gap", 1e-9),
-        ("time_limit", max(0.01, budget.time_left)),
-    ):
-        solver.setOptionValue(name, value)
+    solver = quiet_highs(
+        mip_rel_gap=0.0,
+        mip_abs_gap=1e-9,
+        time_limit=max(0.01, budget.time_left),
+    )
     solver.passModel(lp)
     return solver
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.highs import run_highs
+from solvers.highs import quiet_highs, row_program, run_highs, seconds_left
 from solvers.status import WorkBudget
 
 _FIRST_ROWS = 200
@@ -87,7 +87,7 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
         entries = float(np.count_nonzero(covers[rows]) + n_sets)
         steps = int(budget.remaining / (_UNITS_PER_ITERATION * entries))
         solver.setOptionValue("simplex_iteration_limit", max(1, min(steps, 10**7)))
-        solver.setOptionValue("time_limit", solver.getRunTime() + _seconds(budget))
+        solver.setOptionValue("time_limit", solver.getRunTime() + seconds_left(budget))
         run_highs(solver)
         done = float(solver.getInfo().simplex_iteration_count)
         budget.spend(_UNITS_PER_ITERATION * entries * done + 2.0 * covers.size)
@@ -114,33 +114,11 @@ def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
     return LinearCover(_rounded_up(needed), needed, reduced, tight, primal)
 
 
-def _seconds(budget: WorkBudget) -> float:
-    return float(max(0.01, min(budget.time_left, 1e9)))
-
-
 def program(covers: NDArray[np.bool_], budget: WorkBudget) -> Any:  # noqa: ANN401
     """Return a HiGHS instance that holds min sum x, A x >= 1, 0 <= x <= 1."""
-    import highspy
-
     n_rows, n_sets = covers.shape
-    matrix = sparse.csr_array(covers)
-    lp: Any = highspy.HighsLp()
-    lp.num_col_, lp.num_row_ = n_sets, n_rows
-    lp.col_cost_ = np.ones(n_sets)
-    lp.col_lower_, lp.col_upper_ = np.zeros(n_sets), np.ones(n_sets)
-    lp.row_lower_, lp.row_upper_ = np.ones(n_rows), np.full(n_rows, np.inf)
-    lp.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
-    lp.a_matrix_.start_ = matrix.indptr.astype(np.int32)
-    lp.a_matrix_.index_ = matrix.indices.astype(np.int32)
-    lp.a_matrix_.value_ = matrix.data.astype(np.float64)
-    solver = highspy.Highs()
-    for name, value in (
-        ("output_flag", False),
-        ("threads", 1),
-        ("parallel", "off"),
-        ("random_seed", 0),
-        ("time_limit", _seconds(budget)),
-    ):
-        solver.setOptionValue(name, value)
-    solver.passModel(lp)
+    solver = quiet_highs(time_limit=seconds_left(budget))
+    endless = np.full(n_rows, np.inf)
+    rows = sparse.csr_array(covers)
+    solver.passModel(row_program(np.ones(n_sets), rows, np.ones(n_rows), endless))
     return solver
