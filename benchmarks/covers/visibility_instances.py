@@ -68,7 +68,7 @@ def covers(instance: Instance) -> NDArray[np.bool_]:
         samples.points,
         samples.normals,
         candidates=candidates,
-    ).dense()
+    )
     reached = np.flatnonzero(seen.any(axis=0))
     if reached.size < instance.samples:
         raise ValueError(f"{instance.name}: only {reached.size} samples are seen")

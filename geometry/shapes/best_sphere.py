@@ -11,6 +11,7 @@ isn't round makes centre and radius uncertain, as it should.
 """
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,8 @@ def fit_sphere(points: _Array, covariances: _Array) -> BestSphere:
     high = float(np.abs(fitted.residuals).max())
     while excess(high) > 0.0:
         high *= 2.0
-    return _weighted(points, covariances, start, brentq(excess, 0.0, high, xtol=_TAU))
+    shape_sigma = cast(float, brentq(excess, 0.0, high, xtol=_TAU))
+    return _weighted(points, covariances, start, shape_sigma)
 
 
 def _algebraic(points: _Array) -> _Array:

@@ -54,9 +54,9 @@ def camera_views(
         samples.points,
         samples.normals,
         candidates=wanted,
-    ).dense_transposed()
+    )
     clear = (
-        _taken(sight, np.flatnonzero(free[sight.rows, column]))
+        _taken(sight, np.flatnonzero(free[column, sight.rows]))
         for column, sight in enumerate(offered)
     )
     return tuple(

@@ -111,8 +111,8 @@ def _with_shadows(
         target.samples.normals,
         along=light_of(projectors[0].device).common_direction(poses),
         candidates=np.ascontiguousarray(lit.T),
-    ).dense_transposed()
-    return np.where(lit & ~seen, np.int8(OCCLUDED), first)
+    )
+    return np.where(lit & ~seen.T, np.int8(OCCLUDED), first)
 
 
 def _mark_blocked(
