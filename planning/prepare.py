@@ -16,7 +16,7 @@ from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
-from planning.report.advice.relaxations import nothing_lit
+from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.partial_plan import PlanRequest
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
 from planning.scene.clearance import check_existing_clearance

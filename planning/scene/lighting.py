@@ -50,18 +50,34 @@ def first_failure(
         Shape (n,).
     """
     first = _ignoring_occlusion(projector, SampleColumns.of(target), limits)
-    samples, pose = target.samples, projector.world_from_device
     if visibility is not None:
         clear = np.flatnonzero(first == LIT)
-        hidden = visibility.blocked(
-            pose[:3, 3],
-            samples.points[clear],
-            samples.normals[clear],
-            along=light_of(projector.device).common_direction(pose),
-        )
+        hidden = _in_shadow(projector, target.take(clear), visibility)
         first[clear[hidden]] = OCCLUDED
-    _mark_blocked(first, projector, samples.points, bodies)
+    _mark_blocked(first, projector, target.samples.points, bodies)
     return first
+
+
+def stands_between(
+    scene: Scene, projector: PlannedProjector, target: Target
+) -> NDArray[np.bool_]:
+    """Return from which samples surface or bodies keep the light, shape (n,)."""
+    hidden = _in_shadow(projector, target, scene.visibility)
+    blocked = blocked_by(scene.standing, projector, target.samples.points)
+    return hidden | blocked.any(axis=1)
+
+
+def _in_shadow(
+    projector: PlannedProjector, target: Target, visibility: Visibility
+) -> NDArray[np.bool_]:
+    """Return which samples the surface hides from a projector, shape (n,)."""
+    samples, pose = target.samples, projector.world_from_device
+    return visibility.blocked(
+        pose[:3, 3],
+        samples.points,
+        samples.normals,
+        along=light_of(projector.device).common_direction(pose),
+    )
 
 
 def lit_stages(

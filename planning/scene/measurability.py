@@ -53,29 +53,30 @@ def view(
     """
     rays = CameraRays.of(camera, target)
     first = first_violated(CAMERA_LIMITS, rays, limits, len(target))
-    mark_between(first, camera, target, visibility, bodies)
+    near = np.flatnonzero(first >= OCCLUDED)
+    between = first_between(camera, target.take(near), visibility, bodies)
+    first[near] = np.minimum(first[near], between)
     jacobian = np.zeros((len(target), 3, 2))
     seen, turn = first == SEEN, camera.world_from_device[:3, :3]
     jacobian[seen] = turn @ camera.device.ray_jacobian(rays.local[seen])
     return ViewedSamples(first, rays.rays, rays.distances, rays.facing, jacobian)
 
 
-def mark_between(
-    first: NDArray[np.int8],
+def first_between(
     camera: PlannedCamera,
     target: Target,
     visibility: Visibility | None,
     bodies: Sequence[Standing],
-) -> None:
-    """Mark samples that come as far as to what stands between, and are hidden."""
-    points, normals = target.samples.points, target.samples.normals
-    near = np.flatnonzero(first >= OCCLUDED)
+) -> NDArray[np.int8]:
+    """Return what hides samples first, `OCCLUDED` or `BLOCKED`; `SEEN` if nothing."""
+    points = target.samples.points
+    first = np.full(len(target), SEEN, dtype=np.int8)
     if bodies:
-        first[near[blocked_by(bodies, camera, points[near]).any(axis=1)]] = BLOCKED
+        first[blocked_by(bodies, camera, points).any(axis=1)] = BLOCKED
     if visibility is not None:
-        eye = camera.world_from_device[:3, 3]
-        hidden = visibility.blocked(eye, points[near], normals[near])
-        first[near[hidden]] = OCCLUDED
+        place, normals = camera.world_from_device[:3, 3], target.samples.normals
+        first[visibility.blocked(place, points, normals)] = OCCLUDED
+    return first
 
 
 def pair_quality(

@@ -17,15 +17,15 @@ from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.report.advice import camera_relaxations
-from planning.report.advice.camera_demands import Demands, demands
-from planning.report.advice.camera_knobs import knobs
 from planning.report.advice.camera_relaxations import (
     _SPARE,
     _least_enough,
-    _Share,
     for_so_many,
     out_of_reach,
 )
+from planning.report.advice.demands import Demands, demands
+from planning.report.advice.least_changes import Share
+from planning.report.advice.rig_facts import relaxations_of_cameras as ways
 from planning.report.claims import Devices, make_claims
 from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
@@ -182,7 +182,7 @@ def test_a_sample_is_measured_from_exactly_what_it_asks_on(rig, world, name, say
         "gap": {"triangulation": {"min_ring_pitch_px": 12.0}},
     }[name]
     scene = tightened(scene, **alone)
-    (knob,) = (k for k in knobs(rig, scene.requirements) if says in k.say(1.0))
+    (knob,) = (k for k in ways(rig, scene.requirements) if says in k.say(1.0))
     assert asked_and_checked(name, knob, scene, rows, cameras) > 0
 
 
@@ -199,7 +199,7 @@ def test_ends_of_a_range_of_its_own_give_way(world, name, says, tmp_path):
     scene, _, rows, cameras = world
     own = load_rig(path)
     cameras = [replace(camera, device=own.camera_device()) for camera in cameras]
-    turned = knobs(own, scene.requirements)
+    turned = ways(own, scene.requirements)
     value = -1.0 if name == "near" else 1.0
     knob = [k for k in turned if "sharp" in k.say(value) and says in k.say(value)][
         -1 if name == "both" else 0
@@ -216,21 +216,19 @@ def test_a_lens_asks_for_the_blur_that_makes_it_sharp(world, tmp_path):
     scene, _, rows, cameras = world
     own = load_rig(path)
     cameras = [replace(camera, device=own.camera_device()) for camera in cameras]
-    turned = [k for k in knobs(own, scene.requirements) if "focus" in k.say(0.6)]
+    turned = [k for k in ways(own, scene.requirements) if "focus" in k.say(0.6)]
     assert len(turned) == 1
     assert asked_and_checked("blur", turned[0], scene, rows, cameras) > 0
     # Twice the blur is half the aperture.
     assert turned[0].say(0.8) == (
         "camera.focus.blur_px = 0.8 (now 0.4) or camera.focus.f_number = 22 (now 11)"
     )
-    assert not any("sharp" in k.say(1.0) for k in knobs(own, scene.requirements)[2:])
+    assert not any("sharp" in k.say(1.0) for k in ways(own, scene.requirements)[2:])
 
 
 def test_an_image_asks_for_the_angle_off_its_middle(rig, world):
     scene, _, rows, cameras = world
-    (knob,) = (
-        k for k in knobs(rig, scene.requirements) if "off its middle" in k.say(1)
-    )
+    (knob,) = (k for k in ways(rig, scene.requirements) if "off its middle" in k.say(1))
     camera = cameras[2]
     found = demands(scene, camera, rows, (knob,))
     helped = np.isfinite(found.asked[0])
@@ -254,7 +252,7 @@ def test_the_limit_at_which_a_sample_comes_furthest_is_that_of_its_views(rig, wo
     aside = replace(aside, device=replace(aside.device, range_m=(1.0, 1.05)))
     causes = set()
     for camera in (near, *cameras, aside):
-        found = demands(scene, camera, rows, knobs(rig, scene.requirements))
+        found = demands(scene, camera, rows, ways(rig, scene.requirements))
         assert np.array_equal(found.furthest, furthest_failure(scene, [camera], rows))
         causes |= set(found.furthest.tolist())
     assert len(causes) >= 7
@@ -268,7 +266,7 @@ def test_two_limits_that_forbid_a_sample_are_helped_by_neither(rig, world):
         camera={"max_incidence": np.radians(1e-3)},
         triangulation={"min_conditioning": 1.0},
     )
-    found = demands(none, cameras[0], rows, knobs(rig, required))
+    found = demands(none, cameras[0], rows, ways(rig, required))
     assert np.all(np.isposinf(found.asked))
 
 
@@ -279,7 +277,7 @@ def test_the_least_value_with_which_so_many_are_enough_is_that_of_every_choice(s
         rng.random((12, 5)) < 0.7, rng.integers(1, 30, (12, 5)).astype(float), np.inf
     )
     asked[rng.random((12, 5)) < 0.2] = -np.inf
-    knob = knobs(load_rig("default"), _requirements())[0]
+    knob = ways(load_rig("default"), _requirements())[0]
 
     class Two(camera_relaxations._Covers):
         def enough(self, value):
@@ -309,7 +307,7 @@ def _requirements():
 
 
 def test_changes_that_gain_less_than_a_point_are_left_out():
-    share = _Share(1000, 500, 0.9)
+    share = Share(1000, 500, 0.9)
     assert share.wanted == 400
     gained = share.gains({"a": 400, "b": 9, "c": 10})
     assert gained == [
@@ -392,11 +390,11 @@ def test_a_limit_gives_way_as_far_as_the_share_asks_or_as_it_helps(rig, monkeypa
     found = Demands(furthest, asked)
     monkeypatch.setattr(camera_relaxations, "demands", lambda *_: found)
     monkeypatch.setattr(camera_relaxations, "taken", lambda rows, *_: rows)
-    (knob,) = knobs(rig, _requirements())[:1]
+    (knob,) = ways(rig, _requirements())[:1]
     table = camera_relaxations._Least((knob,), 20)
     table.add(scene=None, camera=None, rows=SimpleNamespace(lit=None))
     for least, degrees, gained in ((0.35, 5, 5), (0.9, 10, 10), (0.1, None, None)):
-        changes = table.least_changes(_Share(20, 2, least))
+        changes = table.least_changes(Share(20, 2, least))
         want = {} if degrees is None else {knob.say(degrees): gained}
         assert changes == want
 

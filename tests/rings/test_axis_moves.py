@@ -296,9 +296,7 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
 def test_axes_that_cost_the_proof_are_dropped(ball, changes, enough):
     _, _, cover = ball
     three = {"chosen": np.array([1, 2, 3]), "lower_bound": 3, "status": "optimal"}
-    old = SimpleNamespace(
-        status="feasible", candidates=SimpleNamespace(lower_bound=3)
-    )
+    old = SimpleNamespace(status="feasible", candidates=SimpleNamespace(lower_bound=3))
     assert proves_as_much(replace(cover.selection, **three | changes), old, 3) == enough
 
 

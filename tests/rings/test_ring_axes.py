@@ -11,7 +11,7 @@ from planning.cameras.camera_cover import (
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
-from planning.report.advice.relaxations import reachability_relaxations
+from planning.report.advice.projector_relaxations import reachability_relaxations
 from planning.report.claims import Devices, make_claims
 from planning.rig.rig import load_rig
 from planning.rings.ring_pitch import widest_gap

@@ -24,13 +24,14 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from planning.model.requirements import Requirements
+from planning.scene.limits.camera_limits import CAMERA_LIMITS, CellView
+from planning.scene.limits.limit import may_hold
+from planning.scene.limits.pair_limits import PAIR_LIMITS, PairCell
 from planning.scene.measured import LitSamples
 
 from .image_cone import image_cone
 
 _Array = NDArray[np.float64]
-# Products of a few cosines and lengths are exact to this.
-_ROUNDING = 1e-9
 
 
 class MeasurableCells:
@@ -75,11 +76,9 @@ class MeasurableCells:
         self._pulse()
         cosine, sine = np.cos(psi), np.sin(psi)
         facing = _nearest(_dot(self._normals[samples], towards), cosine, sine)
-        seen = facing >= np.cos(self._camera.max_incidence) - _ROUNDING
-        finest = self._camera.max_sample_distance_m
-        if finest is not None:
-            step = nearest * np.cos(self._image.off_axis) * (1.0 - _ROUNDING)
-            seen &= step <= finest * self._focal * np.maximum(facing, 1e-9)
+        depth = nearest * np.cos(self._image.off_axis)
+        cell = CellView(facing, depth, self._focal)
+        seen = may_hold(CAMERA_LIMITS, cell, self._camera, len(samples))
         some = np.flatnonzero(seen)
         found = np.zeros(samples.size, dtype=bool)
         found[some] = self._paired(
@@ -110,35 +109,10 @@ class MeasurableCells:
             crossing = _nearest(np.abs(_dot(self._across[p, own], u)), c, s)
             turn = _least_sine(np.abs(_dot(self._along[p, own], u)), c, s)
             g = nearest[left] * self._image.least_turn * self._width[p, own] * turn
-            found[left] = self._passes(p, own, crossing, facing[left], g)
+            noise, spacing = self._noise[p, own], self._spacing[p, own]
+            cell = PairCell(crossing, facing[left], g, noise, spacing)
+            found[left] = may_hold(PAIR_LIMITS, cell, self._pair, len(own))
         return found
-
-    def _passes(
-        self,
-        p: int,
-        own: NDArray[np.int64],
-        crossing: _Array,
-        facing: _Array,
-        shift: _Array,
-    ) -> NDArray[np.bool_]:
-        """Return which limits of a pair hold at best.
-
-        Args:
-            p: Projector.
-            own: Samples, shape (k,).
-            crossing: |r.m| at most, shape (k,).
-            facing: |N.r| at most, shape (k,).
-            shift: t |g| at least, shape (k,).
-        """
-        pair = self._pair
-        good = crossing >= pair.min_conditioning - _ROUNDING
-        if pair.max_sigma_m is not None:
-            edge = self._noise[p, own] * shift * (1.0 - _ROUNDING)
-            good &= edge <= pair.max_sigma_m * np.maximum(crossing, 1e-12)
-        if pair.min_ring_pitch_px is not None:
-            wide = self._spacing[p, own] * facing * (1.0 + _ROUNDING)
-            good &= wide >= pair.min_ring_pitch_px * shift
-        return good
 
 
 def _nearest(c: _Array, cosine: _Array, sine: _Array) -> _Array:

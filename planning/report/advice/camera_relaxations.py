@@ -16,27 +16,25 @@ from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import CameraStage, NothingMeasuredError, n_fixed
 from planning.model.planned import PlannedCamera
-from planning.proofs.selection import cover_problem, required_samples
+from planning.proofs.selection import required_samples
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import projector_limits
+from planning.scene.limits.limit import LimitRelaxation
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import camera_candidates
-from solvers import solve_max_coverage
 
-from .camera_demands import demands
-from .camera_knobs import Relaxation, knobs
+from .demands import demands
+from .least_changes import Share, covers_enough, least_changes
+from .rig_facts import relaxations_of_cameras
 
-_GAIN = 0.01
-# Rows that covers are looked for on, and what they cover beyond the requirement, so
+# Samples that covers are looked for on, and what they cover beyond the requirement, so
 # that fresh samples confirm it.
-_ROWS = 2000
+_SAMPLES = 2000
 _SPARE = 0.003
-# Counted work of each cover, of which no proof is asked.
-_BUDGET = 1e8
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +69,12 @@ def out_of_reach(
     )
     missed = target.take(lit & ~claims.measured_by.any(axis=1))
     rows = lit_samples(planned, devices.projectors, missed)
-    table = _Least(knobs(rig, scene.requirements), len(rows.target))
+    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(rows.target))
     for camera in devices.reference_cameras:
         table.add(scene=among, camera=camera, rows=rows)
     out = table.furthest < MEASURED
     n = int(lit.sum())
-    share = _Share(n, n - int(out.sum()), scene.requirements.min_reachable)
+    share = Share(n, n - int(out.sum()), scene.requirements.min_reachable)
     found = table.least_changes(share)
     found |= _whole_shell(among, devices.reference_cameras, rows, out, share)
     weight = target.samples.weight
@@ -102,10 +100,10 @@ def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str
     rows = error.samples
     if not len(rows.target):
         return "no limit of a camera helps"
-    table = _Least(knobs(rig, scene.requirements), len(rows.target))
+    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(rows.target))
     for camera in error.cameras:
         table.add(scene=scene, camera=camera, rows=rows)
-    share = _Share(len(rows.target), 0, scene.requirements.min_reachable)
+    share = Share(len(rows.target), 0, scene.requirements.min_reachable)
     steps = [
         f"{step['change']} would make {100.0 * step['reachable_share']:.1f} % of what "
         f"is lit measurable"
@@ -130,61 +128,32 @@ def for_so_many(
         stage: Candidates, and lit samples.
         count: Cameras that are allowed.
     """
-    n = min(len(stage.cover.samples.target), _ROWS)
-    rows = taken(stage.cover.samples, np.arange(n), stage.cover.samples.lit)
-    turned = knobs(rig, scene.requirements)
+    lit = stage.cover.samples
+    rows = taken(lit, np.arange(min(len(lit.target), _SAMPLES)), lit.lit)
+    relaxations = relaxations_of_cameras(rig, scene.requirements)
     asked = np.stack(
-        [demands(scene, camera, rows, turned).asked for camera in stage.reference],
+        [demands(scene, camera, rows, relaxations).asked for camera in stage.reference],
         axis=2,
     )
     found: list[str] = []
-    for knob, table in zip(turned, asked, strict=True):
-        value = _least_enough(knob, _Covers(table, scene, count))
+    for relaxation, table in zip(relaxations, asked, strict=True):
+        value = _least_enough(relaxation, _Covers(table, scene, count))
         if value is not None:
-            found.append(knob.say(value))
+            found.append(relaxation.say(value))
     return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class _Share:
-    """How much of n lit samples is reached now, and how much must be.
-
-    Attributes:
-        n: Lit samples.
-        reached: Those that some pose measures.
-        least: Share that must be.
-    """
-
-    n: int
-    reached: int
-    least: float
-
-    @property
-    def wanted(self) -> int:
-        """Samples to gain."""
-        return int(np.ceil(self.least * self.n - 1e-9)) - self.reached
-
-    def gains(self, gained: dict[str, int]) -> list[dict[str, Any]]:
-        """Return the changes that gain at least a percentage point, least first."""
-        entries = [
-            {"change": change, "reachable_share": (self.reached + more) / self.n}
-            for change, more in gained.items()
-            if more >= _GAIN * self.n
-        ]
-        return sorted(entries, key=lambda entry: entry["reachable_share"])
-
-
 class _Least:
-    """The least that samples ask of each knob, and how far they come, over cameras.
+    """The least that samples ask of each limit, and how far they come, over cameras.
 
     Args:
-        turned: The knobs.
+        relaxations: Limits that may give way.
         n: Samples.
     """
 
-    def __init__(self, turned: tuple[Relaxation, ...], n: int) -> None:
-        self._knobs = turned
-        self._asked = np.full((len(turned), n), np.inf)
+    def __init__(self, relaxations: Sequence[LimitRelaxation], n: int) -> None:
+        self._relaxations = relaxations
+        self._asked = np.full((len(relaxations), n), np.inf)
         self.furthest = np.zeros(n, dtype=np.int8)
 
     def add(self, *, scene: Scene, camera: PlannedCamera, rows: LitSamples) -> None:
@@ -192,32 +161,25 @@ class _Least:
         left = np.flatnonzero(self.furthest < MEASURED)
         if not len(left):
             return
-        found = demands(scene, camera, taken(rows, left, rows.lit), self._knobs)
+        found = demands(scene, camera, taken(rows, left, rows.lit), self._relaxations)
         self._asked[:, left] = np.minimum(self._asked[:, left], found.asked)
         self.furthest[left] = np.maximum(self.furthest[left], found.furthest)
 
-    def least_changes(self, share: _Share) -> dict[str, int]:
-        """Return how far each knob alone must turn, and how many samples that gains.
+    def least_changes(self, share: Share) -> dict[str, int]:
+        """Return how far each limit alone must give way, and what that gains.
 
         As far as the share asks, or where it can't be had, as far as it helps.
         """
         out = self.furthest < MEASURED
-        found: dict[str, int] = {}
-        for knob, asked in zip(self._knobs, self._asked[:, out], strict=True):
-            helped = np.sort(asked[np.isfinite(asked)])
-            if helped.size and share.wanted > 0:
-                last = min(share.wanted, helped.size) - 1
-                value = float(knob.rounded(helped[last]))
-                found[knob.say(value)] = int((asked <= value).sum())
-        return found
+        return least_changes(self._relaxations, self._asked[:, out], share.wanted)
 
 
 @dataclass(frozen=True, eq=False)
 class _Covers:
-    """What so many candidates cover at the most, as one knob turns.
+    """What so many candidates cover at the most, as one limit gives way.
 
     Attributes:
-        asked: What a sample asks of the knob at a candidate, (n, m).
+        asked: What a sample asks of the limit at a candidate, (n, m).
         scene: Requirements and seed.
         count: Cameras.
     """
@@ -231,19 +193,19 @@ class _Covers:
         measured = self.asked <= value
         share = min(self.scene.requirements.coverage + _SPARE, 1.0)
         required = required_samples(np.any(measured, axis=1), share)
-        best = solve_max_coverage(
-            cover_problem(measured, required, n_fixed(self.scene)),
+        return covers_enough(
+            measured,
+            required,
             self.count,
+            n_existing=n_fixed(self.scene),
             seed=self.scene.seed,
-            budget=_BUDGET,
-        ).selected
-        return bool(measured[:, best].any(axis=1).sum() >= required)
+        )
 
 
-def _least_enough(knob: Relaxation, covers: _Covers) -> float | None:
-    """Return the least value of a knob, rounded, at which a cover is enough."""
+def _least_enough(relaxation: LimitRelaxation, covers: _Covers) -> float | None:
+    """Return the least value, rounded, at which a cover is enough."""
     finite = covers.asked[np.isfinite(covers.asked)]
-    values = np.unique(knob.rounded(finite)).tolist()
+    values = np.unique(relaxation.rounded(finite)).tolist()
     if not values or not covers.enough(values[-1]):
         return None
     low, high = 0, len(values) - 1
@@ -260,7 +222,7 @@ def _whole_shell(
     cameras: Sequence[PlannedCamera],
     rows: LitSamples,
     out: NDArray[np.bool_],
-    share: _Share,
+    share: Share,
 ) -> dict[str, int]:
     """What cameras anywhere in the shell would measure, where they may not stand."""
     workspace = scene.requirements.workspace

@@ -9,7 +9,7 @@ from planning.report.claims import Claims, Devices
 from planning.report.partial_plan import PartialPlan
 
 from .camera_relaxations import for_so_many, out_of_reach
-from .relaxations import reachability_relaxations
+from .projector_relaxations import reachability_relaxations
 from .wider_field import wider_field
 
 

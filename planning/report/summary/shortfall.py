@@ -9,28 +9,13 @@ from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.model.words import area_words, percent
+from planning.scene.limits.limit import causes
+from planning.scene.limits.pair_limits import MEASURED_LIMITS
+from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
 # Causes that take less than this share of what is left aren't told.
 _TOLD = 0.01
-_OF_PROJECTORS = ("projector_", "tangent_angle")
-_OF_CAMERAS = ("camera_", "sample_distance", "conditioning", "sigma", "pitch")
-_CAUSE_WORDS = {
-    "projector_beam": "outside the beam or the image of every projector",
-    "projector_range": "out of the projectors' range",
-    "projector_incidence": "met by the light at too large an angle",
-    "tangent_angle": "lit along the steep direction (tangent angle too small)",
-    "projector_occlusion": "shadowed from every projector that faces it",
-    "projector_body": "kept from the light by a device's body",
-    "camera_field": "outside the image of every camera",
-    "camera_range": "out of the cameras' depth of field",
-    "camera_incidence": "seen at too large an angle",
-    "camera_occlusion": "hidden from every camera that faces it",
-    "camera_body": "hidden by a device's body",
-    "sample_distance": "sampled too coarsely",
-    "conditioning": "on a blind curve (|r.m| too small)",
-    "sigma": "measured with too large a deviation",
-    "pitch": "with rings too close in the image",
-}
+_CAUSE_WORDS = {limit.name: limit.words for limit in PROJECTOR_LIMITS + MEASURED_LIMITS}
 
 
 def cause_words(cause: str) -> str:
@@ -150,11 +135,11 @@ def _covered(document: PlanDocument, asked: Requirements) -> Iterator[str]:
 
 def _why(kind: str, coverage: Coverage) -> str:
     """What keeps devices of a kind from the target, with areas, as a sentence."""
-    prefixes = _OF_PROJECTORS if kind == "projectors" else _OF_CAMERAS
+    limits = PROJECTOR_LIMITS if kind == "projectors" else MEASURED_LIMITS
     areas = {
         cause: area
         for cause, area in coverage.uncovered_by_cause.items()
-        if cause.startswith(prefixes)
+        if cause in causes(limits)
     }
     if not areas:
         return ""

@@ -18,8 +18,8 @@ from .limit import (
     Array,
     InBetween,
     Limit,
+    LimitRelaxation,
     Mask,
-    Relaxation,
     RigFacts,
     causes,
     degrees,
@@ -138,10 +138,10 @@ class CameraField(CameraLimit):
         """Return which samples appear in the image."""
         return view.device.in_field(view.local)
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return an image that reaches farther, up to three times as wide."""
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 _off_axis,
                 to_step(1.0),
@@ -164,7 +164,7 @@ class CameraRange(CameraLimit):
         low, high = view.device.range_m
         return (view.distances >= low) & (view.distances <= high)
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return the blur that is let pass where it sets the range; else its ends."""
         sharp, focus = facts.device.range_m, facts.focus
         if focus is None:
@@ -184,7 +184,7 @@ class CameraRange(CameraLimit):
                 f"(now {focus.f_number:g})"
             )
 
-        blur = Relaxation(self.name, ask, to_digits(3), say)
+        blur = LimitRelaxation(self.name, ask, to_digits(3), say)
         # Ends that the focus sets move only with it.
         return (blur, *range_ends(self.name, "camera", allowed, sharp))
 
@@ -203,12 +203,12 @@ class CameraIncidence(CameraLimit):
         """Return which may face a camera in the cell."""
         return cell.facing >= np.cos(rules.max_incidence) - ROUNDING
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return a larger angle."""
         limit = facts.required.camera.max_incidence
         least = np.cos(max(limit, STEEPEST))
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 lambda view: np.where(
                     view.facing >= least, degrees(view.facing), np.inf
@@ -241,13 +241,13 @@ class SampleDistance(CameraLimit):
         widest = limit * cell.focal_px * np.maximum(cell.facing, 1e-9)
         return cell.least_depth * (1.0 - ROUNDING) <= widest
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return a larger distance."""
         limit = facts.required.camera.max_sample_distance_m
         if limit is None:
             return ()
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 lambda view: 1e3 * view.sample_distance,
                 to_digits(3),

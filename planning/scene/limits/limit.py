@@ -64,7 +64,7 @@ class _HasDistances(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Relaxation:
+class LimitRelaxation:
     """How one limit may give way, all others as they are.
 
     Attributes:
@@ -102,7 +102,7 @@ class Limit(Generic[View, Cell, Rules]):
         """Return a superset of where it holds from poses of a cell; None: of all."""
         return None
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return how it may give way; empty: nothing is advised."""
         return ()
 
@@ -150,9 +150,21 @@ def violated(
     return table
 
 
+def may_hold(
+    limits: Sequence[Limit[Any, Cell, Rules]], cell: Cell, rules: Rules, n: int
+) -> Mask:
+    """Return a superset of the samples on which all limits hold from a cell, (n,)."""
+    possible = np.ones(n, dtype=bool)
+    for limit in limits:
+        holds = limit.may_hold(cell, rules)
+        if holds is not None:
+            possible &= holds
+    return possible
+
+
 def range_ends(
     cause: str, device: str, ends: tuple[float, float], sharp: tuple[float, float]
-) -> tuple[Relaxation, ...]:
+) -> tuple[LimitRelaxation, ...]:
     """Return relaxations of a range's near end, its far end, and both at once.
 
     Each is left out where that end isn't what binds. Views have `distances` in [m].
@@ -169,7 +181,7 @@ def range_ends(
     def away(view: _HasDistances) -> Array:
         return 1e3 * view.distances
 
-    nearer = Relaxation(
+    nearer = LimitRelaxation(
         cause,
         lambda view: np.where(
             (view.distances >= 0.0) & (view.distances <= sharp[1]), -away(view), np.inf
@@ -177,13 +189,13 @@ def range_ends(
         to_step(1.0),
         lambda value: f"a {device} sharp from {-value:.0f} mm (now {low:.0f})",
     )
-    farther = Relaxation(
+    farther = LimitRelaxation(
         cause,
         lambda view: np.where(view.distances >= sharp[0], away(view), np.inf),
         to_step(1.0),
         lambda value: f"a {device} sharp to {value:.0f} mm (now {high:.0f})",
     )
-    both = Relaxation(
+    both = LimitRelaxation(
         cause,
         lambda view: np.maximum(low - away(view), away(view) - high),
         to_step(1.0),

@@ -16,8 +16,8 @@ from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES, ViewedSamples
 from .limit import (
     Array,
     Limit,
+    LimitRelaxation,
     Mask,
-    Relaxation,
     RigFacts,
     causes,
     to_digits,
@@ -85,11 +85,11 @@ class Conditioning(PairLimit):
         """Return which may be, from the largest |r.m|."""
         return cell.conditioning >= rules.min_conditioning - ROUNDING
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return a smaller |r.m|."""
         limit = facts.required.triangulation.min_conditioning
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 lambda pair: np.where(
                     pair.conditioning >= _LEAST_CONDITIONING, -pair.conditioning, np.inf
@@ -119,13 +119,13 @@ class Sigma(PairLimit):
         edge = cell.noise * cell.shift * (1.0 - ROUNDING)
         return edge <= limit * np.maximum(cell.conditioning, 1e-12)
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return a larger deviation."""
         limit = facts.required.triangulation.max_sigma_m
         if limit is None:
             return ()
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 lambda pair: 1e3 * pair.sigma,
                 to_digits(3),
@@ -152,19 +152,19 @@ class Pitch(PairLimit):
             return None
         return cell.spacing * cell.facing * (1.0 + ROUNDING) >= least * cell.shift
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return a wider gap; a smaller limit too where the gap doesn't follow it."""
         least, gap = facts.required.triangulation.min_ring_pitch_px, facts.ring_gap_m
         if least is None:
             return ()
         chosen = ", chosen" if facts.ring_gap_chosen else ""
-        wider = Relaxation(
+        wider = LimitRelaxation(
             self.name,
             lambda pair: 1e3 * gap * least / np.maximum(pair.pitch, 1e-12),
             to_digits(3),
             lambda value: f"rings.gap_mm = {value:.3g} (now {1e3 * gap:.3g}{chosen})",
         )
-        closer = Relaxation(
+        closer = LimitRelaxation(
             self.name,
             lambda pair: np.where(pair.pitch >= _LEAST_PITCH_PX, -pair.pitch, np.inf),
             to_step(0.1),

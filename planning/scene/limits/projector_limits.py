@@ -17,8 +17,8 @@ from .limit import (
     Array,
     InBetween,
     Limit,
+    LimitRelaxation,
     Mask,
-    Relaxation,
     RigFacts,
     causes,
     degrees,
@@ -77,11 +77,11 @@ class ProjectorBeam(ProjectorLimit):
         inside = pattern_of(view.projector).inside(view.points)
         return inside & view.projector.device.in_field(view.local.T)
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return an image or beam that reaches farther, up to three times as wide."""
         parallel = isinstance(facts.device, ParallelModel)
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 _off_axis,
                 to_step(1.0),
@@ -106,7 +106,7 @@ class ProjectorRange(ProjectorLimit):
         low, high = view.projector.device.range_m
         return (view.distances >= low) & (view.distances <= high)
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return either end of the range."""
         sharp = facts.device.range_m
         return range_ends(self.name, "projector", sharp, sharp)[:2]
@@ -122,12 +122,12 @@ class ProjectorIncidence(ProjectorLimit):
         """Return which samples face the light."""
         return view.incidence_cos >= np.cos(rules.max_incidence)
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return a larger angle."""
         limit = facts.required.projector.max_incidence
         least = np.cos(max(limit, STEEPEST))
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 lambda view: np.where(
                     view.incidence_cos >= least, degrees(view.incidence_cos), np.inf
@@ -151,11 +151,11 @@ class TangentAngle(ProjectorLimit):
         """Return which samples aren't lit along T1."""
         return view.tangent_cos <= np.cos(rules.min_tangent_angle)
 
-    def relaxations(self, facts: RigFacts) -> tuple[Relaxation, ...]:
+    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
         """Return a smaller angle."""
         limit = facts.required.projector.min_tangent_angle
         return (
-            Relaxation(
+            LimitRelaxation(
                 self.name,
                 lambda view: -degrees(view.tangent_cos),
                 to_step(1.0),
