@@ -12,7 +12,7 @@ from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
 from planning.model.ring_frame import ring_frame
-from planning.report.entries.firing import schedule_line
+from planning.report.entries.exposure import schedule_line
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.rig.rig import load_rig
 from planning.scene.scene import Scene

@@ -30,7 +30,7 @@ from planning.scene.patterns.pattern import pattern_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
-from .firing import firing_schedule
+from .exposure import exposure_schedule
 
 # Rays and rounding can't tell on which side light passes that runs along a face.
 _ANY_LIGHT = ProjectorLimits(float(np.radians(89.0)), 0.0)
@@ -57,7 +57,7 @@ def overlap_records(
     )
     conflicts = (on_target > 0.0) | (on_surface > 0.0)
     np.fill_diagonal(conflicts, val=False)
-    return overlaps, firing_schedule(names, conflicts)
+    return overlaps, exposure_schedule(names, conflicts)
 
 
 def shared_areas(

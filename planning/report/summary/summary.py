@@ -17,7 +17,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.model.words import percent
 from planning.report.entries.cost import cost_lines
-from planning.report.entries.firing import schedule_line
+from planning.report.entries.exposure import schedule_line
 from planning.report.entries.range_entries import summary_lines
 from planning.report.entries.ring_entries import rings_lines
 

@@ -1,4 +1,4 @@
-"""Which projectors fire together: the fewest groups without an overlap."""
+"""The exposure schedule: fewest groups of projectors without an overlap."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from planning.model.document.plan_document import PlanDocument
 from solvers.colouring import fewest_colours
 
 
-def firing_schedule(
+def exposure_schedule(
     names: Sequence[str], conflicts: NDArray[np.bool_]
 ) -> ExposureSchedule:
     """Return the plan's `firing_schedule`: the fewest groups without an overlap.
@@ -19,13 +19,13 @@ def firing_schedule(
         names: Ids of the projectors.
         conflicts: Whether two overlap, shape (k, k).
     """
-    found = fewest_colours(conflicts)
+    colouring = fewest_colours(conflicts)
     return ExposureSchedule(
-        groups=tuple(tuple(names[i] for i in group) for group in found.groups),
-        n_groups=found.n_colours,
-        lower_bound=found.lower_bound,
-        proof=found.proof,
-        clique=tuple(names[i] for i in found.clique),
+        groups=tuple(tuple(names[i] for i in group) for group in colouring.groups),
+        n_groups=colouring.n_colours,
+        lower_bound=colouring.lower_bound,
+        proof=colouring.proof,
+        clique=tuple(names[i] for i in colouring.clique),
     )
 
 
