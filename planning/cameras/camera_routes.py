@@ -73,8 +73,9 @@ def cover_for(
     scene: Scene, projectors: _Projectors, candidates: CandidateViews, by: CamerasBy
 ) -> CameraCover:
     """Choose cameras for projectors: by the cover, or by the paper's route."""
-    choose = cover_by_paper if by == "paper" else cover_by_cover
-    return choose(scene, projectors, candidates)
+    if by == "paper":
+        return cover_by_paper(scene, projectors, candidates)
+    return cover_by_cover(scene, projectors, candidates)
 
 
 def cover_again(

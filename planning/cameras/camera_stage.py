@@ -36,7 +36,7 @@ class CameraSolution:
 
 def place_cameras(
     scene: Scene,
-    projectors: Sequence[PlannedProjector],
+    projectors: tuple[PlannedProjector, ...],
     candidates: CandidateViews,
     by: CamerasBy = "both",
 ) -> CameraSolution:
@@ -48,7 +48,7 @@ def place_cameras(
         candidates: From `camera_candidate_views`.
         by: Route to the cameras.
     """
-    cover = cover_for(scene, tuple(projectors), candidates, by)
+    cover = cover_for(scene, projectors, candidates, by)
     moved, cover = move_axes(scene, projectors, cover, by)
     cover, routes = better_route(scene, moved, cover, by)
     return CameraSolution(moved, camera_stage(scene, cover, routes))
@@ -56,7 +56,7 @@ def place_cameras(
 
 def move_axes(
     scene: Scene,
-    projectors: Sequence[PlannedProjector],
+    projectors: tuple[PlannedProjector, ...],
     cover: CameraCover,
     by: CamerasBy = "cover",
 ) -> tuple[tuple[PlannedProjector, ...], CameraCover]:
@@ -72,7 +72,7 @@ def move_axes(
         cover: Cameras chosen for these ring axes.
         by: Route to the cameras.
     """
-    kept = tuple(projectors)
+    kept = projectors
     for _ in range(_ROUNDS):
         among = scene.among((*kept, *cover.cameras))
         moved = move_ring_axes(among, kept, cover.cameras, cover.samples)
