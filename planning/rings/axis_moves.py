@@ -1,7 +1,7 @@
 """Move the ring axes, tilt and azimuth, to where the cameras measure most exactly.
 
-`solvers.poses.axis_program` proposes from where `ring_axes` turned them; the exact
-predicate decides, on the cover's rows and on samples that neither has seen.
+`solvers.poses.axis_program` proposes, from the present axis and from its own grid of
+starts; the exact predicate decides, on the cover's samples and on fresh ones.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,11 @@ from geometry.poses import inverse, transform
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
 from planning.model.ring_frame import ring_frame
-from planning.scene import measurability
 from planning.scene.camera_views import view_of
 from planning.scene.limits import camera_limits
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import PairQuality
-from planning.scene.measured import LitSamples, lit_samples, pairs_of
+from planning.scene.measured import LitSamples, lit_samples, pairs_of, taken
 from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.patterns.ring_pattern import inside_rings
 from planning.scene.scene import Scene
@@ -109,6 +108,14 @@ class AxisJudge:
         trial[p] = self.sigma_with(projector, p)
         return trial
 
+    def keep(
+        self, projector: PlannedProjector, p: int, sigma: NDArray[np.float64]
+    ) -> None:
+        """Go on with another axis of projector p, and `with_axis` of it."""
+        points = self.rows.target.samples.points
+        self.rows = self.rows.with_surfaces(p, code_surfaces(projector, points))
+        self.sigma = sigma
+
     def holds(self, projector: PlannedProjector, p: int) -> bool:
         """Whether what a projector lights is inside its largest ring."""
         return inside_rings(
@@ -137,7 +144,7 @@ def _move(
         if better(trials, [judge.sigma for judge in judges]):
             moved[p] = offered
             for judge, trial in zip(judges, trials, strict=True):
-                judge.sigma = trial
+                judge.keep(offered, p, trial)
             return True
     return False
 
@@ -193,7 +200,7 @@ def axis_program(
         scene: Surface and requirements.
         projectors: As they stand, with even rings.
         p: Whose axis moves.
-        rows: Lit samples.
+        rows: Samples that they light.
         views: How each camera sees them.
     """
     limits, projector = scene.requirements.triangulation, projectors[p]
@@ -214,7 +221,12 @@ def axis_program(
     jacobians = np.stack([view.jacobian for view in seen], axis=1)
     slopes = np.einsum("ikja,ikjl->ikal", jacobians, spread)
     noise = limits.noise_px / np.maximum(rows.lights[p].incidence_cos[chosen], 1e-9)
-    rest = [q for q in range(len(projectors)) if q != p]
+    few, others = taken(rows, chosen, rows.lit), np.zeros(len(chosen))
+    among = [q for q in range(len(projectors)) if q != p]
+    for view in seen:
+        for pair in pairs_of(limits, few, view, projectors=among):
+            score = smooth_count(pair.quality, limits)
+            others[pair.samples] = np.maximum(others[pair.samples], score)
     return AxisProgram(
         light=projector.light,
         points=transform(into, points[chosen]),
@@ -224,7 +236,7 @@ def axis_program(
         noise=noise[:, None] * distances,
         placement_m=(limits.ring_sigma_m or 0.0) * np.abs(facing),
         facing=np.abs(facing) / distances,
-        others=_scores_of(scene, projectors, rest, rows, chosen, seen),
+        others=others,
         held=transform(into, points[lit]),
         start=ring_axis(pose, device, projector.world_from_ring),
         ring_radius=_RING_SHARE * float(projector.ring_radii[-1]),
@@ -233,31 +245,6 @@ def axis_program(
         max_sigma_m=limits.max_sigma_m or np.inf,
         min_pitch_px=limits.min_ring_pitch_px or 0.0,
     )
-
-
-def _scores_of(
-    scene: Scene,
-    projectors: Sequence[PlannedProjector],
-    which: Sequence[int],
-    rows: LitSamples,
-    chosen: NDArray[np.int64],
-    seen: Sequence[ViewedSamples],
-) -> NDArray[np.float64]:
-    """Largest 1/(1 + e) of chosen samples by some projectors and every camera."""
-    limits = scene.requirements.triangulation
-    samples = rows.target.samples.take(chosen)
-    score = np.zeros(len(chosen))
-    for p in which:
-        rings = code_surfaces(projectors[p], samples.points)
-        light = rows.lights[p].take(chosen)
-        for view in seen:
-            quality = measurability.pair_quality(
-                samples.normals, light, rings, view, limits
-            )
-            own = smooth_count(quality, limits)
-            pair = rows.lit[chosen, p] & (view.stage == camera_limits.SEEN)
-            score = np.maximum(score, np.where(pair, own, 0.0))
-    return score
 
 
 def smooth_count(
