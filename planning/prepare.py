@@ -1,37 +1,124 @@
-"""What stands before any device does: target, limits, rings, the first candidates."""
+"""What stands before any device does: request, target, limits and rings."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.curvature.curvature import CurvatureField, principal_curvatures
+from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.bearing import bearing
+from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
-from planning.model.errors import InfeasibleLimitsError, InputError
+from planning.cameras.routes import CamerasBy
+from planning.model.errors import InputError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
-from planning.projectors.candidate_set import NothingLitError
-from planning.projectors.projector_stage import ProjectorStage, plan_projectors
-from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.partial_plan import PlanRequest
+from planning.rig.range_guard import Guard, guarded
+from planning.rig.rig import Rig
+from planning.rig.wishes import TargetName, Wishes
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
 from planning.scene.clearance import check_existing_clearance
+from planning.scene.interest import Select, Weight, interest_of
+from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
 
 # Upwards in the image: where the ring axis points until the cameras are known.
 _FIRST_AZIMUTH = -float(np.pi / 2)
 
 
+def request_of(
+    mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
+    rig: Rig,
+    wishes: Wishes,
+    *,
+    select: Select | None = None,
+    weight: Weight | None = None,
+    seed: int = 0,
+    threads: int = 2,
+    command: tuple[str, ...] = (),
+    prove: bool = False,
+    cameras_by: CamerasBy = "both",
+) -> PlanRequest:
+    """Return what is asked, of a surface whose long edges are cut.
+
+    Args:
+        mesh: As in `plan_rig`.
+        rig: Likewise; tightened by what isn't known of a body of ranges.
+        wishes: What is asked beside what the rig says.
+        select: As in `plan_rig`.
+        weight: Likewise.
+        seed: Likewise.
+        threads: Likewise.
+        command: Likewise.
+        prove: Likewise.
+        cameras_by: Likewise.
+
+    Raises:
+        InputError: If the target is none, or there are several meshes.
+        InfeasibleLimitsError: If a body's ranges leave the limits no room.
+    """
+    selected = select is not None or weight is not None
+    ranges: tuple[RangedBody, Guard] | None = None
+    if isinstance(mesh, RangedBody):
+        wishes = replace(wishes, target=_whole(wishes.target, selected))
+        rig, guard = guarded(rig, mesh)
+        mesh, ranges = mesh.mesh, (mesh, guard)
+    surface = _single(mesh)
+    if wishes.target == "surface" and selected:
+        raise InputError("the whole surface and a selection both are targets: give one")
+    interest = interest_of(surface, select, weight)
+    # Planned and judged on places, not on whatever triangles a flat face came in.
+    cut, parent = cut_for_curvature(surface)
+    notes = (
+        f"  long edges cut: {len(surface.faces):,} triangles become "
+        f"{len(cut.faces):,}, the surface stays",
+    )
+    return PlanRequest(
+        cut,
+        rig,
+        wishes,
+        seed,
+        threads,
+        command,
+        None if interest is None else interest.on_parts(parent),
+        prove,
+        ranges,
+        cameras_by,
+        notes if len(cut.faces) > len(surface.faces) else (),
+    )
+
+
+def _whole(target: str | None, selected: bool) -> TargetName:
+    """The target of a body of which only ranges are known: all of it."""
+    if target == "dominant" or selected:
+        raise InputError(
+            "of a body that is known by its ranges alone the target is the whole "
+            "surface: it has no dominant region and no faces to select"
+        )
+    return "surface"
+
+
+def _single(mesh: TriangleMesh | Sequence[TriangleMesh]) -> TriangleMesh:
+    if isinstance(mesh, TriangleMesh):
+        return mesh
+    if len(mesh) != 1:
+        raise InputError(
+            f"{len(mesh)} meshes: one rig for several isn't built yet, give one"
+        )
+    return mesh[0]
+
+
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """An order, ready to have devices placed.
+    """A request, ready to have devices placed.
 
     Attributes:
-        order: What was ordered.
+        request: What is asked.
         scene: Surface, target and requirements.
         regions: The target.
         curvature_radius_m: Physical scale of the curvature.
@@ -39,7 +126,7 @@ class Prepared:
         tilt: Tilt or shift of ring axes.
     """
 
-    order: PlanRequest
+    request: PlanRequest
     scene: Scene
     regions: DominantRegions
     curvature_radius_m: float
@@ -52,26 +139,26 @@ class Prepared:
         return self.tilt, _FIRST_AZIMUTH
 
 
-def prepared(order: PlanRequest, clock: Stopwatch) -> Prepared:
+def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
     """Find the regions and state what is asked.
 
     Raises:
         InputError: If nothing is curved enough to be a target.
         InfeasibleLimitsError: If limits exclude each other.
     """
-    mesh, rig = order.mesh, order.rig
+    mesh, rig = request.mesh, request.rig
     with clock.stage("regions", "curvature and dominant regions"):
         field = principal_curvatures(mesh)
-        regions = _regions(order, field)
+        regions = _regions(request, field)
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
-    requirements, radii, tilt = _resolve(order)
+    requirements, radii, tilt = _resolve(request)
     scene = Scene(
         mesh,
         regions.face_region,
-        _steep(regions, order.asked["target"]),
+        _steep(regions, request.wishes.target),
         requirements,
-        order.seed,
-        order.threads,
+        request.seed,
+        request.threads,
         clock.check,
     )
     template = PlannedProjector(
@@ -85,40 +172,15 @@ def prepared(order: PlanRequest, clock: Stopwatch) -> Prepared:
     )
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
     check_existing_clearance(scene, template, camera)
-    return Prepared(order, scene, regions, field.radius, template, tilt)
+    return Prepared(request, scene, regions, field.radius, template, tilt)
 
 
-def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
-    """Return the fewest projectors of the candidates.
-
-    Raises:
-        InfeasibleLimitsError: If no candidate lights any sample.
-    """
-    rig = ready.order.rig
-    with clock.stage("projectors", "projectors: candidates and cover"):
-        try:
-            stage = plan_projectors(
-                ready.scene,
-                ready.template,
-                rig.n_projector_poses,
-                ring_offset=ready.ring_offset,
-            )
-        except NothingLitError as error:
-            helps = nothing_lit(ready.scene, error)
-            raise InfeasibleLimitsError(f"{error}; {helps}") from None
-        clock.say(
-            f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
-            f"{stage.certificate.candidates.lower_bound} are needed"
-        )
-    return stage
-
-
-def _regions(order: PlanRequest, field: CurvatureField) -> DominantRegions:
+def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
     """The user's selection, or else the most curved surface."""
-    if order.interest is not None:
-        return regions_of_faces(order.mesh, field, order.interest.chosen)
-    regions = dominant_regions(order.mesh, field)
-    if order.asked["target"] == "dominant" and not len(regions):
+    if request.interest is not None:
+        return regions_of_faces(request.mesh, field, request.interest.chosen)
+    regions = dominant_regions(request.mesh, field)
+    if request.wishes.target != "surface" and not len(regions):
         raise InputError(
             "no dominant region: the surface is flat where its curvature can be "
             "trusted; use --target surface, or choose faces with --select"
@@ -126,11 +188,11 @@ def _regions(order: PlanRequest, field: CurvatureField) -> DominantRegions:
     return regions
 
 
-def _resolve(order: PlanRequest) -> tuple[Requirements, Any, float]:
+def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64], float]:
     """Return the requirements, the ring radii, and the tilt or shift of ring axes."""
-    mesh, rig = order.mesh, order.rig
+    mesh, rig = request.mesh, request.rig
     requirements = rig.requirements(
-        mesh.centre, mesh.radius, **order.asked, tau_m=rig.standoff_m
+        mesh.centre, mesh.radius, request.wishes, tau_m=rig.standoff_m
     )
     projector, camera = rig.projector_device(), rig.camera_device()
     parallel = rig.light == "parallel"
@@ -160,7 +222,7 @@ def _direction(vector: NDArray[np.float64]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _steep(regions: DominantRegions, target: str) -> NDArray[np.float64]:
+def _steep(regions: DominantRegions, target: str | None) -> NDArray[np.float64]:
     """T1 of each face of the target; zero elsewhere, where it binds nothing."""
     if target == "surface":
         return regions.steep

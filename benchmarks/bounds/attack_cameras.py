@@ -37,13 +37,15 @@ from planning import load_rig
 from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
-from planning.prepare import first_projectors, prepared
+from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.camera_bound import CameraCells, CameraEffort
 from planning.proofs.cells.image_cone import image_cone
 from planning.report.partial_plan import PlanRequest
+from planning.rig.wishes import Wishes
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
+from planning.stages import first_projectors
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
@@ -217,8 +219,8 @@ def main() -> int:
     total = 0
     for path, options, up in jobs(given.meshes):
         mesh, _ = cut_for_curvature(load_mesh(path, **options))
-        asked = {"max_projectors": 3, "target": "dominant", "up": up}
-        order = PlanRequest(mesh, load_rig("default"), _every(asked), 0, 2, ())
+        wishes = Wishes(max_projectors=3, up=up)
+        order = PlanRequest(mesh, load_rig("default"), wishes)
         ready = prepared(order, Stopwatch())
         projectors = widen_margins(ready.scene, first_projectors(ready, Stopwatch()))
         target = ready.scene.target_samples(given.rows, _STREAM)
@@ -258,17 +260,6 @@ def lens_of(device: PinholeModel, lens: str) -> PinholeModel:
     matrix = device.camera_matrix.copy()
     matrix[[0, 1], [0, 1]] *= 4.0
     return replace(device, camera_matrix=matrix)
-
-
-def _every(asked: dict[str, object]) -> dict[str, object]:
-    unset = (
-        "max_cameras",
-        "dominant_coverage",
-        "coverage",
-        "min_reachable",
-        "accuracy_mm",
-    )
-    return dict.fromkeys(unset) | asked
 
 
 def _arguments() -> argparse.Namespace:

@@ -47,6 +47,7 @@ from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.projector_bound import Effort, bound_projectors
 from planning.report.partial_plan import PlanRequest
+from planning.rig.wishes import Wishes
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -419,18 +420,9 @@ def _arguments() -> argparse.Namespace:
 def _scene(
     mesh: TriangleMesh, light: str, up: str | None, fit: str
 ) -> tuple[Scene, PlannedProjector]:
-    asked = {
-        "max_projectors": 9,
-        "max_cameras": None,
-        "target": "dominant",
-        "dominant_coverage": None,
-        "coverage": None,
-        "min_reachable": None,
-        "accuracy_mm": None,
-        "up": up,
-    }
+    wishes = Wishes(max_projectors=9, up=up)
     order = PlanRequest(
-        mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ()
+        mesh, load_rig("default", light), wishes, threads=os.cpu_count() or 1
     )
     ready = prepared(order, Stopwatch())
     return fitted(ready.scene, ready.template, fit)

@@ -32,10 +32,12 @@ from planning.cameras.proved_cameras import bound_stage
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.prepare import first_projectors, prepared
+from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.camera_bound import DEFAULT, PROVE
 from planning.report.partial_plan import PlanRequest
+from planning.rig.wishes import Wishes
+from planning.stages import first_projectors
 
 
 def main() -> int:
@@ -80,15 +82,9 @@ def _case(
     given: argparse.Namespace,
 ) -> tuple[int, str, int]:
     """Return the projectors, the table's cell, and by how much the bound is below."""
-    unset = ("max_cameras", "dominant_coverage", "min_reachable", "accuracy_mm")
-    asked = dict.fromkeys(unset) | {
-        "max_projectors": given.max_projectors,
-        "target": "dominant",
-        "coverage": share,
-        "up": up,
-    }
+    wishes = Wishes(max_projectors=given.max_projectors, coverage=share, up=up)
     order = PlanRequest(
-        mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ()
+        mesh, load_rig("default", light), wishes, threads=os.cpu_count() or 1
     )
     ready = prepared(order, Stopwatch())
     projectors = widen_margins(ready.scene, first_projectors(ready, Stopwatch()))

@@ -35,6 +35,7 @@ from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import DEFAULT, PROVE
 from planning.report.partial_plan import PlanRequest
+from planning.rig.wishes import Wishes
 
 ROOT = Path(__file__).resolve().parents[2]
 MANY = 200
@@ -123,18 +124,15 @@ def ready_for(
         devices: Projectors and cameras at most, and as much measured as they can;
             None: as many as needed.
     """
-    asked = {
-        "max_projectors": devices or MANY,
-        "max_cameras": devices,
-        "target": "dominant",
-        "dominant_coverage": share,
-        "coverage": devices and 1.0,
-        "min_reachable": None,
-        "accuracy_mm": None,
-        "up": up,
-    }
+    wishes = Wishes(
+        max_projectors=devices or MANY,
+        max_cameras=devices,
+        dominant_coverage=share,
+        coverage=1.0 if devices else None,
+        up=up,
+    )
     order = PlanRequest(
-        mesh, load_rig("default", light), asked, 0, os.cpu_count() or 1, ()
+        mesh, load_rig("default", light), wishes, threads=os.cpu_count() or 1
     )
     ready = prepared(order, Stopwatch())
     if tangent is None:
@@ -147,7 +145,7 @@ def ready_for(
 
 def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
     """Return the projectors chosen of so many times the candidates; None: no light."""
-    rig = ready.order.rig
+    rig = ready.request.rig
     number = times * rig.n_projector_poses
     try:
         return plan_projectors(

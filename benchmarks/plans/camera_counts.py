@@ -38,14 +38,15 @@ from planning.cameras.camera_stage import CameraSolution, place_cameras
 from planning.cameras.routes import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
-from planning.pipeline import _polish
-from planning.prepare import Prepared, first_projectors, prepared
+from planning.prepare import Prepared, prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
 from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest
+from planning.rig.wishes import Wishes
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
+from planning.stages import first_projectors, polished
 from planning.verify.audit.audit import audit_plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -139,7 +140,7 @@ def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh, str | None]]:
 class Job:
     """One mesh with its projectors, as far as the cameras."""
 
-    order: PlanRequest
+    request: PlanRequest
     ready: Prepared
     stage: ProjectorStage
     projectors: tuple[PlannedProjector, ...]
@@ -147,7 +148,7 @@ class Job:
 
     def place(self, by: CamerasBy) -> CameraSolution:
         """Place the cameras."""
-        rig, ready = self.order.rig, self.ready
+        rig, ready = self.request.rig, self.ready
         body = rig.camera_body()
         camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=body)
         n = rig.n_camera_poses
@@ -159,10 +160,8 @@ class Job:
 
 def _job(mesh: TriangleMesh, up: str | None) -> Job:
     cut, _ = cut_for_curvature(mesh)
-    asked = dict.fromkeys(
-        ("max_cameras", "dominant_coverage", "coverage", "min_reachable", "accuracy_mm")
-    ) | {"max_projectors": _PROJECTORS, "target": "dominant", "up": up}
-    order = PlanRequest(cut, load_rig("default"), asked, 0, 2, ())
+    wishes = Wishes(max_projectors=_PROJECTORS, up=up)
+    order = PlanRequest(cut, load_rig("default"), wishes)
     clock = Stopwatch(None)
     ready = prepared(order, clock)
     stage = first_projectors(ready, clock)
@@ -214,7 +213,7 @@ def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:
     """The plan of the paper's route alone, and what the audit says of it."""
     ready, placed, clock = job.ready, job.place("paper"), job.clock
     draft = PartialPlan(
-        replace(job.order, cameras_by="paper"),
+        replace(job.request, cameras_by="paper"),
         ready.scene,
         ready.regions,
         ready.curvature_radius_m,
@@ -224,7 +223,7 @@ def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:
         placed.stage,
         placed.stage.cameras,
     )
-    plan = write_plan(_polish(draft, clock), clock)
+    plan = write_plan(polished(draft, clock), clock)
     found = verify_plan(plan) if check else None
     false = audit_plan(plan, seed=20_261_122).failures
     pixels = None if found is None else found.reconstruction

@@ -79,7 +79,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def _row(ready: Prepared) -> tuple[str, int]:
-    scene, rig = ready.scene, ready.order.rig
+    scene, rig = ready.scene, ready.request.rig
     number = rig.n_projector_poses
     begin = time.perf_counter()
     try:

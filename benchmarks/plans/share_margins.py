@@ -141,7 +141,7 @@ def _margins(
 
 
 def _number(ready: Prepared) -> int:
-    rig = ready.order.rig
+    rig = ready.request.rig
     return rig.n_projector_poses
 
 
@@ -163,7 +163,7 @@ def _print_axes(given: argparse.Namespace) -> None:
 
 def _axes(ready: Prepared) -> tuple[list[str], str, list[float]]:
     """On fresh samples, by where ring axes stand; and seconds of the last two."""
-    scene, rig = ready.scene, ready.order.rig
+    scene, rig = ready.scene, ready.request.rig
     stage = plan_projectors(
         scene, ready.template, _number(ready), ring_offset=ready.ring_offset
     )

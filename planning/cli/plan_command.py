@@ -13,12 +13,14 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import InterruptedPlanError, RequirementError
 from planning.model.progress import Report
-from planning.pipeline import plan_rig
+from planning.pipeline import plan_requested
+from planning.prepare import request_of
 from planning.report.drawing.rig_picture import save_rig_picture
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.face_status import face_status
 from planning.report.summary.summary import summary
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import read_ranges
 from planning.verify.reconstruction.patterns.pattern_files import (
@@ -49,30 +51,27 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
             surface = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
             _say_size(report, surface)
             selection, weight = _interest(options, surface, report)
+        wishes = Wishes(**{key: options[key] for key in Wishes.__dataclass_fields__})
         missed: tuple[str, ...] = ()
         code = 0
         try:
-            plan = plan_rig(
+            request = request_of(
                 surface,
                 rig,
-                max_projectors=options["max_projectors"],
-                max_cameras=options["max_cameras"],
-                target=options["target"],
+                wishes,
                 select=selection,
                 weight=weight,
-                dominant_coverage=options["dominant_coverage"],
-                coverage=options["coverage"],
-                min_reachable=options["min_reachable"],
-                accuracy_mm=options["accuracy_mm"],
-                up=options["up"],
                 seed=options["seed"],
                 threads=options["threads"] or cores(),
-                check=not options["no_check"],
+                command=("plan", *command),
                 prove=options["prove"],
                 cameras_by=options["cameras_by"],
+            )
+            plan = plan_requested(
+                request,
+                check=not options["no_check"],
                 time_limit=_left(options["time_limit"], begin),
                 progress=report,
-                command=("plan", *command),
             )
         except RequirementError as error:
             plan, missed, code = error.plan, error.shortfalls, error.exit_code

@@ -37,41 +37,41 @@ from .marginal import camera_table, projector_table
 from .partial_plan import PartialPlan
 
 
-def write_plan(draft: PartialPlan, clock: Stopwatch) -> RigPlan:
+def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     """Round the poses, recompute every claim from them, and write the document."""
-    devices = _rounded_devices(draft)
-    scene = draft.scene
+    devices = _rounded_devices(partial)
+    scene = partial.scene
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
-        marginal = _marginal(draft, devices, claims)
+        marginal = _marginal(partial, devices, claims)
     standing = replace(
-        draft, scene=scene.among((*devices.projectors, *devices.cameras))
+        partial, scene=scene.among((*devices.projectors, *devices.cameras))
     )
-    lost = lost_to_rings_m2(standing.scene, devices, draft.rings, claims)
+    lost = lost_to_rings_m2(standing.scene, devices, partial.rings, claims)
     coverage = entries.coverage_record(claims, lost)
-    coverage = with_relaxations(coverage, draft, devices, claims, clock)
-    regions = entries.region_records(draft.regions, claims)
+    coverage = with_relaxations(coverage, partial, devices, claims, clock)
+    regions = entries.region_records(partial.regions, claims)
     overlaps, schedule = overlap_records(standing.scene, devices.projectors)
     surface, requirements = (
-        _surface(draft, devices),
+        _surface(partial, devices),
         _final_requirements(standing, claims, devices),
     )
-    certificates = with_fewer_needed(_certificates(draft), draft, clock)
+    certificates = with_fewer_needed(_certificates(partial), partial, clock)
     document = PlanDocument(
         format=FORMAT,
         version=VERSION,
         units=Units(length="m", angle="rad"),
-        seed=draft.order.seed,
+        seed=partial.request.seed,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
-        command=draft.order.command,
-        truncated=draft.truncated,
+        command=partial.request.command,
+        truncated=partial.truncated,
         meshes=(entries.mesh_record(scene.mesh, scene.shell),),
-        surface=_surface_record(draft, surface),
-        rig=RigRecord(**draft.order.rig.to_document()),
+        surface=_surface_record(partial, surface),
+        rig=RigRecord(**partial.request.rig.to_document()),
         requirements=requirements,
         regions=regions,
         projectors=entries.projector_records(
-            standing.scene, devices, draft.rings, claims
+            standing.scene, devices, partial.rings, claims
         ),
         cameras=entries.camera_records(devices.cameras, claims),
         coverage=coverage,
@@ -79,7 +79,7 @@ def write_plan(draft: PartialPlan, clock: Stopwatch) -> RigPlan:
         firing_schedule=schedule,
         marginal=marginal,
         certificates=certificates,
-        baselines=_baselines(draft, devices, claims, requirements),
+        baselines=_baselines(partial, devices, claims, requirements),
         camera_groups=_camera_groups(devices, claims),
         cost=cost_record(
             devices.cameras, certificates.cameras.greedy_count, clock.processor
@@ -95,37 +95,37 @@ def write_plan(draft: PartialPlan, clock: Stopwatch) -> RigPlan:
         reconstruction=None,
         timings_s=dict(clock.seconds),
     )
-    if draft.order.ranges is not None:
-        document = document.changed(ranges=ranges_record(*draft.order.ranges))
+    if partial.request.ranges is not None:
+        document = document.changed(ranges=ranges_record(*partial.request.ranges))
     return RigPlan(document, surface)
 
 
-def _rounded_devices(draft: PartialPlan) -> Devices:
+def _rounded_devices(partial: PartialPlan) -> Devices:
     """The devices and the reference sets as they will be written."""
-    projectors, cameras = draft.final_projectors, draft.cameras
+    projectors, cameras = partial.final_projectors, partial.cameras
     return Devices(
         tuple(
             entries.rounded_projector(p, f"P{i}") for i, p in enumerate(projectors, 1)
         ),
         tuple(entries.rounded_camera(c, f"C{i}") for i, c in enumerate(cameras, 1)),
-        tuple(entries.rounded_projector(p, "") for p in draft.stage.reference),
-        tuple(entries.rounded_camera(c, "") for c in draft.camera_stage.reference),
+        tuple(entries.rounded_projector(p, "") for p in partial.stage.reference),
+        tuple(entries.rounded_camera(c, "") for c in partial.camera_stage.reference),
     )
 
 
 def _marginal(
-    draft: PartialPlan, devices: Devices, claims: Claims
+    partial: PartialPlan, devices: Devices, claims: Claims
 ) -> tuple[ProjectorMarginal | CameraMarginal, ...]:
     # Rings are fine for the planned cameras; others would get their own.
-    even, scene = evenly_ringed(devices, draft.rings), draft.scene
+    even, scene = evenly_ringed(devices, partial.rings), partial.scene
     return (
-        *projector_table(scene, devices, draft.stage.by_count, claims),
-        *camera_table(scene, even, draft.camera_stage.by_count, claims),
+        *projector_table(scene, devices, partial.stage.by_count, claims),
+        *camera_table(scene, even, partial.camera_stage.by_count, claims),
     )
 
 
-def _surface(draft: PartialPlan, devices: Devices) -> Surface:
-    scene, reference = draft.scene, devices.reference_projectors
+def _surface(partial: PartialPlan, devices: Devices) -> Surface:
+    scene, reference = partial.scene, devices.reference_projectors
     return Surface(
         scene.mesh,
         np.zeros(len(scene.mesh.faces), dtype=np.int64),
@@ -137,42 +137,42 @@ def _surface(draft: PartialPlan, devices: Devices) -> Surface:
     )
 
 
-def _surface_record(draft: PartialPlan, surface: Surface) -> SurfaceRecord:
+def _surface_record(partial: PartialPlan, surface: Surface) -> SurfaceRecord:
     return SurfaceRecord(
         path="surface.npz",
         sha256=surface.sha256(),
-        curvature_radius_m=draft.curvature_radius_m,
-        dominant_share=draft.regions.dominant_share,
+        curvature_radius_m=partial.curvature_radius_m,
+        dominant_share=partial.regions.dominant_share,
         selection=entries.selection_record(
-            draft.scene.mesh, draft.scene.region, draft.order.interest
+            partial.scene.mesh, partial.scene.region, partial.request.interest
         ),
     )
 
 
 def _final_requirements(
-    draft: PartialPlan, claims: Claims, devices: Devices
+    partial: PartialPlan, claims: Claims, devices: Devices
 ) -> Requirements:
     """State tau, one ring gap, and the reference sets as they are."""
-    requirements = draft.scene.requirements
+    requirements = partial.scene.requirements
     workspace = replace(
         requirements.workspace,
         n_reference_projectors=len(devices.reference_projectors),
         n_reference_cameras=len(devices.reference_cameras),
     )
-    gap = widest_gap(draft.scene, devices.projectors, claims.target_samples)
+    gap = widest_gap(partial.scene, devices.projectors, claims.target_samples)
     check = replace(requirements.check, tau_m=round(gap, 6))
     return replace(requirements, workspace=workspace, check=check)
 
 
-def _certificates(draft: PartialPlan) -> Certificates:
-    cameras, routes = draft.camera_stage.certificate, draft.camera_stage.routes
+def _certificates(partial: PartialPlan) -> Certificates:
+    cameras, routes = partial.camera_stage.certificate, partial.camera_stage.routes
     if routes is not None:
         cameras = cameras.changed(routes=routes.counts())
-    return Certificates(projectors=draft.stage.certificate, cameras=cameras)
+    return Certificates(projectors=partial.stage.certificate, cameras=cameras)
 
 
 def _baselines(
-    draft: PartialPlan, devices: Devices, claims: Claims, requirements: Requirements
+    partial: PartialPlan, devices: Devices, claims: Claims, requirements: Requirements
 ) -> tuple[BaselineRow, ...]:
     samples = claims.target_samples.samples
     rows = tuple(
@@ -184,9 +184,9 @@ def _baselines(
             requirements.camera.max_incidence,
         )
     )
-    if draft.order.ranges is None:
+    if partial.request.ranges is None:
         return rows
-    body, guard = draft.order.ranges
+    body, guard = partial.request.ranges
     return with_spread(rows, devices.cameras, body.ball, guard)
 
 

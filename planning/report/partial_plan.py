@@ -1,7 +1,6 @@
 """A plan in the making: what was ordered, and the stages as far as they came."""
 
 from dataclasses import dataclass
-from typing import Any
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
@@ -11,6 +10,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
+from planning.rig.wishes import Wishes
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
 from planning.scene.ranges.ranged_body import RangedBody
@@ -19,12 +19,12 @@ from planning.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
-    """What was ordered: the mesh, the rig, and how to go about it.
+    """What is asked: the mesh, the rig, the wishes, and how to go about it.
 
     Attributes:
         mesh: The surface.
         rig: Devices and limits.
-        asked: Keyword arguments of `Rig.requirements`.
+        wishes: What is asked beside what the rig says.
         seed: Of every random draw.
         threads: Worker threads.
         command: Words of the command line, for the record.
@@ -33,18 +33,20 @@ class PlanRequest:
         ranges: The body whose sphere the mesh is, and what the rig's limits keep free
             for it; None: the mesh was known.
         cameras_by: Route to the cameras.
+        notes: Lines to report before the run.
     """
 
     mesh: TriangleMesh
     rig: Rig
-    asked: dict[str, Any]
-    seed: int
-    threads: int
-    command: tuple[str, ...]
+    wishes: Wishes
+    seed: int = 0
+    threads: int = 2
+    command: tuple[str, ...] = ()
     interest: Interest | None = None
     prove: bool = False
     ranges: tuple[RangedBody, Guard] | None = None
     cameras_by: CamerasBy = "both"
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ class PartialPlan:
     `projectors` have evenly spaced rings; `rings` holds those that cameras let finer.
     """
 
-    order: PlanRequest
+    request: PlanRequest
     scene: Scene
     regions: DominantRegions
     curvature_radius_m: float

@@ -23,8 +23,9 @@ from . import optics
 from .rig_devices import device_document, parallel_device, pinhole_device
 from .rig_existing import build_existing, check_existing
 from .rig_files import Figure, Preset, list_presets, read_rig
-from .rig_requirements import Pattern, Target, build_requirements
+from .rig_requirements import build_requirements
 from .rig_tables import ParallelTable, PinholeTable, RigTable
+from .wishes import Wishes
 
 __all__ = ["Figure", "Preset", "Rig", "list_presets", "load_rig"]
 
@@ -195,33 +196,17 @@ class Rig:
         self,
         mesh_centre: Sequence[float] | NDArray[np.float64],
         object_radius_m: float,
+        wishes: Wishes,
         *,
-        max_projectors: int,
         tau_m: float,
-        max_cameras: int | None = None,
-        target: Target = "dominant",
-        pattern: Pattern = "rings",
-        dominant_coverage: float | None = None,
-        coverage: float | None = None,
-        min_reachable: float | None = None,
-        accuracy_mm: float | None = None,
-        up: str | None = None,
     ) -> Requirements:
         """Return what a plan of this rig must reach for one object.
 
         Args:
             mesh_centre: Centre of the smallest ball that holds the object in [m], (3,).
             object_radius_m: Radius of that ball in [m].
-            max_projectors: Projectors at most.
+            wishes: What is asked beside what the rig says.
             tau_m: Distance within which a sample must have a measured point in [m].
-            max_cameras: Cameras at most; None: as many as needed.
-            target: `dominant` regions or the whole `surface`.
-            pattern: `rings`, `dense` or `none`.
-            dominant_coverage: Lit over reachable; None: what the rig says.
-            coverage: Measured over reachable; None: what the rig says.
-            min_reachable: Reachable over target; None: what the rig says.
-            accuracy_mm: Largest s_N in [mm]; None: what the rig says.
-            up: x, y, z, -x, -y or -z; None: what the rig says.
 
         Raises:
             InputError: If an argument isn't usable.
@@ -235,16 +220,8 @@ class Rig:
             self.outer_ring_radius(),
             mesh_centre,
             object_radius_m,
-            max_projectors=max_projectors,
+            wishes,
             tau_m=tau_m,
-            max_cameras=max_cameras,
-            target=target,
-            pattern=pattern,
-            dominant_coverage=dominant_coverage,
-            coverage=coverage,
-            min_reachable=min_reachable,
-            accuracy_mm=accuracy_mm,
-            up=up,
             overflowing=(
                 not projector.holds_ball(object_radius_m, middle_m),
                 not camera.holds_ball(object_radius_m, middle_m),

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,9 @@ from planning.model.requirements import (
 from planning.scene.workspace.zone_conflicts import check_zones
 
 from .rig_tables import CheckTable, LimitsTable, RigTable
+from .wishes import Wishes
 from .zone_tables import build_zones
 
-Pattern = Literal["rings", "dense", "none"]
-Target = Literal["dominant", "surface"]
 Overflowing = tuple[bool, bool]
 
 UP_VECTORS: dict[str, tuple[float, float, float]] = {
@@ -40,17 +39,9 @@ def build_requirements(
     reference_ring_radius: float,
     mesh_centre: Sequence[float] | NDArray[np.float64],
     object_radius_m: float,
+    wishes: Wishes,
     *,
-    max_projectors: int,
     tau_m: float,
-    max_cameras: int | None,
-    target: Target,
-    pattern: Pattern,
-    dominant_coverage: float | None,
-    coverage: float | None,
-    min_reachable: float | None,
-    accuracy_mm: float | None,
-    up: str | None,
     overflowing: Overflowing = (False, False),
 ) -> Requirements:
     """Return what a plan must reach; `Rig.requirements` documents the arguments.
@@ -63,28 +54,36 @@ def build_requirements(
         InfeasibleLimitsError: If no position in the workspace is admissible.
     """
     shares = table.requirements
+    target = wishes.target or "dominant"
     _check_choice("target", target, ("dominant", "surface"))
-    _check_choice("pattern", pattern, ("rings", "dense", "none"))
-    _check_count("max_projectors", max_projectors)
-    if max_cameras is not None:
-        _check_count("max_cameras", max_cameras)
+    _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
+    _check_count("max_projectors", wishes.max_projectors)
+    if wishes.max_cameras is not None:
+        _check_count("max_cameras", wishes.max_cameras)
     _check_positive("tau_m", tau_m)
     workspace = build_workspace(
-        table, reference_ring_radius, mesh_centre, object_radius_m, up, overflowing
+        table,
+        reference_ring_radius,
+        mesh_centre,
+        object_radius_m,
+        wishes.up,
+        overflowing,
     )
     return Requirements(
-        max_projectors=max_projectors,
-        max_cameras=max_cameras,
-        coverage=_share("coverage", coverage, shares.coverage),
+        max_projectors=wishes.max_projectors,
+        max_cameras=wishes.max_cameras,
+        coverage=_share("coverage", wishes.coverage, shares.coverage),
         dominant_coverage=_share(
-            "dominant_coverage", dominant_coverage, shares.dominant_coverage
+            "dominant_coverage", wishes.dominant_coverage, shares.dominant_coverage
         ),
-        min_reachable=_share("min_reachable", min_reachable, shares.min_reachable),
+        min_reachable=_share(
+            "min_reachable", wishes.min_reachable, shares.min_reachable
+        ),
         target=target,
-        pattern=pattern,
+        pattern=wishes.pattern,
         projector=_projector_limits(table.limits),
         camera=_camera_limits(table.limits),
-        triangulation=_triangulation_limits(table.limits, accuracy_mm),
+        triangulation=_triangulation_limits(table.limits, wishes.accuracy_mm),
         check=_check_limits(table.check, tau_m),
         workspace=workspace,
     )

@@ -33,6 +33,7 @@ from planning.proofs.projector_bound import Effort
 from planning.proofs.selection import required_samples
 from planning.report.summary.summary import _routes
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
@@ -58,10 +59,8 @@ def ball():
     required = rig.requirements(
         mesh.centre,
         mesh.radius,
-        max_projectors=6,
-        target="surface",
+        Wishes(max_projectors=6, target="surface", dominant_coverage=0.6),
         tau_m=0.004,
-        dominant_coverage=0.6,
     )
     n, eye = len(mesh.faces), np.eye(4)
     scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
@@ -274,7 +273,7 @@ def planned(small_job, tmp_path_factory, with_few_samples):
     with pytest.MonkeyPatch.context() as patch, with_few_samples():
         # What is proved of the projectors isn't the question.
         weak = Effort(finest=3, budget=1e6, shadows=0.0, most_samples=200)
-        patch.setattr("planning.pipeline.DEFAULT", weak)
+        patch.setattr("planning.proofs.projector_bound.DEFAULT", weak)
         ended = small_job.run(folder / "block.obj", folder, words)
     assert ended.code == 0, ended.message
     return ended.plan, RigPlan.load(folder / "plan" / "plan.json")

@@ -21,15 +21,13 @@ from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import Effort
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.lighting import assigned_projectors, lit_stages, margins_of
 from planning.scene.limits.projector_limits import LIT
 from solvers.poses.cone import max_margin_direction
 
 EFFORT = Effort(finest=5, budget=3e8, shadows=0.0, most_samples=2000)
 SHADOWS = replace(EFFORT, finest=6, shadows=np.inf)
-ASKED = dict.fromkeys(
-    ("max_cameras", "coverage", "min_reachable", "accuracy_mm", "up"), None
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +51,9 @@ def planned(
     effort=EFFORT,
 ):
     """Plan the projectors of a surface; shadows count where the effort says so."""
-    asked = ASKED | {"max_projectors": 20, "target": "surface"}
     rig = load_rig("default", light)
-    order = PlanRequest(mesh, rig, asked | {"dominant_coverage": share}, 0, 2, ())
+    wishes = Wishes(max_projectors=20, target="surface", dominant_coverage=share)
+    order = PlanRequest(mesh, rig, wishes)
     ready = prepared(order, Stopwatch())
     required = ready.scene.requirements
     limits = replace(
@@ -121,7 +119,10 @@ def test_sphere_in_diverging_light_takes_caps_that_are_smaller():
         return 0.5 * (1.0 - np.cos(cap))
 
     required = load_rig("default", light="diverging").requirements(
-        ball.centre, ball.radius, max_projectors=9, target="surface", tau_m=0.004
+        ball.centre,
+        ball.radius,
+        Wishes(max_projectors=9, target="surface"),
+        tau_m=0.004,
     )
     near, far = required.workspace.projector_radius_m
     at_most, at_least = share_at(far), share_at(0.5 * (near + far))

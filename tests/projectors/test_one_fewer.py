@@ -18,6 +18,7 @@ from planning.projectors.one_fewer import one_fewer
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
@@ -32,7 +33,10 @@ def ball():
     mesh = sphere(0.1, subdivisions=4)
     rig = load_rig("default", light="parallel")
     required = rig.requirements(
-        mesh.centre, mesh.radius, max_projectors=9, target="surface", tau_m=0.004
+        mesh.centre,
+        mesh.radius,
+        Wishes(max_projectors=9, target="surface"),
+        tau_m=0.004,
     )
     limits = replace(required.projector, max_incidence=np.radians(45.0))
     required = replace(required, projector=limits, dominant_coverage=0.875)

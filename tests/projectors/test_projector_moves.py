@@ -15,6 +15,7 @@ from planning.projectors.projector_poses import _between, widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
@@ -36,7 +37,9 @@ def shaded():
         np.concatenate([plate.faces, lid.faces + len(plate.vertices)]),
     )
     rig = load_rig("default")
-    required = rig.requirements(mesh.centre, mesh.radius, max_projectors=1, tau_m=0.004)
+    required = rig.requirements(
+        mesh.centre, mesh.radius, Wishes(max_projectors=1), tau_m=0.004
+    )
     ours = (mesh.face_normals[:, 2] > 0.9) & (mesh.face_centroids[:, 2] < 0.01)
     region = np.where(ours, 0, -1)
     scene = Scene(mesh, region, np.zeros((len(region), 3)), required, 0, 1)
@@ -86,7 +89,10 @@ def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     mesh = sphere(0.06, subdivisions=3)
     rig = load_rig("default", light="parallel")
     required = rig.requirements(
-        mesh.centre, mesh.radius, max_projectors=4, target="surface", tau_m=0.004
+        mesh.centre,
+        mesh.radius,
+        Wishes(max_projectors=4, target="surface"),
+        tau_m=0.004,
     )
     cone = replace(
         required.workspace, axis=(0.0, -1.0, 0.0), half_angle=float(np.radians(40.0))

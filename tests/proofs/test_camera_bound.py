@@ -41,6 +41,7 @@ from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.lights import LightOnSamples
 from planning.scene.limits import camera_limits, pair_limits
 from planning.scene.measured import LitSamples, lit_samples
@@ -64,10 +65,8 @@ def scene_of(mesh, *, existing=(), coverage=None, limits=None, **workspace):
     required = rig.requirements(
         mesh.centre,
         mesh.radius,
-        max_projectors=9,
-        target="surface",
+        Wishes(max_projectors=9, target="surface", coverage=coverage),
         tau_m=0.004,
-        coverage=coverage,
     )
     limits = dict(limits or {})
     incidence = limits.pop("max_incidence", required.camera.max_incidence)

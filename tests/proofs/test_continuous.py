@@ -16,6 +16,7 @@ from planning.proofs import projector_bound as continuous
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.projector_bound import DEFAULT, Effort, bound_projectors
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
@@ -34,7 +35,10 @@ def stage_for(mesh, light, *, tangent_deg=0.0, steep=(0.0, 0.0, 0.0), **workspac
     """A scene whose target is the whole surface, and a projector without a pose."""
     rig = load_rig("default", light=light)
     required = rig.requirements(
-        mesh.centre, mesh.radius, max_projectors=9, target="surface", tau_m=0.004
+        mesh.centre,
+        mesh.radius,
+        Wishes(max_projectors=9, target="surface"),
+        tau_m=0.004,
     )
     required = replace(
         required,

@@ -30,6 +30,7 @@ from planning.report.claims import Devices, make_claims
 from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.camera_views import CandidateViews
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import furthest_failure, lit_samples, measured_by
@@ -59,7 +60,10 @@ def world(rig):
     """A ball under two projectors, seen by cameras that hold it, nearly or not."""
     ball = sphere(0.1, subdivisions=3)
     required = rig.requirements(
-        ball.centre, ball.radius, max_projectors=1, target="surface", tau_m=0.004
+        ball.centre,
+        ball.radius,
+        Wishes(max_projectors=1, target="surface"),
+        tau_m=0.004,
     )
     n = len(ball.faces)
     scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
@@ -302,7 +306,7 @@ def test_the_least_value_with_which_so_many_are_enough_is_that_of_every_choice(s
 
 def _requirements():
     return load_rig("default").requirements(
-        np.zeros(3), 0.1, max_projectors=1, tau_m=0.004
+        np.zeros(3), 0.1, Wishes(max_projectors=1), tau_m=0.004
     )
 
 

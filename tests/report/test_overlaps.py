@@ -15,6 +15,7 @@ from planning.model.ring_frame import ring_frame
 from planning.report.entries.exposure import schedule_line
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
@@ -33,7 +34,10 @@ WIDE = ParallelModel((2000, 2000), 2e-4, (0.8, 1.2))
 def scene_of(mesh, light="parallel"):
     rig = load_rig("default", light=light)
     required = rig.requirements(
-        mesh.centre, mesh.radius, max_projectors=9, target="surface", tau_m=0.004
+        mesh.centre,
+        mesh.radius,
+        Wishes(max_projectors=9, target="surface"),
+        tau_m=0.004,
     )
     n = len(mesh.faces)
     return Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)

@@ -13,6 +13,7 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.scene import Scene
 
 
@@ -84,10 +85,8 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
     required = rig.requirements(
         ball.centre,
         ball.radius,
-        max_projectors=14,
-        target="surface",
+        Wishes(max_projectors=14, target="surface", dominant_coverage=0.5),
         tau_m=0.004,
-        dominant_coverage=0.5,
     )
     n = len(ball.faces)
     scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)

@@ -22,6 +22,7 @@ from planning.proofs.projector_bound import Effort
 from planning.proofs.selection import CandidateCover, marginals, select_fewest
 from planning.report.claims import Devices, make_claims
 from planning.report.summary.summary import summary
+from planning.rig.wishes import Wishes
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
 
@@ -47,8 +48,8 @@ def required_of(tmp_path):
     def build(text, **wishes):
         path = tmp_path / "rig.toml"
         path.write_text(f'base = "default"\n{text}', encoding="utf-8")
-        settings = {"max_projectors": 3, "tau_m": 0.003} | wishes
-        return load_rig(path).requirements(CENTRE, 0.1, **settings)
+        asked = Wishes(**({"max_projectors": 3} | wishes))
+        return load_rig(path).requirements(CENTRE, 0.1, asked, tau_m=0.003)
 
     return build
 
@@ -150,7 +151,10 @@ def ball_scene(existing):
     ball = sphere(0.08, subdivisions=4)
     rig = load_rig("default", light="parallel")
     required = rig.requirements(
-        ball.centre, ball.radius, max_projectors=9, target="surface", tau_m=0.004
+        ball.centre,
+        ball.radius,
+        Wishes(max_projectors=9, target="surface"),
+        tau_m=0.004,
     )
     required = replace(
         required,

@@ -14,6 +14,7 @@ from planning.model.requirements import Requirements
 from planning.rig.rig import list_presets, load_rig
 from planning.rig.rig_files import lay_over, preset_names, read_rig
 from planning.rig.rig_tables import RigTable
+from planning.rig.wishes import Wishes
 
 MINIMAL = """
 name = "bench"
@@ -44,8 +45,9 @@ def write(tmp_path):
 
 
 def require(rig, radius=0.1, **wishes):
-    settings = {"max_projectors": 3, "tau_m": 0.003} | wishes
-    return rig.requirements([0.0, 0.0, 0.0], radius, **settings)
+    tau_m = wishes.pop("tau_m", 0.003)
+    asked = Wishes(**({"max_projectors": 3} | wishes))
+    return rig.requirements([0.0, 0.0, 0.0], radius, asked, tau_m=tau_m)
 
 
 # ---- the default rig
@@ -466,7 +468,7 @@ def test_wishes_override_the_rig():
 
 def test_shell_follows_the_object():
     rig = load_rig()
-    asked = rig.requirements([1.0, 2.0, 3.0], 0.2, max_projectors=1, tau_m=0.01)
+    asked = rig.requirements([1.0, 2.0, 3.0], 0.2, Wishes(max_projectors=1), tau_m=0.01)
     space = asked.workspace
     assert space.centre == (1.0, 2.0, 3.0)
     assert space.projector_radius_m == pytest.approx((1.15, 1.25))
@@ -563,7 +565,7 @@ def test_unusable_wishes_are_refused(wishes):
 @pytest.mark.parametrize("centre", [[0.0, 0.0], [0.0, math.nan, 0.0]])
 def test_centre_must_be_a_point(centre):
     with pytest.raises(InputError, match="mesh_centre"):
-        load_rig().requirements(centre, 0.1, max_projectors=1, tau_m=0.01)
+        load_rig().requirements(centre, 0.1, Wishes(max_projectors=1), tau_m=0.01)
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])

@@ -21,6 +21,7 @@ from planning.cameras.camera_stage import (
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.rings.axis_moves import (
     AxisJudge,
     axis_program,
@@ -50,10 +51,8 @@ def ball(request):
     required = rig.requirements(
         mesh.centre,
         mesh.radius,
-        max_projectors=2,
-        target="surface",
+        Wishes(max_projectors=2, target="surface", coverage=0.8),
         tau_m=0.004,
-        coverage=0.8,
     )
     n = len(mesh.faces)
     scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)

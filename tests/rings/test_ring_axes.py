@@ -14,6 +14,7 @@ from planning.projectors.projector_stage import plan_projectors
 from planning.report.advice.projector_relaxations import reachability_relaxations
 from planning.report.claims import Devices, make_claims
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.rings.ring_pitch import widest_gap
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_stages, margins_of
@@ -30,10 +31,8 @@ def scene(request):
     required = rig.requirements(
         ball.centre,
         ball.radius,
-        max_projectors=6,
-        target="surface",
+        Wishes(max_projectors=6, target="surface", dominant_coverage=0.6),
         tau_m=0.004,
-        dominant_coverage=0.6,
     )
     n = len(ball.faces)
     made = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)

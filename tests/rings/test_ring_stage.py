@@ -13,6 +13,7 @@ from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.rings import ring_pitch
 from planning.rings.beam_profile import cast_beam
 from planning.rings.ring_creases import crease_errors, find_creases
@@ -40,7 +41,7 @@ def made(light, *, tilt_deg=0.0, mesh=None):
     ball = sphere(RADIUS, subdivisions=5) if mesh is None else mesh
     rig = load_rig("default", light=light)
     required = rig.requirements(
-        np.zeros(3), RADIUS, max_projectors=1, target="surface", tau_m=0.004
+        np.zeros(3), RADIUS, Wishes(max_projectors=1, target="surface"), tau_m=0.004
     )
     n = len(ball.faces)
     scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)

@@ -34,6 +34,7 @@ from planning.proofs.conflicts import (
 )
 from planning.proofs.selection import CandidateCover, marginals, select_fewest
 from planning.report.drawing.figures import device_figures
+from planning.rig.wishes import Wishes
 from planning.scene import lighting, measurability
 from planning.scene.camera_views import camera_views
 from planning.scene.clearance import (
@@ -163,7 +164,10 @@ def camera(x=0.02, y=0.01, z=0.6, *, body=HOUSING, name="C1"):
 def scene():
     plate = grid(0.5, 0.5, divisions=(20, 20))
     required = load_rig().requirements(
-        plate.centre, plate.radius, max_projectors=3, target="surface", tau_m=0.003
+        plate.centre,
+        plate.radius,
+        Wishes(max_projectors=3, target="surface"),
+        tau_m=0.003,
     )
     n = len(plate.faces)
     return Scene(plate, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
@@ -515,7 +519,7 @@ def test_bodies_of_a_rig_file_reach_devices_plan_and_existing(rig_of):
     assert np.allclose(parallel.centre_m, body.centre_m)
     assert np.allclose(rig.to_document()["camera"]["body"]["half_m"], body.half_m)
     assert "body" not in rig.to_document()["projector"]
-    required = rig.requirements(np.zeros(3), 0.1, max_projectors=3, tau_m=0.003)
+    required = rig.requirements(np.zeros(3), 0.1, Wishes(max_projectors=3), tau_m=0.003)
     a, b = required.existing
     assert a.body == body
     assert b.body is not None
@@ -525,7 +529,9 @@ def test_bodies_of_a_rig_file_reach_devices_plan_and_existing(rig_of):
     assert Requirements.from_document(required.to_document()) == required
     without = rig_of(old.format("a", 0))
     assert "body" not in without.to_document()["existing"][0]
-    required = without.requirements(np.zeros(3), 0.1, max_projectors=3, tau_m=0.003)
+    required = without.requirements(
+        np.zeros(3), 0.1, Wishes(max_projectors=3), tau_m=0.003
+    )
     assert "body" not in required.to_document()["existing"][0]
 
 

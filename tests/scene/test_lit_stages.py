@@ -14,6 +14,7 @@ from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.claims import Devices, _reachable_by_projectors
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
 from planning.scene.lighting import lit_stages
@@ -35,7 +36,10 @@ def test_candidates_together_light_what_each_lights_alone(light):
     )
     rig = load_rig("default", light=light)
     required = rig.requirements(
-        pair.centre, pair.radius, max_projectors=6, target="surface", tau_m=0.004
+        pair.centre,
+        pair.radius,
+        Wishes(max_projectors=6, target="surface"),
+        tau_m=0.004,
     )
     n = len(pair.faces)
     scene = Scene(pair, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)

@@ -27,15 +27,13 @@ from planning.proofs.projector_bound import Effort
 from planning.report.advice.wider_field import wider_field
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
 from planning.verify.audit.devices.device_claims import outside_by
 
-ASKED = dict.fromkeys(
-    ("max_cameras", "coverage", "min_reachable", "accuracy_mm", "up"), None
-)
 EFFORT = Effort(finest=4, budget=1e7, shadows=0.0, most_samples=500)
 SHIFTED = PinholeModel(
     np.array([[1500.0, 0, 511.5], [0, 1500.0, 880.0], [0, 0, 1]]),
@@ -57,9 +55,8 @@ def askew(width, height):
 
 def readied(mesh, light, incidence, most=9, share=0.99, **workspace):
     """The scene, the template and the offset of rings, limits as given in degrees."""
-    asked = ASKED | {"max_projectors": most, "target": "surface"}
-    asked |= {"dominant_coverage": share}
-    order = PlanRequest(mesh, load_rig("default", light), asked, 0, 2, ())
+    wishes = Wishes(max_projectors=most, target="surface", dominant_coverage=share)
+    order = PlanRequest(mesh, load_rig("default", light), wishes)
     ready = prepared(order, Stopwatch())
     required = ready.scene.requirements
     required = replace(

@@ -15,6 +15,7 @@ from planning.model.plan import RigPlan
 from planning.model.plan_errors import RequirementError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
+from planning.rig.wishes import Wishes
 from planning.scene.workspace.candidates import (
     camera_candidates,
     projectors_around,
@@ -59,7 +60,7 @@ def workspace_of(tmp_path):
         path.write_text(f'base = "default"\n[workspace]\n{text}', encoding="utf-8")
         return (
             load_rig(path)
-            .requirements(CENTRE, radius, max_projectors=3, tau_m=0.003)
+            .requirements(CENTRE, radius, Wishes(max_projectors=3), tau_m=0.003)
             .workspace
         )
 

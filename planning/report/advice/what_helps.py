@@ -15,7 +15,7 @@ from .wider_field import wider_field
 
 def with_relaxations(
     coverage: Coverage,
-    draft: PartialPlan,
+    partial: PartialPlan,
     devices: Devices,
     claims: Claims,
     clock: Stopwatch,
@@ -24,21 +24,21 @@ def with_relaxations(
 
     Args:
         coverage: Of the plan.
-        draft: What the plan is written from.
+        partial: What the plan is written from.
         devices: As written, with the reference sets.
         claims: Made for these devices.
         clock: Times it.
     """
-    areas, least = coverage.target, draft.scene.requirements.min_reachable
+    areas, least = coverage.target, partial.scene.requirements.min_reachable
     if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
             found = reachability_relaxations(
-                draft.scene, devices.reference_projectors, (draft.tilt, 0.0)
+                partial.scene, devices.reference_projectors, (partial.tilt, 0.0)
             )
         coverage = coverage.changed(relaxations=found)
     if falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least):
         with _timed(clock):
-            out = out_of_reach(draft.scene, draft.order.rig, devices, claims)
+            out = out_of_reach(partial.scene, partial.request.rig, devices, claims)
         coverage = coverage.changed(
             unmeasurable_by_cause=out.by_cause, camera_relaxations=out.relaxations
         )
@@ -46,21 +46,21 @@ def with_relaxations(
 
 
 def with_fewer_needed(
-    proofs: Certificates, draft: PartialPlan, clock: Stopwatch
+    proofs: Certificates, partial: PartialPlan, clock: Stopwatch
 ) -> Certificates:
     """Return the certificates with what would let as many as are allowed be enough."""
-    required = draft.scene.requirements
+    required = partial.scene.requirements
     if _too_few(proofs.projectors, required.max_projectors):
         with _timed(clock):
-            field = wider_field(draft.scene, draft.stage, required.max_projectors)
+            field = wider_field(partial.scene, partial.stage, required.max_projectors)
         if field is not None:
             needed = proofs.projectors.needed.changed(wider_field=field)
             proofs = proofs.changed(projectors=proofs.projectors.changed(needed=needed))
     if _too_few(proofs.cameras, required.max_cameras):
         with _timed(clock):
-            scene, count = draft.scene.among(draft.projectors), required.max_cameras
+            scene, count = partial.scene.among(partial.projectors), required.max_cameras
             changes = for_so_many(
-                scene, draft.order.rig, draft.camera_stage, count or 0
+                scene, partial.request.rig, partial.camera_stage, count or 0
             )
         if changes:
             needed = proofs.cameras.needed.changed(relaxations=changes)

@@ -12,6 +12,7 @@ from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.cells.shell_cells import spread
 from planning.rig.rig import load_rig
+from planning.rig.wishes import Wishes
 from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 
@@ -51,7 +52,10 @@ SHAPES = {"sphere": sphere(0.06, subdivisions=3), "notched box": notched_box()}
 def made(mesh, light, attack_cells):
     rig = load_rig("default", light=light)
     required = rig.requirements(
-        mesh.centre, mesh.radius, max_projectors=9, target="surface", tau_m=0.004
+        mesh.centre,
+        mesh.radius,
+        Wishes(max_projectors=9, target="surface"),
+        tau_m=0.004,
     )
     limits = replace(required.projector, min_tangent_angle=np.radians(40.0))
     required = replace(required, projector=limits)

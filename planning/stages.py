@@ -1,0 +1,213 @@
+"""The stages of planning, each of which takes a partial plan further."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from planning.cameras.camera_cover import (
+    CameraStage,
+    NothingMeasuredError,
+    camera_candidate_views,
+)
+from planning.cameras.camera_routes import widest_route
+from planning.cameras.camera_stage import follow_cameras, place_cameras
+from planning.cameras.proved_cameras import bound_stage
+from planning.model.document.certificates import Certificate
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.progress import Stopwatch
+from planning.projectors.projector_poses import widen_margins
+from planning.projectors.candidate_set import NothingLitError
+from planning.projectors.projector_stage import ProjectorStage, plan_projectors
+from planning.projectors.proved_projectors import prove_fewest
+from planning.proofs import camera_bound, projector_bound
+from planning.proofs.selection import larger
+from planning.report.advice.camera_relaxations import nothing_measured
+from planning.report.advice.relaxations import nothing_lit
+from planning.report.advice.what_helps import falls_short
+from planning.report.partial_plan import PartialPlan, PlanRequest
+from planning.rings.ring_stage import space_rings
+from planning.scene.scene import Scene
+
+from .prepare import Prepared
+
+
+def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
+    """Return the fewest projectors of the candidates.
+
+    Raises:
+        InfeasibleLimitsError: If no candidate lights any sample.
+    """
+    rig = ready.request.rig
+    with clock.stage("projectors", "projectors: candidates and cover"):
+        try:
+            stage = plan_projectors(
+                ready.scene,
+                ready.template,
+                rig.n_projector_poses,
+                ring_offset=ready.ring_offset,
+            )
+        except NothingLitError as error:
+            helps = nothing_lit(ready.scene, error)
+            raise InfeasibleLimitsError(f"{error}; {helps}") from None
+        clock.say(
+            f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
+            f"{stage.certificate.candidates.lower_bound} are needed"
+        )
+    return stage
+
+
+def bounded_projectors(
+    ready: Prepared, stage: ProjectorStage, clock: Stopwatch
+) -> ProjectorStage:
+    """Return the fewest projectors with their bound over all poses."""
+    prove = ready.request.prove
+    with clock.stage("bounds", "bounds over all poses of the workspace"):
+        effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
+        stage = prove_fewest(
+            ready.scene, stage, ready.template, effort, ring_offset=ready.ring_offset
+        )
+        clock.say(f"  projectors: {_bound_words(stage.certificate)}")
+    return stage
+
+
+def placed(
+    request: PlanRequest,
+    scene: Scene,
+    stage: ProjectorStage,
+    clock: Stopwatch,
+) -> tuple[tuple[PlannedProjector, ...], CameraStage]:
+    """Poses of widest margin for chosen projectors, and the cameras for them."""
+    rig = request.rig
+    with clock.stage("projector_poses", "projector poses: widest margins"):
+        projectors = widen_margins(scene, stage)
+    with clock.stage("cameras", "cameras: candidates, measurability and cover"):
+        n_cameras = rig.n_camera_poses
+        camera = PlannedCamera(
+            "", np.eye(4), rig.camera_device(), body=rig.camera_body()
+        )
+        scene = scene.among(projectors)
+        candidates = camera_candidate_views(scene, camera, n_cameras)
+        try:
+            solution = place_cameras(scene, projectors, candidates, request.cameras_by)
+        except NothingMeasuredError as error:
+            helps = nothing_measured(scene, rig, error)
+            raise InfeasibleLimitsError(f"{error}; {helps}") from None
+        cameras = solution.stage
+        clock.say(
+            f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "
+            f"least {cameras.certificate.candidates.lower_bound} are needed"
+        )
+    return solution.projectors, cameras
+
+
+def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
+    """Section VI: cameras slide apart while the coverage holds; then their rings."""
+    with clock.stage("baselines", "baselines: cameras slide apart"):
+        ranges = partial.request.ranges
+        stage, moved = widest_route(
+            partial.scene,
+            partial.projectors,
+            partial.camera_stage,
+            spare_field=0.0 if ranges is None else ranges[1].angle_rad,
+        )
+        if moved.smallest_before_m is not None and moved.smallest_after_m is not None:
+            clock.say(
+                f"  smallest baseline {1e3 * moved.smallest_before_m:.0f} -> "
+                f"{1e3 * moved.smallest_after_m:.0f} mm"
+            )
+    with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
+        final = follow_cameras(
+            partial.scene,
+            partial.projectors,
+            moved.cameras,
+            stage,
+            partial.request.cameras_by,
+        )
+        scene = partial.scene.among((*final.projectors, *moved.cameras))
+        rings = space_rings(
+            scene,
+            final.projectors,
+            moved.cameras,
+            partial.request.rig.ring_spacing,
+            final.stage.cover.samples,
+        )
+    return replace(
+        partial,
+        projectors=final.projectors,
+        camera_stage=final.stage,
+        cameras=moved.cameras,
+        rings=rings,
+    )
+
+
+def bounded_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
+    """The cameras' bound over all poses, for the ring axes that were kept.
+
+    One that stands already belongs to the same projectors and axes: other axes come
+    with another certificate.
+    """
+    stage, request = partial.camera_stage, partial.request
+    if stage.certificate.continuous is not None:
+        return partial
+    with clock.stage("camera_bounds", "bounds over all poses of the cameras"):
+        effort = camera_bound.PROVE if request.prove else camera_bound.DEFAULT
+        stage = bound_stage(partial.scene, stage, request.rig.camera_device(), effort)
+        clock.say(f"  cameras: {_bound_words(stage.certificate)}")
+    return replace(partial, camera_stage=stage)
+
+
+def one_device_more(
+    partial: PartialPlan, plan: RigPlan, clock: Stopwatch
+) -> PartialPlan | None:
+    """One device more where fresh samples don't confirm a cover that met its own.
+
+    The proved bound stays what it is; the count is then above it, and says so.
+    """
+    required, areas = plan.requirements, plan.coverage.target
+    if falls_short(
+        areas.lit_m2, areas.reachable_by_projectors_m2, required.dominant_coverage
+    ):
+        more = _one_projector_more(partial, required.max_projectors, clock)
+        if more is not None:
+            return more
+    if falls_short(areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage):
+        return _one_camera_more(partial, required.max_cameras, clock)
+    return None
+
+
+def _one_projector_more(
+    partial: PartialPlan, allowed: int, clock: Stopwatch
+) -> PartialPlan | None:
+    stage = larger(partial.stage, partial.stage.projectors, allowed)
+    if stage is None:
+        return None
+    clock.say("  fresh samples fall short: one projector more")
+    stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
+    projectors, cameras = placed(partial.request, partial.scene, stage, clock)
+    return replace(
+        partial,
+        stage=stage,
+        projectors=projectors,
+        rings=None,
+        camera_stage=cameras,
+        cameras=cameras.cameras,
+    )
+
+
+def _one_camera_more(
+    partial: PartialPlan, allowed: int | None, clock: Stopwatch
+) -> PartialPlan | None:
+    stage = larger(partial.camera_stage, partial.cameras, allowed)
+    if stage is None:
+        return None
+    clock.say("  fresh samples fall short: one camera more")
+    cameras = stage.by_count[stage.certificate.count]
+    stage = replace(stage, cameras=cameras)
+    return replace(partial, camera_stage=stage, cameras=cameras, rings=None)
+
+
+def _bound_words(proof: Certificate) -> str:
+    bound = proof.continuous
+    return "" if bound is None else f"at least {bound.lower_bound}, {bound.proof}"
