@@ -17,8 +17,8 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
-from planning.projectors.projector_poses import widen_margins
 from planning.projectors.candidate_set import NothingLitError
+from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs import camera_bound, projector_bound
