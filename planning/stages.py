@@ -24,7 +24,7 @@ from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs import camera_bound, projector_bound
 from planning.proofs.selection import larger
 from planning.report.advice.camera_relaxations import nothing_measured
-from planning.report.advice.relaxations import nothing_lit
+from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.rings.ring_stage import space_rings
