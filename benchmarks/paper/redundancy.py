@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from support import reconstruction_rigs
 from support.plain_shapes import box
+from support.reconstruction_rigs import reconstruct_plan
 from support.white_frames import balanced_accuracy, best_threshold, render_whites
 
 from geometry.files.readers import load_mesh
@@ -34,14 +35,11 @@ from planning.verify.reconstruction.check.accuracy import (
     measure_accuracy,
     nearest_distance,
 )
-from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.check.image_overlap import (
     overlap_by_frames,
     overlap_by_intensity,
 )
-from planning.verify.reconstruction.faults.overlapping_light import (
-    light_falls,
-)
+from planning.verify.reconstruction.faults.overlapping_light import light_falls
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view

@@ -19,7 +19,7 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
-from planning.verify.reconstruction.light import LIGHTS, LightName
+from planning.verify.reconstruction.light_laws import LIGHTS, LightName
 
 MIN_CONDITIONING = 0.1
 _POINTS_A_POSE = 2000

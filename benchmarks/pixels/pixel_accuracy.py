@@ -16,13 +16,13 @@ from pathlib import Path
 
 import numpy as np
 from support import reconstruction_rigs
+from support.reconstruction_rigs import reconstruct_plan
 from verify.reconstruction import test_reconstruction_decode
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning import load_mesh
 from planning.verify.reconstruction.check.accuracy import measure_accuracy
-from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.decode.edges import find_edges
 from planning.verify.reconstruction.render.photometry import Photometry
 

@@ -14,10 +14,11 @@ from collections.abc import Callable
 
 import numpy as np
 from support import reconstruction_rigs
+from support.reconstruction_rigs import reconstruct_plan
 
 from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
-from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan
+from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.verification import verify_plan
 
 RIGS = reconstruction_rigs

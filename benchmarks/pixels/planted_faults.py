@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from support.reconstruction_rigs import reconstruct_plan
 
 from benchmarks.pixels.seam_gap import GAP, predicted_limit, seam_samples, wall_rig
 from geometry.mesh.mesh import TriangleMesh
@@ -28,7 +29,6 @@ from planning import load_mesh, load_rig, plan_rig
 from planning.cli.sample import write_sample
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit import audit_plan
-from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.verification import verify_plan
 
 SEEDS = 20

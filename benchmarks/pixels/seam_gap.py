@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from support import reconstruction_rigs
 from support.plain_shapes import grid
+from support.reconstruction_rigs import reconstruct_plan
 
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from planning.cameras.baselines.baseline_rows import half_field
 from planning.model.plan import RigPlan
-from planning.verify.reconstruction.check.check import Reconstruction, reconstruct_plan
+from planning.verify.reconstruction.check.result import Reconstruction
 
 RIGS = reconstruction_rigs
 FOCAL, RESOLUTION = 8000.0, (1280, 180)

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from support import reconstruction_rigs
 from support.edge_noise import EdgeNoise
 from support.plain_shapes import grid
+from support.reconstruction_rigs import reconstruct_plan
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
@@ -29,7 +30,6 @@ from planning.scene import lighting, measurability
 from planning.scene.limits import camera_limits
 from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
-from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry
 

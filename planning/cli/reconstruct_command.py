@@ -19,11 +19,11 @@ from planning.model.progress import Report
 from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.captures.calibration_file import calibrated
 from planning.verify.reconstruction.captures.captured import (
-    Expected,
     reconstruct_captured,
     reconstruct_rendered,
 )
 from planning.verify.reconstruction.captures.captures import CaptureFolder
+from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud_file import (
     CloudFile,
@@ -87,8 +87,7 @@ def _reconstruct(
     if options["single_shot"]:
         return reconstruct_single_shot(
             scanner,
-            expected.samples,
-            expected.measured,
+            expected,
             tolerance_m=1e-3 * (options["prior_mm"] or _PRIOR_MM),
             seed=seed,
             threads=threads,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.arrays import Array, Indices
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.single_shot import Shot
@@ -89,11 +90,8 @@ def judged_labels(scanner: Scanner, shots: Sequence[Shot]) -> LabelCount:
 
 
 def true_labels(
-    pixels: NDArray[np.float64],
-    pair: PairCalibration,
-    caster: RayCaster,
-    width: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
+    pixels: Array, pair: PairCalibration, caster: RayCaster, width: float
+) -> tuple[Indices, NDArray[np.int8]]:
     """Return the ring and root that really are at pixels; ring -1: none is.
 
     Args:

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.poses import look_at
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
 )
-from planning.verify.reconstruction.light import LIGHTS, LightName
+from planning.verify.reconstruction.light_laws import LIGHTS, LightName
 
 UP = np.array([0.0, 0.0, 1.0])
 # Both projectors of the paper have 1024 x 768 px, the cameras 1280 x 720 px.
@@ -50,7 +50,7 @@ PRINTED = Optics(8000.0, (174.0, 68.0))
 FITTING = Optics(2800.0, (639.5, 359.5))
 
 
-def bearing(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
+def bearing(azimuth_deg: float, elevation_deg: float) -> Array:
     """Return the direction (3,) from the object to a device.
 
     Args:
@@ -62,11 +62,7 @@ def bearing(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
 
 
 def placed_projector(
-    name: str,
-    light: LightName,
-    direction: NDArray[np.float64],
-    target: NDArray[np.float64],
-    radii_m: NDArray[np.float64],
+    name: str, light: LightName, direction: Array, target: Array, radii_m: Array
 ) -> ProjectorCalibration:
     """Return a projector whose rings are centred on a point of the object.
 
@@ -93,10 +89,7 @@ def placed_projector(
 
 
 def placed_camera(
-    name: str,
-    optics: Optics,
-    direction: NDArray[np.float64],
-    target: NDArray[np.float64],
+    name: str, optics: Optics, direction: Array, target: Array
 ) -> CameraCalibration:
     """Return a camera with the target in the middle of its image.
 
@@ -118,7 +111,7 @@ def placed_camera(
     return CameraCalibration(name, pose, matrix, lens, CAMERA_PX)
 
 
-def _turned_to_z(ray: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned_to_z(ray: Array) -> Array:
     """Smallest rotation that takes a unit vector near +z to +z, shape (3, 3)."""
     x, y, z = ray
     share = 1.0 / (1.0 + z)

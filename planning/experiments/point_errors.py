@@ -3,10 +3,10 @@
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.check.accuracy import (
     measure_accuracy,
     nearest_distance,
@@ -38,7 +38,7 @@ class Errors:
     rest_m: float | None = None
 
     @classmethod
-    def of(cls, distances: NDArray[np.float64]) -> "Errors":
+    def of(cls, distances: Array) -> "Errors":
         """Summarise signed distances [m], shape (n,)."""
         if len(distances) == 0:
             return cls(0)
@@ -71,7 +71,7 @@ class MeasuredErrors:
 
     name: str
     cloud: Cloud
-    distances: NDArray[np.float64]
+    distances: Array
     complete: tuple[float, float]
 
     @property
@@ -81,11 +81,7 @@ class MeasuredErrors:
 
 
 def measured(
-    name: str,
-    cloud: Cloud,
-    mesh: TriangleMesh,
-    samples: SurfaceSamples,
-    gap_m: float,
+    name: str, cloud: Cloud, mesh: TriangleMesh, samples: SurfaceSamples, gap_m: float
 ) -> MeasuredErrors:
     """Hold a cloud to the truth.
 

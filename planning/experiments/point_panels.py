@@ -17,6 +17,7 @@ from planning.report.drawing.picture_view import (
     fitted,
 )
 from planning.report.drawing.shader import Shader
+from planning.verify.reconstruction.arrays import Array, Mask
 
 from .paper_devices import UP, bearing
 
@@ -75,11 +76,7 @@ class PanelStage:
         self._object = Shader(self.caster, colours).shade(self.view)
 
     def panel(
-        self,
-        title: str,
-        points: NDArray[np.float64],
-        colours: NDArray[np.float64],
-        legend: Legend = (),
+        self, title: str, points: Array, colours: Array, legend: Legend = ()
     ) -> Image.Image:
         """Return a panel of points on the object; those behind it are left out.
 
@@ -99,7 +96,7 @@ class PanelStage:
         panel.scale_bar(size=13.0)
         return _framed(panel.image, title, legend)
 
-    def _hidden(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _hidden(self, points: Array) -> Mask:
         if len(points) == 0:
             return np.zeros(0, dtype=bool)
         mesh = self.caster.mesh
@@ -109,16 +106,14 @@ class PanelStage:
         return self.caster.occluded(points + 4e-3 * rays, rays, away)
 
 
-def signed_colours(values: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
+def signed_colours(values: Array, limit: float) -> Array:
     """Return colours (n, 3) of signed values, saturated at plus and minus a limit."""
     place = np.clip(0.5 + 0.5 * values / limit, 0.0, 1.0) * (len(_SIGNED) - 1)
     at = np.arange(len(_SIGNED))
     return np.stack([np.interp(place, at, channel) for channel in _SIGNED.T], axis=1)
 
 
-def chosen_colours(
-    palette: Sequence[Colour], index: NDArray[np.integer]
-) -> NDArray[np.float64]:
+def chosen_colours(palette: Sequence[Colour], index: NDArray[np.integer]) -> Array:
     """Return the palette's colour of each index, beginning again at its end, (n, 3)."""
     return np.array(palette, dtype=np.float64)[np.asarray(index) % len(palette)]
 
@@ -182,11 +177,7 @@ def _framed(image: Image.Image, title: str, legend: Legend) -> Image.Image:
     return sheet.resize(final, Image.Resampling.BOX)
 
 
-def _splat(
-    picture: NDArray[np.uint8],
-    pixels: NDArray[np.float64],
-    colours: NDArray[np.float64],
-) -> None:
+def _splat(picture: NDArray[np.uint8], pixels: Array, colours: Array) -> None:
     """Draw points as small discs into a picture (h, w, 3)."""
     height, width = picture.shape[:2]
     middle = np.rint(pixels).astype(np.int64)

@@ -6,10 +6,10 @@ The paper's false projections, and what its lens cuts off, by rays of the truth.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
@@ -76,9 +76,7 @@ def ring_outcomes(scanner: Scanner, cloud: Cloud) -> tuple[RingOutcome, ...]:
     return tuple(outcomes)
 
 
-def lit_and_seen(
-    scanner: Scanner, points: NDArray[np.float64], normals: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def lit_and_seen(scanner: Scanner, points: Array, normals: Array) -> Mask:
     """Return which points some ring pattern lights and some camera shows, (n,).
 
     What could be measured at all: inside the outermost ring of a projector, facing it
@@ -100,7 +98,7 @@ def lit_and_seen(
 
 def _landed(
     projector: ProjectorCalibration, radius: float, caster: RayCaster
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Points and normals of the object that a ring falls on, (n, 3) each."""
     turn = np.arange(_PLACES) * (2.0 * np.pi / _PLACES)
     flat = radius * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -112,11 +110,8 @@ def _landed(
 
 
 def _lights(
-    projector: ProjectorCalibration,
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    caster: RayCaster,
-) -> NDArray[np.bool_]:
+    projector: ProjectorCalibration, points: Array, normals: Array, caster: RayCaster
+) -> Mask:
     pixels, _ = projector.panel(points)
     _, beams, away = projector.aim(points)
     lit = projector.in_panel(pixels)
@@ -126,11 +121,8 @@ def _lights(
 
 
 def _shows(
-    camera: CameraCalibration,
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    caster: RayCaster,
-) -> NDArray[np.bool_]:
+    camera: CameraCalibration, points: Array, normals: Array, caster: RayCaster
+) -> Mask:
     """Whether a camera's image shows points of the surface, (n,)."""
     u, v = camera.project(points).T
     width, height = camera.resolution
@@ -142,21 +134,14 @@ def _shows(
     return inside & ~_blocked(points, towards, away, caster)
 
 
-def _blocked(
-    points: NDArray[np.float64],
-    towards: NDArray[np.float64],
-    away: NDArray[np.float64],
-    caster: RayCaster,
-) -> NDArray[np.bool_]:
+def _blocked(points: Array, towards: Array, away: Array, caster: RayCaster) -> Mask:
     """Whether the object lies between its points and a device, (n,)."""
     slack = _SLACK * away
     reach = np.maximum(away - 2.0 * slack, 0.0)
     return caster.occluded(points + slack[:, None] * towards, towards, reach)
 
 
-def _measured(
-    cloud: Cloud, which: tuple[int, int, int], points: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _measured(cloud: Cloud, which: tuple[int, int, int], points: Array) -> Mask:
     """Whether places of a ring have a point of that projector, camera and ring."""
     p, c, k = which
     own = (cloud.projector == p) & (cloud.camera == c) & (cloud.ring == k)
@@ -166,5 +151,5 @@ def _measured(
     return np.isfinite(apart)
 
 
-def _share(values: NDArray[np.bool_]) -> float:
+def _share(values: Mask) -> float:
     return float(np.mean(values)) if len(values) else 0.0

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
+from planning.verify.reconstruction.arrays import Mask
 from planning.verify.reconstruction.check.check import conclude, reconstruct
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud import Cloud
@@ -62,7 +63,7 @@ class Outcome:
         return (self.single, *self.viewpoints, self.union, self.merged)
 
     @property
-    def stays(self) -> NDArray[np.bool_]:
+    def stays(self) -> Mask:
         """Which of all points stay where redundancy is removed, shape (n,)."""
         return np.isin(_keys(self.union.cloud), _keys(self.merged.cloud))
 

@@ -8,8 +8,8 @@ images; a second sequence doubles the density and keeps their distance.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
@@ -31,7 +31,7 @@ class Doubled:
     both: MeasuredErrors
 
 
-def midway(radii: NDArray[np.float64]) -> NDArray[np.float64]:
+def midway(radii: Array) -> Array:
     """Return radii midway between the rings, the first between centre and ring."""
     return 0.5 * (np.concatenate([[0.0], radii[:-1]]) + radii)
 

@@ -11,14 +11,14 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box
 from geometry.shapes.sample_head.sample_head import HeadShape, sample_head
 from planning.model.requirements import CheckLimits
-from planning.verify.reconstruction.light import LightName
+from planning.verify.reconstruction.arrays import Array
+from planning.verify.reconstruction.light_laws import LightName
 from planning.verify.reconstruction.scanner import ScanLimits, Scanner
 
 from .paper_devices import (
@@ -69,7 +69,7 @@ class Experiment:
     variant: str
     light: LightName
     optics: Optics
-    radii_m: NDArray[np.float64]
+    radii_m: Array
     scanner: Scanner
 
     @property
@@ -108,7 +108,7 @@ def face_experiment(
     light: LightName = "parallel",
     variant: Variant = "printed",
     distortion: float = 0.0,
-    radii_m: NDArray[np.float64] = FACE_RADII_M,
+    radii_m: Array = FACE_RADII_M,
     shape: HeadShape | None = None,
 ) -> Experiment:
     """Return the head under 2 projectors of circles of 1, 2 and 4 inches.
@@ -142,8 +142,8 @@ def _head(shape: HeadShape) -> TriangleMesh:
 def _experiment(
     name: str,
     mesh: TriangleMesh,
-    target: NDArray[np.float64],
-    radii_m: NDArray[np.float64],
+    target: Array,
+    radii_m: Array,
     light: LightName,
     variant: Variant,
     distortion: float,

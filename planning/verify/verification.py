@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from geometry.mesh.sampling import SurfaceSamples
     from planning.verify.audit.audit_samples import AuditSamples
     from planning.verify.reconstruction.check.check import Reconstruction
-    from planning.verify.reconstruction.check.comparison import Prediction
+    from planning.verify.reconstruction.check.comparison import PredictedSamples
 
 _MM = 1e3
 _MESH_SAMPLES = 2000
@@ -206,17 +206,18 @@ def _reconstruct(
     say: Callable[[str], None],
 ) -> Reconstruction:
     """Run the check from pixels on the audit's own samples."""
-    from planning.verify.reconstruction.check.check import reconstruct_plan
+    from planning.verify.reconstruction.check.accuracy import Expected
+    from planning.verify.reconstruction.check.check import reconstruct
     from planning.verify.reconstruction.check.comparison import compare
+    from planning.verify.reconstruction.scanner import Scanner
 
     inside, predicted = audit.in_target()
-    found = reconstruct_plan(
-        plan,
+    found = reconstruct(
+        Scanner.of(plan),
         seed=seed,
         threads=threads,
-        truth=truth,
-        samples=_bare(inside),
-        predicted=predicted,
+        truth=None if truth is None else Scanner.of(truth),
+        expected=Expected(_bare(inside), predicted),
         progress=lambda done, total: say(f"pixels: pair {done} of {total}"),
     )
     comparison = compare(
@@ -229,13 +230,13 @@ def _reconstruct(
     return replace(found, comparison=comparison)
 
 
-def _prediction(plan: RigPlan, audit: Audit, threads: int) -> Prediction:
+def _prediction(plan: RigPlan, audit: Audit, threads: int) -> PredictedSamples:
     """What the audit recomputed, by the plan's limits and at the physical floors."""
     from planning.verify.audit.coverage.floors import possible_at_floors
-    from planning.verify.reconstruction.check.comparison import Prediction
+    from planning.verify.reconstruction.check.comparison import PredictedSamples
 
     samples = audit.samples
-    return Prediction(
+    return PredictedSamples(
         _bare(samples),
         samples.weights,
         samples.in_target,

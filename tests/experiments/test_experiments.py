@@ -41,9 +41,7 @@ from planning.experiments.setups import (
     single,
 )
 from planning.experiments.table import outcome_document, outcome_lines
-from planning.verify.reconstruction.calibration import (
-    PairCalibration,
-)
+from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.check.accuracy import measure_accuracy
 from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud

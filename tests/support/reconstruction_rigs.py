@@ -10,7 +10,11 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
-from tests.support.bare_plan import bare_plan
+from support.bare_plan import bare_plan
+from planning.verify.reconstruction.check.accuracy import Expected
+from planning.verify.reconstruction.check.check import reconstruct
+from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.scanner import Scanner
 
 MESH_TABLE = {
     "path": None,
@@ -162,6 +166,23 @@ def plan_of(
         },
     }
     return bare_plan(requirements, projectors, cameras, surface, **sections)
+
+
+def reconstruct_plan(
+    plan: RigPlan,
+    *,
+    truth: RigPlan | None = None,
+    samples: SurfaceSamples | None = None,
+    predicted: np.ndarray | None = None,
+    **options: Any,
+) -> Reconstruction:
+    """Measure the object of a plan through images rendered of the plan or the truth."""
+    return reconstruct(
+        Scanner.of(plan),
+        truth=None if truth is None else Scanner.of(truth),
+        expected=None if samples is None else Expected(samples, predicted),
+        **options,
+    )
 
 
 def small_rig(mesh: TriangleMesh, light: str = "diverging", focal: float = 3478.0):

@@ -14,7 +14,7 @@ from planning.verify.audit.predicates.predicates import AuditCamera, AuditProjec
 from planning.verify.reconstruction.check.accuracy import Accuracy
 from planning.verify.reconstruction.check.comparison import (
     Confusion,
-    Prediction,
+    PredictedSamples,
     compare,
 )
 from planning.verify.reconstruction.cloud import Cloud
@@ -37,7 +37,7 @@ def four():
     """Four samples a metre apart that face up; the first two lie beside a point."""
     points = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0]])
     up = np.tile([0.0, 0.0, 1.0], (4, 1))
-    prediction = Prediction(
+    prediction = PredictedSamples(
         SurfaceSamples(points, up, np.arange(4), 1.0),
         weights=np.array([1.0, 2.0, 3.0, 4.0]),
         in_target=np.array([True, True, True, False]),
@@ -83,7 +83,7 @@ def beside(normal, centre) -> Confusion:
     points = np.array([[0.0, 0.0, 0.0], [0.5 * TAU, 0.0, 0.0], [1.0, 0.0, 0.0]])
     normals = np.array([[0.0, 0.0, 1.0], normal, [0.0, 0.0, 1.0]])
     claimed = np.array([[True, False, False]])
-    prediction = Prediction(
+    prediction = PredictedSamples(
         SurfaceSamples(points, normals, np.arange(3), 1.0),
         np.ones(3),
         np.ones(3, bool),

@@ -8,16 +8,18 @@ top-left pixel is (0, 0).
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    DrawnRings,
+    RingsForCamera,
+)
 
-from .light import LIGHTS, Light
-from .patterns.ring_patterns import CameraPattern, RingPattern
+from .arrays import Array, Mask
+from .light_laws import LIGHTS, LightLaw
 
-_Array = NDArray[np.float64]
 _UNDISTORT_STEPS = 60
 _UNDISTORT_TOLERANCE = 1e-13
 
@@ -36,14 +38,14 @@ class CameraCalibration:
     """
 
     id: str
-    world_from_device: _Array
-    matrix: _Array
+    world_from_device: Array
+    matrix: Array
     distortion: tuple[float, float, float, float, float]
     resolution: tuple[int, int]
     body: Body | None = None
 
     @property
-    def centre(self) -> _Array:
+    def centre(self) -> Array:
         """Optical centre in the world in [m], shape (3,)."""
         return self.world_from_device[:3, 3]
 
@@ -52,7 +54,7 @@ class CameraCalibration:
         """Mean of the two focal lengths in [px]."""
         return 0.5 * float(self.matrix[0, 0] + self.matrix[1, 1])
 
-    def project(self, points: _Array) -> _Array:
+    def project(self, points: Array) -> Array:
         """Return pixels (n, 2) of world points (n, 3); NaN behind the camera."""
         turn = self.world_from_device[:3, :3]
         x, y, z = ((points - self.centre) @ turn).T
@@ -63,7 +65,7 @@ class CameraCalibration:
             [matrix[0, 0] * x + matrix[0, 2], matrix[1, 1] * y + matrix[1, 2]]
         )
 
-    def rays(self, pixels: _Array) -> _Array:
+    def rays(self, pixels: Array) -> Array:
         """Return unit viewing directions (n, 3) in the world of pixels (n, 2).
 
         The lens is inverted by the fixed point ``p = (q - tangential(p)) / radial(p)``;
@@ -78,7 +80,7 @@ class CameraCalibration:
         local = np.column_stack([x * scale, y * scale, scale])
         return local @ self.world_from_device[:3, :3].T
 
-    def _terms(self, x: _Array, y: _Array) -> tuple[_Array, _Array, _Array]:
+    def _terms(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Radial factor and the two tangential shifts of the lens."""
         k1, k2, p1, p2, k3 = self.distortion
         xx, xy, yy = x * x, x * y, y * y
@@ -90,11 +92,11 @@ class CameraCalibration:
             p1 * (s + 2.0 * yy) + (2.0 * p2 * xy),
         )
 
-    def _bend(self, x: _Array, y: _Array) -> tuple[_Array, _Array]:
+    def _bend(self, x: Array, y: Array) -> tuple[Array, Array]:
         radial, shift_x, shift_y = self._terms(x, y)
         return x * radial + shift_x, y * radial + shift_y
 
-    def _unbend(self, qx: _Array, qy: _Array) -> tuple[_Array, _Array]:
+    def _unbend(self, qx: Array, qy: Array) -> tuple[Array, Array]:
         x, y = qx, qy
         change = np.full_like(qx, np.inf)
         with np.errstate(all="ignore"):
@@ -123,47 +125,47 @@ class ProjectorCalibration:
             (x, y) in [m], 1 / pixel pitch on the diagonal.
         resolution: Width and height in [px].
         beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
-        radii: Of the ring edges that it draws, as in `RingPattern`, shape (n_rings,).
+        radii: Of the ring edges that it draws, as in `DrawnRings`, shape (n_rings,).
         body: Its housing; None: it takes no room.
     """
 
     id: str
-    light: Light
-    world_from_device: _Array
-    world_from_ring: _Array
-    matrix: _Array
+    light: LightLaw
+    world_from_device: Array
+    world_from_ring: Array
+    matrix: Array
     resolution: tuple[int, int]
     beam_radius: float | None
-    radii: _Array = field(default_factory=lambda: np.zeros(0))
+    radii: Array = field(default_factory=lambda: np.zeros(0))
     body: Body | None = None
 
     @property
-    def centre(self) -> _Array:
+    def centre(self) -> Array:
         """Optical centre, or centre of the panel, in the world in [m], shape (3,)."""
         return self.world_from_device[:3, 3]
 
     @property
-    def axis(self) -> _Array:
+    def axis(self) -> Array:
         """Direction of the optical axis in the world, shape (3,)."""
         return self.world_from_device[:3, 2]
 
     @property
-    def pattern(self) -> RingPattern:
+    def pattern(self) -> DrawnRings:
         """What it draws."""
-        return RingPattern(self.light, self.radii)
+        return DrawnRings(self.light, self.radii)
 
-    def pattern_for(self, camera: CameraCalibration) -> CameraPattern:
+    def pattern_for(self, camera: CameraCalibration) -> RingsForCamera:
         """Return what it draws with the root disc of a camera."""
-        return CameraPattern(
+        return RingsForCamera(
             self.light, self.radii, self.to_ring(camera.centre[None])[0]
         )
 
-    def aim(self, points: _Array) -> tuple[_Array, _Array, _Array]:
+    def aim(self, points: Array) -> tuple[Array, Array, Array]:
         """Return where the light of world points starts, its directions and lengths."""
         depth = (points - self.centre) @ self.axis
         return self.light.aim(self.world_from_device, points, depth)
 
-    def incidence_cosine(self, points: _Array, normals: _Array) -> _Array:
+    def incidence_cosine(self, points: Array, normals: Array) -> Array:
         """Return the cosine of the incidence of its light, shadows left aside, (n,).
 
         Args:
@@ -173,7 +175,7 @@ class ProjectorCalibration:
         return -np.einsum("ij,ij->i", self.aim(points)[1], normals)
 
     @property
-    def ring_from_device(self) -> _Array:
+    def ring_from_device(self) -> Array:
         """Pose of the device in the ring frame, shape (4, 4)."""
         turn = self.world_from_ring[:3, :3].T
         pose = np.eye(4)
@@ -181,16 +183,16 @@ class ProjectorCalibration:
         pose[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
         return pose
 
-    def to_ring(self, points: _Array) -> _Array:
+    def to_ring(self, points: Array) -> Array:
         """Return world points (n, 3) in the ring frame."""
         return (points - self.world_from_ring[:3, 3]) @ self.world_from_ring[:3, :3]
 
-    def ring_coordinate(self, points: _Array) -> _Array:
+    def ring_coordinate(self, points: Array) -> Array:
         """Return |p| of the light at world points (n, 3), shape (n,)."""
         p = self.light.plane(self.to_ring(points))
         return np.hypot(p[:, 0], p[:, 1])
 
-    def ring_plane(self, pixels: _Array) -> _Array:
+    def ring_plane(self, pixels: Array) -> Array:
         """Return where pixels (n, 2) lie in the plane that rings are drawn in, (n, 2).
 
         (x/z, y/z) in diverging light, (x, y) in [m] in parallel light.
@@ -198,7 +200,7 @@ class ProjectorCalibration:
         flat = self.panel_coordinates(pixels)
         return self.light.turned(flat, self.ring_from_device)
 
-    def panel(self, points: _Array) -> tuple[_Array, _Array]:
+    def panel(self, points: Array) -> tuple[Array, Array]:
         """Return pixels (n, 2) that light world points (n, 3), and depths z (n,).
 
         Pixels are NaN behind the device.
@@ -209,7 +211,7 @@ class ProjectorCalibration:
         flat = local[:, :2] * np.where(z > 0.0, shrink, np.nan)[:, None]
         return flat * np.diag(self.matrix)[:2] + self.matrix[:2, 2], z
 
-    def in_panel(self, pixels: _Array, margin_px: float = 0.0) -> NDArray[np.bool_]:
+    def in_panel(self, pixels: Array, margin_px: float = 0.0) -> Mask:
         """Return whether pixels (n, 2) are drawn: in the image and in the beam."""
         u, v = pixels.T
         width, height = self.resolution
@@ -222,7 +224,7 @@ class ProjectorCalibration:
             inside &= np.hypot(flat[:, 0], flat[:, 1]) <= reach
         return inside
 
-    def panel_coordinates(self, pixels: _Array) -> _Array:
+    def panel_coordinates(self, pixels: Array) -> Array:
         """Return panel coordinates (n, 2) of pixels (n, 2)."""
         return (pixels - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
 

@@ -1,17 +1,18 @@
 """Measured points and what the scanner knows of each."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .arrays import Array, Columns
 
 # Shift of edges by texture under the blur of a lens [px], error of a normal [rad].
 _TEXTURE_PX, _NORMAL_RAD = 0.015, 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Cloud:
+class Cloud(Columns):
     """Points triangulated from ring edges.
 
     Attributes:
@@ -28,23 +29,19 @@ class Cloud:
         noise_px: Standard deviation of the edge's position across itself [px], (n,).
     """
 
-    points: NDArray[np.float64]
-    rays: NDArray[np.float64]
-    beams: NDArray[np.float64]
-    pixels: NDArray[np.float64]
+    points: Array
+    rays: Array
+    beams: Array
+    pixels: Array
     camera: NDArray[np.int16]
     projector: NDArray[np.int16]
     ring: NDArray[np.int16]
-    conditioning: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    noise_px: NDArray[np.float64]
+    conditioning: Array
+    shift: Array
+    noise_px: Array
 
     def __len__(self) -> int:
         return len(self.points)
-
-    def take(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> "Cloud":
-        """Return some of the points."""
-        return Cloud(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def of_devices(self, projector: int, camera: int) -> "Cloud":
         """Return the points with these indices of their devices."""
@@ -59,7 +56,7 @@ class Cloud:
         step = max(1, -(-len(self) // most))
         return self.take(np.arange(0, len(self), step))
 
-    def sigma(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    def sigma(self, normals: Array) -> Array:
         """Return the standard deviation [m] of each point along a normal, (n,).
 
         Grey noise isn't all: where brightness changes across an edge, the blur of the
@@ -86,14 +83,4 @@ class Cloud:
             conditioning=numbers,
             shift=vectors,
             noise_px=numbers,
-        )
-
-    @staticmethod
-    def join(clouds: Sequence["Cloud"]) -> "Cloud":
-        """Return all points of several clouds, in their order."""
-        return Cloud(
-            *(
-                np.concatenate([getattr(cloud, field.name) for cloud in clouds])
-                for field in fields(Cloud)
-            )
         )

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array
+
 # Every seventeenth of the 256 colours of viridis (S. van der Walt, N. Smith, CC0);
 # lightness rises evenly, so that colour blindness loses nothing.
 _VIRIDIS = np.array(
@@ -31,15 +33,13 @@ _NAMES = ((0.0, "violet"), (0.5, "teal"), (1.0, "yellow"))
 _ENDS = (0.02, 0.98)
 
 
-def colour_range(values: NDArray[np.float64]) -> tuple[float, float]:
+def colour_range(values: Array) -> tuple[float, float]:
     """Return what the ends of the scale stand for: the 2nd and 98th percentile."""
     low, high = np.quantile(values, _ENDS).tolist() if len(values) else (0.0, 1.0)
     return low, high
 
 
-def colours(
-    values: NDArray[np.float64], limits: tuple[float, float]
-) -> NDArray[np.uint8]:
+def colours(values: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
     """Return the colour of each value, red, green and blue of 255, shape (n, 3)."""
     low, high = limits
     share = np.clip((values - low) / max(high - low, 1e-300), 0.0, 1.0)

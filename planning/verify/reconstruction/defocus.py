@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
+
+from .arrays import Array
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Defocus:
     focus_m: float
     aperture_m: float
 
-    def blur_m(self, depth: NDArray[np.float64]) -> NDArray[np.float64]:
+    def blur_m(self, depth: Array) -> Array:
         """Return the standard deviation of the blur at the object [m], any shape.
 
         By similar triangles a point of the plane in focus is a disc of diameter c at

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
 from planning.model.requirements import CheckLimits
 
+from .arrays import Indices, Mask
 from .calibration import (
     CameraCalibration,
     PairCalibration,
@@ -81,8 +81,8 @@ class Scanner:
     projectors: tuple[ProjectorCalibration, ...]
     cameras: tuple[CameraCalibration, ...]
     mesh: TriangleMesh
-    region: NDArray[np.int64]
-    target: NDArray[np.bool_]
+    region: Indices
+    target: Mask
     limits: ScanLimits
     projector_focus: Defocus | None = None
     camera_focus: Defocus | None = None

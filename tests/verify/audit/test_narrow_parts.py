@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from support.reconstruction_rigs import reconstruct_plan
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from planning.verify.audit.ledger import Ledger
 from planning.verify.audit.rings.ring_claims import _audit_quantile
-from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.render.photometry import Photometry
 
 # Two thirds of a gap: 8 pixels in the image.

@@ -13,10 +13,8 @@ from planning.model.errors import CalibrationError
 from planning.model.plan import RigPlan
 from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.captures.calibration_file import calibrated
-from planning.verify.reconstruction.captures.captured import (
-    Expected,
-    reconstruct_rendered,
-)
+from planning.verify.reconstruction.captures.captured import reconstruct_rendered
+from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.scanner import Scanner
 
 

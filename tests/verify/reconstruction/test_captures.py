@@ -17,11 +17,11 @@ from planning.model.errors import CapturesError
 from planning.model.plan import RigPlan
 from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.captures.captured import (
-    Expected,
     reconstruct_captured,
     reconstruct_rendered,
 )
 from planning.verify.reconstruction.captures.captures import CaptureFolder
+from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.scanner import Scanner
 

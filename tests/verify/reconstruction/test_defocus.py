@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.plain_shapes import grid
+from support.reconstruction_rigs import reconstruct_plan
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
@@ -11,11 +12,7 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from planning.verify.reconstruction.check.check import reconstruct_plan
-from planning.verify.reconstruction.defocus import (
-    Defocus,
-    defocus_of,
-)
+from planning.verify.reconstruction.defocus import Defocus, defocus_of
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_pair
 from planning.verify.reconstruction.render.rendered_light import Shown

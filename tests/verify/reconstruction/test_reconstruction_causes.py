@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.reconstruction_rigs import reconstruct_plan
 
 from geometry.mesh.sampling import sample_surface
 from geometry.shapes.primitives import sphere
@@ -16,7 +17,6 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from planning.verify.reconstruction.check.check import reconstruct_plan
 from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import CAUSES, Decoded

@@ -15,11 +15,8 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.decode.decode import decode
 from planning.verify.reconstruction.decode.edges import find_edges
-from planning.verify.reconstruction.light import LIGHTS
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    CameraPattern,
-    Frames,
-)
+from planning.verify.reconstruction.light_laws import LIGHTS
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_pair
 from planning.verify.reconstruction.render.rendered_light import Shown
@@ -316,7 +313,7 @@ def test_a_missing_frame_is_refused(rigs):
 @pytest.mark.parametrize("n_rings", [2, 3, 4, 63, 64, 100])
 def test_neighbouring_annuli_differ_in_one_bit(n_rings):
     radii = np.arange(1.0, n_rings + 1.0)
-    patterns = CameraPattern(LIGHTS["parallel"], radii, np.zeros(3))
+    patterns = RingsForCamera(LIGHTS["parallel"], radii, np.zeros(3))
     codes = patterns.codes
     changed = codes[1:] ^ codes[:-1]
     assert patterns.outer_radius == n_rings + 1.0

@@ -15,11 +15,8 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
-from planning.verify.reconstruction.light import LIGHTS
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    CameraPattern,
-    Frames,
-)
+from planning.verify.reconstruction.light_laws import LIGHTS
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.single_shot.prior_labels import label_by_prior
 from planning.verify.reconstruction.single_shot.ring_lines import (
     find_lines,
@@ -75,7 +72,7 @@ def test_what_is_faint_or_an_edge_is_no_line():
 
 
 def test_lines_alternate_with_gaps_and_must_fit_between_rings():
-    patterns = CameraPattern(LIGHTS["parallel"], np.array([0.02, 0.05]), np.zeros(3))
+    patterns = RingsForCamera(LIGHTS["parallel"], np.array([0.02, 0.05]), np.zeros(3))
     lines = line_patterns(patterns, 0.002)
     np.testing.assert_allclose(lines.radii, [0.019, 0.021, 0.049, 0.051])
     for width in (0.0, np.nan, 0.031, 0.041):

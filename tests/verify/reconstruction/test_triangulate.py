@@ -8,10 +8,8 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
-from planning.verify.reconstruction.light import LIGHTS
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    CameraPattern,
-)
+from planning.verify.reconstruction.light_laws import LIGHTS
+from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
 
 
 def random_turn(rng: np.random.Generator) -> np.ndarray:
@@ -50,7 +48,7 @@ def drawn_root(projector, local, eye) -> np.ndarray:
     """The root bit as it is drawn in the projector and lands on each point."""
     flat = local[:, :2]
     plane = flat / local[:, 2:] if projector.light.name == "diverging" else flat
-    patterns = CameraPattern(
+    patterns = RingsForCamera(
         projector.light, np.array([0.1, 0.2]), projector.to_ring(eye[None])[0]
     )
     return np.where(patterns.root_side(plane) > 0.0, 1, -1).astype(np.int8)

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
 from planning.model.errors import CalibrationError
 from planning.model.table_types import Name, Table
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
@@ -62,7 +62,7 @@ class _File(Table):
     devices: Annotated[list[_Device], Field(min_length=1)]
 
 
-def _check_pose(pose: NDArray[np.float64]) -> None:
+def _check_pose(pose: Array) -> None:
     turn = pose[:3, :3]
     off = float(np.abs(turn @ turn.T - np.eye(3)).max())
     if not (off <= _ROTATION and np.linalg.det(turn) > 0.0):
@@ -76,7 +76,7 @@ def _check_pose(pose: NDArray[np.float64]) -> None:
         )
 
 
-def _check_matrix(matrix: NDArray[np.float64]) -> None:
+def _check_matrix(matrix: Array) -> None:
     plain = matrix.copy()
     plain[[0, 1, 0, 1], [0, 1, 2, 2]] = 0.0
     if plain.tolist() != [[0.0] * 3, [0.0] * 3, [0.0, 0.0, 1.0]]:
@@ -164,7 +164,7 @@ def _projector(
 
 def _measured_pose(
     device: _Device, planned: CameraCalibration | ProjectorCalibration, plan: Scanner
-) -> NDArray[np.float64]:
+) -> Array:
     """Return where a device was measured; where it should stand if it wasn't.
 
     Raises:

@@ -5,13 +5,13 @@ saved images is the one that was made of them before.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry.mesh.sampling import SurfaceSamples
 from planning.model.errors import CapturesError
+from planning.verify.reconstruction.arrays import Images
+from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.check import conclude
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import (
@@ -23,11 +23,7 @@ from planning.verify.reconstruction.decode.decode import (
 from planning.verify.reconstruction.decode.inspection import DarkError, inspect
 from planning.verify.reconstruction.faults.causes import rejection
 from planning.verify.reconstruction.patterns.pattern_frames import PatternSequence
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    CameraPattern,
-    Frames,
-    Images,
-)
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import (
     Progress,
@@ -43,21 +39,6 @@ from .confirm import Confirmed, confirm
 _MM = 1e3
 # A pair that should measure this share of the target, and gives nothing, is missed.
 _MISSED = 0.01
-
-
-@dataclass(frozen=True, eq=False)
-class Expected:
-    """What should be measured.
-
-    Attributes:
-        samples: Of the target.
-        measured: Which of them some pair measures, shape (n,).
-        by_pair: Share of them that each pair measures, shape (n_p, n_c).
-    """
-
-    samples: SurfaceSamples
-    measured: NDArray[np.bool_]
-    by_pair: NDArray[np.float64]
 
 
 def reconstruct_rendered(
@@ -174,7 +155,7 @@ class _Inspection:
         self.dark: dict[PairIndex, str] = {}
         self.notes: dict[PairIndex, tuple[str, ...]] = {}
 
-    def patterns(self, pair: PairIndex) -> CameraPattern:
+    def patterns(self, pair: PairIndex) -> RingsForCamera:
         """Return what a projector drew, as a camera's decoder knows it."""
         p, c = pair
         return self._plan.projectors[p].pattern_for(self._plan.cameras[c])
@@ -212,6 +193,7 @@ class _Inspection:
         self, pairs: Pairs, confirmed: Confirmed, expected: Expected
     ) -> tuple[str, ...]:
         """Return a sentence for each reason for which the cloud is smaller."""
+        assert expected.by_pair is not None
         found = [
             f"{self._plan.name(pair)}: {why}"
             for pair, decoded in pairs
@@ -277,8 +259,7 @@ def _concluded(
         plan,
         confirmed.pairs,
         seed=0,
-        samples=expected.samples,
-        predicted=expected.measured,
+        expected=expected,
         photometry=photometry,
         seconds=spent.seconds,
     )

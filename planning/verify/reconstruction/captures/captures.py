@@ -14,8 +14,9 @@ from PIL import Image
 
 from planning.model.errors import CapturesError
 from planning.model.files import write_together
+from planning.verify.reconstruction.arrays import Images
 from planning.verify.reconstruction.patterns.pattern_frames import PatternSequence
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, Images
+from planning.verify.reconstruction.patterns.ring_patterns import Frames
 from planning.verify.reconstruction.scanner import Scanner
 
 from .images import SUFFIXES, read_grey

@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import closest_points
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import (
@@ -116,11 +117,11 @@ def confirm(
     )
 
 
-def _distances(mesh: TriangleMesh, cloud: Cloud) -> NDArray[np.float64]:
+def _distances(mesh: TriangleMesh, cloud: Cloud) -> Array:
     return closest_points(mesh, cloud.points).distances
 
 
-def _left(pair: Decoded, kept: NDArray[np.bool_]) -> Decoded:
+def _left(pair: Decoded, kept: Mask) -> Decoded:
     """Return a pair with some of its points, the others counted as unconfirmed."""
     why = pair.rejected | {"unconfirmed": int(np.count_nonzero(~kept))}
     outcomes = pair.outcomes.copy()
@@ -179,7 +180,7 @@ def _disagreements(
 
 def _difference(
     seen: Cloud, other: Cloud, camera: CameraCalibration, *, same: bool
-) -> NDArray[np.float64]:
+) -> Array:
     """How far points of a pair are from those of another, as its camera sees them [m].
 
     Where the other's show on an edge, the difference of distance. On an edge of the
@@ -205,18 +206,14 @@ def _difference(
     return np.maximum(deep, wide)
 
 
-def _place(
-    pixels: NDArray[np.float64], rings: NDArray[np.int16], by_ring: bool
-) -> NDArray[np.float64]:
+def _place(pixels: Array, rings: NDArray[np.int16], by_ring: bool) -> Array:
     """Return pixels with a third coordinate that keeps rings apart, if asked for."""
     apart = _RING_APART_PX * float(by_ring)
     return np.column_stack([pixels, apart * rings.astype(np.float64)])
 
 
 def _agree(
-    keys: set[PairIndex],
-    apart: dict[frozenset[PairIndex], float],
-    tolerance: float,
+    keys: set[PairIndex], apart: dict[frozenset[PairIndex], float], tolerance: float
 ) -> bool:
     """Whether pairs of several cameras and projectors agree, each with some other."""
     if len({p for p, _ in keys}) < 2 or len({c for _, c in keys}) < 2:

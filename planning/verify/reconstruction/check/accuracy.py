@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.rays.proximity import closest_points
 from planning.model.requirements import CheckLimits
+from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
 
 _MM = 1e3
@@ -24,8 +24,8 @@ class Accuracy:
         faces: Nearest face of each point, shape (n,).
     """
 
-    distances: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    distances: Array
+    faces: Indices
 
     @property
     def rms_m(self) -> float:
@@ -49,6 +49,37 @@ class Accuracy:
 
 
 @dataclass(frozen=True, eq=False)
+class Expected:
+    """What should be measured.
+
+    Attributes:
+        samples: Of the surface.
+        measured: Which of them some pair measures, shape (n,); None: nobody says.
+        by_pair: Share of them that each pair measures, shape (n_p, n_c); None likewise.
+
+    Raises:
+        ValueError: If `measured` speaks of another number of samples.
+    """
+
+    samples: SurfaceSamples
+    measured: Mask | None = None
+    by_pair: Array | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.samples)
+        if self.measured is not None and self.measured.shape != (n,):
+            raise ValueError(
+                f"measured has shape {self.measured.shape} for {n} samples"
+            )
+
+    def within(self, target: Mask) -> "Expected":
+        """Return what lies on faces of the target, shape (n_f,)."""
+        inside = target[self.samples.faces]
+        measured = None if self.measured is None else self.measured[inside]
+        return Expected(self.samples.take(inside), measured, self.by_pair)
+
+
+@dataclass(frozen=True, eq=False)
 class Completeness:
     """Shares of surface samples with a measured point nearby.
 
@@ -63,7 +94,7 @@ class Completeness:
     thresholds_m: tuple[float, float, float]
     fractions: tuple[float, float, float]
     predicted_missing: float | None
-    missing: NDArray[np.bool_]
+    missing: Mask
 
 
 def measure_accuracy(cloud: Cloud, mesh: TriangleMesh) -> Accuracy:
@@ -72,9 +103,7 @@ def measure_accuracy(cloud: Cloud, mesh: TriangleMesh) -> Accuracy:
     return Accuracy(nearest.distances, nearest.faces)
 
 
-def nearest_distance(
-    cloud: Cloud, samples: SurfaceSamples, reach_m: float
-) -> NDArray[np.float64]:
+def nearest_distance(cloud: Cloud, samples: SurfaceSamples, reach_m: float) -> Array:
     """Return the distance from each sample to a point measured from its own side.
 
     A point counts if its viewing ray r meets the sample's normal with r.N < 0: on a
@@ -103,39 +132,34 @@ def nearest_distance(
 
 
 def measure_completeness(
-    everything: Cloud,
-    merged: Cloud,
-    samples: SurfaceSamples,
-    predicted: NDArray[np.bool_] | None,
-    tau_m: float,
+    everything: Cloud, merged: Cloud, expected: Expected, tau_m: float
 ) -> Completeness:
     """Return how much of the samples was measured, and what should have been.
 
     Args:
         everything: All points.
         merged: Those that stay after redundancy is removed.
-        samples: Of the target.
-        predicted: Samples that the plan claims measured; None: all, without a claim.
+        expected: Samples of the target, and which of them the plan claims measured;
+            without a claim, all are asked for.
         tau_m: One ring gap [m].
     """
+    samples, predicted = expected.samples, expected.measured
     claimed = np.ones(len(samples), dtype=bool) if predicted is None else predicted
     thresholds = (0.5 * tau_m, tau_m, 2.0 * tau_m)
     reach = 2.01 * tau_m
-    kept = nearest_distance(merged, samples.take(claimed), reach)
-    fractions = [_share(kept <= threshold) for threshold in thresholds]
+    near = nearest_distance(merged, samples.take(claimed), reach)
+    half, whole, twice = (_share(near <= threshold) for threshold in thresholds)
     missing = claimed & ~(nearest_distance(everything, samples, reach) <= tau_m)
     return Completeness(
         thresholds,
-        (fractions[0], fractions[1], fractions[2]),
+        (half, whole, twice),
         None if predicted is None else _share(missing[claimed]),
         missing,
     )
 
 
 def judge(
-    accuracy: Accuracy,
-    completeness: Completeness,
-    limits: CheckLimits,
+    accuracy: Accuracy, completeness: Completeness, limits: CheckLimits
 ) -> tuple[str, ...]:
     """Return a clause for each limit that isn't kept: what, value, limit."""
     lengths = (
@@ -165,5 +189,5 @@ def judge(
     return tuple(failures)
 
 
-def _share(values: NDArray[np.bool_]) -> float:
+def _share(values: Mask) -> float:
     return float(np.mean(values)) if len(values) else 0.0

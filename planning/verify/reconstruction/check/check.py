@@ -1,10 +1,8 @@
 """The simulated reconstruction: render, decode, triangulate, merge, compare."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry.mesh.sampling import SurfaceSamples, sample_surface
-from planning.model.plan import RigPlan
+from geometry.mesh.sampling import sample_surface
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.faults.causes import (
@@ -20,35 +18,11 @@ from planning.verify.reconstruction.render.rendered import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .accuracy import judge, measure_accuracy, measure_completeness
+from .accuracy import Expected, judge, measure_accuracy, measure_completeness
 from .merge import merge
 from .result import PairCount, Reconstruction
 
 _DEFAULT_SAMPLES = 20_000
-
-
-def reconstruct_plan(
-    plan: RigPlan,
-    *,
-    seed: int,
-    threads: int = 2,
-    truth: RigPlan | None = None,
-    samples: SurfaceSamples | None = None,
-    predicted: NDArray[np.bool_] | None = None,
-    photometry: Photometry | None = None,
-    progress: Progress | None = None,
-) -> Reconstruction:
-    """Measure the object of a plan through rendered images, see `reconstruct`."""
-    return reconstruct(
-        Scanner.of(plan),
-        seed=seed,
-        threads=threads,
-        truth=None if truth is None else Scanner.of(truth),
-        samples=samples,
-        predicted=predicted,
-        photometry=photometry,
-        progress=progress,
-    )
 
 
 def reconstruct(
@@ -57,8 +31,7 @@ def reconstruct(
     seed: int,
     threads: int = 2,
     truth: Scanner | None = None,
-    samples: SurfaceSamples | None = None,
-    predicted: NDArray[np.bool_] | None = None,
+    expected: Expected | None = None,
     photometry: Photometry | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
@@ -70,15 +43,11 @@ def reconstruct(
         threads: Worker threads; the result doesn't depend on them.
         truth: What really stands there, devices matched by id; the plan by default. A
             device that it lacks is off.
-        samples: Points of the surface to judge completeness on; those outside the
-            target are left aside. Fresh ones of the target by default.
-        predicted: Which of the samples the plan claims measured, shape (n,). Without it
-            completeness is reported but not judged.
+        expected: Points of the surface to judge completeness on, and which of them the
+            plan claims measured; those outside the target are left aside. By default
+            fresh points of the target, whose completeness is reported but not judged.
         photometry: Simulated light and sensor.
         progress: Called with the pairs done and their total.
-
-    Raises:
-        ValueError: If `predicted` comes without samples, or in another number.
     """
     light, spent = photometry or Photometry(), Spent()
     decoded = decode_rendered(
@@ -94,8 +63,7 @@ def reconstruct(
         plan,
         decoded,
         seed=seed,
-        samples=samples,
-        predicted=predicted,
+        expected=expected,
         photometry=light,
         seconds=spent.seconds,
     )
@@ -106,8 +74,7 @@ def conclude(
     decoded: Pairs,
     *,
     seed: int,
-    samples: SurfaceSamples | None = None,
-    predicted: NDArray[np.bool_] | None = None,
+    expected: Expected | None = None,
     photometry: Photometry | None = None,
     seconds: dict[str, float] | None = None,
 ) -> Reconstruction:
@@ -117,12 +84,15 @@ def conclude(
         plan: As in `reconstruct`.
         decoded: Projector, camera and what they gave, of every pair.
         seed: Of the samples, where none are given.
-        samples: Likewise.
-        predicted: Likewise.
+        expected: Likewise.
         photometry: Of the simulation; None: the images were taken.
         seconds: Processor time spent so far by stage [s]; that of `merge` is added.
     """
-    samples, predicted = _target_samples(plan, samples, predicted, seed)
+    if expected is None:
+        mesh, target = plan.mesh, plan.target
+        fresh = sample_surface(mesh, _DEFAULT_SAMPLES, seed=seed, within=target)
+        expected = Expected(fresh)
+    expected = expected.within(plan.target)
     spent = Spent(seconds)
     parts = [pair.cloud.of_devices(p, c) for (p, c), pair in decoded]
     everything = Cloud.join(parts)
@@ -131,7 +101,7 @@ def conclude(
         merged = merge(everything, gap_m=gap_m, pitch_px=pitch_px)
     limits = plan.limits.check
     completeness = measure_completeness(
-        everything, merged.cloud, samples, predicted, limits.tau_m
+        everything, merged.cloud, expected, limits.tau_m
     )
     pairs = tuple(PairCount.of(plan, pair, gave) for pair, gave in decoded)
     accuracy, why = None, rejection(pairs) or "no ring edge was decoded"
@@ -141,7 +111,7 @@ def conclude(
         failures = judge(accuracy, completeness, limits)
     if accuracy is not None and failures:
         measured = MeasuredClouds(
-            plan, decoded, pairs, everything, samples, predicted, completeness.missing
+            plan, decoded, pairs, everything, expected, completeness.missing
         )
         failures = explained(failures, measured)
     return Reconstruction(
@@ -154,29 +124,6 @@ def conclude(
         failures,
         spent.seconds,
     )
-
-
-def _target_samples(
-    plan: Scanner,
-    samples: SurfaceSamples | None,
-    predicted: NDArray[np.bool_] | None,
-    seed: int,
-) -> tuple[SurfaceSamples, NDArray[np.bool_] | None]:
-    if samples is None:
-        if predicted is not None:
-            raise ValueError("predicted needs the samples that it speaks of")
-        fresh = sample_surface(
-            plan.mesh, _DEFAULT_SAMPLES, seed=seed, within=plan.target
-        )
-        return fresh, None
-    inside = plan.target[samples.faces]
-    if predicted is None:
-        return samples.take(inside), None
-    if predicted.shape != (len(samples),):
-        raise ValueError(
-            f"predicted has shape {predicted.shape} for {len(samples)} samples"
-        )
-    return samples.take(inside), predicted[inside]
 
 
 def _ring_gap(plan: Scanner, cloud: Cloud) -> tuple[float, float]:

@@ -6,22 +6,20 @@ of the prediction, and they are counted apart.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
+from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
 
 from .accuracy import Accuracy, nearest_distance
 
-_Flags = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PredictedSamples:
     """What a plan says of samples of its surface.
 
     Attributes:
@@ -35,14 +33,14 @@ class Prediction:
     """
 
     samples: SurfaceSamples
-    weights: NDArray[np.float64]
-    in_target: _Flags
-    region: NDArray[np.int64]
-    centres: NDArray[np.float64]
-    claimed: _Flags
-    possible: _Flags
+    weights: Array
+    in_target: Mask
+    region: Indices
+    centres: Array
+    claimed: Mask
+    possible: Mask
 
-    def widened(self, by_camera: _Flags, tau_m: float) -> _Flags:
+    def widened(self, by_camera: Mask, tau_m: float) -> Mask:
         """Return which samples lie within tau of what a camera would measure, (n,)."""
         cameras, chosen = np.nonzero(by_camera)
         points = self.samples.points[chosen]
@@ -74,11 +72,7 @@ class Confusion:
 
     @classmethod
     def of(
-        cls,
-        predicted: _Flags,
-        near: _Flags,
-        measured: _Flags,
-        weights: NDArray[np.float64],
+        cls, predicted: Mask, near: Mask, measured: Mask, weights: Array
     ) -> "Confusion":
         """Count areas; of no area at all, nothing was predicted nor measured.
 
@@ -115,20 +109,13 @@ class Confusion:
 
     def to_document(self) -> dict[str, float]:
         """Return plain JSON values."""
-        return {
-            "both": self.both,
-            "missing": self.missing,
-            "unexpected": self.unexpected,
-            "neither": self.neither,
-            "beside": self.beside,
-            "agreement": self.agreement,
-            "trivial_agreement": self.trivial,
-        }
+        derived = {"agreement": self.agreement, "trivial_agreement": self.trivial}
+        return asdict(self) | derived
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Prediction against measurement, and what every part of the surface got.
+    """PredictedSamples against measurement, and what every part of the surface got.
 
     Attributes:
         tables: By `target` and `surface`, then by `limits` (of the plan) and `floors`.
@@ -156,10 +143,10 @@ class Comparison:
 
 
 def compare(
-    prediction: Prediction,
+    prediction: PredictedSamples,
     everything: Cloud,
     accuracy: Accuracy | None,
-    face_region: NDArray[np.int64],
+    face_region: Indices,
     tau_m: float,
 ) -> Comparison:
     """Return how prediction and measurement compare.
@@ -193,7 +180,7 @@ def compare(
         for name, part in parts.items()
     }
 
-    def row(part: _Flags, faces: _Flags) -> dict[str, Any]:
+    def row(part: Mask, faces: Mask) -> dict[str, Any]:
         return _row(prediction, measured, part) | _errors(accuracy, faces)
 
     ids = [int(i) for i in np.unique(face_region[face_region >= 0])]
@@ -206,16 +193,16 @@ def compare(
     )
 
 
-def _by_any(by_camera: _Flags) -> _Flags:
+def _by_any(by_camera: Mask) -> Mask:
     return np.asarray(by_camera.any(axis=0))
 
 
-def _row(prediction: Prediction, measured: _Flags, part: _Flags) -> dict[str, Any]:
+def _row(prediction: PredictedSamples, measured: Mask, part: Mask) -> dict[str, Any]:
     """Shares of a part of the surface; null where nothing of it was sampled."""
     weights = prediction.weights[part]
     claimed = _by_any(prediction.claimed)[part]
 
-    def share(of: _Flags, among: _Flags) -> float | None:
+    def share(of: Mask, among: Mask) -> float | None:
         total = float(weights[among].sum())
         return float(weights[of & among].sum()) / total if total > 0.0 else None
 
@@ -227,17 +214,12 @@ def _row(prediction: Prediction, measured: _Flags, part: _Flags) -> dict[str, An
     }
 
 
-def _errors(accuracy: Accuracy | None, faces: _Flags) -> dict[str, Any]:
+def _errors(accuracy: Accuracy | None, faces: Mask) -> dict[str, Any]:
     """Errors of the points whose nearest face is one of these."""
-    if accuracy is None:
-        return {"n_points": 0, "rms_m": None, "p95_m": None, "bias_m": None}
+    nothing = {"n_points": 0, "rms_m": None, "p95_m": None, "bias_m": None}
+    if accuracy is None or not np.any(faces[accuracy.faces]):
+        return nothing
     here = faces[accuracy.faces]
-    own = Accuracy(accuracy.distances[here], accuracy.faces[here])
-    if not here.any():
-        return {"n_points": 0, "rms_m": None, "p95_m": None, "bias_m": None}
-    return {
-        "n_points": int(here.sum()),
-        "rms_m": own.rms_m,
-        "p95_m": own.p95_m,
-        "bias_m": own.bias_m,
-    }
+    near = Accuracy(accuracy.distances[here], accuracy.faces[here])
+    values = int(here.sum()), near.rms_m, near.p95_m, near.bias_m
+    return dict(zip(nothing, values, strict=True))

@@ -6,7 +6,8 @@ and a threshold; one white frame of each projector alone needs none of them.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 
 # Less contrast between on and off is noise: three deviations of both [grey levels].
 MIN_CONTRAST = 5.0
@@ -14,10 +15,8 @@ _LEVELS = 256
 
 
 def overlap_by_intensity(
-    together: NDArray[np.uint8 | np.float32],
-    dark: NDArray[np.uint8 | np.float32],
-    threshold: float | None = None,
-) -> NDArray[np.bool_]:
+    together: Images, dark: Images, threshold: float | None = None
+) -> Mask:
     """Return the paper's overlap: pixels brighter than one projector makes them.
 
     Args:
@@ -31,9 +30,7 @@ def overlap_by_intensity(
     return light > max(threshold, MIN_CONTRAST)
 
 
-def overlap_by_frames(
-    alone: NDArray[np.uint8 | np.float32], dark: NDArray[np.uint8 | np.float32]
-) -> NDArray[np.bool_]:
+def overlap_by_frames(alone: Images, dark: Images) -> Mask:
     """Return pixels that two projectors or more light, from a white frame of each.
 
     Args:
@@ -44,7 +41,7 @@ def overlap_by_frames(
     return np.count_nonzero(lit, axis=0) >= 2
 
 
-def three_classes(light: NDArray[np.float32]) -> tuple[float, float]:
+def three_classes(light: Grey) -> tuple[float, float]:
     """Return the thresholds that part grey levels into three classes.
 
     They maximise the variance between the classes. Source: Otsu, "A threshold selection
@@ -58,7 +55,7 @@ def three_classes(light: NDArray[np.float32]) -> tuple[float, float]:
     below = np.concatenate([[0.0], np.cumsum(count)])
     moment = np.concatenate([[0.0], np.cumsum(count * np.arange(_LEVELS))])
 
-    def gain(first: NDArray[np.int64], last: NDArray[np.int64]) -> NDArray[np.float64]:
+    def gain(first: Indices, last: Indices) -> Array:
         n, sum_ = below[last] - below[first], moment[last] - moment[first]
         return sum_ * sum_ / np.maximum(n, 1.0)
 
@@ -73,7 +70,5 @@ def three_classes(light: NDArray[np.float32]) -> tuple[float, float]:
     return float(one), float(two)
 
 
-def _brighter(
-    image: NDArray[np.uint8 | np.float32], dark: NDArray[np.uint8 | np.float32]
-) -> NDArray[np.float32]:
+def _brighter(image: Images, dark: Images) -> Grey:
     return np.subtract(image, dark, dtype=np.float32)

@@ -8,8 +8,8 @@ the one with the smaller standard deviation along the normal.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
 
 # Edges are compared within tiles of the image about one ring pitch wide.
@@ -35,8 +35,8 @@ class Merged:
     """
 
     cloud: Cloud
-    normals: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    normals: Array
+    sigma: Array
 
 
 def merge(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Merged:
@@ -66,24 +66,22 @@ def merge(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Merged:
 class _Tiles:
     """Squares of an image, and which of them each point is in."""
 
-    of_point: NDArray[np.int64]
+    of_point: Indices
     shape: tuple[int, int]
 
     @classmethod
-    def of(cls, pixels: NDArray[np.float64], side: int) -> "_Tiles":
+    def of(cls, pixels: Array, side: int) -> "_Tiles":
         """Lay tiles over the points, with one row and column of empty ones around."""
         place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
         columns, rows = (place.max(axis=0) + 2).tolist()
         return cls(place[:, 1] * columns + place[:, 0], (rows, columns))
 
-    def occupied(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def occupied(self, chosen: Mask) -> Mask:
         """Return whether each tile holds one of the chosen points, (n_tiles,)."""
         rows, columns = self.shape
         return np.bincount(self.of_point[chosen], minlength=rows * columns) > 0
 
-    def sum_around(
-        self, values: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
+    def sum_around(self, values: Array | None = None) -> Array:
         """Return sums over each tile and its eight neighbours, (n_tiles,)."""
         rows, columns = self.shape
         summed = np.bincount(self.of_point, values, rows * columns)
@@ -93,7 +91,7 @@ class _Tiles:
         return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
 
 
-def _plane_normals(cloud: Cloud, tiles: _Tiles) -> NDArray[np.float64]:
+def _plane_normals(cloud: Cloud, tiles: _Tiles) -> Array:
     """Normals of the planes through the points around each point's tile, (n, 3)."""
     points = cloud.points - cloud.points.mean(axis=0)
     count = tiles.sum_around()
@@ -112,9 +110,7 @@ def _plane_normals(cloud: Cloud, tiles: _Tiles) -> NDArray[np.float64]:
     return np.where(away[:, None], -normals, normals)
 
 
-def _squarest_projector(
-    cloud: Cloud, tiles: _Tiles, normals: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _squarest_projector(cloud: Cloud, tiles: _Tiles, normals: Array) -> Mask:
     """Points of the projector that meets each tile most squarely, shape (n,)."""
     projectors = np.unique(cloud.projector)
     if len(projectors) < 2:
@@ -136,7 +132,7 @@ def _squarest_projector(
     return ~known | (cloud.projector == winner[tiles.of_point])
 
 
-def _side(normals: NDArray[np.float64]) -> NDArray[np.int64]:
+def _side(normals: Array) -> Indices:
     """Which of the six directions of the axes each normal is nearest to; 6 for none."""
     known = np.isfinite(normals[:, 0])
     steepest = np.argmax(np.abs(np.where(known[:, None], normals, 0.0)), axis=1)
@@ -144,12 +140,7 @@ def _side(normals: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.where(known, 2 * steepest + sign, _SIDES - 1)
 
 
-def _sharpest_camera(
-    cloud: Cloud,
-    sigma: NDArray[np.float64],
-    side: NDArray[np.int64],
-    cell_m: float,
-) -> NDArray[np.bool_]:
+def _sharpest_camera(cloud: Cloud, sigma: Array, side: Indices, cell_m: float) -> Mask:
     """Points of the camera with the least mean sigma in each cell of space, (n,).
 
     Points whose surface faces another way aren't compared: on a thin part they are

@@ -8,10 +8,9 @@ the rule.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planning.model.errors import CapturesError
-from planning.verify.reconstruction.patterns.ring_patterns import Images
+from planning.verify.reconstruction.arrays import Array, Grey, Images, Mask
 
 _FEWEST_BRIGHT = 100
 # A pixel is surely bright in a frame that exceeds its inverse by this share of white.
@@ -31,9 +30,7 @@ _MOST_MOVED_PX = 0.1
 _MOVED_SIGMAS = 8.0
 
 
-def broken_pixels(
-    stack: Images, good: NDArray[np.bool_], names: Sequence[str]
-) -> NDArray[np.bool_]:
+def broken_pixels(stack: Images, good: Mask, names: Sequence[str]) -> Mask:
     """Pixels of which a frame and its inverse don't add up to white and black.
 
     Raises:
@@ -61,11 +58,7 @@ def broken_pixels(
     return broken
 
 
-def _require_linear(
-    pairs: NDArray[np.float32],
-    rests: NDArray[np.float32],
-    contrast: NDArray[np.float32],
-) -> None:
+def _require_linear(pairs: Grey, rests: Grey, contrast: Grey) -> None:
     """Refuse grey levels that aren't in proportion to light, by half-bright pixels.
 
     There a frame and its inverse together exceed white if dark tones were lifted, as
@@ -89,7 +82,7 @@ def _require_linear(
         )
 
 
-def _which_broke(shares: NDArray[np.float64], names: Sequence[str]) -> str:
+def _which_broke(shares: Array, names: Sequence[str]) -> str:
     bad = np.flatnonzero(shares > _MOST_BROKEN)
     share = float(shares.max())
     if len(bad) > 0.5 * len(shares) and len(shares) > 2:
@@ -106,10 +99,7 @@ def _which_broke(shares: NDArray[np.float64], names: Sequence[str]) -> str:
 
 
 def _require_one_exposure(
-    pairs: NDArray[np.float32],
-    rests: NDArray[np.float32],
-    contrast: NDArray[np.float32],
-    names: Sequence[str],
+    pairs: Grey, rests: Grey, contrast: Grey, names: Sequence[str]
 ) -> None:
     """Refuse frames brighter or darker than the rest, by the pixels that they light."""
     drift = np.zeros(pairs.shape[:2])
@@ -136,10 +126,7 @@ def _require_one_exposure(
 
 
 def _require_still(
-    stack: Images,
-    good: NDArray[np.bool_],
-    rests: NDArray[np.float32],
-    names: Sequence[str],
+    stack: Images, good: Mask, rests: Grey, names: Sequence[str]
 ) -> None:
     """Refuse frames that moved against the others, by least squares over the image.
 
@@ -160,17 +147,13 @@ def _require_still(
             )
 
 
-def _gradient(
-    image: NDArray[np.uint8 | np.float32], good: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def _gradient(image: Images, good: Mask) -> Array:
     """Grey levels a pixel along u and v at the good pixels, shape (2, n)."""
     down, across = map(np.asarray, np.gradient(image.astype(np.float32)))
     return np.stack([across[good], down[good]]).astype(np.float64)
 
 
-def _least_squares(
-    terms: NDArray[np.float64], rest: NDArray[np.float32]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _least_squares(terms: Array, rest: Grey) -> tuple[Array, Array]:
     """Return the factors of ``rest = -factors . terms``, and their deviations."""
     normal = np.linalg.pinv(terms @ terms.T, hermitian=True)
     factors = -normal @ (terms @ rest)

@@ -8,9 +8,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 from .edges import SATURATED, ImageEdges, find_edges
 from .triangulate import RingHits, intersect_rings
@@ -78,7 +79,7 @@ class Decoded:
     edges: ImageEdges
     outcomes: NDArray[np.int8]
     n_saturated: int
-    saturated: NDArray[np.float64]
+    saturated: Array
 
     @classmethod
     def nothing(cls) -> "Decoded":
@@ -93,7 +94,7 @@ Pairs = list[tuple[PairIndex, Decoded]]
 
 def decode(
     frames: Frames,
-    patterns: CameraPattern,
+    patterns: RingsForCamera,
     calibration: PairCalibration,
     *,
     min_conditioning: float = 0.1,
@@ -138,10 +139,10 @@ def decode(
 
 def measure_edges(
     edges: ImageEdges,
-    patterns: CameraPattern,
+    patterns: RingsForCamera,
     calibration: PairCalibration,
     lit_pixels: int,
-    saturated: NDArray[np.float64],
+    saturated: Array,
     *,
     min_conditioning: float,
     max_slant: float = _MAX_SLANT,
@@ -195,10 +196,10 @@ def measure_edges(
 
 def _doubtful_root(
     edges: ImageEdges,
-    rays: NDArray[np.float64],
-    patterns: CameraPattern,
+    rays: Array,
+    patterns: RingsForCamera,
     calibration: PairCalibration,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Edges of which both roots, or neither, lie on the side that the disc told.
 
     The disc was drawn for the planned place of the camera. Where that isn't its
@@ -209,7 +210,7 @@ def _doubtful_root(
     if np.allclose(place, patterns.camera_in_ring, rtol=0.0, atol=1e-9):
         return np.zeros(len(edges), dtype=bool)
 
-    def fits(roots: NDArray[np.int8]) -> NDArray[np.bool_]:
+    def fits(roots: NDArray[np.int8]) -> Mask:
         radii = patterns.radii[edges.rings]
         points = intersect_rings(camera.centre, rays, radii, roots, projector).points
         local = projector.to_ring(points)
@@ -234,7 +235,7 @@ def _out_of_order(edges: ImageEdges) -> bool:
 
 def _chains(
     edges: ImageEdges, hits: RingHits, focal_px: float, max_slant: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[Indices, Array]:
     """How far edges go on as a surface, along their rings and from ring to ring.
 
     Slant is the change of distance between edges in units of a pixel's width there:
@@ -261,7 +262,7 @@ def _chains(
     _, chain = connected_components(links, directed=False)
     length[rows] = np.bincount(chain)[chain]
 
-    def towards(ring: int) -> NDArray[np.float64]:
+    def towards(ring: int) -> Array:
         near = place + np.array([0.0, 0.0, ring * _RING_APART_PX])
         apart, nearest = tree.query(near, distance_upper_bound=_NEXT_RING_PX)
         found = (nearest < len(rows)) & (apart > 0.5)
@@ -275,10 +276,7 @@ def _chains(
 
 
 def _cloud(
-    edges: ImageEdges,
-    rays: NDArray[np.float64],
-    hits: RingHits,
-    calibration: PairCalibration,
+    edges: ImageEdges, rays: Array, hits: RingHits, calibration: PairCalibration
 ) -> Cloud:
     return Cloud(
         points=hits.points,
@@ -295,11 +293,8 @@ def _cloud(
 
 
 def _shift(
-    edges: ImageEdges,
-    rays: NDArray[np.float64],
-    hits: RingHits,
-    calibration: PairCalibration,
-) -> NDArray[np.float64]:
+    edges: ImageEdges, rays: Array, hits: RingHits, calibration: PairCalibration
+) -> Array:
     """Move of a point on its ring surface with its edge: t dr - r (m.t dr)/(r.m)."""
     beside = calibration.camera.rays(edges.pixels + 0.5 * edges.across)
     moved = 2.0 * hits.distances[:, None] * (beside - rays)

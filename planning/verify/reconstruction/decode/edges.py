@@ -11,11 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfinv
 
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    CameraPattern,
-    Frames,
-    Images,
-)
+from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 _MIN_CONTRAST = 10.0
 SATURATED = 254.5
@@ -43,13 +40,13 @@ class ImageEdges:
         named: Those of them that name a ring, shape (n_bits,).
     """
 
-    pixels: NDArray[np.float64]
-    rings: NDArray[np.int64]
+    pixels: Array
+    rings: Indices
     roots: NDArray[np.int8]
-    across: NDArray[np.float64]
-    noise_px: NDArray[np.float64]
-    flips: NDArray[np.int64]
-    named: NDArray[np.int64]
+    across: Array
+    noise_px: Array
+    flips: Indices
+    named: Indices
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -64,7 +61,7 @@ class ImageEdges:
         )
 
 
-def find_edges(frames: Frames, patterns: CameraPattern) -> tuple[ImageEdges, int]:
+def find_edges(frames: Frames, patterns: RingsForCamera) -> tuple[ImageEdges, int]:
     """Return the labelled ring edges of a stack of images, and its lit pixels."""
     reader = _Reader(frames.stack, patterns)
     noise = reader.grey_noise()
@@ -98,7 +95,7 @@ class _Reader:
         even: Pixels about which the contrast is nearly the same.
     """
 
-    def __init__(self, stack: Images, patterns: CameraPattern) -> None:
+    def __init__(self, stack: Images, patterns: RingsForCamera) -> None:
         self._stack = stack
         self.patterns = patterns
         white, black = stack[0].astype(np.float32), stack[1].astype(np.float32)
@@ -125,9 +122,7 @@ class _Reader:
             setattr(other, name, getattr(self, name).T)
         return other
 
-    def level(
-        self, frame: NDArray[np.int64] | int, i: NDArray[np.int64], j: NDArray[np.int64]
-    ) -> NDArray[np.float32]:
+    def level(self, frame: Indices | int, i: Indices, j: Indices) -> Grey:
         """Return (I - I_inv) / (W - K) of a frame at pixels: -1 dark to 1 bright."""
         stack = self._stack
         bright = stack[frame, i, j].astype(np.float32)
@@ -144,11 +139,11 @@ class _Reader:
         # Mean absolute values: a median of whole grey levels would be a whole one.
         return max(0.5 * np.sqrt(0.5 * np.pi) * float(np.mean(np.abs(rest))), 1e-3)
 
-    def _difference(self, frame: int) -> NDArray[np.float32]:
+    def _difference(self, frame: int) -> Grey:
         return np.subtract(self._stack[frame], self._stack[frame + 1], dtype=np.float32)
 
 
-def _even(contrast: NDArray[np.float32], noise: float) -> NDArray[np.bool_]:
+def _even(contrast: Grey, noise: float) -> Mask:
     """Pixels whose 3 x 3 neighbours' contrast differs by little, noise allowed for."""
     low, high = np.pad(contrast, 1, mode="edge"), np.pad(contrast, 1, mode="edge")
     low = np.minimum(np.minimum(low[:-2], low[1:-1]), low[2:])
@@ -197,15 +192,13 @@ def _crossings(reader: _Reader, noise: float) -> ImageEdges:
     )
 
 
-def _count_single(flipped: NDArray[np.int16], n_bits: int) -> NDArray[np.int64]:
+def _count_single(flipped: NDArray[np.int16], n_bits: int) -> Indices:
     """Count the changes of one bit alone, by bit; between rings there are no others."""
     count = np.bincount(flipped, minlength=1 << n_bits)
     return count[1 << np.arange(n_bits)].astype(np.int64)
 
 
-def _zero_between(
-    left: NDArray[np.float32], right: NDArray[np.float32]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _zero_between(left: Grey, right: Grey) -> tuple[Array, Array]:
     """Return where between two pixels a blurred step crosses zero, and how surely.
 
     A blurred step is an error function, whose inverse makes it a straight line: with
@@ -227,12 +220,7 @@ def _zero_between(
     return a / (a - b), 0.5 * np.sqrt(np.pi) * spread
 
 
-def _row_slope(
-    reader: _Reader,
-    frame: NDArray[np.int64],
-    i: NDArray[np.int64],
-    j: NDArray[np.int64],
-) -> NDArray[np.float32]:
+def _row_slope(reader: _Reader, frame: Indices, i: Indices, j: Indices) -> Grey:
     """Change of the level from row to row at an edge; 0 beside unlit pixels."""
     below, above = (
         reader.level(frame, i + side, j) + reader.level(frame, i + side, j + 1)

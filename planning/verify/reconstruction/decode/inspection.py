@@ -4,15 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
 from planning.model.errors import CapturesError
-from planning.verify.reconstruction.patterns.ring_patterns import (
-    CameraPattern,
-    Frames,
-    Images,
-)
+from planning.verify.reconstruction.arrays import Grey, Images, Mask
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 from .adding_up import broken_pixels
 
@@ -50,7 +46,7 @@ class DarkError(CapturesError):
     """White is no brighter than black; whether light should be there, others know."""
 
 
-def inspect(stack: Images, patterns: CameraPattern, names: Sequence[str]) -> Inspected:
+def inspect(stack: Images, patterns: RingsForCamera, names: Sequence[str]) -> Inspected:
     """Hold the images of a camera under a projector against each other.
 
     Args:
@@ -87,7 +83,7 @@ def inspect(stack: Images, patterns: CameraPattern, names: Sequence[str]) -> Ins
     return Inspected(Frames(frames, corner), tuple(notes))
 
 
-def _lit(stack: Images) -> NDArray[np.bool_]:
+def _lit(stack: Images) -> Mask:
     """Pixels that get light: in white, or in the first bits and their inverses.
 
     Two of them, so that a single damaged frame lights nothing; what is isolated is
@@ -100,11 +96,11 @@ def _lit(stack: Images) -> NDArray[np.bool_]:
     return (_contrast(stack) >= _LIT) | opened
 
 
-def _contrast(stack: Images) -> NDArray[np.float32]:
+def _contrast(stack: Images) -> Grey:
     return np.subtract(stack[0], stack[1], dtype=np.float32)
 
 
-def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+def _share(part: Mask, whole: Mask) -> float:
     return float(np.count_nonzero(part & whole) / max(1, np.count_nonzero(whole)))
 
 
@@ -136,9 +132,7 @@ def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
     return stack[:, top:bottom, left:right], (left, top)
 
 
-def _clipped(
-    stack: Images, lit: NDArray[np.bool_], names: Sequence[str]
-) -> NDArray[np.bool_]:
+def _clipped(stack: Images, lit: Mask, names: Sequence[str]) -> Mask:
     """Pixels in which any frame reaches what the sensor can tell apart at most.
 
     Raises:
@@ -162,7 +156,7 @@ def _clipped(
     )
 
 
-def _piled_level(white: NDArray[np.uint8 | np.float32]) -> float:
+def _piled_level(white: Images) -> float:
     """Return the brightest level if pixels pile up there, inf if they don't.
 
     A sensor may be full before its numbers are.
@@ -184,9 +178,7 @@ def _require_different(stack: Images, names: Sequence[str]) -> None:
             )
 
 
-def _require_codes(
-    stack: Images, good: NDArray[np.bool_], patterns: CameraPattern
-) -> None:
+def _require_codes(stack: Images, good: Mask, patterns: RingsForCamera) -> None:
     """Refuse images whose pixels hold codes that the projector never drew."""
     rows, columns = np.nonzero(good & (_contrast(stack) >= _LIT))
     contrast = _contrast(stack)[rows, columns]

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import ProjectorCalibration
-from planning.verify.reconstruction.light import Light
+from planning.verify.reconstruction.light_laws import LightLaw
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,16 +21,16 @@ class RingHits:
         conditioning: r.m, shape (n,).
     """
 
-    points: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    conditioning: NDArray[np.float64]
+    points: Array
+    distances: Array
+    normals: Array
+    conditioning: Array
 
 
 def intersect_rings(
-    origin: NDArray[np.float64],
-    rays: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    origin: Array,
+    rays: Array,
+    radii: Array,
     roots: NDArray[np.int8],
     projector: ProjectorCalibration,
 ) -> RingHits:
@@ -73,13 +74,7 @@ def intersect_rings(
     )
 
 
-def _distance(
-    o: NDArray[np.float64],
-    q: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    root: NDArray[np.float64],
-    light: Light,
-) -> NDArray[np.float64]:
+def _distance(o: Array, q: Array, radii: Array, root: Array, light: LightLaw) -> Array:
     k, c = light.quadric(radii)
     qx, qy, qz = q.T
     a = qx * qx + qy * qy - k * qz * qz

@@ -1,9 +1,9 @@
 """A diagnosis in a sentence, with sizes and an "as if"."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.scanner import Scanner
 
@@ -149,11 +149,11 @@ def _too_wide(name: str, after: Device, plan: Scanner) -> str:
     return ""
 
 
-def _angle(turn: NDArray[np.float64]) -> float:
+def _angle(turn: Array) -> float:
     return float(Rotation.from_matrix(turn).magnitude())
 
 
-def _aside(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def _aside(one: Array, other: Array) -> float:
     """Tangent of the angle between two unit vectors."""
     return float(np.linalg.norm(np.cross(one, other)) / max(float(one @ other), 1e-3))
 

@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from geometry.mesh.sampling import SurfaceSamples
+from planning.verify.reconstruction.arrays import Mask
+from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import Pairs
@@ -61,8 +59,7 @@ class MeasuredClouds:
         decoded: What each pair gave, by indices of projector and camera.
         counts: The same in numbers.
         cloud: All points, before redundancy was removed.
-        samples: Of the target.
-        predicted: Which of them the plan claims measured; None: no claim.
+        expected: Samples of the target, and what the plan claims of them.
         missing: Which of those have no point, shape (n,).
     """
 
@@ -70,9 +67,8 @@ class MeasuredClouds:
     decoded: Pairs
     counts: tuple[PairCount, ...]
     cloud: Cloud
-    samples: SurfaceSamples
-    predicted: NDArray[np.bool_] | None
-    missing: NDArray[np.bool_]
+    expected: Expected
+    missing: Mask
 
 
 def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str, ...]:
@@ -179,10 +175,11 @@ def _wrong_roots(measured: MeasuredClouds) -> list[str]:
 
 def _lost(measured: MeasuredClouds, *, displaced: bool) -> list[str]:
     """Say where samples are missing, and why unless devices are to blame as a whole."""
-    plan, samples, missing = measured.plan, measured.samples, measured.missing
-    if measured.predicted is None or not missing.any():
+    plan, missing = measured.plan, measured.missing
+    samples, claimed = measured.expected.samples, measured.expected.measured
+    if claimed is None or not missing.any():
         return []
-    where = missing_where(plan, samples, measured.predicted, missing)
+    where = missing_where(plan, samples, claimed, missing)
     if displaced:
         return [where]
     hole = hole_between(plan, measured.cloud, samples, missing)

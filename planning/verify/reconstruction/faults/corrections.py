@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
@@ -19,7 +19,6 @@ from planning.verify.reconstruction.calibration import (
 from .supposed import Evidence, Role, Supposed
 
 Device = CameraCalibration | ProjectorCalibration
-Vector = NDArray[np.float64]
 Kind = Literal[
     "swap", "focal", "aim", "place", "pose", "far pose", "scale", "moved", "similar"
 ]
@@ -52,9 +51,9 @@ class Correction:
     role: Role | None
     devices: tuple[int, ...]
     n_parameters: int
-    apply: Callable[[Supposed, Vector], Supposed]
+    apply: Callable[[Supposed, Array], Supposed]
 
-    def concerns(self, evidence: Evidence) -> NDArray[np.bool_]:
+    def concerns(self, evidence: Evidence) -> Mask:
         """Return which edges it bears on."""
         if self.role is None:
             return np.ones(len(evidence), dtype=bool)
@@ -78,7 +77,7 @@ def of_device(role: Role, index: int, kind: Kind, reach_m: float) -> Correction:
         reach_m: Distance of the object, for turning lengths into angles [m].
     """
 
-    def apply(supposed: Supposed, x: Vector) -> Supposed:
+    def apply(supposed: Supposed, x: Array) -> Supposed:
         devices = list(getattr(supposed, role))
         device = devices[index]
         if kind == "focal":
@@ -94,11 +93,11 @@ def of_device(role: Role, index: int, kind: Kind, reach_m: float) -> Correction:
     return Correction(kind, role, (index,), count, apply)
 
 
-def standing_at(role: Role, index: int, pose: Vector, reach_m: float) -> Correction:
+def standing_at(role: Role, index: int, pose: Array, reach_m: float) -> Correction:
     """Return a change of pose that begins at quite another one, shape (4, 4)."""
     near = of_device(role, index, "pose", reach_m)
 
-    def apply(supposed: Supposed, x: Vector) -> Supposed:
+    def apply(supposed: Supposed, x: Array) -> Supposed:
         devices = list(getattr(supposed, role))
         devices[index] = _posed(devices[index], pose)
         return near.apply(_with(supposed, role, devices), x)
@@ -109,7 +108,7 @@ def standing_at(role: Role, index: int, pose: Vector, reach_m: float) -> Correct
 def swapped(role: Role, one: int, other: int) -> Correction:
     """Return the exchange of two devices: each stands where the other should."""
 
-    def apply(supposed: Supposed, x: Vector) -> Supposed:
+    def apply(supposed: Supposed, x: Array) -> Supposed:
         del x
         devices = list(getattr(supposed, role))
         devices[one], devices[other] = devices[other], devices[one]
@@ -122,7 +121,7 @@ def of_object(kind: Kind) -> Correction:
     """Return a change of the object: `scale` about its centre, `moved`, `similar`."""
     counts = {"scale": 1, "moved": 6, "similar": 7}
 
-    def apply(supposed: Supposed, x: Vector) -> Supposed:
+    def apply(supposed: Supposed, x: Array) -> Supposed:
         body = supposed.body
         size = body.mesh.radius
         scale = 1.0 + float(x[-1]) / size if kind != "moved" else 1.0
@@ -145,7 +144,7 @@ def _with(supposed: Supposed, role: Role, devices: list[Device]) -> Supposed:
     return replace(supposed, **{role: tuple(devices)})
 
 
-def _moved(device: Device, turn: Vector, shift: Vector) -> Device:
+def _moved(device: Device, turn: Array, shift: Array) -> Device:
     pose = device.world_from_device.copy()
     pose[:3, :3] = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
     pose[:3, 3] += shift
@@ -159,11 +158,11 @@ def _zoomed(device: Device, factor: float) -> Device:
     return replace(device, matrix=matrix)
 
 
-def _posed(device: Device, pose: Vector) -> Device:
+def _posed(device: Device, pose: Array) -> Device:
     return replace(device, world_from_device=pose)
 
 
-def turns_aside(pose: Vector) -> list[Vector]:
+def turns_aside(pose: Array) -> list[Array]:
     """Return turns about a device's x and y axes, as lengths at the object [m].
 
     Args:
@@ -173,7 +172,7 @@ def turns_aside(pose: Vector) -> list[Vector]:
     return [a * x + b * y for a in _ASIDE_M for b in _ASIDE_M]
 
 
-def far_poses(pose: Vector, middle: Vector) -> list[Vector]:
+def far_poses(pose: Array, middle: Array) -> list[Array]:
     """Return poses all about the object at the same distance, in several rolls.
 
     The directions are a Fibonacci lattice on the sphere; the aim at the object stays.
@@ -189,7 +188,7 @@ def far_poses(pose: Vector, middle: Vector) -> list[Vector]:
     sphere = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
     away = pose[:3, 3] - middle
     reach = float(np.linalg.norm(away))
-    poses: list[Vector] = []
+    poses: list[Array] = []
     for towards in sphere:
         about = _shortest_turn(away / reach, towards)
         for roll in np.arange(_ROLLS) * (2.0 * np.pi / _ROLLS):
@@ -201,7 +200,7 @@ def far_poses(pose: Vector, middle: Vector) -> list[Vector]:
     return poses
 
 
-def _shortest_turn(one: Vector, other: Vector) -> Vector:
+def _shortest_turn(one: Array, other: Array) -> Array:
     """Return the least rotation that takes one unit vector to another, (3, 3)."""
     axis = np.cross(one, other)
     sine, cosine = float(np.linalg.norm(axis)), float(one @ other)

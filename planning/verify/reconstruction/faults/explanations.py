@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from planning.verify.reconstruction.arrays import Array, Indices, Mask
 
 from .corrections import (
     Correction,
@@ -36,7 +37,7 @@ _ROLES: tuple[Role, Role] = ("cameras", "projectors")
 _THIN = 4
 _FITTED_FAR = 12
 
-Look = Callable[[Supposed], tuple[NDArray[np.float64], NDArray[np.float64]]]
+Look = Callable[[Supposed], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +56,12 @@ class Explanation:
     """
 
     correction: Correction
-    parameters: NDArray[np.float64]
+    parameters: Array
     before: Supposed
     after: Supposed
-    mismatch: NDArray[np.float64]
+    mismatch: Array
     left_m: float
-    rows: NDArray[np.bool_]
+    rows: Mask
     cosine: float
 
 
@@ -70,14 +71,10 @@ class State:
 
     evidence: Evidence
     supposed: Supposed
-    mismatch: NDArray[np.float64]
+    mismatch: Array
     fine_m: float
 
-    def misfit(
-        self,
-        mismatch: NDArray[np.float64] | None = None,
-        rows: NDArray[np.bool_] | None = None,
-    ) -> float:
+    def misfit(self, mismatch: Array | None = None, rows: Mask | None = None) -> float:
         """Return the mismatch [m], mean over the pairs of some of the edges."""
         error = self.mismatch if mismatch is None else mismatch
         chosen = np.ones(len(error), dtype=bool) if rows is None else rows
@@ -174,9 +171,7 @@ class State:
         device = getattr(self.supposed, role)[index]
         return float(np.linalg.norm(device.centre - self.supposed.body.centre))
 
-    def _nearest(
-        self, changes: list[Correction], starts: list[NDArray[np.float64]]
-    ) -> list[int]:
+    def _nearest(self, changes: list[Correction], starts: list[Array]) -> list[int]:
         """Return which changes leave least at their starts, the best first."""
         rows = np.flatnonzero(changes[0].concerns(self.evidence))[::_THIN]
         look = self._looking(changes[0], rows)
@@ -186,7 +181,7 @@ class State:
         ]
         return np.argsort(left, kind="stable").tolist()
 
-    def _looking(self, correction: Correction, rows: NDArray[np.int64]) -> Look:
+    def _looking(self, correction: Correction, rows: Indices) -> Look:
         """Return what tells mismatch and cosine of some edges, however all stands."""
         few = self.evidence.take(rows)
         if correction.role == "projectors":
@@ -204,24 +199,20 @@ class State:
         return self._explanation(found.correction, nearer)
 
     def _fitted(
-        self, correction: Correction, start: NDArray[np.float64] | None = None
+        self, correction: Correction, start: Array | None = None
     ) -> Explanation:
         x = np.zeros(correction.n_parameters) if start is None else start
         if len(x):
             x = fit(self._off_rings(correction), x)
         return self._explanation(correction, x)
 
-    def _off_rings(
-        self, correction: Correction
-    ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    def _off_rings(self, correction: Correction) -> Callable[[Array], Array]:
         """Return what tells the mismatch of the edges that a change bears on."""
         rows = np.flatnonzero(correction.concerns(self.evidence))
         look = self._looking(correction, rows)
         return lambda x: look(correction.apply(self.supposed, x))[0]
 
-    def _explanation(
-        self, correction: Correction, x: NDArray[np.float64]
-    ) -> Explanation:
+    def _explanation(self, correction: Correction, x: Array) -> Explanation:
         rows = correction.concerns(self.evidence)
         after = correction.apply(self.supposed, x)
         mismatch = self.mismatch.copy()
@@ -239,11 +230,11 @@ class State:
         )
 
 
-def capped(mismatch: NDArray[np.float64], cap: float) -> NDArray[np.float64]:
+def capped(mismatch: Array, cap: float) -> Array:
     """Return absolute mismatches, none above a cap; where there is none, the cap."""
     return np.minimum(np.where(np.isfinite(mismatch), np.abs(mismatch), cap), cap)
 
 
-def _sound(size: NDArray[np.float64]) -> float:
+def _sound(size: Array) -> float:
     """Return the mean of the smaller ones."""
     return float(np.sort(size)[: int(np.ceil(SOUND_SHARE * len(size)))].mean())

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from planning.verify.reconstruction.arrays import Array
+
 # Step of finite differences at the object [m].
 _STEP_M = 2e-5
 _STEPS = 25
@@ -20,8 +20,8 @@ _SETTLED_M = 2e-8
 
 
 def least_change(
-    mismatch: Callable[[Vector], Vector], found: Vector, origin: Vector
-) -> Vector:
+    mismatch: Callable[[Array], Array], found: Array, origin: Array
+) -> Array:
     """Return parameters as good as those found, and nearer to where they began.
 
     A turn of a projector about its rings' axis, for one, leaves no trace in any edge:
@@ -50,7 +50,7 @@ def least_change(
     return found
 
 
-def fit(mismatch: Callable[[Vector], Vector], start: Vector) -> Vector:
+def fit(mismatch: Callable[[Array], Array], start: Array) -> Array:
     """Return parameters of a small sum of capped absolute mismatches.
 
     Levenberg-Marquardt steps on reweighted squares, w = 1 / max(|e|, small), zero
@@ -84,26 +84,26 @@ def fit(mismatch: Callable[[Vector], Vector], start: Vector) -> Vector:
     return x
 
 
-def _typical(error: Vector) -> float:
+def _typical(error: Array) -> float:
     known = np.isfinite(error)
     return float(np.median(np.abs(error[known]))) if known.any() else np.inf
 
 
-def _cost(error: Vector, cap: float) -> float:
+def _cost(error: Array, cap: float) -> float:
     return float(
         np.mean(np.minimum(np.where(np.isfinite(error), np.abs(error), cap), cap))
     )
 
 
-def _slopes(mismatch: Callable[[Vector], Vector], x: Vector, error: Vector) -> Vector:
+def _slopes(mismatch: Callable[[Array], Array], x: Array, error: Array) -> Array:
     """Return the derivative of each mismatch by each parameter, shape (n, k)."""
     steps = _STEP_M * np.eye(len(x))
     return np.stack([(mismatch(x + step) - error) / _STEP_M for step in steps], axis=1)
 
 
 def _step(
-    error: Vector, slopes: Vector, cap: float, small: float, damping: float
-) -> Vector:
+    error: Array, slopes: Array, cap: float, small: float, damping: float
+) -> Array:
     size = np.abs(error)
     use = (size < cap) & np.all(np.isfinite(slopes), axis=1)
     # Where a ray leaves one surface for another in the step, the slope is senseless.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.proximity import closest_points
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.scanner import Scanner
@@ -60,9 +61,7 @@ def where_inaccurate(plan: Scanner, cloud: Cloud) -> str:
     return _name_devices(off, known, medians, *ids)
 
 
-def _grazing(
-    plan: Scanner, projector: NDArray[np.int16], cosine: NDArray[np.float64]
-) -> list[str]:
+def _grazing(plan: Scanner, projector: NDArray[np.int16], cosine: Array) -> list[str]:
     """Name projectors whose points among those that are off are lit at grazing light.
 
     Args:
@@ -82,8 +81,8 @@ def _grazing(
 
 
 def _pair_medians(
-    cloud: Cloud, error: NDArray[np.float64], n_projectors: int, n_cameras: int
-) -> NDArray[np.float64]:
+    cloud: Cloud, error: Array, n_projectors: int, n_cameras: int
+) -> Array:
     """Median error of each pair [m], NaN where it has no point."""
     medians = np.full((n_projectors, n_cameras), np.nan)
     for p in range(n_projectors):
@@ -95,9 +94,9 @@ def _pair_medians(
 
 
 def _name_devices(
-    off: NDArray[np.bool_],
-    known: NDArray[np.bool_],
-    medians: NDArray[np.float64],
+    off: Mask,
+    known: Mask,
+    medians: Array,
     projectors: tuple[str, ...],
     cameras: tuple[str, ...],
 ) -> str:
@@ -110,7 +109,7 @@ def _name_devices(
     ]
     by_camera = np.tile(bad_cameras, (len(projectors), 1))
     by_projector = np.tile(bad_projectors[:, None], len(cameras))
-    explanations: tuple[tuple[list[str], NDArray[np.bool_]], ...] = (
+    explanations: tuple[tuple[list[str], Mask], ...] = (
         (projectors_off, by_projector),
         (cameras_off, by_camera),
         (projectors_off + cameras_off, by_camera | by_projector),

@@ -4,10 +4,10 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from geometry.mesh.sampling import SurfaceSamples
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import CAUSES, Pairs
 from planning.verify.reconstruction.scanner import Scanner
@@ -27,10 +27,7 @@ _MOST = 0.5
 
 
 def missing_where(
-    plan: Scanner,
-    samples: SurfaceSamples,
-    predicted: NDArray[np.bool_],
-    missing: NDArray[np.bool_],
+    plan: Scanner, samples: SurfaceSamples, predicted: Mask, missing: Mask
 ) -> str:
     """Return the regions that most of the missing samples lie in, with their shares."""
     region = plan.region[samples.faces]
@@ -52,7 +49,7 @@ def missing_where(
 
 
 def hole_between(
-    plan: Scanner, cloud: Cloud, samples: SurfaceSamples, missing: NDArray[np.bool_]
+    plan: Scanner, cloud: Cloud, samples: SurfaceSamples, missing: Mask
 ) -> str | None:
     """Return the pair of cameras between whose measured parts most missing samples lie.
 
@@ -88,9 +85,7 @@ def hole_between(
     return None
 
 
-def _side(
-    measured: NDArray[np.float64], points: NDArray[np.float64], reach: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _side(measured: Array, points: Array, reach: float) -> tuple[Array, Array]:
     """Return the direction of a camera's points about others, and how near they are.
 
     Zero directions where it has none within reach, or has them on all sides.
@@ -109,10 +104,7 @@ def _side(
 
 
 def left_out_nearby(
-    plan: Scanner,
-    decoded: Pairs,
-    samples: SurfaceSamples,
-    missing: NDArray[np.bool_],
+    plan: Scanner, decoded: Pairs, samples: SurfaceSamples, missing: Mask
 ) -> tuple[str, float] | None:
     """Return why most edges on missing samples gave no point, and for which share.
 
@@ -145,9 +137,7 @@ def left_out_nearby(
     return CAUSES[cause], float(shares[cause])
 
 
-def no_edges(
-    plan: Scanner, points: NDArray[np.float64], normals: NDArray[np.float64]
-) -> str:
+def no_edges(plan: Scanner, points: Array, normals: Array) -> str:
     """Say why there is no edge about missing samples, by the plan's own geometry.
 
     Args:

@@ -1,8 +1,8 @@
 """Which projectors' light falls on points of the surface, by ray casting."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.render.occluders import Occluder
 from planning.verify.reconstruction.render.rendered_light import SHADOW_SLACK
@@ -15,11 +15,8 @@ _GLANCING = np.cos(np.deg2rad(89.0))
 
 
 def light_falls(
-    projector: ProjectorCalibration,
-    caster: Occluder,
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+    projector: ProjectorCalibration, caster: Occluder, points: Array, normals: Array
+) -> Mask:
     """Return whether a projector's rings light points of the surface, by ray casting.
 
     Args:
@@ -41,9 +38,7 @@ def light_falls(
     return lit
 
 
-def lit_twice(
-    plan: Scanner, pixels: NDArray[np.float64], p: int, c: int
-) -> tuple[str, ...]:
+def lit_twice(plan: Scanner, pixels: Array, p: int, c: int) -> tuple[str, ...]:
     """Return which other projectors light most of some pixels, by the plan's geometry.
 
     Args:

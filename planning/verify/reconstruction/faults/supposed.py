@@ -6,14 +6,14 @@ and the projector draws something there: how far that is from ring k is the mism
 needs no root of a cone and no nearest point, and so stays smooth far from the truth.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.arrays import Array, Columns, Indices
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
@@ -47,14 +47,12 @@ class Object:
 
     mesh: TriangleMesh
     caster: RayCaster
-    centre: NDArray[np.float64]
-    turn: NDArray[np.float64]
+    centre: Array
+    turn: Array
     scale: float
-    shift: NDArray[np.float64]
+    shift: Array
 
-    def hits(
-        self, origin: NDArray[np.float64], rays: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def hits(self, origin: Array, rays: Array) -> tuple[Array, Indices]:
         """Return where rays (n, 3) meet it, NaN where they don't, and the faces."""
         back = self.turn / self.scale
         start = self.centre + (origin - self.centre - self.shift) @ back
@@ -62,7 +60,7 @@ class Object:
         reach = np.where(faces >= 0, self.scale * distances, np.nan)
         return origin + reach[:, None] * rays, faces
 
-    def normals(self, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    def normals(self, faces: Indices) -> Array:
         """Return unit normals of faces in the world, shape (n, 3)."""
         return self.mesh.face_normals[faces] @ self.turn.T
 
@@ -85,7 +83,7 @@ class Supposed:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Evidence(Columns):
     """Some labelled edges of every pair of devices.
 
     Attributes:
@@ -97,17 +95,17 @@ class Evidence:
         designs: Projectors as the patterns were drawn for them.
     """
 
-    pixels: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    camera: NDArray[np.int64]
-    projector: NDArray[np.int64]
-    noise_px: NDArray[np.float64]
+    pixels: Array
+    radii: Array
+    camera: Indices
+    projector: Indices
+    noise_px: Array
     designs: tuple[ProjectorCalibration, ...]
 
     def __len__(self) -> int:
         return len(self.radii)
 
-    def index(self, role: Role) -> NDArray[np.int64]:
+    def index(self, role: Role) -> Indices:
         """Return which device of a role each edge is of, shape (n,)."""
         return self.camera if role == "cameras" else self.projector
 
@@ -116,18 +114,8 @@ class Evidence:
         both = zip(self.projector.tolist(), self.camera.tolist(), strict=True)
         return sorted(set(both))
 
-    def take(self, chosen: NDArray[np.int64]) -> "Evidence":
-        """Return some of the edges."""
-        return replace(self, **{n: getattr(self, n)[chosen] for n in self._arrays()})
-
     @classmethod
-    def _arrays(cls) -> list[str]:
-        return [field.name for field in fields(cls)[:-1]]
-
-    @classmethod
-    def at(
-        cls, plan: Scanner, pixels: NDArray[np.float64], p: int, c: int
-    ) -> "Evidence":
+    def at(cls, plan: Scanner, pixels: Array, p: int, c: int) -> "Evidence":
         """Return pixels (n, 2) of one pair that are on no ring in particular."""
         n = len(pixels)
         index = np.full(n, c), np.full(n, p)
@@ -147,11 +135,7 @@ class Evidence:
             part = cls.at(plan, edges.pixels[rows], p, c)
             noise = edges.noise_px[rows]
             parts.append(replace(part, radii=radii, noise_px=noise))
-        joined = {
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in cls._arrays()
-        }
-        return replace(parts[0], **joined)
+        return Evidence.join(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +147,8 @@ class Places:
         normals: Unit normals there.
     """
 
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    points: Array
+    normals: Array
 
 
 def places(evidence: Evidence, supposed: Supposed) -> Places:
@@ -184,7 +168,7 @@ def places(evidence: Evidence, supposed: Supposed) -> Places:
 
 def mismatches(
     evidence: Evidence, supposed: Supposed, at: Places
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Return how far edges are off their rings, and how squarely they are lit.
 
     With X where the edge lies, z its depth before the projector, and rho the ring

@@ -75,12 +75,7 @@ def remove_patterns(folder: Path) -> None:
 
 
 def _manifest(entries: list[dict[str, Any]]) -> dict[str, Any]:
-    return {
-        "format": _SECTION,
-        "version": 1,
-        **_NOTES,
-        "projectors": entries,
-    }
+    return {"format": _SECTION, "version": 1, **_NOTES, "projectors": entries}
 
 
 def _entry(sequence: PatternSequence) -> dict[str, Any]:

@@ -9,14 +9,14 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from planning.verify.reconstruction.arrays import Mask
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
 )
 
-from .ring_patterns import CameraPattern
+from .ring_patterns import RingsForCamera
 
 Kind = Literal["white", "black", "bit", "root"]
 
@@ -57,7 +57,7 @@ class PatternSequence:
     """
 
     projector: ProjectorCalibration
-    discs: dict[str, CameraPattern]
+    discs: dict[str, RingsForCamera]
 
     @classmethod
     def of(
@@ -85,7 +85,7 @@ class PatternSequence:
         """Return the names of the frames that a camera's decoder reads, in order."""
         return tuple(f.name for f in self.frames if f.camera in (None, camera))
 
-    def annulus_levels(self, frame: Frame) -> NDArray[np.bool_]:
+    def annulus_levels(self, frame: Frame) -> Mask:
         """Return whether each annulus is bright in a white, black or bit frame."""
         pattern = self.projector.pattern
         if frame.bit is not None:

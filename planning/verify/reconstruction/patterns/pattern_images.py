@@ -12,8 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.verify.reconstruction.arrays import Array, Grey
+
 from .pattern_frames import Frame, PatternSequence
-from .ring_patterns import CameraPattern
+from .ring_patterns import RingsForCamera
 
 _WHITE = 255.0
 _NEIGHBOURS = (slice(None, -1), slice(1, None))
@@ -33,8 +35,8 @@ class PatternCanvas:
     """
 
     sequence: PatternSequence
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Array
+    y: Array
     edge: NDArray[np.intp]
     within: NDArray[np.uint8]
     beyond: NDArray[np.uint8]
@@ -82,9 +84,7 @@ def canvas(sequence: PatternSequence) -> PatternCanvas:
     return PatternCanvas(sequence, x, y, edge, white - beyond, beyond)
 
 
-def _root_level(
-    patterns: CameraPattern, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _root_level(patterns: RingsForCamera, x: Array, y: Array) -> Array:
     """Return what is zero on the border of a root disc, with the sign of r.m.
 
     |p|^2 o_z - o_x p_x - o_y p_y, with o_z = 1 in parallel light.
@@ -94,7 +94,7 @@ def _root_level(
     return x * (depth * x - across) + y * (depth * y - down)
 
 
-def _share_at_once(level: NDArray[np.float64]) -> NDArray[np.float32]:
+def _share_at_once(level: Array) -> Grey:
     """Return `_share` of a quantity with a single border: slopes matter there alone."""
     positive = level > 0.0
     border = np.zeros_like(positive)
@@ -116,14 +116,12 @@ def _share_at_once(level: NDArray[np.float64]) -> NDArray[np.float32]:
     return share
 
 
-def _slope(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _slope(values: Array) -> Array:
     """Return |grad| in units a pixel, never 0."""
     down, across = np.gradient(values)
     return np.maximum(np.hypot(across, down), np.finfo(float).tiny)
 
 
-def _share(
-    signed: NDArray[np.float64], slope: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _share(signed: Array, slope: Array) -> Array:
     """Return the share of a pixel beyond the border where a quantity is zero."""
     return np.clip(signed / slope + 0.5, 0.0, 1.0)

@@ -11,13 +11,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.verify.reconstruction.light import Light
-
-Images = NDArray[np.uint8 | np.float32]
+from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices
+from planning.verify.reconstruction.light_laws import LightLaw
 
 
 @dataclass(frozen=True, eq=False)
-class RingPattern:
+class DrawnRings:
     """What one projector draws.
 
     Attributes:
@@ -25,8 +24,8 @@ class RingPattern:
         radii: Ring edges, rising: tangents R = x/z (diverging) or radii in [m], (n,).
     """
 
-    light: Light
-    radii: NDArray[np.float64]
+    light: LightLaw
+    radii: Array
 
     @property
     def n_annuli(self) -> int:
@@ -44,7 +43,7 @@ class RingPattern:
         return float(2.0 * self.radii[-1] - self.radii[-2])
 
     @cached_property
-    def codes(self) -> NDArray[np.int64]:
+    def codes(self) -> Indices:
         """Gray code of each annulus, shape (n_annuli,)."""
         index = np.arange(self.n_annuli)
         return index ^ (index >> 1)
@@ -57,38 +56,38 @@ class RingPattern:
         return table
 
     @cached_property
-    def flipping_bit(self) -> NDArray[np.int64]:
+    def flipping_bit(self) -> Indices:
         """Bit that changes across each ring edge, shape (n_rings,)."""
         changed = self.codes[1:] ^ self.codes[:-1]
         return np.log2(changed).astype(np.int64)
 
-    def bit(self, bit: int) -> NDArray[np.float32]:
+    def bit(self, bit: int) -> Grey:
         """Return whether each annulus is bright in the frame of a bit, (n_annuli,)."""
         return ((self.codes >> bit) & 1).astype(np.float32)
 
     @property
-    def steps(self) -> NDArray[np.float64]:
+    def steps(self) -> Array:
         """Distance of each ring from the next one inwards, shape (n,)."""
         first = self.radii[0] - (self.radii[1] - self.radii[0])
         return np.diff(self.radii, prepend=first)
 
 
 @dataclass(frozen=True, eq=False)
-class CameraPattern(RingPattern):
+class RingsForCamera(DrawnRings):
     """What one projector draws, as one camera's decoder reads it.
 
     Attributes:
         camera_in_ring: The camera's optical centre in the ring frame [m], shape (3,).
     """
 
-    camera_in_ring: NDArray[np.float64]
+    camera_in_ring: Array
 
     @property
     def n_frames(self) -> int:
         """Frames that the decoder reads."""
         return 2 * self.n_bits + 4
 
-    def root_side(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def root_side(self, p: Array) -> Array:
         """Return the signed distance of ring-plane points from the border of the disc.
 
         With o the camera in ring coordinates, the sign is that of r.m::

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from planning.verify.reconstruction.arrays import Grey, Indices
 
 from .photometry import Photometry
 from .view import RenderedView
@@ -30,12 +31,12 @@ class ImageCanvas:
     corner: tuple[int, int]
     shape: tuple[int, int]
     fold: int
-    cells: NDArray[np.int64]
-    weights: NDArray[np.float32]
-    inside: NDArray[np.int64]
+    cells: Indices
+    weights: Grey
+    inside: Indices
 
     @classmethod
-    def about(cls, seen: RenderedView, lit: NDArray[np.int64]) -> "ImageCanvas":
+    def about(cls, seen: RenderedView, lit: Indices) -> "ImageCanvas":
         """Return the bounding box of samples and a margin; all where there is none."""
         fold, (rows, columns) = seen.fold, seen.shape
         y, x = np.divmod(seen.cells, fold * columns)
@@ -56,12 +57,7 @@ class ImageCanvas:
             np.flatnonzero(inside),
         )
 
-    def image(
-        self,
-        values: NDArray[np.float32],
-        samples: NDArray[np.int64],
-        lens: Photometry,
-    ) -> NDArray[np.float32]:
+    def image(self, values: Grey, samples: Indices, lens: Photometry) -> Grey:
         """Return the image (h, w) that samples of these values make behind a lens."""
         rows, columns = (self.fold * side for side in self.shape)
         weighted = self.weights[samples] * values
@@ -70,7 +66,7 @@ class ImageCanvas:
         return _binned(lens.blur(cells, self.fold), self.fold)
 
 
-def _binned(cells: NDArray[np.float32], fold: int) -> NDArray[np.float32]:
+def _binned(cells: Grey, fold: int) -> Grey:
     """Return the mean of the cells of each pixel."""
     if fold == 1:
         return cells

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
@@ -19,26 +19,14 @@ from planning.verify.reconstruction.scanner import Scanner
 
 # Six quads of a box whose corner i has the signs of the bits of i.
 _QUADS = np.array(
-    [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ]
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
 )
 
 
 class Occluder(Protocol):
     """Whatever answers, as `RayCaster` does, whether rays are blocked."""
 
-    def occluded(
-        self,
-        origins: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        distances: NDArray[np.float64],
-    ) -> NDArray[np.bool_]:
+    def occluded(self, origins: Array, directions: Array, distances: Array) -> Mask:
         """Return whether each ray is blocked within its distance, shape (n,)."""
         ...
 
@@ -50,12 +38,7 @@ class Both:
     surface: Occluder
     obstacles: Occluder
 
-    def occluded(
-        self,
-        origins: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        distances: NDArray[np.float64],
-    ) -> NDArray[np.bool_]:
+    def occluded(self, origins: Array, directions: Array, distances: Array) -> Mask:
         """Return whether either blocks each ray within its distance, shape (n,)."""
         ray = origins, directions, distances
         return self.surface.occluded(*ray) | self.obstacles.occluded(*ray)
@@ -80,9 +63,7 @@ def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
     return RayCaster(mesh, threads=1)
 
 
-def _corners(
-    device: ProjectorCalibration | CameraCalibration,
-) -> NDArray[np.float64]:
+def _corners(device: ProjectorCalibration | CameraCalibration) -> Array:
     """Corners of a device's body in the world, shape (8, 3); it has one."""
     assert device.body is not None
     signs = np.array([[2 * (i >> k & 1) - 1 for k in range(3)] for i in range(8)])

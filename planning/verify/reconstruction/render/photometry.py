@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from planning.verify.reconstruction.arrays import Array, Grey, Images
 from planning.verify.reconstruction.defocus import Defocus
 
 _WAVELENGTHS_M = (0.009, 0.017, 0.031)
@@ -65,7 +65,7 @@ class Photometry:
         """Return grey levels in a unit of irradiance for the brightest one."""
         return self.exposure * 255.0 / max(brightest, 1e-9)
 
-    def albedo(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+    def albedo(self, points: Array) -> Grey:
         """Return the albedo of world points (n, 3): a solid texture about 1."""
         if self.albedo_variation == 0.0:
             return np.ones(len(points), dtype=np.float32)
@@ -75,7 +75,7 @@ class Photometry:
             waves += np.sin((along * (2.0 * np.pi / length)).astype(np.float32))
         return 1.0 + np.float32(self.albedo_variation / 3.0) * waves
 
-    def blur(self, image: NDArray[np.float32], fold: int = 1) -> NDArray[np.float32]:
+    def blur(self, image: Grey, fold: int = 1) -> Grey:
         """Return an image under the lens's point spread, a separable Gaussian.
 
         Args:
@@ -95,9 +95,7 @@ class Photometry:
             _smooth_rows(strip, taps, blurred[first:last])
         return blurred
 
-    def capture(
-        self, grey: NDArray[np.float32], key: tuple[int, ...], gain: float
-    ) -> NDArray[np.uint8 | np.float32]:
+    def capture(self, grey: Grey, key: tuple[int, ...], gain: float) -> Images:
         """Return what the sensor reports of an image.
 
         Shot noise and read noise, ``var = 255 grey / full_well + read_noise^2`` in grey
@@ -122,9 +120,7 @@ class Photometry:
         return np.clip(level, 0.0, 255.0, out=level).astype(np.uint8)
 
 
-def _smooth_columns(
-    image: NDArray[np.float32], taps: NDArray[np.float32], first: int, last: int
-) -> NDArray[np.float32]:
+def _smooth_columns(image: Grey, taps: Grey, first: int, last: int) -> Grey:
     """Convolve rows first to last along axis 0; beyond the border it is dark."""
     n = len(image)
     result = image[first:last] * taps[0]
@@ -137,9 +133,7 @@ def _smooth_columns(
     return result
 
 
-def _smooth_rows(
-    image: NDArray[np.float32], taps: NDArray[np.float32], out: NDArray[np.float32]
-) -> None:
+def _smooth_rows(image: Grey, taps: Grey, out: Grey) -> None:
     """Convolve along axis 1 into `out`; beyond the border it is dark."""
     np.multiply(image, taps[0], out=out)
     for k in range(1, min(len(taps), image.shape[1])):

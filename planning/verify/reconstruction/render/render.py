@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, Images
+from planning.verify.reconstruction.arrays import Grey, Images
+from planning.verify.reconstruction.patterns.ring_patterns import Frames
 
 from .canvas import ImageCanvas
 from .photometry import Photometry
@@ -63,7 +63,7 @@ def _images(
     light: RenderedLight,
     n_bits: int,
     photometry: Photometry,
-) -> Iterator[NDArray[np.float32]]:
+) -> Iterator[Grey]:
     """Images of a projector's white, so many bits and disc; what it lacks is dark."""
     patterns = shown.patterns
     yield canvas.image(light.white, light.samples, photometry)
@@ -106,7 +106,7 @@ def render_lines(
     return Frames(captured[None], canvas.corner)
 
 
-def _level(bright: NDArray[np.float32], light: RenderedLight) -> NDArray[np.float32]:
+def _level(bright: Grey, light: RenderedLight) -> Grey:
     """Blurred brightness of a bit's frame at each lit sample."""
     inwards = np.concatenate([bright[:1], bright[:-1]]) - bright
     outwards = np.concatenate([bright[1:], bright[-1:]]) - bright

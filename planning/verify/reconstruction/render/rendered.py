@@ -13,7 +13,7 @@ from planning.verify.reconstruction.decode.decode import (
     Pairs,
     decode,
 )
-from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.scanner import Scanner
 
 from .occluders import Both, obstacles_of
@@ -62,7 +62,7 @@ class RenderedScene:
         before = obstacles_of(self._truth, camera.id)
         return view(camera, self._truth.mesh, self._caster, self.lenses[c], before)
 
-    def shown(self, p: int, patterns: CameraPattern) -> Shown | None:
+    def shown(self, p: int, patterns: RingsForCamera) -> Shown | None:
         """Return a projector that shows its patterns; None: it isn't there."""
         design = self._plan.projectors[p]
         projector = self._projectors.get(design.id)

@@ -1,15 +1,15 @@
 """A projector's light on what a camera sees: which annulus, how bright, how blurred."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from geometry.rays.rays import CHUNK, equal_parts
+from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.defocus import Defocus
-from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern
+from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
 
 from .occluders import Occluder
 from .view import RenderedView
@@ -21,7 +21,7 @@ SHADOW_SLACK = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
-class RenderedLight:
+class RenderedLight(Columns):
     """A projector's light on the samples of a view that it reaches, shape (n,) each.
 
     `annulus` is where a sample lies; `inner` and `outer` the shares of blurred light
@@ -29,18 +29,12 @@ class RenderedLight:
     outside; `white` the irradiance under the white frame times the albedo.
     """
 
-    samples: NDArray[np.int64]
-    white: NDArray[np.float32]
-    annulus: NDArray[np.int64]
-    inner: NDArray[np.float32]
-    outer: NDArray[np.float32]
-    root: NDArray[np.float32]
-
-    @classmethod
-    def joined(cls, parts: "list[RenderedLight]") -> "RenderedLight":
-        """Return the light on the samples of all parts."""
-        names = [field.name for field in fields(cls)]
-        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+    samples: Indices
+    white: Grey
+    annulus: Indices
+    inner: Grey
+    outer: Grey
+    root: Grey
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +51,7 @@ class Shown:
 
     projector: ProjectorCalibration
     design: ProjectorCalibration
-    patterns: CameraPattern
+    patterns: RingsForCamera
     caster: Occluder
     defocus: Defocus | None = None
 
@@ -76,7 +70,7 @@ class Shown:
             self._light_on(seen, samples[part], in_focus_m)
             for part in equal_parts(len(samples), CHUNK) or [slice(0)]
         ]
-        light = RenderedLight.joined([light for light, _ in parts])
+        light = RenderedLight.join([light for light, _ in parts])
         if not len(light.samples):
             return light
         depth = np.concatenate([depth for _, depth in parts])
@@ -84,8 +78,8 @@ class Shown:
         return replace(light, white=(light.white * falloff).astype(np.float32))
 
     def _light_on(
-        self, seen: RenderedView, samples: NDArray[np.int64], in_focus_m: float
-    ) -> tuple[RenderedLight, NDArray[np.float64]]:
+        self, seen: RenderedView, samples: Indices, in_focus_m: float
+    ) -> tuple[RenderedLight, Array]:
         """Light on those of some samples that it reaches, and their depths.
 
         How it falls off with depth is left to the caller.
@@ -121,10 +115,8 @@ class Shown:
         return light, depth
 
     def _reached(
-        self, seen: RenderedView, samples: NDArray[np.int64]
-    ) -> tuple[
-        NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]:
+        self, seen: RenderedView, samples: Indices
+    ) -> tuple[Indices, Array, Array, Array]:
         """Samples that are lit, their cos(incidence), pixels and depths."""
         projector = self.projector
         pixels, depth = projector.panel(seen.points[samples])

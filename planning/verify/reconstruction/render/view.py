@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
+from planning.verify.reconstruction.arrays import Array, Grey, Indices, Mask
 from planning.verify.reconstruction.calibration import CameraCalibration
 
 from .photometry import Photometry
@@ -42,13 +42,13 @@ class RenderedView:
     corner: tuple[int, int]
     shape: tuple[int, int]
     fold: int
-    cells: NDArray[np.int64]
-    weights: NDArray[np.float32]
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    rays: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    albedo: NDArray[np.float32]
+    cells: Indices
+    weights: Grey
+    points: Array
+    normals: Array
+    rays: Array
+    distances: Array
+    albedo: Grey
 
 
 def view(
@@ -131,9 +131,9 @@ def _window(
 def _cast(
     camera: CameraCalibration,
     caster: RayCaster,
-    pixels: NDArray[np.float64],
+    pixels: Array,
     obstacles: RayCaster | None,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[Array, Indices, Array]:
     n = len(pixels)
     rays, faces, distances = np.empty((n, 3)), np.empty(n, dtype=np.int64), np.empty(n)
     for part in equal_parts(n, CHUNK):
@@ -152,11 +152,8 @@ def _cast(
 
 
 def _depth_steps(
-    faces: NDArray[np.int64],
-    distances: NDArray[np.float64],
-    shape: tuple[int, int],
-    focal_px: float,
-) -> NDArray[np.bool_]:
+    faces: Indices, distances: Array, shape: tuple[int, int], focal_px: float
+) -> Mask:
     """Pixels whose neighbour is the background or lies many pixels' width apart."""
     depth = np.where(faces >= 0, distances, 1e9).astype(np.float32).reshape(shape)
     steps = np.zeros(shape, dtype=bool)

@@ -1,6 +1,6 @@
 """Labels for one image of rings, from a mesh that the object is known to lie near."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import closest_points
 from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.arrays import Array, Columns, Indices, Mask
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
 
@@ -27,14 +28,14 @@ class PriorLabels:
             near the prior; `ambiguous`, several do.
     """
 
-    rings: NDArray[np.int64]
+    rings: Indices
     roots: NDArray[np.int8]
     rejected: dict[str, int]
 
 
 def label_by_prior(
-    pixels: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    pixels: Array,
+    radii: Array,
     pair: PairCalibration,
     prior: TriangleMesh,
     *,
@@ -81,33 +82,25 @@ def label_by_prior(
 
 
 @dataclass(frozen=True, eq=False)
-class _Candidates:
+class _Crossings(Columns):
     """Where rays meet ring surfaces: ray, ring, root and point of each."""
 
-    rows: NDArray[np.int64]
-    rings: NDArray[np.int64]
+    rows: Indices
+    rings: Indices
     roots: NDArray[np.int8]
-    points: NDArray[np.float64]
-
-    def take(self, chosen: NDArray[np.bool_]) -> "_Candidates":
-        return _Candidates(*(getattr(self, f.name)[chosen] for f in fields(self)))
-
-    @classmethod
-    def join(cls, parts: "list[_Candidates]") -> "_Candidates":
-        names = [field.name for field in fields(cls)]
-        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+    points: Array
 
 
 def _candidates(
-    rays: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    rays: Array,
+    radii: Array,
     pair: PairCalibration,
     prior: TriangleMesh,
     tolerance_m: float,
-) -> _Candidates:
+) -> _Crossings:
     """Intersections of every ray with every ring in the prior's box."""
     low, high = prior.bounds[0] - tolerance_m, prior.bounds[1] + tolerance_m
-    parts: list[_Candidates] = []
+    parts: list[_Crossings] = []
     for ring, radius in enumerate(radii):
         for root in _ROOTS:
             every, side = np.full(len(rays), radius), np.full(len(rays), root, np.int8)
@@ -118,17 +111,17 @@ def _candidates(
             inside = np.all((hits.points >= low) & (hits.points <= high), axis=1)
             rows = np.flatnonzero(inside)
             number = np.full(len(rows), ring, dtype=np.int64)
-            parts.append(_Candidates(rows, number, side[rows], hits.points[rows]))
-    return _Candidates.join(parts)
+            parts.append(_Crossings(rows, number, side[rows], hits.points[rows]))
+    return _Crossings.join(parts)
 
 
 def _possible(
-    met: _Candidates,
-    rays: NDArray[np.float64],
+    met: _Crossings,
+    rays: Array,
     pair: PairCalibration,
     prior: TriangleMesh,
     tolerance_m: float,
-) -> _Candidates:
+) -> _Crossings:
     """Those near the prior, in the panel, that the object leaves seen and lit."""
     if len(met.rows) == 0:
         return met
@@ -145,12 +138,8 @@ def _possible(
 
 
 def _behind_prior(
-    points: NDArray[np.float64],
-    towards: NDArray[np.float64],
-    away: NDArray[np.float64],
-    caster: RayCaster,
-    tolerance_m: float,
-) -> NDArray[np.bool_]:
+    points: Array, towards: Array, away: Array, caster: RayCaster, tolerance_m: float
+) -> Mask:
     """Whether rays that end at points ran deeper in the prior than it may be off, (n,).
 
     Then the object itself stands in the way. Whether the prior's own surface does, or

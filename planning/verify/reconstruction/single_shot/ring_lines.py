@@ -7,10 +7,10 @@ PAMI 20(2), 1998: where the image, smoothed at the scale of the line, has a ridg
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import convolve, gaussian_filter1d, map_coordinates
 
-from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
+from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 # Least brightness of a line above what lies beside it, in grey levels and in noises.
 _MIN_CONTRAST = 10.0
@@ -35,15 +35,15 @@ class RingLines:
         noise_px: Standard deviation of the position along `across` [px], shape (n,).
     """
 
-    pixels: NDArray[np.float64]
-    across: NDArray[np.float64]
-    noise_px: NDArray[np.float64]
+    pixels: Array
+    across: Array
+    noise_px: Array
 
     def __len__(self) -> int:
         return len(self.pixels)
 
 
-def line_patterns(patterns: CameraPattern, width: float) -> CameraPattern:
+def line_patterns(patterns: RingsForCamera, width: float) -> RingsForCamera:
     """Return patterns whose odd annuli are bright lines on the rings.
 
     Args:
@@ -102,12 +102,7 @@ def find_lines(frames: Frames, width_px: float) -> RingLines:
     return RingLines(pixels, across[inside], spread)
 
 
-def _falls(
-    smooth: NDArray[np.float64],
-    places: NDArray[np.float64],
-    reach: NDArray[np.float64],
-    least: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+def _falls(smooth: Array, places: Array, reach: Array, least: Array) -> Mask:
     """Whether it is darker on both sides, a width away; beside an edge it isn't."""
     here, before, after = (
         map_coordinates(
@@ -118,9 +113,7 @@ def _falls(
     return (here - before >= least) & (here - after >= least)
 
 
-def _derivative(
-    image: NDArray[np.float64], scale: float, order: tuple[int, int]
-) -> NDArray[np.float64]:
+def _derivative(image: Array, scale: float, order: tuple[int, int]) -> Array:
     """Derivative of a smoothed image, of some order down and across."""
     smooth = np.empty_like(image)
     gaussian_filter1d(image, scale, axis=0, order=order[0], output=smooth)
@@ -128,9 +121,7 @@ def _derivative(
     return smooth
 
 
-def _direction(
-    a: NDArray[np.float64], c: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _direction(a: Array, c: Array, b: Array) -> Array:
     """Eigenvectors across a line, (n, 2), of matrices less that eigenvalue."""
     # [[a, b], [b, c]] is singular; its null vector is orthogonal to its larger row.
     first = np.abs(a) >= np.abs(c)
@@ -139,9 +130,7 @@ def _direction(
     return np.column_stack([x / length, y / length])
 
 
-def _grey_noise(
-    image: NDArray[np.float64], bend: NDArray[np.float64], scale: float
-) -> float:
+def _grey_noise(image: Array, bend: Array, scale: float) -> float:
     """Standard deviation of a pixel on the lines, in grey levels."""
     lines = -bend * (scale * scale / _BAR) >= _MIN_CONTRAST
     if np.count_nonzero(lines) < 100:

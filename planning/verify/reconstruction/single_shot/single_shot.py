@@ -8,14 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.sampling import SurfaceSamples
 from planning.verify.reconstruction.calibration import (
     PairCalibration,
     ProjectorCalibration,
 )
+from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.check import conclude
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.decode.decode import (
@@ -25,7 +24,7 @@ from planning.verify.reconstruction.decode.decode import (
     measure_edges,
 )
 from planning.verify.reconstruction.decode.edges import ImageEdges
-from planning.verify.reconstruction.patterns.ring_patterns import CameraPattern, Frames
+from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_lines
 from planning.verify.reconstruction.render.rendered import Progress, RenderedScene
@@ -65,8 +64,7 @@ class Shot:
 
 def reconstruct_single_shot(
     plan: Scanner,
-    samples: SurfaceSamples | None = None,
-    predicted: NDArray[np.bool_] | None = None,
+    expected: Expected | None = None,
     *,
     tolerance_m: float,
     seed: int,
@@ -78,8 +76,7 @@ def reconstruct_single_shot(
 
     Args:
         plan: Devices, patterns and the object; its mesh is the prior, too.
-        samples: As in `reconstruct`.
-        predicted: Likewise; what sequences would measure.
+        expected: As in `reconstruct`; what sequences would measure.
         tolerance_m: How near the object is taken to lie to the mesh [m].
         seed: Of the pixel noise.
         threads: Worker threads; the result doesn't depend on them.
@@ -100,8 +97,7 @@ def reconstruct_single_shot(
         plan,
         decoded_pairs(shots),
         seed=seed,
-        samples=samples,
-        predicted=predicted,
+        expected=expected,
         photometry=light,
         seconds={"render": 0.0, "decode": time.thread_time() - begin, "merge": 0.0},
     )
@@ -159,8 +155,8 @@ def decoded_pairs(shots: Sequence[Shot]) -> Pairs:
 
 
 def drawn_lines(
-    projector: ProjectorCalibration, patterns: CameraPattern, mesh: TriangleMesh
-) -> tuple[float, CameraPattern]:
+    projector: ProjectorCalibration, patterns: RingsForCamera, mesh: TriangleMesh
+) -> tuple[float, RingsForCamera]:
     """Return the width of a projector's lines, in the unit of its radii, and them."""
     depth = (mesh.centre - projector.centre)[None] @ projector.axis
     width = _LINE_M * float(projector.light.shrink(depth)[0])
@@ -171,7 +167,7 @@ def drawn_lines(
 
 def decode_single_shot(
     frames: Frames,
-    patterns: CameraPattern,
+    patterns: RingsForCamera,
     calibration: PairCalibration,
     prior: TriangleMesh,
     *,

@@ -9,13 +9,13 @@ cylinder or a cone about the ring axis.
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Array = NDArray[np.float64]
+from .arrays import Array, Mask
+
 LightName = Literal["diverging", "parallel"]
 
 
-class Light:
+class LightLaw:
     """Parallel light along +z from the plane z = 0; `_Diverging` says what differs.
 
     Attributes:
@@ -24,22 +24,22 @@ class Light:
 
     name: LightName = "parallel"
 
-    def shrink(self, depth: _Array) -> _Array:
+    def shrink(self, depth: Array) -> Array:
         """Return p in units of (x, y) at depths z [m], shape (n,): 1, or 1 / z."""
         return np.ones_like(depth)
 
-    def turned(self, p: _Array, b_from_a: _Array) -> _Array:
+    def turned(self, p: Array, b_from_a: Array) -> Array:
         """Return the light p (n, 2) of frame a in frame b, its pose of shape (4, 4)."""
         return p @ b_from_a[:2, :2].T + b_from_a[:2, 3]
 
-    def rays(self, p: _Array, pose: _Array) -> tuple[_Array, _Array]:
+    def rays(self, p: Array, pose: Array) -> tuple[Array, Array]:
         """Return origins [m] and unit directions (n, 3) of light p of a posed frame."""
         starts = pose[:3, 3] + p @ pose[:3, :2].T
         return starts, np.broadcast_to(pose[:3, 2], starts.shape)
 
     def aim(
-        self, pose: _Array, points: _Array, depth: _Array
-    ) -> tuple[_Array, _Array, _Array]:
+        self, pose: Array, points: Array, depth: Array
+    ) -> tuple[Array, Array, Array]:
         """Return where the light of world points starts, its directions and lengths.
 
         Args:
@@ -53,34 +53,34 @@ class Light:
         beams = np.broadcast_to(pose[:3, 2], points.shape)
         return points - depth[:, None] * beams, beams, depth
 
-    def faces(self, pose: _Array, points: _Array, normals: _Array) -> NDArray[np.bool_]:
+    def faces(self, pose: Array, points: Array, normals: Array) -> Mask:
         """Return whether surface of normals (n, 3) is turned to a device's light."""
         return normals @ pose[:3, 2] < 0.0
 
-    def falloff(self, depth: _Array) -> _Array | float:
+    def falloff(self, depth: Array) -> Array | float:
         """Return the brightness at depths, 1 at their median, shape (n,)."""
         return 1.0
 
-    def tilt(self, rho: _Array) -> _Array:
+    def tilt(self, rho: Array) -> Array:
         """Return the slope of ring surfaces against their axis: 0, or R, shape (n,)."""
         return np.zeros_like(rho)
 
-    def across_m(self, step: _Array, rho: _Array, depth: _Array) -> _Array:
+    def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
         """Return steps of |p| at rho and depth z as lengths across the beam [m].
 
         In diverging light a step is ``z / sqrt(1 + rho^2)`` times as long.
         """
         return step
 
-    def per_metre(self, rho: _Array, depth: _Array) -> _Array:
+    def per_metre(self, rho: Array, depth: Array) -> Array:
         """Return the change of |p| in a metre across the beam, shape (n,)."""
         return np.ones_like(rho)
 
-    def quadric(self, radii: _Array) -> tuple[_Array | float, _Array | float]:
+    def quadric(self, radii: Array) -> tuple[Array | float, Array | float]:
         """Return k and c of the ring surfaces ``x^2 + y^2 = k z^2 + c``."""
         return 0.0, radii * radii
 
-    def reaches(self, z: _Array) -> NDArray[np.bool_]:
+    def reaches(self, z: Array) -> Mask:
         """Return whether rings of light exist at z of the ring frame, shape (n,)."""
         return np.ones_like(z, dtype=bool)
 
@@ -88,11 +88,11 @@ class Light:
         """Return the factor of |p|^2 on the border of a root disc: 1, or o_z."""
         return 1.0
 
-    def plane(self, local: _Array) -> _Array:
+    def plane(self, local: Array) -> Array:
         """Return p (n, 2) at points (n, 3) in the frame of the device or its rings."""
         return local[:, :2]
 
-    def ring_normals(self, outward: _Array, rho: _Array) -> _Array:
+    def ring_normals(self, outward: Array, rho: Array) -> Array:
         """Return unit normals (n, 3) of ring surfaces in the ring frame.
 
         Args:
@@ -104,58 +104,58 @@ class Light:
         return np.column_stack([outward, -tilt]) / slope
 
 
-class _Diverging(Light):
+class _Diverging(LightLaw):
     """Rays from the optical centre; rings are cones."""
 
     name: LightName = "diverging"
 
-    def shrink(self, depth: _Array) -> _Array:
+    def shrink(self, depth: Array) -> Array:
         return 1.0 / depth
 
-    def turned(self, p: _Array, b_from_a: _Array) -> _Array:
+    def turned(self, p: Array, b_from_a: Array) -> Array:
         x, y, z = b_from_a[:3, :2] @ p.T + b_from_a[:3, 2:3]
         return np.column_stack([x / z, y / z])
 
-    def rays(self, p: _Array, pose: _Array) -> tuple[_Array, _Array]:
+    def rays(self, p: Array, pose: Array) -> tuple[Array, Array]:
         beams = p @ pose[:3, :2].T + pose[:3, 2]
         beams /= np.linalg.norm(beams, axis=1, keepdims=True)
         return np.broadcast_to(pose[:3, 3], beams.shape), beams
 
     def aim(
-        self, pose: _Array, points: _Array, depth: _Array
-    ) -> tuple[_Array, _Array, _Array]:
+        self, pose: Array, points: Array, depth: Array
+    ) -> tuple[Array, Array, Array]:
         beams = points - pose[:3, 3]
         reach = np.sqrt(np.einsum("ij,ij->i", beams, beams))
         beams /= reach[:, None]
         return pose[:3, 3], beams, reach
 
-    def faces(self, pose: _Array, points: _Array, normals: _Array) -> NDArray[np.bool_]:
+    def faces(self, pose: Array, points: Array, normals: Array) -> Mask:
         along = np.einsum("ij,ij->i", normals, points)
         return along - normals @ pose[:3, 3] < 0.0
 
-    def falloff(self, depth: _Array) -> _Array | float:
+    def falloff(self, depth: Array) -> Array | float:
         return (float(np.median(depth)) / depth) ** 2
 
-    def tilt(self, rho: _Array) -> _Array:
+    def tilt(self, rho: Array) -> Array:
         return rho
 
-    def across_m(self, step: _Array, rho: _Array, depth: _Array) -> _Array:
+    def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
         return step * depth / np.sqrt(1.0 + rho * rho)
 
-    def per_metre(self, rho: _Array, depth: _Array) -> _Array:
+    def per_metre(self, rho: Array, depth: Array) -> Array:
         return np.sqrt(1.0 + rho * rho) / depth
 
-    def quadric(self, radii: _Array) -> tuple[_Array | float, _Array | float]:
+    def quadric(self, radii: Array) -> tuple[Array | float, Array | float]:
         return radii * radii, 0.0
 
-    def reaches(self, z: _Array) -> NDArray[np.bool_]:
+    def reaches(self, z: Array) -> Mask:
         return z > 0.0
 
     def root_weight(self, camera_z: float) -> float:
         return camera_z
 
-    def plane(self, local: _Array) -> _Array:
+    def plane(self, local: Array) -> Array:
         return local[:, :2] / local[:, 2:]
 
 
-LIGHTS: dict[LightName, Light] = {"parallel": Light(), "diverging": _Diverging()}
+LIGHTS: dict[LightName, LightLaw] = {"parallel": LightLaw(), "diverging": _Diverging()}
