@@ -1,5 +1,7 @@
 """Hand-made plans for the tests of the check from pixels; no planner is involved."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +12,11 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
-from support.bare_plan import bare_plan
 from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.scanner import Scanner
+from support.bare_plan import bare_plan
 
 MESH_TABLE = {
     "path": None,
@@ -166,6 +168,18 @@ def plan_of(
         },
     }
     return bare_plan(requirements, projectors, cameras, surface, **sections)
+
+
+def changed(
+    plan: RigPlan,
+    change: Callable[[dict[str, Any]], object],
+    mesh: TriangleMesh | None = None,
+) -> RigPlan:
+    """A plan after its document was changed in place, perhaps about another object."""
+    document = plan.to_document()
+    change(document)
+    surface = plan.surface if mesh is None else replace(plan.surface, mesh=mesh)
+    return RigPlan.from_document(document, surface)
 
 
 def reconstruct_plan(

@@ -1,13 +1,12 @@
 """Failures that no displaced device explains: each is named for what it is."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from support.reconstruction_rigs import reconstruct_plan
+from support.reconstruction_rigs import changed, reconstruct_plan
 
 from geometry.mesh.sampling import sample_surface
 from geometry.shapes.primitives import sphere
@@ -17,6 +16,8 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
+from planning.verify.reconstruction.check.accuracy import Expected
+from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import CAUSES, Decoded
@@ -41,28 +42,22 @@ def claims(rigs, plan) -> dict[str, Any]:
     return {"samples": samples, "predicted": rigs.predict_on_sphere(near, samples)}
 
 
-def changed(plan: RigPlan, change: Callable[[dict[str, Any]], object]) -> RigPlan:
-    document = plan.to_document()
-    change(document)
-    return RigPlan.from_document(document, plan.surface)
-
-
 def failures(plan: RigPlan, claims: dict[str, Any], truth: RigPlan | None = None):
     return reconstruct_plan(plan, seed=0, truth=truth, **claims).failures
 
 
 def test_two_projectors_on_at_once_are_named(plan, claims):
-    schedule = {"groups": [["P1", "P2"]]}
-    truth = changed(plan, lambda d: d.update(firing_schedule=schedule))
-    found = failures(plan, claims, truth)
+    apart = Scanner.of(plan)
+    together = replace(apart, groups=(frozenset({"P1", "P2"}),))
+    expected = Expected(claims["samples"], claims["predicted"])
+    found = reconstruct(apart, seed=0, truth=together, expected=expected).failures
     assert found
     words = (
         r"P1 saturates lit pixels, \d+ % in C\d.*: P2 lights them too, on at the same"
     )
     assert all(re.search(words, text) for text in found), found
     # A plan that fires them together itself isn't rendered so: its images are apart.
-    together = changed(plan, lambda d: d.update(firing_schedule=schedule))
-    assert failures(together, claims, together) == ()
+    assert reconstruct(together, seed=0, expected=expected).failures == ()
 
 
 def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):

@@ -1,14 +1,13 @@
 """The whole check: a sound plan passes, a rig that differs fails with a cause."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from support.plain_shapes import box
-from support.reconstruction_rigs import reconstruct_plan
+from support.reconstruction_rigs import changed, reconstruct_plan
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
@@ -62,17 +61,6 @@ def check(rigs, plan, samples) -> Reconstruction:
     assert predicted.mean() > 0.3
     options = {"samples": samples, "predicted": predicted}
     return reconstruct_plan(plan, seed=0, threads=2, **options)
-
-
-def changed(
-    plan: RigPlan,
-    change: Callable[[dict[str, Any]], object],
-    mesh: TriangleMesh | None = None,
-) -> RigPlan:
-    document = plan.to_document()
-    change(document)
-    surface = plan.surface if mesh is None else replace(plan.surface, mesh=mesh)
-    return RigPlan.from_document(document, surface)
 
 
 def test_a_sound_plan_passes(check):

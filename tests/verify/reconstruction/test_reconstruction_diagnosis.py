@@ -5,12 +5,12 @@ there, and labelled with the ring coordinate at which it lights them.
 """
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from support.reconstruction_rigs import changed
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
@@ -38,17 +38,6 @@ def plan(rigs, request) -> RigPlan:
 @pytest.fixture(scope="module")
 def diverging(rigs) -> RigPlan:
     return rigs.small_rig(rigs.bumpy_sphere(0.05, subdivisions=4))
-
-
-def changed(
-    plan: RigPlan,
-    change: Callable[[dict[str, Any]], object],
-    mesh: TriangleMesh | None = None,
-) -> RigPlan:
-    document = plan.to_document()
-    change(document)
-    surface = plan.surface if mesh is None else replace(plan.surface, mesh=mesh)
-    return RigPlan.from_document(document, surface)
 
 
 def edges(plan: RigPlan, truth: RigPlan, *, outliers: float = 0.03) -> Evidence:
