@@ -90,7 +90,6 @@ def _reconstruct(
             expected,
             tolerance_m=1e-3 * (options["prior_mm"] or _PRIOR_MM),
             seed=seed,
-            threads=threads,
             progress=progress,
         )
     if options["captures"] is not None:

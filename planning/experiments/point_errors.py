@@ -95,6 +95,6 @@ def measured(
     if len(cloud) == 0:
         return MeasuredErrors(name, cloud, np.zeros(0), (0.0, 0.0))
     apart = nearest_distance(cloud, samples, 1.01 * gap_m)
-    distances = measure_accuracy(cloud, mesh, threads=1).distances
+    distances = measure_accuracy(cloud, mesh).distances
     half, whole = (float(np.mean(apart <= part * gap_m)) for part in (0.5, 1.0))
     return MeasuredErrors(name, cloud, distances, (half, whole))

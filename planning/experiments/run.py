@@ -107,9 +107,7 @@ def run_experiment(
             progress=progress,
         )
         pairs = decoded_pairs(shots)
-        found = conclude(
-            scanner, pairs, seed=seed, threads=threads, photometry=photometry
-        )
+        found = conclude(scanner, pairs, seed=seed, photometry=photometry)
         labels = judged_labels(scanner, shots)
     samples, visible = observable(experiment, seed)
     everything, merged = found.everything, found.merged.cloud

@@ -101,5 +101,5 @@ def test_a_plan_is_measured_from_single_images_too():
     vague = reconstruct_single_shot(one, tolerance_m=0.05, seed=3)
     assert vague.n_points < 0.3 * found.n_points
     assert "several rings meet the rays" in (rejection(vague.pairs) or "")
-    again = reconstruct_single_shot(one, tolerance_m=1e-3, seed=3, threads=1)
+    again = reconstruct_single_shot(one, tolerance_m=1e-3, seed=3)
     np.testing.assert_array_equal(again.merged.cloud.points, found.merged.cloud.points)

@@ -24,7 +24,7 @@ from planning.verify.reconstruction.calibration import (
 from planning.verify.reconstruction.faults.cause_words import _two_digits, in_words
 from planning.verify.reconstruction.faults.diagnosis import diagnose_edges
 from planning.verify.reconstruction.faults.supposed import Evidence
-from planning.verify.reconstruction.scanner import Scanner
+from planning.verify.reconstruction.scanner import BaselineLimit, Scanner
 
 NOISE_PX = 0.02
 EDGES = 150
@@ -220,8 +220,8 @@ def test_one_pair_is_enough_to_tell_a_camera_from_the_object(diverging):
 def test_a_baseline_that_becomes_too_wide_is_named(diverging):
     centres = [c.world_from_device[:3, 3] for c in diverging.cameras]
     d = float(np.linalg.norm(centres[1] - centres[0]))
-    row = {"cameras": ["C1", "C2"], "d": d, "d_max": d + 1e-3}
-    plan = changed(diverging, lambda document: document.update(baselines=[row]))
+    limit = BaselineLimit(frozenset({"C1", "C2"}), d, d + 1e-3)
+    scanner = replace(Scanner.of(diverging), baselines=(limit,))
 
     def apart(document: dict[str, Any], metres: float) -> None:
         away = (centres[1] - centres[0]) / d * metres
@@ -229,10 +229,15 @@ def test_a_baseline_that_becomes_too_wide_is_named(diverging):
         for axis in range(3):
             pose[axis][3] += away[axis]
 
-    (sentence,) = said(plan, changed(plan, lambda document: apart(document, 2e-3)))
+    def sentences(metres: float) -> list[str]:
+        truth = changed(diverging, lambda document: apart(document, metres))
+        causes = diagnose_edges(scanner, edges(diverging, truth))
+        return [in_words(cause, scanner) for cause in causes]
+
+    (sentence,) = sentences(2e-3)
     wide = f"its baseline to C1 {1e3 * d + 2:.1f} mm: too wide, eq. (10) allows"
     assert wide in sentence, sentence
-    (sentence,) = said(plan, changed(plan, lambda document: apart(document, -2e-3)))
+    (sentence,) = sentences(-2e-3)
     assert "too wide" not in sentence
 
 

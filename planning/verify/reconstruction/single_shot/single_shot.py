@@ -68,7 +68,6 @@ def reconstruct_single_shot(
     *,
     tolerance_m: float,
     seed: int,
-    threads: int = 2,
     photometry: Photometry | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
@@ -79,7 +78,6 @@ def reconstruct_single_shot(
         expected: As in `reconstruct`; what sequences would measure.
         tolerance_m: How near the object is taken to lie to the mesh [m].
         seed: Of the pixel noise.
-        threads: Worker threads; the result doesn't depend on them.
         photometry: Simulated light and sensor.
         progress: Called with the pairs done and their total.
     """
