@@ -169,6 +169,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         rig.projector_device(),
         radii,
         body=rig.projector_body(),
+        pattern=requirements.pattern,
     )
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
     check_existing_clearance(scene, template, camera)

@@ -20,8 +20,8 @@ from planning.cameras.baselines.widest_baselines import (
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.clearance import lacks_clearance
 from planning.scene.measured import LitSamples, lit_samples, measured_by
+from planning.scene.placed_bodies import moves_bodies
 from planning.scene.scene import Scene
-from planning.scene.standing import moves_bodies
 
 from .camera_bodies import lit_among
 

@@ -15,8 +15,8 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.conflicts import resolve_conflicts
 from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.placed_bodies import blocked_by, bodies_of, collide, moves_bodies
 from planning.scene.scene import Scene
-from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
 
 from .camera_cover import CameraCover, candidate_cover
 

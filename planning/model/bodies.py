@@ -1,7 +1,7 @@
 """The housing of a device, as rig files and plans hold it: a box that moves with it.
 
-Only values; what follows from them the planner (`standing`) and the checkers each work
-out alone.
+Only values; what follows from them the planner (`placed_bodies`) and the checkers each
+work out alone.
 """
 
 from collections.abc import Mapping

@@ -15,9 +15,9 @@ from planning.proofs.selection import required_samples
 from planning.scene.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
+from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.standing import moves_bodies
 from planning.scene.workspace.zone_limits import half_spaces
 from planning.scene.workspace.zone_positions import is_zoned
 from solvers.poses.pose_problem import PoseProgram, pose_margins

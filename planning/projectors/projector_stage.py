@@ -230,7 +230,7 @@ def _stage(
         excluded_pairs={
             cause: int((candidates.stages == index).sum())
             for index, cause in enumerate(projector_limits.CAUSES)
-            if index != projector_limits.BLOCKED or candidates.scene.standing
+            if index != projector_limits.BLOCKED or candidates.scene.bodies
         },
         n_regions=int(candidates.scene.region.max()) + 1,
     )

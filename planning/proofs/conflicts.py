@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.scene.placed_bodies import blocked_by, bodies_of, collide, moves_bodies
 from planning.scene.samples import Target
-from planning.scene.standing import blocked_by, bodies_of, collide, moves_bodies
 from solvers.covers.cover import solve_max_coverage
 
 from .selection import MORE, CandidateCover, Marginals, Selection, cover_problem

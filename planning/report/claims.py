@@ -20,9 +20,9 @@ from planning.scene.measured import (
     lit_samples,
     measured_by,
 )
+from planning.scene.placed_bodies import Device, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.standing import Device, blocked_by
 
 N_SAMPLES = 12_000
 _TARGET_STREAM = 900
@@ -220,7 +220,7 @@ def _reachable_by_projectors(
             rest,
             scene.requirements.projector,
             scene.visibility,
-            bodies=scene.standing,
+            bodies=scene.bodies,
         )
         reachable[left] = stage == LIT
         furthest[left] = np.maximum(furthest[left], stage)
@@ -262,13 +262,13 @@ def _blocked_by_body(
     measured: NDArray[np.bool_],
 ) -> dict[str, float]:
     """Unmeasured area on which nothing but a body stops some device, by body."""
-    if not scene.standing:
+    if not scene.bodies:
         return {}
-    stopped = np.zeros((len(target), len(scene.standing)), dtype=bool)
+    stopped = np.zeros((len(target), len(scene.bodies)), dtype=bool)
 
     def note(device: Device, rows: NDArray[np.int64]) -> None:
         points = target.samples.points[rows]
-        stopped[rows] |= blocked_by(scene.standing, device, points)
+        stopped[rows] |= blocked_by(scene.bodies, device, points)
 
     for p, projector in enumerate(devices.projectors):
         dark = stages[:, p] == projector_limits.BLOCKED
@@ -281,7 +281,7 @@ def _blocked_by_body(
     every = (*devices.projectors, *devices.cameras)
     return {
         next(d.id for d in every if body.is_of(d)): float(area)
-        for body, area in zip(scene.standing, areas, strict=True)
+        for body, area in zip(scene.bodies, areas, strict=True)
     }
 
 

@@ -82,7 +82,7 @@ def cast_beam(
     normals = scene.mesh.face_normals[faces]
     met = Target(SurfaceSamples(points, normals, faces, 0.0), scene.steep[faces])
     # What the ray meets first, no part of the surface hides.
-    limits, bodies = scene.requirements.projector, scene.standing
+    limits, bodies = scene.requirements.projector, scene.bodies
     stage = lighting.first_failure(projector, met, limits, None, bodies=bodies)
     ring = points - projector.world_from_ring[:3, 3]
     heights = ring @ projector.world_from_ring[:3, 2]

@@ -90,7 +90,7 @@ def crease_errors(
             target,
             scene.requirements.projector,
             scene.visibility,
-            bodies=scene.standing,
+            bodies=scene.bodies,
         )
         lit &= stage == LIT
         light = light_on(projector, target)

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from geometry.rays.visibility_matrix import visibility_matrix
 from planning.model.planned import PlannedCamera
+from planning.scene.limits.camera_limits import SEEN, ViewedSamples
 
 from . import measurability
-from .limits.camera_limits import SEEN, ViewedSamples
+from .placed_bodies import PlacedBody, blocked_by
 from .samples import Target
 from .scene import Scene
-from .standing import Standing, blocked_by
 
 # Of a cosine: what this decides roughly, `measurability.view` decides exactly.
 _ROUNDING = 1e-9
@@ -60,7 +60,7 @@ def camera_views(
         for column, sight in enumerate(offered)
     )
     return tuple(
-        unblocked(sight, camera, samples.points, scene.standing)
+        unblocked(sight, camera, samples.points, scene.bodies)
         for sight, camera in zip(clear, cameras, strict=True)
     )
 
@@ -84,7 +84,7 @@ def unblocked(
     sight: CameraView,
     camera: PlannedCamera,
     points: NDArray[np.float64],
-    bodies: Sequence[Standing],
+    bodies: Sequence[PlacedBody],
 ) -> CameraView:
     """Return what is left of a sight of points (n, 3) with bodies in the way."""
     if not bodies:
@@ -96,7 +96,7 @@ def unblocked(
 def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> ViewedSamples:
     """Return how a camera sees samples, everything in between included."""
     limits = scene.requirements.camera
-    return measurability.view(camera, target, limits, scene.visibility, scene.standing)
+    return measurability.view(camera, target, limits, scene.visibility, scene.bodies)
 
 
 class CandidateViews:

@@ -13,8 +13,8 @@ from planning.model.requirements import Workspace
 from planning.model.zones import Box
 
 from .existing import existing_cameras, existing_projectors
+from .placed_bodies import CLEARANCE_M, Device, collide, placed_box
 from .scene import Scene
-from .standing import CLEARANCE_M, Device, collide, placed_box
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 # Poses that are tried for each wanted, at most.
@@ -34,7 +34,7 @@ def lacks_clearance(scene: Scene, device: Device) -> str:
     box = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
     if _touches_object(scene, box):
         return "the object"
-    if others := collide(device, scene.standing):
+    if others := collide(device, scene.bodies):
         return f"the body of {others[0].name or 'another device'}"
     return "" if device.existing else _zone_broken(scene.requirements.workspace, box)
 

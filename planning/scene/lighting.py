@@ -11,19 +11,19 @@ from geometry.rays.visibility import Visibility
 from geometry.rays.visibility_matrix import visibility_matrix
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
-
-from .lights import LightOnSamples, light_of, light_on
-from .limits.limit import first_violated
-from .limits.projector_limits import (
+from planning.scene.limits.limit import first_violated
+from planning.scene.limits.projector_limits import (
     BLOCKED,
     LIT,
     OCCLUDED,
     PROJECTOR_LIMITS,
     ProjectorView,
 )
+
+from .lights import LightOnSamples, light_of, light_on
+from .placed_bodies import PlacedBody, blocked_by
 from .samples import SampleColumns, Target
 from .scene import Scene
-from .standing import Standing, blocked_by
 
 # Projectors that a thread takes on at a time.
 _SHARED = 32
@@ -35,7 +35,7 @@ def first_failure(
     limits: ProjectorLimits,
     visibility: Visibility | None,
     *,
-    bodies: Sequence[Standing] = (),
+    bodies: Sequence[PlacedBody] = (),
 ) -> NDArray[np.int8]:
     """Return the index in `CAUSES` of the first limit that fails; `LIT` if none does.
 
@@ -63,7 +63,7 @@ def stands_between(
 ) -> NDArray[np.bool_]:
     """Return from which samples surface or bodies keep the light, shape (n,)."""
     hidden = _in_shadow(projector, target, scene.visibility)
-    blocked = blocked_by(scene.standing, projector, target.samples.points)
+    blocked = blocked_by(scene.bodies, projector, target.samples.points)
     return hidden | blocked.any(axis=1)
 
 
@@ -100,7 +100,7 @@ def lit_stages(
         first[:, alike] = _with_shadows(scene, chosen, target, first[:, alike])
     for column, projector in enumerate(projectors):
         points = target.samples.points
-        _mark_blocked(first[:, column], projector, points, scene.standing)
+        _mark_blocked(first[:, column], projector, points, scene.bodies)
     return first
 
 
@@ -135,7 +135,7 @@ def _mark_blocked(
     first: NDArray[np.int8],
     projector: PlannedProjector,
     points: NDArray[np.float64],
-    bodies: Sequence[Standing],
+    bodies: Sequence[PlacedBody],
 ) -> None:
     """Mark lit samples (n,) whose light meets a body."""
     if not bodies:

@@ -7,7 +7,6 @@ holds no pose.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,63 +36,6 @@ class RingSurface:
     stretch: _Array
 
 
-class Light(Protocol):
-    """What a projector sends out: one class for each kind of light."""
-
-    def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
-        """Return unit directions L, (n, 3), and how far points (n, 3) are, (n,) [m].
-
-        That is |P - Q| in diverging light, z in parallel light.
-        """
-        ...
-
-    def cosines(
-        self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
-    ) -> tuple[_Array, _Array, _Array]:
-        """Return what `rays` says of distances, then -N.L and |T1.L|, shape (n,) each.
-
-        Offsets P - Q, N and T1 are columns, (3, n): as rows they are slow to handle.
-        """
-        ...
-
-    def common_direction(self, poses: _Array) -> _Array | None:
-        """Return L where it doesn't depend on the point, (..., 3); else None."""
-        ...
-
-    def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
-        """Return which samples surely show the light their back, shape (n,).
-
-        N.(Q - P) < 0, or N.L > 0 in parallel light, by more than rounding.
-        """
-        ...
-
-    def within_ring(self, local: _Array, ring: float) -> _Mask:
-        """Return which columns of the ring frame, (3, n), lie in a ring, shape (n,)."""
-        ...
-
-    def ring_coordinate(self, local: _Array) -> _Array:
-        """Return R at points (n, 3) of the ring frame, (n,); inf behind the light."""
-        ...
-
-    def ring_surface(self, local: _Array) -> RingSurface:
-        """Return the ring surfaces through points of the ring frame, (n, 3)."""
-        ...
-
-    def ring_rays(self, frame: _Array, flat: _Array) -> tuple[_Array, _Array]:
-        """Return the rays at ring coordinates (n, 2), in the world.
-
-        Origins in [m], (3,) in diverging light, else (n, 3); unit directions, (n, 3).
-        """
-        ...
-
-    def off_axis(self, local: _Array) -> _Array:
-        """Return how far off the middle points (n, 3) of the device frame are, (n,).
-
-        In degrees, or in parallel light in [mm].
-        """
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class DivergingLight:
     """Light from one point, through a lens."""
@@ -101,7 +43,7 @@ class DivergingLight:
     device: PinholeModel
 
     def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
-        """Return (P - Q) / |P - Q| and |P - Q|."""
+        """Return unit L = (P - Q) / |P - Q|, (n, 3), and |P - Q| in [m], (n,)."""
         offsets = points - pose[:3, 3]
         distances = lengths(offsets)
         return offsets / np.where(distances > 0, distances, 1.0)[:, None], distances
@@ -109,28 +51,31 @@ class DivergingLight:
     def cosines(
         self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
     ) -> tuple[_Array, _Array, _Array]:
-        """Return |P - Q|, -N.L and |T1.L|, as `Light.cosines` says."""
+        """Return |P - Q|, -N.L and |T1.L|, shape (n,) each.
+
+        Offsets P - Q, N and T1 are columns, (3, n): as rows they are slow to handle.
+        """
         distances = np.sqrt(_dots(offsets, offsets))
         apart = np.where(distances > 0.0, distances, 1.0)
         incidence = _dots(normals, offsets) / -apart
         return distances, incidence, np.abs(_dots(steep, offsets)) / apart
 
     def common_direction(self, poses: _Array) -> None:
-        """Return None: each point has a direction of its own."""
+        """Return None: L depends on the point."""
 
     def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
-        """Return where N.(P - Q) > 0 by more than rounding."""
+        """Return which samples show light their back, N.(P - Q) > 0 surely."""
         offsets = points - pose[:3, 3]
         behind = np.einsum("ij,ij->i", normals, offsets)
         return behind > 1e-9 * np.abs(offsets).max(axis=0, initial=0.0).sum()
 
     def within_ring(self, local: _Array, ring: float) -> _Mask:
-        """Return which points lie in the cone R <= ring."""
+        """Return which columns of the ring frame, (3, n), lie in the cone R <= ring."""
         x, y, z = local
         return (x * x + y * y <= (ring * z) ** 2) & (z > 0.0)
 
     def ring_coordinate(self, local: _Array) -> _Array:
-        """Return R = rho / z; inf behind the light."""
+        """Return R = rho / z of points (n, 3) of the ring frame; inf behind."""
         rho, z = np.hypot(local[:, 0], local[:, 1]), local[:, 2]
         return np.divide(rho, z, out=np.full_like(rho, np.inf), where=z > 0)
 
@@ -144,7 +89,7 @@ class DivergingLight:
         return RingSurface(slope, normals, depth / scale)
 
     def ring_rays(self, frame: _Array, flat: _Array) -> tuple[_Array, _Array]:
-        """Return the apex, and rays through the plane at depth one."""
+        """Return apex (3,) and unit rays (n, 3) at ring coordinates (n, 2)."""
         local = np.column_stack([flat, np.ones(len(flat))])
         local /= np.linalg.norm(local, axis=1, keepdims=True)
         return frame[:3, 3], local @ frame[:3, :3].T
@@ -169,25 +114,25 @@ class ParallelLight:
     def cosines(
         self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
     ) -> tuple[_Array, _Array, _Array]:
-        """Return z, -N.L and |T1.L|, as `Light.cosines` says."""
+        """Return z, -N.L and |T1.L|, shape (n,) each, of columns (3, n)."""
         along = pose[:3, 2]
         return along @ offsets, -(along @ normals), np.abs(along @ steep)
 
     def common_direction(self, poses: _Array) -> _Array:
-        """Return +z of the devices."""
+        """Return L of poses (..., 4, 4), the same at every point, (..., 3)."""
         return poses[..., :3, 2]
 
     def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
-        """Return where N.L > 0 by more than rounding."""
+        """Return which samples show light their back, N.L > 0 surely."""
         return normals @ pose[:3, 2] > 1e-9
 
     def within_ring(self, local: _Array, ring: float) -> _Mask:
-        """Return which points lie in the cylinder R <= ring."""
+        """Return which columns of the ring frame lie in the cylinder R <= ring."""
         x, y, _ = local
         return x * x + y * y <= ring * ring
 
     def ring_coordinate(self, local: _Array) -> _Array:
-        """Return R = rho."""
+        """Return R = rho of points (n, 3) of the ring frame."""
         return np.hypot(local[:, 0], local[:, 1])
 
     def ring_surface(self, local: _Array) -> RingSurface:
@@ -197,13 +142,16 @@ class ParallelLight:
         return RingSurface(rho, flat, np.ones_like(rho))
 
     def ring_rays(self, frame: _Array, flat: _Array) -> tuple[_Array, _Array]:
-        """Return places on the panel's plane, and the beam's direction."""
+        """Return origins (n, 3) and unit rays (n, 3) at ring coordinates (n, 2)."""
         origins = frame[:3, 3] + flat @ frame[:3, :2].T
         return origins, np.tile(frame[:3, 2], (len(flat), 1))
 
     def off_axis(self, local: _Array) -> _Array:
         """Return the distance from the beam's axis [mm]."""
         return 1e3 * np.hypot(local[:, 0], local[:, 1])
+
+
+Light = DivergingLight | ParallelLight
 
 
 def light_of(device: DeviceModel) -> Light:

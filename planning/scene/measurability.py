@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 from geometry.rays.visibility import Visibility
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
-
-from .lights import LightOnSamples
-from .limits.camera_limits import (
+from planning.scene.limits.camera_limits import (
     BLOCKED,
     CAMERA_LIMITS,
     OCCLUDED,
@@ -28,11 +26,13 @@ from .limits.camera_limits import (
     CameraRays,
     ViewedSamples,
 )
-from .limits.limit import first_violated
-from .limits.pair_limits import PAIR_LIMITS, PairQuality
-from .patterns.code_surfaces import CodeSurfaces
+from planning.scene.limits.limit import first_violated
+from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality
+from planning.scene.patterns.code_surfaces import CodeSurfaces
+
+from .lights import LightOnSamples
+from .placed_bodies import PlacedBody, blocked_by
 from .samples import Target
-from .standing import Standing, blocked_by
 
 
 def view(
@@ -40,7 +40,7 @@ def view(
     target: Target,
     limits: CameraLimits,
     visibility: Visibility | None,
-    bodies: Sequence[Standing] = (),
+    bodies: Sequence[PlacedBody] = (),
 ) -> ViewedSamples:
     """Return how a camera sees samples; without `visibility`, occlusion is left out.
 
@@ -66,7 +66,7 @@ def first_between(
     camera: PlannedCamera,
     target: Target,
     visibility: Visibility | None,
-    bodies: Sequence[Standing],
+    bodies: Sequence[PlacedBody],
 ) -> NDArray[np.int8]:
     """Return what hides samples first, `OCCLUDED` or `BLOCKED`; `SEEN` if nothing."""
     points = target.samples.points

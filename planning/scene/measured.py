@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
+from planning.scene.limits.camera_limits import SEEN, ViewedSamples
+from planning.scene.limits.pair_limits import MEASURED, PairQuality
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.patterns.code_surfaces import CodeSurfaces
+from planning.scene.patterns.pattern import code_surfaces
 
 from .camera_views import CameraView, camera_views, joined_view, view_of
 from .lighting import lit_stages
 from .lights import LightOnSamples, light_on
-from .limits.camera_limits import SEEN, ViewedSamples
-from .limits.pair_limits import MEASURED, PairQuality
-from .limits.projector_limits import LIT
 from .measurability import first_pair_failure, pair_quality
-from .patterns.code_surfaces import CodeSurfaces
-from .patterns.pattern import code_surfaces
 from .samples import Target
 from .scene import Scene
 

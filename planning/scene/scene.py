@@ -16,8 +16,8 @@ from geometry.repair.hollow import MeshShell, measure_shell
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.workspace.view_tiles import Site
 
+from .placed_bodies import Device, PlacedBody, bodies_of, existing_bodies
 from .samples import Target
-from .standing import Device, Standing, bodies_of, existing_bodies
 
 Kind = Literal["projector", "camera"]
 
@@ -50,10 +50,10 @@ class Scene:
     seed: int
     threads: int
     check_cancelled: Callable[[], None] = lambda: None
-    placed: tuple[Standing, ...] = ()
+    placed: tuple[PlacedBody, ...] = ()
 
     @cached_property
-    def standing(self) -> tuple[Standing, ...]:
+    def bodies(self) -> tuple[PlacedBody, ...]:
         """Every body that stands in the way of light and views."""
         return existing_bodies(self.requirements) + self.placed
 

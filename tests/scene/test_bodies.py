@@ -45,8 +45,8 @@ from planning.scene.clearance import (
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.measured import lit_samples, measured_by
+from planning.scene.placed_bodies import bodies_of
 from planning.scene.scene import Scene
-from planning.scene.standing import bodies_of
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.blocks import Block, block_of
 from planning.verify.audit.predicates.occlusion import Shadow
@@ -211,7 +211,7 @@ def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
         target,
         scene.requirements.projector,
         scene.visibility,
-        bodies=among.standing,
+        bodies=among.bodies,
     )
     assert np.array_equal(single, expected)
     # The audit and the check from pixels, each with code of its own.
@@ -245,7 +245,7 @@ def test_a_body_before_a_camera_hides_the_same_rectangle_but_never_its_own(scene
     among = scene.among([blind, eye])
     limits = scene.requirements.camera
     stage = measurability.view(
-        blind, target, limits, scene.visibility, among.standing
+        blind, target, limits, scene.visibility, among.bodies
     ).stage
     assert np.array_equal(
         stage, np.where(dark, camera_limits.BLOCKED, camera_limits.SEEN)

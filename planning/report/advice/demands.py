@@ -21,13 +21,8 @@ from planning.scene.limits.camera_limits import (
 )
 from planning.scene.limits.limit import LimitRelaxation, violated
 from planning.scene.limits.pair_limits import CAUSES, PAIR_LIMITS
-from planning.scene.limits.projector_limits import (
-    CAUSES as PROJECTOR_CAUSES,
-)
-from planning.scene.limits.projector_limits import (
-    PROJECTOR_LIMITS,
-    ProjectorView,
-)
+from planning.scene.limits.projector_limits import CAUSES as PROJECTOR_CAUSES
+from planning.scene.limits.projector_limits import PROJECTOR_LIMITS, ProjectorView
 from planning.scene.measured import LitSamples, pairs_of
 from planning.scene.samples import SampleColumns, Target
 from planning.scene.scene import Scene
@@ -106,7 +101,7 @@ def demands(
     hopeful = (failed.sum(axis=0) == 1) & np.isfinite(asks).any(axis=0)
     near = np.flatnonzero(hopeful | (furthest >= measurability.OCCLUDED))
     between = measurability.first_between(
-        camera, target.take(near), scene.visibility, scene.standing
+        camera, target.take(near), scene.visibility, scene.bodies
     )
     furthest[near] = np.minimum(furthest[near], between)
     near = near[(between == SEEN) & (hopeful | seen)[near]]

@@ -100,7 +100,7 @@ def _unlit(
 ) -> NDArray[np.int64]:
     """Return which samples no projector lights."""
     dark = np.arange(len(target))
-    limits, bodies = scene.requirements.projector, scene.standing
+    limits, bodies = scene.requirements.projector, scene.bodies
     for projector in reference:
         if not len(dark):
             break

@@ -86,6 +86,6 @@ def light_falls(
         plain,
         _ANY_LIGHT,
         scene.visibility,
-        bodies=scene.standing,
+        bodies=scene.bodies,
     )
     return stages == LIT

@@ -23,7 +23,7 @@ CLEARANCE_M = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class PlacedBody:
     """A body in the world.
 
     Attributes:
@@ -57,10 +57,10 @@ def placed_box(body: Body, world_from_device: NDArray[np.float64]) -> OrientedBo
     return OrientedBox(centre, turn.T, np.array(body.half_m))
 
 
-def bodies_of(devices: Iterable[Device]) -> tuple[Standing, ...]:
+def bodies_of(devices: Iterable[Device]) -> tuple[PlacedBody, ...]:
     """Return the bodies of the devices that have one."""
     return tuple(
-        Standing(
+        PlacedBody(
             kind_of(device),
             device.world_from_device,
             placed_box(device.body, device.world_from_device),
@@ -76,18 +76,18 @@ def moves_bodies(devices: Iterable[Device]) -> bool:
     return any(d.body is not None and not d.existing for d in devices)
 
 
-def existing_bodies(required: Requirements) -> tuple[Standing, ...]:
+def existing_bodies(required: Requirements) -> tuple[PlacedBody, ...]:
     """Return the bodies of the devices that stand already."""
     poses = [np.array(device.world_from_device) for device in required.existing]
     return tuple(
-        Standing(device.kind, pose, placed_box(device.body, pose), device.name)
+        PlacedBody(device.kind, pose, placed_box(device.body, pose), device.name)
         for device, pose in zip(required.existing, poses, strict=True)
         if device.body is not None
     )
 
 
 def blocked_by(
-    bodies: Sequence[Standing], device: Device, points: NDArray[np.float64]
+    bodies: Sequence[PlacedBody], device: Device, points: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Return which bodies stand between a device and points; its own never does.
 
@@ -109,7 +109,7 @@ def blocked_by(
     return blocked
 
 
-def collide(device: Device, bodies: Sequence[Standing]) -> list[Standing]:
+def collide(device: Device, bodies: Sequence[PlacedBody]) -> list[PlacedBody]:
     """Return the bodies of other devices that a device's own comes too near to."""
     if device.body is None:
         return []
