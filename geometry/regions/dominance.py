@@ -1,4 +1,4 @@
-"""Which faces are dominant: the highest curvedness, whole plateaus, no specks."""
+"""Which faces are dominant: the highest curvedness, whole plateaus, no small parts."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ def dominant_faces(
         trusted: Faces that may be.
         pairs: Adjacent faces, (m, 2).
         area_share: Share of the trusted area.
-        least: Area in [m²] below which islands, holes and bodies are specks.
+        least: Area in [m²] below which islands, holes and bodies are small components.
     """
     judged = trusted & _on_main_bodies(mesh, least)
     judged = judged if judged.any() else np.ones(len(mesh.faces), dtype=bool)
@@ -63,7 +63,7 @@ def dominant_faces(
     if dominant[judged].all():
         # Uniform: the rim, whose curvature isn't known, is no less dominant.
         dominant = judged = np.ones(len(mesh.faces), dtype=bool)
-    return _without_specks(mesh, dominant, judged, pairs, least)
+    return _without_small_components(mesh, dominant, judged, pairs, least)
 
 
 def _on_main_bodies(mesh: TriangleMesh, least: float) -> NDArray[np.bool_]:
@@ -97,7 +97,7 @@ def _cut(
     return cut * (1.0 - float(band))
 
 
-def _without_specks(
+def _without_small_components(
     mesh: TriangleMesh,
     dominant: NDArray[np.bool_],
     judged: NDArray[np.bool_],

@@ -11,7 +11,7 @@ from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import adjacent_faces
 
-from .cones import cone_pieces, normal_cone
+from .cones import check_cone_options, cone_pieces, normal_cone
 from .dominance import dominant_faces, face_curvedness
 
 
@@ -98,10 +98,7 @@ def dominant_regions(
     """
     if not 0 < area_share <= 1:
         raise ValueError(f"area_share must lie in (0, 1], got {area_share}")
-    if not 0 <= min_region_share < 1:
-        raise ValueError(f"min_region_share must lie in [0, 1), got {min_region_share}")
-    if not 0 < cone_half_angle < np.pi:
-        raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
+    check_cone_options(min_region_share, cone_half_angle)
     curvedness, trusted = face_curvedness(mesh, field)
     pairs = adjacent_faces(mesh.edges, manifold_only=False)
     least = min_region_share * mesh.area

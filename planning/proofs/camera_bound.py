@@ -21,7 +21,7 @@ from geometry.devices import PinholeModel
 from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
-from geometry.lengths import lengths
+from geometry.mesh.tensors import lengths
 from planning.proofs.cells.aim_cells import AimTree
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells

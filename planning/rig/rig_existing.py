@@ -29,13 +29,13 @@ def build_existing(
         projector: The rig's model.
         camera: The rig's model.
     """
-    found: list[Existing] = []
+    devices: list[Existing] = []
     for table in tables:
         device = projector if table.kind == "projector" else camera
         pose = rounded_pose(_pose(table, workspace, device))
         rows = tuple(tuple(row) for row in pose.tolist())
-        found.append(Existing(table.name, table.kind, rows, Body.of(table.body)))
-    return tuple(found)
+        devices.append(Existing(table.name, table.kind, rows, Body.of(table.body)))
+    return tuple(devices)
 
 
 def check_existing(required: Requirements) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
-from geometry.lengths import lengths
+from geometry.mesh.tensors import lengths
 from planning.model.planned import PlannedProjector
 
 from .samples import Target

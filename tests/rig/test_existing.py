@@ -194,18 +194,18 @@ def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, i
     scene, template = ball_scene(existing)
     offset = (0.0, 0.0)
     stage = plan_projectors(scene, template, 300, ring_offset=offset, rounds=1)
-    assert stage.certificate["given"] == len(existing)
+    assert stage.certificate.given == len(existing)
     effort = Effort(finest=6, budget=1e9, shadows=np.inf, most_samples=600)
     stage = prove_fewest(scene, stage, template, effort, ring_offset=offset)
     proof = stage.certificate
-    assert (proof["count"], proof["status"]) == (count, "optimal")
-    entry = proof["continuous"]
-    assert (entry["lower_bound"], entry["status"]) == (count, "proved")
-    assert entry["n_reached"] == entry["n_samples"] >= 600
-    assert (entry["n_cells"] == 0) == idle
-    assert (proof["one_fewer"] is None) == idle
+    assert (proof.count, proof.status) == (count, "optimal")
+    entry = proof.continuous
+    assert (entry.lower_bound, entry.status) == (count, "proved")
+    assert entry.n_reached == entry.n_samples >= 600
+    assert (entry.n_cells == 0) == idle
+    assert (proof.one_fewer is None) == idle
     if not idle:
-        assert entry["one_fewer_upper_bound_m2"] < proof["required_m2"]
+        assert entry.one_fewer_upper_bound_m2 < proof.required_m2
     standing = [p for p in stage.projectors if p.existing]
     assert [p.existing for p in standing] == [e.name for e in existing]
     widened = {p.existing: p for p in widen_margins(scene, stage) if p.existing}

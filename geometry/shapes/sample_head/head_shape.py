@@ -1,37 +1,20 @@
 """Proportions of the sample head, and a population of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from math import isfinite
 
 import numpy as np
 
 from geometry.mesh.mesh import MeshError
 
-# Least and largest proportion that the sculpture stays a head at, and the standard
-# deviation among adults (rounded from anthropometric surveys), all in [mm].
-_RANGES = {
-    "width": (125.0, 180.0, 6.0),
-    "depth": (165.0, 220.0, 7.0),
-    "crown_height": (95.0, 135.0, 5.0),
-    "face_length": (92.0, 135.0, 6.0),
-    "cheek_width": (115.0, 152.0, 6.0),
-    "jaw_width": (88.0, 126.0, 6.0),
-    "brow_ridge": (0.0, 8.0, 1.5),
-    "eye_spacing": (54.0, 74.0, 3.5),
-    "eye_depth": (9.0, 17.0, 1.5),
-    "nose_length": (40.0, 60.0, 3.5),
-    "nose_width": (28.0, 46.0, 3.0),
-    "nose_projection": (12.0, 24.0, 2.2),
-    "nose_hump": (-3.0, 5.0, 1.3),
-    "mouth_width": (42.0, 62.0, 3.5),
-    "lip_fullness": (5.0, 12.0, 1.3),
-    "chin_projection": (-7.0, 6.0, 2.5),
-    "ear_height": (50.0, 76.0, 4.0),
-    "ear_standoff": (7.0, 22.0, 1.6),
-    "neck_width": (86.0, 124.0, 7.0),
-    "neck_length": (14.0, 45.0, 4.0),
-    "scale": (0.1, 10.0, 0.0),
-}
+
+def _length(default: float, least: float, largest: float, deviation: float) -> float:
+    """A proportion in [mm]: at which it stays a head, and its spread among adults.
+
+    Spreads are rounded from anthropometric surveys.
+    """
+    spread = {"limits": (least, largest), "deviation": deviation}
+    return field(default=default, metadata=spread)
 
 
 @dataclass(frozen=True)
@@ -65,31 +48,32 @@ class HeadShape:
         MeshError: If a proportion is outside the range in which this is a head.
     """
 
-    width: float = 154.0
-    depth: float = 190.0
-    crown_height: float = 113.0
-    face_length: float = 113.0
-    cheek_width: float = 134.0
-    jaw_width: float = 108.0
-    brow_ridge: float = 4.0
-    eye_spacing: float = 63.0
-    eye_depth: float = 13.0
-    nose_length: float = 50.0
-    nose_width: float = 35.0
-    nose_projection: float = 19.0
-    nose_hump: float = 1.0
-    mouth_width: float = 51.0
-    lip_fullness: float = 8.0
-    chin_projection: float = 0.0
-    ear_height: float = 61.0
-    ear_standoff: float = 11.0
-    neck_width: float = 104.0
-    neck_length: float = 22.0
-    scale: float = 1.0
+    width: float = _length(154.0, 125.0, 180.0, 6.0)
+    depth: float = _length(190.0, 165.0, 220.0, 7.0)
+    crown_height: float = _length(113.0, 95.0, 135.0, 5.0)
+    face_length: float = _length(113.0, 92.0, 135.0, 6.0)
+    cheek_width: float = _length(134.0, 115.0, 152.0, 6.0)
+    jaw_width: float = _length(108.0, 88.0, 126.0, 6.0)
+    brow_ridge: float = _length(4.0, 0.0, 8.0, 1.5)
+    eye_spacing: float = _length(63.0, 54.0, 74.0, 3.5)
+    eye_depth: float = _length(13.0, 9.0, 17.0, 1.5)
+    nose_length: float = _length(50.0, 40.0, 60.0, 3.5)
+    nose_width: float = _length(35.0, 28.0, 46.0, 3.0)
+    nose_projection: float = _length(19.0, 12.0, 24.0, 2.2)
+    nose_hump: float = _length(1.0, -3.0, 5.0, 1.3)
+    mouth_width: float = _length(51.0, 42.0, 62.0, 3.5)
+    lip_fullness: float = _length(8.0, 5.0, 12.0, 1.3)
+    chin_projection: float = _length(0.0, -7.0, 6.0, 2.5)
+    ear_height: float = _length(61.0, 50.0, 76.0, 4.0)
+    ear_standoff: float = _length(11.0, 7.0, 22.0, 1.6)
+    neck_width: float = _length(104.0, 86.0, 124.0, 7.0)
+    neck_length: float = _length(22.0, 14.0, 45.0, 4.0)
+    scale: float = _length(1.0, 0.1, 10.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name, (least, largest, _) in _RANGES.items():
-            value = getattr(self, name)
+        for proportion in fields(self):
+            least, largest = proportion.metadata["limits"]
+            name, value = proportion.name, getattr(self, proportion.name)
             if not (isfinite(value) and least <= value <= largest):
                 raise MeshError(
                     f"head {name} is {value}: must lie in {least:g} to {largest:g}"
@@ -103,10 +87,11 @@ class HeadShape:
             seed: The same seed gives the same head.
         """
         rng = np.random.default_rng(seed)
-        draws = np.clip(rng.standard_normal(len(_RANGES)), -2.5, 2.5)
-        average, values = cls(), dict[str, float]()
-        for (name, limits), draw in zip(_RANGES.items(), draws, strict=True):
-            least, largest, deviation = limits
-            value = getattr(average, name) + deviation * float(draw)
-            values[name] = min(max(value, least), largest)
+        proportions = fields(cls)
+        draws = np.clip(rng.standard_normal(len(proportions)), -2.5, 2.5)
+        values: dict[str, float] = {}
+        for proportion, draw in zip(proportions, draws, strict=True):
+            least, largest = proportion.metadata["limits"]
+            value = proportion.default + proportion.metadata["deviation"] * float(draw)
+            values[proportion.name] = min(max(value, least), largest)
         return cls(**values)

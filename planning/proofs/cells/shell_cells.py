@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.directions.cube_map import CubeMap, quarters
-from geometry.lengths import lengths
+from geometry.mesh.tensors import lengths
 
 _ROUNDING = 1e-9
 

@@ -19,7 +19,7 @@ from planning.model.document.range_records import (
 )
 from planning.model.planned import PlannedCamera
 from planning.rig.range_guard import Guard
-from planning.scene.ranges.ranged_body import SIGNIFICANCE, RangedBody, told
+from planning.scene.ranges.ranged_body import SIGNIFICANCE, RangedBody, refusal_line
 
 _Array = NDArray[np.float64]
 
@@ -39,10 +39,10 @@ def ranges_record(body: RangedBody, guard: Guard) -> RangesRecord:
             RangePoint(
                 point=point.name,
                 lines=point.lines,
-                position_m=point.found.position.tolist(),
-                covariance_m2=point.found.covariance.tolist(),
-                chi_square=point.found.chi_square,
-                n_free=point.found.n_free,
+                position_m=point.estimate.position.tolist(),
+                covariance_m2=point.estimate.covariance.tolist(),
+                chi_square=point.estimate.chi_square,
+                n_free=point.estimate.n_free,
                 residual_m=float(residual),
             )
             for point, residual in zip(body.points, ball.residuals, strict=True)
@@ -78,7 +78,7 @@ def ranges_lines(body: RangedBody) -> list[str]:
         f"is known worst); points stray from the sphere by "
         f"{1e3 * ball.shape_sigma:.1f} mm",
     ]
-    return lines + [f"  {told(one)}" for one in body.refused]
+    return lines + [f"  {refusal_line(one)}" for one in body.refused]
 
 
 def summary_lines(document: PlanDocument) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from geometry.lengths import lengths
+from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits

@@ -34,12 +34,12 @@ class RangedPoint:
     Attributes:
         name: As in the file.
         lines: Rows that it was located from.
-        found: Where it is, and how well that is known.
+        estimate: Where it is, and how well that is known.
     """
 
     name: str
     lines: tuple[int, ...]
-    found: SightedPoint
+    estimate: SightedPoint
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ def ranged_body(file: RangeFile) -> RangedBody:
         refused += left_out
     try:
         ball = fit_sphere(
-            np.array([p.found.position for p in points]).reshape(-1, 3),
-            np.array([p.found.covariance for p in points]).reshape(-1, 3, 3),
+            np.array([p.estimate.position for p in points]).reshape(-1, 3),
+            np.array([p.estimate.covariance for p in points]).reshape(-1, 3, 3),
         )
     except (ValueError, np.linalg.LinAlgError) as error:
         raise InputError(_too_little(file.path, error, refused)) from None
@@ -143,7 +143,7 @@ def ranged_body(file: RangeFile) -> RangedBody:
 
 
 def _too_little(path: str, error: Exception, refused: list[Refused]) -> str:
-    first = "".join(f"; {told(one)}" for one in refused[:3])
+    first = "".join(f"; {refusal_line(one)}" for one in refused[:3])
     more = f"; {len(refused) - 3} more refused" if len(refused) > 3 else ""
     return (
         f"{path}: {error}; observe more points, from more sides and not all in a "
@@ -151,7 +151,7 @@ def _too_little(path: str, error: Exception, refused: list[Refused]) -> str:
     )
 
 
-def told(one: Refused) -> str:
+def refusal_line(one: Refused) -> str:
     """Return what was left out and why, for a person."""
     lines = ", ".join(map(str, one.lines))
     return f"point {one.name} (line {lines}) refused: {one.reason}"

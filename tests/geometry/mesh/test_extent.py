@@ -130,8 +130,10 @@ def test_rounding_does_not_choose_between_equal_bearings() -> None:
 
 def test_a_fragment_does_not_decide_the_scale_of_a_file(tmp_path) -> None:
     ball = sphere(0.1, subdivisions=3)
-    speck = moved(sphere(0.002, subdivisions=1), np.eye(3), np.array([0.0, 0.0, 3.0]))
-    both = joined(ball, speck)
+    fragment = moved(
+        sphere(0.002, subdivisions=1), np.eye(3), np.array([0.0, 0.0, 3.0])
+    )
+    both = joined(ball, fragment)
     path = tmp_path / "ball.off"
     rows = [" ".join(map(repr, row)) for row in both.vertices.tolist()]
     rows += ["3 {} {} {}".format(*face) for face in both.faces.tolist()]
@@ -145,7 +147,7 @@ def test_a_fragment_does_not_decide_the_scale_of_a_file(tmp_path) -> None:
     assert [(r.kind, r.count) for r in mesh.source.repairs] == [
         (
             "faces of fragments outside the rest, kept but left out of its size",
-            len(speck.faces),
+            len(fragment.faces),
         )
     ]
 

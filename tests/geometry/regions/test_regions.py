@@ -107,7 +107,7 @@ def test_where_nothing_is_trusted_everything_counts_as_uniform() -> None:
 
 
 def crumpled() -> TriangleMesh:
-    """Noise of a fifth of an edge: normals scatter, splitting leaves crumbs."""
+    """Noise of a fifth of an edge: normals scatter, splitting leaves fragments."""
     ball = sphere(0.1, subdivisions=4)
     noise = np.random.default_rng(0).normal(size=ball.vertices.shape)
     return TriangleMesh(ball.vertices + 0.2 * ball.mean_edge * noise, ball.faces)
@@ -154,11 +154,11 @@ def test_regions_are_connected_disjoint_and_fit_the_cone(
         assert components(local, len(region.faces))[0] == 1
     areas = np.array([region.area_m2 for region in found])
     assert np.all(np.diff(areas) <= 1e-9 * mesh.area)
-    # Only where the surface is dominant as a whole may a crumb be a region.
+    # Only where the surface is dominant as a whole may a fragment be a region.
     assert areas.min() >= 0.0005 * mesh.area or np.all(found.face_region >= 0)
 
 
-def test_a_crumb_is_left_alone_only_if_it_fits_no_neighbour() -> None:
+def test_a_fragment_is_left_alone_only_if_it_fits_no_neighbour() -> None:
     mesh = crumpled()
     least, limit = 0.01, np.deg2rad(50.0)
     found = regions_of(mesh, area_share=1.0, min_region_share=least)

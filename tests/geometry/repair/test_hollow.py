@@ -269,9 +269,9 @@ def test_nothing_depends_on_place_turn_or_scale(seed: int, name: str) -> None:
 
 def test_fragments_neither_hide_a_shell_nor_make_one() -> None:
     rng = np.random.default_rng(0)
-    speck = sphere(1e-3, subdivisions=1)
+    fragment = sphere(1e-3, subdivisions=1)
     far = [
-        TriangleMesh(speck.vertices + 0.3 * shift, speck.faces)
+        TriangleMesh(fragment.vertices + 0.3 * shift, fragment.faces)
         for shift in rng.normal(size=(40, 3))
         if 0.12 < 0.3 * np.linalg.norm(shift)
     ]

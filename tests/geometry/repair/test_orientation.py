@@ -92,7 +92,7 @@ def assert_oriented_like(mesh: TriangleMesh, truth: TriangleMesh) -> None:
 # One piece at a time: whatever the winding, the same result
 
 BALL = sphere(0.1, subdivisions=3)
-SPECK = moved(sphere(0.002, subdivisions=1), 0.3, 0.0, 0.0)
+FRAGMENT = moved(sphere(0.002, subdivisions=1), 0.3, 0.0, 0.0)
 TUBE = cylinder(0.05, 0.2, capped=False)
 KNOWN = {
     "ball": BALL,
@@ -102,8 +102,8 @@ KNOWN = {
     "ball with a pinhole": TriangleMesh(BALL.vertices, BALL.faces[1:]),
     "tube": TUBE,
     "short tube": cylinder(0.1, 0.05, capped=False),
-    "ball and speck": joined(BALL, SPECK),
-    "hemisphere and speck": joined(cap(0.5), SPECK),
+    "ball and fragment": joined(BALL, FRAGMENT),
+    "hemisphere and fragment": joined(cap(0.5), FRAGMENT),
     "hemisphere about a ball": joined(cap(0.5), sphere(0.03, subdivisions=2)),
     "two balls": joined(BALL, moved(sphere(0.05, subdivisions=2), 0.2, 0.0, 0.0)),
     "eye in its socket": joined(BALL, moved(sphere(0.03, subdivisions=3), 0.09, 0, 0)),
@@ -115,7 +115,7 @@ KNOWN = {
         BALL, flipped(sphere(0.095, subdivisions=3)), sphere(0.09, subdivisions=3)
     ),
     "hollow ball with a pebble": joined(
-        BALL, flipped(sphere(0.09, subdivisions=3)), moved(SPECK, -0.28, 0.0, 0.0)
+        BALL, flipped(sphere(0.09, subdivisions=3)), moved(FRAGMENT, -0.28, 0.0, 0.0)
     ),
     "torus": torus(0.1, 0.03, around=48, about_tube=24),
 }
@@ -264,24 +264,24 @@ def test_a_one_sided_surface_is_left_and_named() -> None:
     assert len(mesh.faces) == len(strip.faces)
 
 
-def test_a_speck_that_shows_both_sides_goes_with_the_rest() -> None:
-    speck = TriangleMesh(
+def test_a_fragment_that_shows_both_sides_goes_with_the_rest() -> None:
+    fragment = TriangleMesh(
         np.array([[0.3, 0.0, 0.0], [0.301, 0.0, 0.0], [0.3, 0.001, 0.0]]),
         np.array([[0, 1, 2]]),
     )
-    truth = joined(cap(0.5), speck)
+    truth = joined(cap(0.5), fragment)
     mesh, repairs = result(flipped(truth))
     assert_oriented_like(mesh, truth)
     assert repairs == {TURNED: len(truth.faces), PIECES: 2, FOLLOWED: 1}
 
 
-def test_many_specks_never_outvote_the_body() -> None:
+def test_many_fragments_never_outvote_the_body() -> None:
     rng = np.random.default_rng(0)
-    specks = [
+    fragments = [
         moved(grid(1e-3, 1e-3, divisions=(1, 1)), *(0.3 * rng.normal(size=3)))
         for _ in range(200)
     ]
-    truth = joined(cap(0.6), *specks)
+    truth = joined(cap(0.6), *fragments)
     body = np.arange(len(truth.faces)) < len(cap(0.6).faces)
     for stored in (flipped(truth, body), flipped(truth, ~body), flipped(truth)):
         mesh, _ = result(stored)
@@ -383,8 +383,8 @@ def test_what_lies_in_the_box_of_a_body_need_not_lie_in_it() -> None:
     assert [row.tolist() for row in held] == [[], [], [], [0]]
 
 
-def test_a_speck_needs_more_than_a_slight_advantage() -> None:
+def test_a_fragment_needs_more_than_a_slight_advantage() -> None:
     """A plate above a ball shows the upper side a little more; it keeps its side."""
-    speck = moved(grid(1e-3, 1e-3, divisions=(1, 1)), 0.0, 0.0, 0.2)
-    for plate in (speck, flipped(speck)):
+    fragment = moved(grid(1e-3, 1e-3, divisions=(1, 1)), 0.0, 0.0, 0.2)
+    for plate in (fragment, flipped(fragment)):
         assert result(joined(BALL, plate))[1] == {}

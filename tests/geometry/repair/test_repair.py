@@ -233,20 +233,20 @@ def test_a_flat_plate_says_nothing_and_keeps_its_side() -> None:
 
 
 def test_a_floating_fragment_never_decides_for_the_rest() -> None:
-    speck = TriangleMesh(
+    fragment = TriangleMesh(
         np.array([[0.0, 0, 0.2], [0.001, 0, 0.2], [0, 0.001, 0.2]]),
         np.array([[0, 1, 2]]),
     )
-    good = joined(speck, dome())
+    good = joined(fragment, dome())
     for order in (
-        joined(speck, flipped(dome())),
-        joined(flipped(speck), flipped(dome())),
+        joined(fragment, flipped(dome())),
+        joined(flipped(fragment), flipped(dome())),
     ):
         mesh, _ = oriented(order)
-        # The dome ends up outwards whatever the speck does.
+        # The dome ends up outwards whatever the fragment does.
         assert as_sets(mesh.faces[1:]) == as_sets(good.faces[1:])
-    # A speck that says nothing follows the body that was stored inside out.
-    mesh, repairs = oriented(joined(flipped(speck), flipped(dome())))
+    # A fragment that says nothing follows the body that was stored inside out.
+    mesh, repairs = oriented(joined(flipped(fragment), flipped(dome())))
     assert as_sets(mesh.faces) == as_sets(good.faces)
     assert repairs == {"faces turned outwards": len(good.faces)}
 
