@@ -12,7 +12,7 @@ import click
 
 from .declared.plan_declared import rig_command
 from .declared.reconstruct_declared import reconstruct
-from .declared.small_declared import rigs, sample
+from .declared.small_declared import rigs, sample, schema
 from .declared.verify_declared import verify
 from .running import stop
 
@@ -65,7 +65,7 @@ def commands() -> None:
     """  # noqa: D301 - click wants the character that \b stands for
 
 
-for _command in (rig_command, verify, reconstruct, rigs, sample):
+for _command in (rig_command, verify, reconstruct, rigs, schema, sample):
     commands.add_command(_command)
 
 

@@ -1,5 +1,6 @@
-"""What `plan rigs` and `plan sample` do."""
+"""What `plan rigs`, `plan schema` and `plan sample` do."""
 
+from importlib.resources import files
 from pathlib import Path
 
 import click
@@ -20,6 +21,13 @@ def rigs_command() -> int:
                 if figure.device == role:
                     click.echo(f"    {figure.key} = {figure.value}")
                     click.echo(f"        {figure.source}")
+    return 0
+
+
+def schema_command() -> int:
+    """Print the JSON Schema of a plan file, as it is shipped."""
+    text = files("planning.model").joinpath("plan.schema.json").read_text()
+    click.echo(text, nl=False)
     return 0
 
 

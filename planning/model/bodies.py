@@ -4,7 +4,6 @@ Only values; what follows from them the planner (`placed_bodies`) and the checke
 work out alone.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -48,22 +47,14 @@ class Body:
         width, height, depth = (0.5e-3 * value for value in table.size_mm)
         return cls((x, y, z), (width, height, depth))
 
-    @classmethod
-    def read(cls, entry: Mapping[str, Any]) -> Self | None:
-        """Read `body` of a plan's table; None where it has none.
+    def __post_init__(self) -> None:
+        """Refuse what has no extent.
 
         Raises:
-            KeyError: If a key is missing.
-            ValueError: If there aren't three numbers each, or a side isn't positive.
+            ValueError: If a side isn't positive.
         """
-        table = entry.get("body")
-        if table is None:
-            return None
-        x, y, z = (float(value) for value in table["centre_m"])
-        width, height, depth = (float(value) for value in table["half_m"])
-        if not min(width, height, depth) > 0.0:
-            raise ValueError(f"body: half_m = {table['half_m']} must be positive")
-        return cls((x, y, z), (width, height, depth))
+        if not min(self.half_m) > 0.0:
+            raise ValueError(f"body: half_m = {self.half_m} must be positive")
 
 
 def body_entry(body: Body | None) -> dict[str, Any]:

@@ -6,12 +6,11 @@ the plan and the surface alone. A limit that is None doesn't bind.
 
 from dataclasses import asdict, dataclass, replace
 from math import pi
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Literal
 
 from .bodies import Body
-from .zones import Box, read_zones
+from .zones import Box
 
-_T = TypeVar("_T")
 _LEFT_OUT = (
     "box",
     "keep_out",
@@ -192,6 +191,15 @@ class Existing:
     world_from_device: tuple[tuple[float, ...], ...]
     body: Body | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse what is no pose.
+
+        Raises:
+            ValueError: If it isn't 4 x 4.
+        """
+        if [len(row) for row in self.world_from_device] != [4] * 4:
+            raise ValueError("existing: world_from_device must be 4 x 4")
+
 
 @dataclass(frozen=True)
 class Requirements:
@@ -241,47 +249,6 @@ class Requirements:
         ]
         return document | ({"existing": _listed(existing)} if existing else {})
 
-    @classmethod
-    def from_document(cls, document: dict[str, Any]) -> Self:
-        """Read what `to_document` wrote; unknown keys are left aside.
-
-        Raises:
-            KeyError: If a required key is missing.
-            TypeError: If a section isn't a table.
-        """
-        workspace = {
-            key: tuple(value) if isinstance(value, list) else value
-            for key, value in document["workspace"].items()
-        } | read_zones(document["workspace"])
-        plain = {
-            key: document[key]
-            for key in (
-                "max_projectors",
-                "max_cameras",
-                "coverage",
-                "dominant_coverage",
-                "min_reachable",
-                "target",
-                "pattern",
-            )
-        }
-        return cls(
-            **plain,
-            projector=_read(ProjectorLimits, document["projector"]),
-            camera=_read(CameraLimits, document["camera"]),
-            triangulation=_read(TriangulationLimits, document["triangulation"]),
-            check=_read(CheckLimits, document["check"]),
-            workspace=_read(Workspace, workspace),
-            existing=tuple(_existing(e) for e in document.get("existing", ())),
-        )
-
-
-def _existing(table: dict[str, Any]) -> Existing:
-    rows = tuple(tuple(float(x) for x in row) for row in table["world_from_device"])
-    if [len(row) for row in rows] != [4] * 4:
-        raise ValueError("existing: world_from_device must be 4 x 4")
-    return Existing(str(table["name"]), str(table["kind"]), rows, Body.read(table))
-
 
 def _listed(value: object) -> object:
     """Return a value with lists for tuples, as JSON gives it back."""
@@ -290,8 +257,3 @@ def _listed(value: object) -> object:
     if isinstance(value, (tuple, list)):
         return [_listed(part) for part in value]
     return value
-
-
-def _read(kind: type[_T], table: dict[str, Any]) -> _T:
-    known = kind.__dataclass_fields__  # type: ignore[attr-defined]
-    return kind(**{key: value for key, value in table.items() if key in known})

@@ -190,9 +190,10 @@ def failures(plan):
     estimator = Estimator(samples, plan.to_document()["coverage"]["samples"], *areas)
 
     def failures_of(document):
-        ledger = Ledger(document)
-        audit_overlaps(replace(plan, document=document), shadow, estimator, ledger)
-        audit_schedule(replace(plan, document=document), ledger)
+        told = RigPlan.from_document(document, plan.surface)
+        ledger = Ledger(told.to_document())
+        audit_overlaps(told, shadow, estimator, ledger)
+        audit_schedule(told, ledger)
         return ledger.failures
 
     return failures_of
@@ -202,7 +203,7 @@ def test_the_whole_audit_looks_at_both_claims(plan):
     document = plan.to_document()
     _area(document)
     document["firing_schedule"]["n_groups"] = 3
-    found = audit_plan(replace(plan, document=document)).failures
+    found = audit_plan(RigPlan.from_document(document, plan.surface)).failures
     keys = [failure.split(":")[0] for failure in found]
     assert keys == ["overlaps.P1 + P2.target_m2", "firing_schedule.n_groups"]
 

@@ -14,7 +14,7 @@ from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import RequirementError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Existing, Requirements
+from planning.model.requirements import Existing
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
@@ -25,6 +25,7 @@ from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
+from tests.support.written import requirements_of
 
 CENTRE = np.array([0.3, -0.2, 0.1])
 OLD = (
@@ -71,7 +72,7 @@ def test_aim_and_pose_are_where_the_file_says(required_of):
         np.array([[1, 0, 0, 0.35], [0, 0, 1, -1.6], [0, -1, 0, 0.12], [0, 0, 0, 1]]),
         abs=1e-12,
     )
-    assert Requirements.from_document(copy.deepcopy(required.to_document())) == required
+    assert requirements_of(required.to_document()) == required
     assert "existing" not in required_of("").to_document()
     assert "existing" not in load_rig().to_document()
 

@@ -10,11 +10,11 @@ from pydantic import BaseModel
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.errors import InfeasibleLimitsError, InputError, RigError
-from planning.model.requirements import Requirements
 from planning.rig.rig import list_presets, load_rig
 from planning.rig.rig_files import lay_over, preset_names, read_rig
 from planning.rig.rig_tables import RigTable
 from planning.rig.wishes import Wishes
+from tests.support.written import requirements_of
 
 MINIMAL = """
 name = "bench"
@@ -592,7 +592,7 @@ def test_documents_are_plain_and_say_what_was_used(light):
         )
 
     asked = require(rig)
-    again = Requirements.from_document(json.loads(json.dumps(asked.to_document())))
+    again = requirements_of(asked.to_document())
     assert again == asked
 
 

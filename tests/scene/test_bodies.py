@@ -24,7 +24,7 @@ from planning.cameras.camera_cover import CameraCover
 from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Existing, Requirements
+from planning.model.requirements import Existing
 from planning.model.zones import Box
 from planning.projectors.projector_poses import _Lit
 from planning.proofs.conflicts import (
@@ -59,6 +59,7 @@ from planning.verify.audit.predicates.predicates import (
     sight_steps,
 )
 from planning.verify.reconstruction.render.occluders import Both, obstacles_of
+from tests.support.written import requirements_of
 
 # ---- boxes
 
@@ -526,7 +527,7 @@ def test_bodies_of_a_rig_file_reach_devices_plan_and_existing(rig_of):
     assert np.allclose(
         [*b.body.half_m, *b.body.centre_m][:4], [5e-3, 0.01, 0.015, 1e-3]
     )
-    assert Requirements.from_document(required.to_document()) == required
+    assert requirements_of(required.to_document()) == required
     without = rig_of(old.format("a", 0))
     assert "body" not in without.to_document()["existing"][0]
     required = without.requirements(

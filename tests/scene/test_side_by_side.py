@@ -13,7 +13,6 @@ from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.model.requirements import Requirements
 from planning.model.ring_frame import ring_frame
 from planning.model.zones import Box
 from planning.prepare import prepared
@@ -33,6 +32,7 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
 from planning.verify.audit.devices.device_claims import outside_by
+from tests.support.written import requirements_of
 
 EFFORT = Effort(finest=4, budget=1e7, shadows=0.0, most_samples=500)
 SHIFTED = PinholeModel(
@@ -241,7 +241,7 @@ def test_what_fits_stays_as_it_was_and_is_named_by_no_key():
     space = wide.requirements.workspace
     document = wide.requirements.to_document()
     assert document["workspace"]["projector_standoff_m"] == 1.0
-    assert Requirements.from_document(document).workspace == space
+    assert requirements_of(document).workspace == space
     far = 1.05 + space.object_radius_m
     assert space.projector_radius_m == pytest.approx((0.95, far))
     assert space.camera_radius_m == space.projector_radius_m

@@ -1,6 +1,5 @@
 """Rooms, keep-out volumes and mounting planes: who may stand where, and who checks."""
 
-import copy
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,6 @@ from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import RequirementError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Requirements
 from planning.rig.wishes import Wishes
 from planning.scene.workspace.candidates import (
     camera_candidates,
@@ -25,6 +23,7 @@ from planning.scene.workspace.zone_limits import depth, half_spaces, may_hold, s
 from planning.scene.workspace.zone_positions import admissible, along_rays
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.devices.zone_claims import zone_excess
+from tests.support.written import requirements_of
 
 # A ball of 100 mm: devices stand 1050 to 1150 mm from its centre, which is off the
 # origin, so that offsets and positions differ.
@@ -324,14 +323,12 @@ def test_the_zone_that_leaves_no_position_is_named(
 
 
 def test_zones_survive_the_plan_file_and_others_get_no_key(handmade, workspace_of):
-    asked = Requirements.from_document(
-        handmade.build_plan().to_document()["requirements"]
-    )
+    asked = requirements_of(handmade.build_plan().to_document()["requirements"])
     assert not {"box", "keep_out", "mounting"} & set(asked.to_document()["workspace"])
     zoned = replace(asked, workspace=workspace_of(ZONES["both"] + CEILING))
     document = zoned.to_document()
     assert document["workspace"]["keep_out"][0]["name"] == "press"
-    assert Requirements.from_document(copy.deepcopy(document)) == zoned
+    assert requirements_of(document) == zoned
 
 
 # ---- a whole plan

@@ -1,4 +1,4 @@
-"""`plan rigs` and `plan sample`: their options."""
+"""`plan rigs`, `plan schema` and `plan sample`: their options."""
 
 from pathlib import Path
 
@@ -15,6 +15,15 @@ def rigs(debug: bool) -> None:
     from planning.cli.small_commands import rigs_command
 
     run(rigs_command, debug=debug)
+
+
+@click.command()
+@debug_option
+def schema(debug: bool) -> None:
+    """Print the JSON Schema of plan.json."""
+    from planning.cli.small_commands import schema_command
+
+    run(schema_command, debug=debug)
 
 
 @click.command()

@@ -1,5 +1,6 @@
 """The whole plan file, format `ringrig-plan`, version 1."""
 
+import json
 from typing import Any, Literal, Self
 
 from pydantic import field_serializer
@@ -91,3 +92,8 @@ class PlanDocument(Part):
             ValueError: If anything is missing or of another type.
         """
         return cls.model_validate_json(text, strict=True)
+
+
+def plan_schema() -> str:
+    """Return the JSON Schema of a plan file as text, as `plan.schema.json` has it."""
+    return json.dumps(PlanDocument.model_json_schema(), indent=1) + "\n"

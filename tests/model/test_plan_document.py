@@ -1,0 +1,97 @@
+"""The typed plan: schema, what a file keeps, and faults of a file in one line."""
+
+import json
+from importlib.resources import files
+
+import pytest
+from click.testing import CliRunner
+
+from planning.cli.main import commands
+from planning.model.document.plan_document import PlanDocument, plan_schema
+from planning.model.errors import PlanFileError
+from planning.model.plan import RigPlan
+
+
+@pytest.fixture(scope="module")
+def plan(handmade):
+    return handmade.build_plan()
+
+
+def test_the_shipped_schema_is_that_of_the_document():
+    shipped = files("planning.model").joinpath("plan.schema.json").read_text()
+    assert shipped == plan_schema()
+    result = CliRunner().invoke(commands, ["schema"])
+    assert result.exit_code == 0
+    assert result.stdout == shipped
+    assert json.loads(shipped)["properties"]["version"]["const"] == 1
+
+
+def test_a_document_is_written_as_it_was_read(plan):
+    text = plan.to_json()
+    again = PlanDocument.read(text)
+    assert json.dumps(again.to_document(), indent=1) + "\n" == text
+    # Keys that were absent stay absent.
+    assert "ranges" not in again.to_document()
+    assert "given" not in again.to_document()["certificates"]["cameras"]
+
+
+def test_keys_that_are_not_known_are_kept(plan):
+    document = plan.to_document() | {"mood": "good"}
+    document["projectors"][0]["colour"] = [1, 2]
+    again = RigPlan.from_document(document, plan.surface).to_document()
+    assert again["mood"] == "good"
+    assert again["projectors"][0]["colour"] == [1, 2]
+
+
+def test_parts_are_frozen_and_changes_are_validated(plan):
+    proof = plan.document.certificates.cameras
+    with pytest.raises(ValueError, match="frozen"):
+        proof.count = 7
+    assert proof.changed(count=7).count == 7
+    assert proof.count == 2
+    with pytest.raises(ValueError, match="count"):
+        proof.changed(count="many")
+    plan.to_document()["cameras"].clear()
+    assert len(plan.document.cameras) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda d: d.pop("seed"), "seed is missing"),
+        (lambda d: d.update(seed="x"), "seed = 'x' should be a valid integer"),
+        (lambda d: d["cameras"][0].pop("K"), "cameras.0.K is missing"),
+        (lambda d: d["cameras"].append(None), "cameras.2 = None should be an object"),
+        (lambda d: d.update(coverage=[]), "coverage = [] should be an object"),
+        (
+            lambda d: d["coverage"]["target"].update(lit_m2=float("nan")),
+            "coverage.target.lit_m2 = nan should be a finite number",
+        ),
+        (
+            lambda d: d["projectors"][0].update(ring_radii=[0.2, 0.1]),
+            "must be 2 or more, rising from 0",
+        ),
+        (
+            lambda d: d["requirements"]["workspace"].pop("centre"),
+            "requirements.workspace.centre is missing",
+        ),
+        (lambda d: d.update(regions=None, units=3, created=5), "created = 5 should be"),
+        (lambda d: d["certificates"].clear(), "certificates.cameras is missing"),
+    ],
+)
+def test_a_broken_plan_is_refused_in_one_line(
+    plan, handmade, tmp_path, change, sentence
+):
+    path = handmade.save(plan, tmp_path)
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+    with pytest.raises(PlanFileError) as caught:
+        RigPlan.load(path)
+    message = str(caught.value)
+    assert sentence in message
+    assert message.startswith(f"{path}: ")
+    assert message.endswith("; plan again")
+    assert "\n" not in message
+    result = CliRunner().invoke(commands, ["verify", str(path)])
+    assert result.exit_code == 3
