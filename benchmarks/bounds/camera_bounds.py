@@ -101,14 +101,15 @@ def _case(
     effort = PROVE if given.prove else DEFAULT
     proof = bound_stage(ready.scene, stage, camera.device, effort).certificate
     seconds = time.process_time() - begin
-    before, bound = stage.certificate["needed"], proof["continuous"]
-    count, least = before["count"], bound["lower_bound"]
+    before, bound = stage.certificate.needed, proof.continuous
+    assert bound is not None
+    count, least = before.count, bound.lower_bound
     shown = f"**{least}**" if least == count else f"{least}"
-    star = "" if bound["occlusion"] else "*"
+    star = "" if bound.occlusion else "*"
     return (
         len(projectors),
-        f"{count} / {before['lower_bound']} / {shown}{star} "
-        f"({bound['proof'].split(';')[0]}, {seconds:.1f} s)",
+        f"{count} / {before.lower_bound} / {shown}{star} "
+        f"({bound.proof.split(';')[0]}, {seconds:.1f} s)",
         count - least,
     )
 

@@ -162,11 +162,11 @@ def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
 def _with_more(ready: Prepared, times: int) -> tuple[str, int]:
     """Return count and bound with more candidates too, and how many they save."""
     stages = [_stage(ready, number) for number in (1, times)]
-    needed = [None if s is None else s.certificate["needed"] for s in stages]
+    needed = [None if s is None else s.certificate.needed for s in stages]
     if needed[0] is None or needed[1] is None:
         return "nothing lit", 0
-    told = " -> ".join(f"{n['count']} / {n['lower_bound']}" for n in needed if n)
-    return told, needed[0]["count"] - needed[1]["count"]
+    told = " -> ".join(f"{n.count} / {n.lower_bound}" for n in needed if n)
+    return told, needed[0].count - needed[1].count
 
 
 def _cell(ready: Prepared, *, prove: bool) -> tuple[str, int]:
@@ -174,7 +174,7 @@ def _cell(ready: Prepared, *, prove: bool) -> tuple[str, int]:
     stage = _stage(ready)
     if stage is None:
         return "nothing lit", 0
-    before = stage.certificate["needed"]["count"]
+    before = stage.certificate.needed.count
     begin = time.perf_counter()
     stage = prove_fewest(
         ready.scene,
@@ -184,14 +184,15 @@ def _cell(ready: Prepared, *, prove: bool) -> tuple[str, int]:
         ring_offset=ready.ring_offset,
     )
     seconds = time.perf_counter() - begin
-    needed, bound = (stage.certificate[k] for k in ("needed", "continuous"))
-    count, least = needed["count"], bound["lower_bound"]
+    needed, bound = stage.certificate.needed, stage.certificate.continuous
+    assert bound is not None
+    count, least = needed.count, bound.lower_bound
     shown = f"**{least}**" if least == count else f"{least}"
-    star = "" if bound["occlusion"] else "*"
+    star = "" if bound.occlusion else "*"
     saved = f" (was {before})" if count < before else ""
     return (
-        f"{count}{saved} / {needed['lower_bound']} / {shown}{star} "
-        f"({bound['proof'].split(';')[0]}, {seconds:.1f} s)",
+        f"{count}{saved} / {needed.lower_bound} / {shown}{star} "
+        f"({bound.proof.split(';')[0]}, {seconds:.1f} s)",
         count - least,
     )
 

@@ -113,7 +113,7 @@ def _row(ready: Prepared) -> tuple[str, int]:
     margins = np.where(found, margins, -np.inf)
     lit = found.any(axis=1)
     least = np.degrees(margins[lit].max(axis=1).min()) if lit.any() else np.nan
-    required = int(stage.certificate["required_m2"] / target.samples.weight)
+    required = int(stage.certificate.required_m2 / target.samples.weight)
     share = np.degrees(margin_at_share(margins, max(1, min(required, int(lit.sum())))))
     false = int((said & ~found).any(axis=1).sum())
     return (

@@ -109,9 +109,9 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
     assert count - 1 < least <= count
     stage = plan_projectors(scene, template, 60, ring_offset=offset, rounds=1)
     stage = prove_fewest(scene, stage, template, EFFORT, ring_offset=offset)
-    needed = stage.certificate["needed"]
-    assert (needed["count"], needed["lower_bound"]) == (count, count)
-    assert stage.certificate["continuous"]["lower_bound"] <= count
+    needed = stage.certificate.needed
+    assert (needed.count, needed.lower_bound) == (count, count)
+    assert stage.certificate.continuous.lower_bound <= count
     if light == "parallel":
         return
     monkeypatch.setattr("planning.projectors.projector_poses._SWEEPS", 1)
