@@ -103,8 +103,8 @@ def placed(
 
 
 def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
-    """Section VI: cameras slide apart while the coverage holds; then their rings."""
-    with clock.stage("baselines", "baselines: cameras slide apart"):
+    """Section VI: the largest baselines that coverage allows; then their rings."""
+    with clock.stage("baselines", "baselines: the largest that coverage allows"):
         ranges = partial.request.ranges
         stage, moved = widest_route(
             partial.scene,

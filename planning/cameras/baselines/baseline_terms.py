@@ -5,7 +5,7 @@ come back as kept ones, so that the next one knows of them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -314,11 +314,3 @@ def _tight_and_apart(tightness: _Array, points: _Array, n: int) -> NDArray[np.in
         chosen.append(farthest)
         gap = np.minimum(gap, np.linalg.norm(points - points[farthest], axis=1))
     return np.array(sorted(chosen), dtype=np.int64)
-
-
-def at_poses(cameras: Sequence[PlannedCamera], poses: _Array) -> list[PlannedCamera]:
-    """Return the cameras at other poses, shape (k, 4, 4)."""
-    return [
-        replace(camera, world_from_device=pose)
-        for camera, pose in zip(cameras, poses, strict=True)
-    ]

@@ -18,8 +18,8 @@ from planning.scene.workspace.zone_positions import admissible
 
 from .baseline_rows import check_seam
 from .baseline_terms import BaselineLimits
+from .camera_aims import aims_of, rolls_of
 from .seams import SampledSurface, Seam, both_orders, find_seams, neighbouring_pairs
-from .widest_baselines import aims_of, rolls_of
 
 _Array = NDArray[np.float64]
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
-from planning.model.requirements import Workspace
 from planning.scene.workspace.zone_limits import stands
 from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
 
-from .baseline_terms import BaselineLimits, RingsOnSurface, at_poses, state_baselines
+from .baseline_terms import BaselineLimits, RingsOnSurface, state_baselines
+from .camera_aims import aims_of, at_poses, rolls_of
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]
@@ -311,33 +311,6 @@ class _Search:
 
 def _count(measured: NDArray[np.bool_]) -> int:
     return int(measured.any(axis=1).sum())
-
-
-def aims_of(
-    poses: _Array,
-    measured: NDArray[np.bool_],
-    points: _Array,
-    workspace: Workspace,
-) -> _Array:
-    """Return points on the axes at the mean depth of what each camera measures."""
-    centre = np.array(workspace.centre)
-    aims = np.empty((len(poses), 3))
-    for c, pose in enumerate(poses):
-        mine = measured[:, c]
-        looked = points[mine].mean(axis=0) if mine.any() else centre
-        depth = (looked - pose[:3, 3]) @ pose[:3, 2]
-        aims[c] = pose[:3, 3] + depth * pose[:3, 2]
-    return aims
-
-
-def rolls_of(poses: _Array, aims: _Array, up: _Array) -> _Array:
-    """Return the turn of each device about its axis against `look_at` without roll."""
-    level = look_at(poses[:, :3, 3], aims, up)
-    x = poses[:, :3, 0]
-    return np.arctan2(
-        np.einsum("ij,ij->i", x, level[:, :3, 1]),
-        np.einsum("ij,ij->i", x, level[:, :3, 0]),
-    )
 
 
 def _arc(start: _Array, end: _Array, share: _Array) -> _Array:
