@@ -6,8 +6,8 @@ Usage: python -m benchmarks.bounds.attack_cameras [--meshes NAME ...] [--poses 2
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any):
 projectors as planned, three at most, and random admissible camera poses, aimed at or
 beside the object at any roll, against the cells that the bound on cameras rests on:
-those in the open, those among shadows, and those by aim. What a pose measures is said
-by the predicates of `planning.verify.audit`, which share no code with the planner.
+those without shadows, those among shadows, and those by aim. What a pose measures is
+said by the predicates of `planning.verify.audit`, which share no code with the planner.
 
 `--lens long` narrows the cameras' field to a quarter, so that it binds.
 
@@ -39,7 +39,8 @@ from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
 from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
-from planning.proofs.camera_bound import CameraCells, CameraEffort
+from planning.proofs.all_poses import Effort
+from planning.proofs.camera_bound import CameraCells
 from planning.proofs.cells.image_cone import image_cone
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
@@ -192,11 +193,9 @@ def trees_of(
     scene: Scene, device: PinholeModel, rows: LitSamples, finest: int, aims: int
 ) -> dict[str, Tree]:
     """Return the planner's cells; without shadows only, where it leaves these out."""
-    effort = CameraEffort(
-        finest=finest, aims=aims, maps=finest, budget=1.0, shadows=np.inf
-    )
+    effort = Effort(finest=finest, aims=aims, maps=finest, budget=1.0, shadows=np.inf)
     cells = CameraCells(scene, device, rows, effort)
-    found: dict[str, Tree] = {"in the open": cells.in_the_open}
+    found: dict[str, Tree] = {"without shadows": cells.without_shadows}
     if cells.shadows:
         found["among shadows"] = cells.among_shadows()
     if cells.field_binds:

@@ -42,10 +42,11 @@ from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
 from planning.prepare import prepared
+from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.aim_cells import AimTree
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
-from planning.proofs.projector_bound import Effort, bound_projectors
+from planning.proofs.projector_bound import bound_projectors
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
 from planning.scene.samples import Target
@@ -356,8 +357,8 @@ def tree_of(
 ) -> Tree | None:
     """Return the planner's cells with shadows; None where it would leave them out."""
     effort = Effort(finest=finest, budget=1.0, shadows=np.inf)
-    said = {"n_samples": len(rows), "row_area_m2": rows.samples.weight}
-    bound = bound_projectors(scene, template, rows, len(rows), 2, effort, **said)
+    question = BoundQuestion(len(rows), 2, len(rows), rows.samples.weight)
+    bound = bound_projectors(scene, template, rows, question, effort)
     tree = bound.found.tree
     assert isinstance(tree, DirectionTree | PositionTree)
     return tree if bound.shadows else None

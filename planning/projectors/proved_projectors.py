@@ -3,12 +3,21 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
-from planning.proofs.all_poses import ContinuousBound, joined
-from planning.proofs.existing_bound import enough, given_on
-from planning.proofs.projector_bound import Effort, bound_projectors
-from planning.proofs.selection import required_samples
+from planning.proofs.all_poses import (
+    BoundQuestion,
+    ContinuousBound,
+    Effort,
+    joined,
+    with_existing_alone,
+)
+from planning.proofs.projector_bound import bound_projectors
+from planning.scene.existing import existing_projectors
+from planning.scene.lighting import lit_stages
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .candidate_set import CandidateSource
@@ -43,8 +52,8 @@ def prove_fewest(
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.proof()))
         stage = better
-    entry = enough(stage.certificate, stage.candidates.reached)
-    return replace(stage, certificate=stage.certificate.changed(continuous=entry))
+    n_reached = int(stage.candidates.reached.sum())
+    return replace(stage, certificate=with_existing_alone(stage.certificate, n_reached))
 
 
 def _bound_of(
@@ -54,17 +63,28 @@ def _bound_of(
     samples = stage.candidates.samples
     n = min(len(samples), effort.most_samples or len(samples))
     reached = stage.candidates.reached[:n]
-    given = given_on(scene, template, samples.take(np.arange(n)))
-    free = reached & given.lit
-    required = required_samples(reached, scene.requirements.dominant_coverage)
-    found = bound_projectors(
-        scene,
-        template,
-        samples.take(np.flatnonzero(reached & ~free)),
-        max(required - int(free.sum()), 0),
-        stage.certificate.needed.count - given.count,
-        effort,
-        n_samples=n,
-        row_area_m2=samples.samples.weight * len(samples) / n,
+    free = reached & _lit_by_existing(scene, template, samples.take(np.arange(n)))
+    question = BoundQuestion.about(
+        stage.certificate,
+        reached,
+        free,
+        scene.requirements.dominant_coverage,
+        samples.samples.weight * len(samples),
     )
-    return replace(found, given=given.count, n_free=int(free.sum()))
+    wanted = samples.take(np.flatnonzero(reached & ~free))
+    return bound_projectors(scene, template, wanted, question, effort)
+
+
+def _lit_by_existing(
+    scene: Scene, template: PlannedProjector, samples: Target
+) -> NDArray[np.bool_]:
+    """Return what existing projectors may light, whatever their ring axes, shape (n,).
+
+    Their axes may yet be turned, so rings don't count: more that is free can only lower
+    the bound.
+    """
+    ringless = replace(template, ring_radii=np.array([0.0, np.inf]))
+    projectors = existing_projectors(scene.requirements, ringless, (0.0, 0.0))
+    if not projectors:
+        return np.zeros(len(samples), dtype=bool)
+    return np.any(lit_stages(scene, projectors, samples) == LIT, axis=1)

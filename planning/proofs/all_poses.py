@@ -6,7 +6,102 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.document.certificates import Certificate, ContinuousProof
-from solvers.cells.cell_bound import CellBound, CellStatus
+from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
+from solvers.cells.cell_problem import CellProblem
+from solvers.cells.cell_tree import CellTree
+
+from .selection import required_samples
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is spent on a bound.
+
+    Attributes:
+        finest: Cells are parts of a cube map of 2^finest cells an edge. Of cameras, of
+            one twice as fine where the first search leaves room.
+        budget: Counted work of a search.
+        shadows: Pairs of sample and face above which shadows are left out.
+        most_samples: Samples of the cover at most; None: all that it has.
+        offers: Poses offered, beside cells that can't be refuted, where the bound
+            leaves room for fewer projectors.
+        maps: As `finest`, of the maps in which cameras' shadows are drawn.
+        aims: As `finest`, of the aims of cameras whose image the object overflows;
+            None: cells aren't cut by aim.
+    """
+
+    finest: int
+    budget: float
+    shadows: float
+    most_samples: int | None = None
+    offers: int = 0
+    maps: int = 0
+    aims: int | None = None
+
+
+@dataclass(frozen=True)
+class BoundQuestion:
+    """How many devices it takes to cover so many samples, wherever they stand.
+
+    Existing devices are in every plan, so what they cover is free, and the fewest are
+    they and the fewest more that cover the rest::
+
+        n(W) >= n_existing + n_more(W - free)
+
+    Attributes:
+        required: Samples to be covered, of those that existing devices don't cover.
+        count: Devices that are enough for that.
+        n_samples: Samples of the target from which they are.
+        sample_area_m2: Area that each of them stands for.
+        n_existing: Existing devices.
+        n_free: Samples that these cover.
+    """
+
+    required: int
+    count: int
+    n_samples: int
+    sample_area_m2: float
+    n_existing: int = 0
+    n_free: int = 0
+
+    @classmethod
+    def about(
+        cls,
+        certificate: Certificate,
+        reached: NDArray[np.bool_],
+        free: NDArray[np.bool_],
+        share: float,
+        area_m2: float,
+    ) -> "BoundQuestion":
+        """Return the question that a certificate over candidates leaves open.
+
+        Args:
+            certificate: As it stands.
+            reached: Samples that some candidate covers, shape (n,).
+            free: Those of them that existing devices cover, shape (n,).
+            share: Required of those reached.
+            area_m2: For which all n samples stand.
+        """
+        n_free = int(free.sum())
+        return cls(
+            max(required_samples(reached, share) - n_free, 0),
+            certificate.needed.count - certificate.given,
+            len(reached),
+            area_m2 / len(reached),
+            certificate.given,
+            n_free,
+        )
+
+    def searched(self, tree: CellTree, budget: float) -> CellBound:
+        """Return what a search over cells of poses proves.
+
+        Args:
+            tree: Cells, each with a superset of the samples that its poses cover.
+            budget: Counted work.
+        """
+        required = np.array([float(self.required)])
+        problem = CellProblem(np.ones(tree.n_rows), required)
+        return bound_count(problem, tree, self.count, budget=budget)
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,41 +109,55 @@ class ContinuousBound:
     """What was proved over all poses of the workspace.
 
     Attributes:
+        question: What was asked.
         found: Answer of the search over cells.
         shadows: Whether occlusion took part.
         directions: Unit directions from the centre of the workspace, or towards the
             light, of cells in which one device fewer may be enough, shape (k, 3).
-        n_samples: Samples of the target from which the rows are.
-        row_area_m2: Area that a sample stands for.
-        given: Devices that stand already.
-        n_free: Rows that they serve, which the search over cells left out.
     """
 
+    question: BoundQuestion
     found: CellBound
     shadows: bool
     directions: NDArray[np.float64]
-    n_samples: int
-    row_area_m2: float
-    given: int = 0
-    n_free: int = 0
 
     def proof(self) -> ContinuousProof:
         """Return the plan's `continuous` of a certificate."""
-        found = self.found
+        found, question = self.found, self.question
         most = found.most_weight
         if found.status is CellStatus.PROVED:
             # Fewer fall short of what is required, by a sample at least.
             most = min(most, float(found.problem.required_weight[0]) - 1.0)
         return ContinuousProof(
-            lower_bound=int(found.lower_bound) + self.given,
+            lower_bound=int(found.lower_bound) + question.n_existing,
             status=found.status.name.lower(),
             proof=found.proof,
             occlusion=self.shadows,
-            n_samples=self.n_samples,
-            n_reached=len(found.problem.weights) + self.n_free,
+            n_samples=question.n_samples,
+            n_reached=len(found.problem.weights) + question.n_free,
             n_cells=found.cells_used,
-            one_fewer_upper_bound_m2=(most + self.n_free) * self.row_area_m2,
+            one_fewer_upper_bound_m2=(most + question.n_free) * question.sample_area_m2,
         )
+
+
+def with_existing_alone(certificate: Certificate, n_reached: int) -> Certificate:
+    """Return a certificate where existing devices suffice: no cells are searched.
+
+    Args:
+        certificate: As it stands.
+        n_reached: How many of its samples some candidate covers.
+    """
+    proof = ContinuousProof(
+        lower_bound=certificate.given,
+        status="proved",
+        proof="those that stand already are enough, and in every plan",
+        occlusion=True,
+        n_samples=certificate.n_samples,
+        n_reached=n_reached,
+        n_cells=0,
+        one_fewer_upper_bound_m2=None,
+    )
+    return certificate.changed(continuous=proof)
 
 
 def joined(certificate: Certificate, bound: ContinuousProof) -> Certificate:

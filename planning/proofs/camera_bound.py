@@ -1,21 +1,20 @@
 """The bound over all poses for cameras, given the projectors.
 
-Rows are the samples that the projectors light and some candidate measures, frozen as a
-set, and how many of them must be measured: the cover's own. Cells hold every position
-of the workspace, each with a superset of what a camera anywhere inside it measures with
-these projectors, however it is aimed and rolled (`measurable_cells`). Where the object
-overflows the image, cells are cut by aim as well (`aim_cells`).
+The samples are those that the projectors light and some candidate measures, frozen as a
+set, and so is how many of them must be measured: the cover's own. Cells hold every
+position of the workspace, each with a superset of what a camera anywhere inside it
+measures with these projectors, however it is aimed and rolled (`measurable_cells`).
+Where the object overflows the image, cells are cut by aim as well (`aim_cells`).
 
 Shadows are counted only if the bound without them stays below the count: they cost
 most, and what is proved without them holds with them. So with cells by aim.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.directions.cube_map import CubeMap
@@ -28,86 +27,48 @@ from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.proofs.cells.position_cells import PositionTree
 from planning.scene.measured import LitSamples
 from planning.scene.scene import Scene
-from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
-from solvers.cells.cell_problem import CellProblem
+from solvers.cells.cell_bound import CellStatus
 
-from .all_poses import ContinuousBound
-from .optimistic_coverage import mesh_reach, open_rows
+from .all_poses import BoundQuestion, ContinuousBound, Effort
+from .optimistic_coverage import mesh_reach, open_samples
 
-
-@dataclass(frozen=True)
-class CameraEffort:
-    """What is spent on the bound.
-
-    Attributes:
-        finest: Cells of positions are parts of a cube map of 2^finest cells an edge;
-            of one twice as fine where the first search leaves room.
-        aims: The same of aims, where the object overflows the image; None: cells
-            aren't cut by aim.
-        maps: The same of the maps in which shadows are drawn.
-        budget: Counted work of a search.
-        shadows: Pairs of sample and face above which shadows are left out.
-        most_samples: Lit samples at most; None: all that the cover has.
-    """
-
-    finest: int
-    aims: int | None
-    maps: int
-    budget: float
-    shadows: float
-    most_samples: int | None = None
-
-
-DEFAULT = CameraEffort(
+DEFAULT = Effort(
     finest=7, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
 )
-PROVE = CameraEffort(finest=8, aims=5, maps=7, budget=1e10, shadows=np.inf)
+PROVE = Effort(finest=8, aims=5, maps=7, budget=1e10, shadows=np.inf)
 
 
 def bound_cameras(
     scene: Scene,
     device: PinholeModel,
-    rows: LitSamples,
-    required: int,
-    count: int,
-    effort: CameraEffort,
-    *,
-    n_samples: int,
-    row_area_m2: float,
+    samples: LitSamples,
+    question: BoundQuestion,
+    effort: Effort,
 ) -> ContinuousBound:
     """Bound the cameras over every pose of the workspace, for given projectors.
 
     Args:
         scene: Surface and requirements.
         device: Optics of the cameras.
-        rows: Samples that some candidate measures, with light and rings on them.
-        required: How many of them must be measured.
-        count: Cameras that are enough.
+        samples: Those that some candidate measures and no existing camera does, with
+            light and rings on them.
+        question: How many of them must be measured.
         effort: What to spend.
-        n_samples: Lit samples, reached or not, for the record.
-        row_area_m2: Area that each stands for.
     """
-    if count <= 1:
+    if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, aims=None, shadows=0.0)
-    problem = CellProblem(np.ones(len(rows.target)), np.array([float(required)]))
-
-    cells = CameraCells(scene, device, rows, effort)
-
-    def search(tree: PositionTree | AimTree) -> CellBound:
-        return bound_count(problem, tree, count, budget=effort.budget)
-
-    found, shadows = search(cells.in_the_open), False
+    cells = CameraCells(scene, device, samples, effort)
+    found, shadows = question.searched(cells.without_shadows, effort.budget), False
     for tree in cells.finer:
         if found.status is CellStatus.PROVED:
             break
-        better = search(tree())
+        better = question.searched(tree(), effort.budget)
         # Cut short, a finer search may have proved less.
         if better.lower_bound >= found.lower_bound:
             found, shadows = better, cells.shadows
-    told = shadows or found.status is CellStatus.PROVED
-    nowhere: NDArray[np.float64] = np.empty((0, 3))
-    return ContinuousBound(found, told, nowhere, n_samples, row_area_m2)
+    shadows = shadows or found.status is CellStatus.PROVED
+    return ContinuousBound(question, found, shadows, np.empty((0, 3)))
 
 
 class CameraCells:
@@ -116,7 +77,7 @@ class CameraCells:
     Args:
         scene: Surface and requirements.
         device: Optics of the cameras.
-        rows: Samples, with light and rings on them.
+        samples: With light and rings on them.
         effort: How fine they are.
     """
 
@@ -124,20 +85,20 @@ class CameraCells:
         self,
         scene: Scene,
         device: PinholeModel,
-        rows: LitSamples,
-        effort: CameraEffort,
+        samples: LitSamples,
+        effort: Effort,
     ) -> None:
-        self._scene, self._device, self._rows = scene, device, rows
+        self._scene, self._device, self._samples = scene, device, samples
         self._effort = effort
         self._limits = MeasurableCells(
-            rows, scene.requirements, device, check_cancelled=scene.check_cancelled
+            samples, scene.requirements, device, check_cancelled=scene.check_cancelled
         )
         near = scene.requirements.workspace.camera_radius_m[0]
-        pairs = len(rows.target) * len(scene.mesh.faces)
+        pairs = len(samples.target) * len(scene.mesh.faces)
         self.shadows = pairs <= effort.shadows and near >= mesh_reach(scene)
 
     @property
-    def in_the_open(self) -> PositionTree:
+    def without_shadows(self) -> PositionTree:
         """Cells of positions without shadows."""
         return self._positions(self._effort.finest, None)
 
@@ -163,7 +124,7 @@ class CameraCells:
     def field_binds(self) -> bool:
         """Whether a camera that looks at the centre may miss some sample."""
         space = self._scene.requirements.workspace
-        offsets = self._rows.target.samples.points - np.array(space.centre)
+        offsets = self._samples.target.samples.points - np.array(space.centre)
         reach = float(lengths(offsets).max())
         return not self._device.holds_ball(reach, space.camera_radius_m[0])
 
@@ -173,7 +134,7 @@ class CameraCells:
             space,
             space.camera_radius_m,
             self._device.range_m,
-            self._rows.target.samples.points,
+            self._samples.target.samples.points,
             maps,
             finest=finest,
             limits=self._limits,
@@ -186,5 +147,7 @@ class CameraCells:
         cube = CubeMap(1 << self._effort.maps)
         # Of the direction itself, cameras have no limit but incidence.
         limits = DirectionLimits(self._scene.requirements.camera.max_incidence, 0.0)
-        opened = open_rows(self._scene, limits, self._rows.target, cube, shadows=True)
+        opened = open_samples(
+            self._scene, limits, self._samples.target, cube, shadows=True
+        )
         return WidenedMaps(opened, cube)

@@ -1,4 +1,4 @@
-"""Which cells of directions are open to which samples, as bit rows for the bounds."""
+"""Optimistic coverage: which cells of directions are open to which samples, as bits."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,10 @@ def mesh_reach(scene: Scene) -> float:
     return float(np.linalg.norm(mesh.corners.reshape(-1, 3) - centre, axis=1).max())
 
 
-def open_rows(
+def open_samples(
     scene: Scene,
     limits: DirectionLimits,
-    rows: Target,
+    samples: Target,
     cube: CubeMap,
     *,
     shadows: bool,
@@ -30,7 +30,7 @@ def open_rows(
     Args:
         scene: Surface.
         limits: On the direction from a sample to a device.
-        rows: The samples.
+        samples: The samples.
         cube: The map of directions from a sample to a device.
         shadows: Whether occlusion closes cells.
 
@@ -38,19 +38,22 @@ def open_rows(
         Shape (cube.size, n_words).
     """
     maps = OpenDirections(scene.visibility, limits, cube, occlusion=shadows)
-    found = np.zeros((cube.size, words_for(len(rows))), dtype=np.uint64)
+    found = np.zeros((cube.size, words_for(len(samples))), dtype=np.uint64)
     bytes_of = found.view(np.uint8).reshape(cube.size, -1, 8)
-    points, normals = rows.samples.points, rows.samples.normals
+    drawn = samples.samples
 
     def fill(part: slice) -> None:
         scene.check_cancelled()
         marks = maps.maps(
-            points[part], normals[part], rows.steep[part], rows.samples.faces[part]
+            drawn.points[part],
+            drawn.normals[part],
+            samples.steep[part],
+            drawn.faces[part],
         )
         packed = _packed_columns(marks)
         bytes_of[:, part.start // POINTS, : len(packed)] = packed.T
 
-    parts = [slice(b, b + POINTS) for b in range(0, len(rows), POINTS)]
+    parts = [slice(b, b + POINTS) for b in range(0, len(samples), POINTS)]
     scene.visibility.caster.share(fill, parts)
     return found
 

@@ -29,7 +29,7 @@ from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
-from planning.proofs.projector_bound import Effort
+from planning.proofs.all_poses import Effort
 from planning.proofs.selection import required_samples
 from planning.report.summary.summary import _routes
 from planning.rig.rig import load_rig

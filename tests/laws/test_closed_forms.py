@@ -18,7 +18,7 @@ from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
-from planning.proofs.projector_bound import Effort
+from planning.proofs.all_poses import Effort
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes

@@ -34,7 +34,6 @@ from planning.proofs.camera_bound import (
     DEFAULT,
     PROVE,
     CameraCells,
-    CameraEffort,
     bound_cameras,
 )
 from planning.proofs.cells import measurable_cells
@@ -50,7 +49,7 @@ from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
 
-EFFORT = CameraEffort(finest=5, aims=4, maps=5, budget=1e9, shadows=np.inf)
+EFFORT = all_poses.Effort(finest=5, aims=4, maps=5, budget=1e9, shadows=np.inf)
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -116,16 +115,8 @@ FREE = {"min_conditioning": 0.0, "max_sigma_m": None, "min_ring_pitch_px": None}
 def bounded(scene, share, count, *, n=300, effort=EFFORT, device=None):
     rows = everything_lit(scene, n)
     required = int(np.ceil(share * n - 1e-9))
-    return bound_cameras(
-        scene,
-        device or lens(),
-        rows,
-        required,
-        count,
-        effort,
-        n_samples=n,
-        row_area_m2=rows.target.samples.weight,
-    )
+    question = all_poses.BoundQuestion(required, count, n, rows.target.samples.weight)
+    return bound_cameras(scene, device or lens(), rows, question, effort)
 
 
 # ---- under attack
@@ -181,7 +172,7 @@ def test_no_pose_measures_what_its_cells_lack(mesh, name, attack_cameras):
         assert tally.depth >= 5
 
 
-@pytest.mark.parametrize("name", ["in the open", "by aim"])
+@pytest.mark.parametrize("name", ["without shadows", "by aim"])
 def test_a_cell_with_a_sample_too_few_is_caught(name, attack_cameras):
     device = LENSES["long"]
     scene, projectors, rows = shown(PLATES, device, {})

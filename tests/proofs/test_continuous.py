@@ -13,8 +13,9 @@ from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.zones import Box
 from planning.proofs import projector_bound as continuous
+from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.direction_cells import DirectionTree
-from planning.proofs.projector_bound import DEFAULT, Effort, bound_projectors
+from planning.proofs.projector_bound import DEFAULT, bound_projectors
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.scene.samples import Target
@@ -23,7 +24,6 @@ from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cells.cell_bound import CellStatus
 
 QUICK = Effort(finest=6, budget=1e9, shadows=np.inf)
-SAID = {"n_samples": 300, "row_area_m2": 1e-6}
 RADII = np.array([0.1, 0.45])
 
 
@@ -56,12 +56,16 @@ def stage_for(mesh, light, *, tangent_deg=0.0, steep=(0.0, 0.0, 0.0), **workspac
     return scene, PlannedProjector("", light, eye, eye, rig.projector_device(), RADII)
 
 
+def question(required, count, n_samples=300, sample_area_m2=1e-6):
+    return BoundQuestion(required, count, n_samples, sample_area_m2)
+
+
 def bounded(mesh, light, share, count, effort=QUICK, n=400, **options):
     scene, template = stage_for(mesh, light, **options)
     rows = scene.target_samples(n, 3)
     required = int(np.ceil(share * n - 1e-9))
-    said = {"n_samples": n, "row_area_m2": rows.samples.weight}
-    return bound_projectors(scene, template, rows, required, count, effort, **said)
+    asked = question(required, count, n, rows.samples.weight)
+    return bound_projectors(scene, template, rows, asked, effort)
 
 
 SHAPES = {
@@ -148,7 +152,7 @@ def test_no_pose_lights_what_its_cells_lack(name, light, tangent_deg):
         SHAPES[name], light, tangent_deg=tangent_deg, steep=(0.3, 0.2, 1.0)
     )
     rows = scene.target_samples(300, 5)
-    found = bound_projectors(scene, template, rows, 250, 9, QUICK, **SAID)
+    found = bound_projectors(scene, template, rows, question(250, 9), QUICK)
     assert found.shadows
     tree = found.found.tree
     workspace = scene.requirements.workspace
@@ -179,7 +183,7 @@ def test_a_cell_with_a_sample_too_few_is_caught():
     """The attack above sees a superset that isn't one."""
     scene, template = stage_for(SHAPES["ring"], "parallel")
     rows = scene.target_samples(300, 5)
-    found = bound_projectors(scene, template, rows, 250, 9, QUICK, **SAID)
+    found = bound_projectors(scene, template, rows, question(250, 9), QUICK)
     tree = found.found.tree
     towards = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
     lit = lit_by_hand(
@@ -200,7 +204,7 @@ def test_cells_hold_the_cone_and_what_is_over_the_floor(light):
     options = {"axis": tuple(axis), "half_angle": 0.9, "floor_m": 0.3}
     scene, template = stage_for(mesh, light, **options)
     rows = scene.target_samples(200, 5)
-    found = bound_projectors(scene, template, rows, 100, 3, QUICK, **SAID)
+    found = bound_projectors(scene, template, rows, question(100, 3), QUICK)
     tree, workspace = found.found.tree, scene.requirements.workspace
     near, far = workspace.projector_radius_m
     rng = np.random.default_rng(2)
@@ -255,7 +259,7 @@ def test_rooms_planes_and_keep_out_volumes_empty_cells_and_only_theirs(light):
     }
     scene, template = stage_for(SHAPES["ring"], light, **options)
     rows = scene.target_samples(200, 5)
-    found = bound_projectors(scene, template, rows, 100, 3, QUICK, **SAID)
+    found = bound_projectors(scene, template, rows, question(100, 3), QUICK)
     tree, workspace = found.found.tree, scene.requirements.workspace
     near, far = workspace.projector_radius_m
     rng = np.random.default_rng(2)
@@ -382,14 +386,14 @@ def test_cells_that_are_left_are_where_the_better_cover_is():
     """Two poses light a cube; a cover of three is improved where the cells point."""
     scene, template = stage_for(box((0.1, 0.1, 0.1), divisions=4), "parallel")
     rows = scene.target_samples(600, 3)
-    found = bound_projectors(scene, template, rows, 600, 3, DEFAULT, **SAID)
+    found = bound_projectors(scene, template, rows, question(600, 3), DEFAULT)
     assert found.found.lower_bound == 2
     corners = np.abs(found.directions)
     np.testing.assert_allclose(corners, 3**-0.5, atol=0.15)
     assert len(corners) == 2
     # More may be asked for: where the multipliers say that much is to be had.
     asked = replace(DEFAULT, offers=40)
-    more = bound_projectors(scene, template, rows, 600, 3, asked, **SAID).directions
+    more = bound_projectors(scene, template, rows, question(600, 3), asked).directions
     assert len(more) == 42
     np.testing.assert_allclose(np.linalg.norm(more, axis=1), 1.0)
     assert continuous.PROVE.finest > DEFAULT.finest

@@ -18,7 +18,7 @@ from planning.model.requirements import Existing
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
-from planning.proofs.projector_bound import Effort
+from planning.proofs.all_poses import Effort
 from planning.proofs.selection import CandidateCover, marginals, select_fewest
 from planning.report.claims import Devices, make_claims
 from planning.report.summary.summary import summary

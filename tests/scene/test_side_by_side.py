@@ -22,7 +22,7 @@ from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.projectors.share_margin import margin_at_share
-from planning.proofs.projector_bound import Effort
+from planning.proofs.all_poses import Effort
 from planning.report.advice.wider_field import wider_field
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
