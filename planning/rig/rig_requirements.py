@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from typing import cast
+from dataclasses import fields, replace
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from .wishes import Wishes
 from .zone_tables import build_zones
 
 Overflowing = tuple[bool, bool]
+_Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
 UP_VECTORS: dict[str, tuple[float, float, float]] = {
     "x": (1.0, 0.0, 0.0),
@@ -81,8 +83,8 @@ def build_requirements(
         ),
         target=target,
         pattern=wishes.pattern,
-        projector=_projector_limits(table.limits),
-        camera=_camera_limits(table.limits),
+        projector=_limits_of(ProjectorLimits, table.limits, "projector_"),
+        camera=_limits_of(CameraLimits, table.limits, "camera_"),
         triangulation=_triangulation_limits(table.limits, wishes.accuracy_mm),
         check=_check_limits(table.check, tau_m),
         workspace=workspace,
@@ -164,35 +166,41 @@ def _check_floor(workspace: Workspace) -> None:
         )
 
 
-def _projector_limits(limits: LimitsTable) -> ProjectorLimits:
-    return ProjectorLimits(
-        max_incidence=math.radians(limits.projector_max_incidence_deg),
-        min_tangent_angle=math.radians(limits.min_tangent_angle_deg),
-    )
+def _limits_of(kind: type[_Limits], table: LimitsTable, device: str = "") -> _Limits:
+    """Return limits by their names: `x_m` is `x_mm` of the table, an angle `x_deg`.
+
+    Args:
+        kind: Which limits.
+        table: As written.
+        device: What a key of the table may begin with.
+    """
+    written = table.model_dump()
+    values: dict[str, Any] = {}
+    for field in fields(kind):
+        stem = field.name.removesuffix("_m")
+        keys = (field.name, f"{stem}_mm", f"{stem}_deg", f"{device}{stem}_deg")
+        key = next(key for key in keys if key in written)
+        values[field.name] = _si(key, written[key])
+    return kind(**values)
 
 
-def _camera_limits(limits: LimitsTable) -> CameraLimits:
-    return CameraLimits(
-        max_incidence=math.radians(limits.camera_max_incidence_deg),
-        max_sample_distance_m=_metres(limits.max_sample_distance_mm),
-    )
+def _si(key: str, value: float | None) -> float | None:
+    """Return a value of a rig file in metres or radians, as its key says."""
+    if value is None:
+        return None
+    if key.endswith("_deg"):
+        return math.radians(value)
+    return value * 1e-3 if key.endswith("_mm") else value
 
 
 def _triangulation_limits(
-    limits: LimitsTable, accuracy_mm: float | None
+    table: LimitsTable, accuracy_mm: float | None
 ) -> TriangulationLimits:
-    if accuracy_mm is not None:
-        _check_positive("accuracy_mm", accuracy_mm)
-    sigma_mm = limits.max_sigma_mm if accuracy_mm is None else accuracy_mm
-    return TriangulationLimits(
-        min_conditioning=limits.min_conditioning,
-        noise_px=limits.noise_px,
-        max_sigma_m=_metres(sigma_mm),
-        min_ring_pitch_px=limits.min_ring_pitch_px,
-        ring_sigma_m=_metres(limits.ring_sigma_mm),
-        min_angle=_radians(limits.min_angle_deg),
-        max_angle=_radians(limits.max_angle_deg),
-    )
+    limits = _limits_of(TriangulationLimits, table)
+    if accuracy_mm is None:
+        return limits
+    _check_positive("accuracy_mm", accuracy_mm)
+    return replace(limits, max_sigma_m=accuracy_mm * 1e-3)
 
 
 def _check_limits(check: CheckTable, tau_m: float) -> CheckLimits:
@@ -235,11 +243,3 @@ def _share(name: str, value: float | None, default: float) -> float:
     if not 0.0 < share <= 1.0:
         raise InputError(f"{name} = {share} must be a share, over 0 and at most 1")
     return share
-
-
-def _metres(millimetres: float | None) -> float | None:
-    return None if millimetres is None else millimetres * 1e-3
-
-
-def _radians(degrees: float | None) -> float | None:
-    return None if degrees is None else math.radians(degrees)

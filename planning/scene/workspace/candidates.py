@@ -19,7 +19,7 @@ from planning.model.ring_frame import ring_frame
 
 from .view_tiles import Site, poses_beside, tiled_poses
 from .zone_conflicts import no_position
-from .zone_positions import along_rays, filled, is_zoned
+from .zone_positions import admissible, along_rays, filled, is_zoned
 
 _QUARTER = float(np.pi / 2)
 # A floor may leave a sliver of the cone; finer lattices than this aren't tried for it.
@@ -61,10 +61,10 @@ def shell_positions(
         return centre + filled(workspace, radius_m, n, lattice)
     offered = n
     while True:
-        directions = lattice(offered)
-        kept = directions[_stands(directions, radius, workspace)]
+        offsets = radius * lattice(offered)
+        kept = offsets[admissible(workspace, (radius, radius), offsets)]
         if len(kept) >= n or not len(kept) or offered > _MOST_OFFERED * n:
-            return centre + radius * kept
+            return centre + kept
         offered = int(np.ceil(1.1 * offered * n / len(kept)))
 
 
@@ -212,7 +212,8 @@ def _offsets(
         return along_rays(workspace, shell_m, directions)
     near, far = shell_m
     radius = 0.5 * (near + far)
-    return radius * directions[_stands(directions, radius, workspace)]
+    offsets = radius * directions
+    return offsets[admissible(workspace, (radius, radius), offsets)]
 
 
 def _about_ball(
@@ -230,16 +231,6 @@ def _spacing(workspace: Workspace, n_positions: int) -> float:
     # Each position of the lattice has this much of the solid angle.
     solid_angle = 2 * np.pi * (1 - np.cos(workspace.half_angle))
     return float(np.sqrt(solid_angle / max(1, n_positions)))
-
-
-def _stands(
-    directions: NDArray[np.float64], radius: float, workspace: Workspace
-) -> NDArray[np.bool_]:
-    """Whether places on a sphere about the centre are in the cone, over the floor."""
-    height = radius * (directions @ np.array(workspace.up))
-    floor = -np.inf if workspace.floor_m is None else workspace.floor_m
-    along = directions @ np.array(workspace.axis)
-    return (height >= floor) & (along >= np.cos(workspace.half_angle))
 
 
 def _projectors(
