@@ -7,7 +7,6 @@ from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.routes import CamerasBy
-from planning.model.document.check_records import ReconstructionRecord
 from planning.model.errors import TimeLimitError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import InterruptedPlanError, RequirementError
@@ -185,7 +184,7 @@ def _checked(plan: RigPlan, partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     check, seconds, record = verification.reconstruction, clock.processor, None
     if check is not None:
         false = verification.audit.failures
-        record = ReconstructionRecord(**check.to_document())
+        record = check.record()
         record = record.changed(
             failures=(*false, *record.failures), passed=record.passed and not false
         )

@@ -34,7 +34,7 @@ class Outcome:
     Attributes:
         experiment: What was run.
         photometry: Light and sensor.
-        reconstruction: From pixels, all pairs of devices.
+        reconstruction: From rendered images, all pairs of devices.
         samples: Of the surface that could be measured.
         visible: Share of the whole surface that these are.
         single: The first projector and the first camera alone.

@@ -1,4 +1,4 @@
-"""`plan verify`: the audit of every claim, then the check from pixels."""
+"""`plan verify`: the audit of every claim, then the simulated reconstruction."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Verification:
 
     Attributes:
         failures: One sentence for each false claim, and for each limit of the check
-            that isn't kept and that the plan doesn't own up to.
+            that isn't kept and that the plan doesn't report.
         audit: The geometric audit.
-        reconstruction: The check from pixels; None if it wasn't asked for.
+        reconstruction: The simulated one; None if it wasn't asked for.
         missed: Limits of the check that aren't kept, as the plan records itself.
     """
 
@@ -133,8 +133,8 @@ def verify_plan(
         # What is recorded is of the rig as planned.
         return Verification((*failures, *found.failures), audit, found)
     false = compare_figures(recorded, found.to_document())
-    owned_up = recorded is not None and recorded.get("passed") is False
-    if owned_up and not false:
+    reported = recorded is not None and recorded.get("passed") is False
+    if reported and not false:
         return Verification(tuple(failures), audit, found, found.failures)
     return Verification((*failures, *found.failures, *false), audit, found)
 
@@ -205,7 +205,7 @@ def _reconstruct(
     threads: int,
     say: Callable[[str], None],
 ) -> Reconstruction:
-    """Run the check from pixels on the audit's own samples."""
+    """Run the simulated reconstruction on the audit's own samples."""
     from planning.verify.reconstruction.check.accuracy import Expected
     from planning.verify.reconstruction.check.check import reconstruct
     from planning.verify.reconstruction.check.comparison import compare

@@ -1,1 +1,1 @@
-"""The check from pixels: it shares no code with the planner but data types."""
+"""The simulated reconstruction: it shares data types with the planner, and no code."""

@@ -15,7 +15,7 @@ from planning.model.document.input_records import MeshRecord
 from planning.model.files import write_atomically
 from planning.verify.reconstruction.check.merge import Merged
 
-from .colour_scale import colour_range, colours, legend
+from .arrays import Array
 
 _GENERATOR = "comment ringrig cloud"
 _FIELDS = (
@@ -25,6 +25,33 @@ _FIELDS = (
 )
 _ROW = np.dtype(list(_FIELDS))
 _PLY_TYPES = {"<f8": "double", "<f4": "float", "u1": "uchar"}
+
+# Every seventeenth of the 256 colours of viridis (S. van der Walt, N. Smith, CC0);
+# lightness rises evenly, so that colour blindness loses nothing.
+_VIRIDIS = np.array(
+    [
+        [68, 1, 84],
+        [72, 26, 108],
+        [71, 47, 125],
+        [65, 68, 135],
+        [57, 86, 140],
+        [49, 104, 142],
+        [42, 120, 142],
+        [35, 136, 142],
+        [31, 152, 139],
+        [34, 168, 132],
+        [53, 183, 121],
+        [84, 197, 104],
+        [122, 209, 81],
+        [165, 219, 54],
+        [210, 226, 27],
+        [253, 231, 37],
+    ],
+    dtype=np.float64,
+)
+_NAMES = ((0.0, "violet"), (0.5, "teal"), (1.0, "yellow"))
+# Values beyond these quantiles take the colours of the ends.
+_ENDS = (0.02, 0.98)
 
 
 @dataclass(frozen=True)
@@ -72,14 +99,14 @@ class CloudFile:
         known = np.isfinite(merged.normals[:, 0])
         largest = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
         sigma = np.where(known, merged.sigma, largest) / unit.in_m
-        limits = colour_range(sigma)
+        limits = _colour_range(sigma)
         rows = np.empty(len(cloud), dtype=_ROW)
         normals = np.where(known[:, None], merged.normals, 0.0)
         for axis, name in enumerate("xyz"):
             rows[name] = cloud.points[:, axis] / unit.in_m
             rows[f"n{name}"] = normals[:, axis]
         rows["sigma"] = sigma
-        shades = colours(sigma, limits)
+        shades = _colours(sigma, limits)
         for channel, name in enumerate(("red", "green", "blue")):
             rows[name] = shades[:, channel]
         return cls(rows, unit, limits)
@@ -87,7 +114,7 @@ class CloudFile:
     @property
     def legend(self) -> str:
         """What the colours mean, in one line."""
-        return legend(self.limits, self.unit.name)
+        return _legend(self.limits, self.unit.name)
 
     def save(self, path: Path) -> None:
         """Write the file; its old content stays whole until the new one is complete.
@@ -124,3 +151,27 @@ def remove_cloud(path: Path) -> bool:
     if ours:
         path.unlink()
     return ours
+
+
+def _colour_range(values: Array) -> tuple[float, float]:
+    """Return what the ends of the scale stand for: the 2nd and 98th percentile."""
+    low, high = np.quantile(values, _ENDS).tolist() if len(values) else (0.0, 1.0)
+    return low, high
+
+
+def _colours(values: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
+    """Return the colour of each value, red, green and blue of 255, shape (n, 3)."""
+    low, high = limits
+    share = np.clip((values - low) / max(high - low, 1e-300), 0.0, 1.0)
+    place = share * (len(_VIRIDIS) - 1)
+    steps = np.arange(len(_VIRIDIS))
+    mixed = [np.interp(place, steps, channel) for channel in _VIRIDIS.T]
+    return np.rint(np.column_stack(mixed)).astype(np.uint8)
+
+
+def _legend(limits: tuple[float, float], unit: str) -> str:
+    """Return what the colours mean, in one line."""
+    low, high = limits
+    return ", ".join(
+        f"{name} {low + share * (high - low):.4g} {unit}" for share, name in _NAMES
+    )

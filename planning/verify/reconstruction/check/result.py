@@ -3,6 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
+from planning.model.document.check_records import (
+    CompletenessRecord,
+    ReconstructionRecord,
+)
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import Decoded, PairIndex
 from planning.verify.reconstruction.render.photometry import Photometry
@@ -92,28 +96,32 @@ class Reconstruction:
         """Share of the points that was removed as redundant."""
         return 1.0 - self.n_merged / self.n_points if self.n_points else 0.0
 
-    def to_document(self) -> dict[str, Any]:
-        """Return the `reconstruction` object of `plan.json`."""
-        accuracy, complete = self.accuracy, self.completeness
-        light = self.photometry
-        return {
-            "n_points": self.n_points,
-            "n_merged": self.n_merged,
-            "redundant_fraction": self.redundant_fraction,
-            "accuracy_rms_m": accuracy and accuracy.rms_m,
-            "accuracy_p95_m": accuracy and accuracy.p95_m,
-            "accuracy_bias_m": accuracy and accuracy.bias_m,
-            "accuracy_max_m": accuracy and accuracy.max_m,
-            "completeness": [
-                {"threshold_m": threshold, "fraction": fraction}
+    def record(self) -> ReconstructionRecord:
+        """Return the `reconstruction` part of a plan."""
+        accuracy, complete, light = self.accuracy, self.completeness, self.photometry
+        compared = {} if self.comparison is None else self.comparison.to_document()
+        return ReconstructionRecord(
+            n_points=self.n_points,
+            n_merged=self.n_merged,
+            redundant_fraction=self.redundant_fraction,
+            accuracy_rms_m=accuracy and accuracy.rms_m,
+            accuracy_p95_m=accuracy and accuracy.p95_m,
+            accuracy_bias_m=accuracy and accuracy.bias_m,
+            accuracy_max_m=accuracy and accuracy.max_m,
+            completeness=tuple(
+                CompletenessRecord(threshold_m=threshold, fraction=fraction)
                 for threshold, fraction in zip(
                     complete.thresholds_m, complete.fractions, strict=True
                 )
-            ],
-            "predicted_missing": complete.predicted_missing,
-            "pixel_noise": light and light.pixel_noise,
-            "ambient": light and light.ambient,
-            **({} if self.comparison is None else self.comparison.to_document()),
-            "passed": self.passed,
-            "failures": list(self.failures),
-        }
+            ),
+            predicted_missing=complete.predicted_missing,
+            pixel_noise=light and light.pixel_noise,
+            ambient=light and light.ambient,
+            **compared,
+            passed=self.passed,
+            failures=self.failures,
+        )
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the record as plain JSON values."""
+        return self.record().to_document()
