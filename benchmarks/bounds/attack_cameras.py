@@ -48,12 +48,11 @@ from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
 from planning.stages import first_projectors
 from planning.verify.audit.audit_samples import AuditSamples
+from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     PAIR_CAUSES,
     SEEN,
-    AuditCamera,
-    AuditProjector,
     pair_steps,
     sight_steps,
 )

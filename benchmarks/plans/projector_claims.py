@@ -35,10 +35,10 @@ from planning.scene.lighting import lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.samples import Target
 from planning.verify.audit.audit_samples import AuditSamples
+from planning.verify.audit.predicates.audit_devices import AuditProjector
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     LIT,
-    AuditProjector,
     light_margin,
     light_steps,
 )

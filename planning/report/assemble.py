@@ -28,7 +28,7 @@ from planning.report.advice.what_helps import with_fewer_needed, with_relaxation
 from planning.report.entries.cost import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
-from planning.report.entries.ring_entries import evenly_ringed, lost_to_rings_m2
+from planning.report.entries.ring_entries import evenly_ringed
 from planning.rings.ring_pitch import widest_gap
 
 from .claims import Claims, Devices, make_claims
@@ -47,8 +47,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     standing = replace(
         partial, scene=scene.among((*devices.projectors, *devices.cameras))
     )
-    lost = lost_to_rings_m2(standing.scene, devices, partial.rings, claims)
-    coverage = entries.coverage_record(claims, lost)
+    coverage = entries.coverage_record(claims)
     coverage = with_relaxations(coverage, partial, devices, claims, clock)
     regions = entries.region_records(partial.regions, claims)
     overlaps, schedule = overlap_records(standing.scene, devices.projectors)

@@ -60,8 +60,8 @@ def find_creases(mesh: TriangleMesh, step: float) -> Creases:
 
 def crease_errors(
     scene: Scene, projector: PlannedProjector, creases: Creases
-) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
-    """Return which points a projector lights, their slope jump J and error J h / 4.
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Return which points a projector lights, and the error J h / 4 of a slope jump J.
 
     Along the beam, radially: a face of normal n rises by -(n.m)/(n.L) a metre across
     the rings; J is the difference of both faces', h the gap of the rings there.
@@ -72,7 +72,7 @@ def crease_errors(
         creases: Of the surface.
 
     Returns:
-        Lit on both sides; J; J h / 4 in [m], (n,) each.
+        Lit on both sides; J h / 4 in [m], (n,) each.
     """
     mesh = scene.mesh
     rings = code_surfaces(projector, creases.points)
@@ -97,4 +97,4 @@ def crease_errors(
         across = np.einsum("ij,ij->i", samples.normals, rings.normals)
         slopes.append(across / np.maximum(light.incidence_cos, 1e-9))
     jump = np.abs(slopes[0] - slopes[1])
-    return lit, jump, 0.25 * jump * rings.spacing
+    return lit, 0.25 * jump * rings.spacing

@@ -113,11 +113,6 @@ class RingBeam:
         gaps = gap_at(projector, self.profile.coordinates)[rows]
         return self.errors[self.counted] * (gaps / self.even_gap) ** 2
 
-    def errors_at_floor(self) -> NDArray[np.float64]:
-        """Return them with rings as fine as may be, in [m]."""
-        rows, _ = np.nonzero(self.counted)
-        return self.errors[self.counted] * (self.floor[rows] / self.even_gap) ** 2
-
 
 def ring_beam(scene: Scene, projector: PlannedProjector, creases: Creases) -> RingBeam:
     """Cast the light of a projector with evenly spaced rings."""

@@ -19,7 +19,7 @@ from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
-from .beam_profile import BeamProfile, beam_rays, cast_beam
+from .beam_profile import BeamProfile, cast_beam
 
 _AZIMUTHS = 360
 # From just inside each: rounding doesn't decide between two gaps, nor about the last.
@@ -31,13 +31,11 @@ class RingShares:
     """Shares of each ring's azimuth, in [0, 1], shape (n_rings,) each.
 
     Attributes:
-        drawn: On the panel; what lies beyond isn't projected.
         on_object: Lands on the object.
         on_target: Lands on its target.
         measured: Is lit, and a camera measures it with this projector.
     """
 
-    drawn: NDArray[np.float64]
     on_object: NDArray[np.float64]
     on_target: NDArray[np.float64]
     measured: NDArray[np.float64]
@@ -61,10 +59,7 @@ def ring_shares(
     """
     scene.check_cancelled()
     profile = cast_beam(scene, projector, _INSIDE * projector.ring_radii, _AZIMUTHS)
-    origins, rays = beam_rays(projector, profile.coordinates, profile.azimuths)
-    drawn = lighting.in_panel(projector, origins + rays)
     return RingShares(
-        drawn.reshape(profile.lit.shape).mean(axis=1),
         profile.on_object.mean(axis=1),
         (profile.on_object & profile.target).mean(axis=1),
         _measured(scene, projector, cameras, profile).mean(axis=1),

@@ -232,7 +232,7 @@ def _reconstruct(
 
 def _prediction(plan: RigPlan, audit: Audit, threads: int) -> PredictedSamples:
     """What the audit recomputed, by the plan's limits and at the physical floors."""
-    from planning.verify.audit.coverage.floors import possible_at_floors
+    from planning.verify.audit.coverage.prediction import possible_at_floors
     from planning.verify.reconstruction.check.comparison import PredictedSamples
 
     samples = audit.samples

@@ -19,13 +19,13 @@ from planning.rig.wishes import Wishes
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
-from planning.verify.audit.audit_samples import AuditSamples, draw_samples
+from planning.verify.audit.audit_case import examine
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.counts.overlap_claims import audit_overlaps, light_falls
 from planning.verify.audit.counts.schedule_claims import audit_schedule
-from planning.verify.audit.estimates import Estimator
-from planning.verify.audit.ledger import Ledger
+from planning.verify.audit.predicates.audit_devices import AuditProjector
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import AuditProjector
 
 # A panel of 0.4 m a side.
 WIDE = ParallelModel((2000, 2000), 2e-4, (0.8, 1.2))
@@ -181,20 +181,14 @@ def plan(request, handmade) -> RigPlan:
 @pytest.fixture(scope="module")
 def failures(plan):
     """What the audit of these two claims says of a document."""
-    shadow = Shadow(plan.surface.mesh, threads=2)
-    samples = draw_samples(plan.surface, "dominant", 20_000, 0)
-    areas = (
-        plan.to_document()["coverage"][part]["area_m2"]
-        for part in ("surface", "target")
-    )
-    estimator = Estimator(samples, plan.to_document()["coverage"]["samples"], *areas)
+    case = examine(plan, seed=0, n_samples=20_000, threads=2)
 
     def failures_of(document):
-        told = RigPlan.from_document(document, plan.surface)
-        ledger = Ledger(told.to_document())
-        audit_overlaps(told, shadow, estimator, ledger)
-        audit_schedule(told, ledger)
-        return ledger.failures
+        findings = AuditFindings()
+        changed = RigPlan.from_document(document, plan.surface)
+        audit_overlaps(replace(case, plan=changed), findings)
+        audit_schedule(replace(case, plan=changed), findings)
+        return findings.failures
 
     return failures_of
 
@@ -238,7 +232,7 @@ def _together_and_nothing_shared(document):
             lambda d: d["overlaps"].append(d["overlaps"][0]),
             "must name each of the 1 pairs",
         ),
-        (lambda d: d.pop("firing_schedule"), "None must name each of P1, P2 exactly"),
+        (lambda d: d.pop("firing_schedule"), "firing_schedule: is missing"),
         (
             lambda d: d["firing_schedule"].update(groups=[["P1"], []]),
             "must name each of P1, P2 exactly once",
@@ -249,7 +243,7 @@ def _together_and_nothing_shared(document):
         ),
         (
             lambda d: d["firing_schedule"].update(clique=["P1"]),
-            "proof: 'clique' doesn't prove that 2.0 groups are needed",
+            "proof: 'clique' doesn't prove that 2 groups are needed",
         ),
         (
             lambda d: d["firing_schedule"].update(clique=["P1", "P7"]),

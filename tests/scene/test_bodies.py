@@ -48,13 +48,12 @@ from planning.scene.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import bodies_of
 from planning.scene.scene import Scene
 from planning.verify.audit.audit_samples import AuditSamples
+from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.blocks import Block, block_of
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
     PROJECTOR_BODY,
-    AuditCamera,
-    AuditProjector,
     light_steps,
     sight_steps,
 )

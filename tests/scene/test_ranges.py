@@ -1,6 +1,7 @@
 """Ranges by least squares: points, their sphere, and what isn't known of it."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,9 @@ from planning.rig.range_guard import guarded
 from planning.rig.rig import load_rig
 from planning.scene.ranges.range_file import read_range_file
 from planning.scene.ranges.ranged_body import read_ranges
+from planning.verify.audit.audit_case import examine
+from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.baselines.range_claims import audit_ranges
-from planning.verify.audit.ledger import Ledger
 
 HEADER = "point,x_mm,y_mm,z_mm,dx,dy,dz,sigma_deg"
 RANGED = HEADER + ",range_mm,sigma_mm"
@@ -457,9 +459,15 @@ def test_d_max_of_a_row_is_that_of_the_incidence_as_stated(plan, body):
 
 
 def audited(plan, document):
-    ledger = Ledger(document)
-    audit_ranges(RigPlan.from_document(document, plan.surface), ledger)
-    return ledger.failures
+    findings = AuditFindings()
+    changed = RigPlan.from_document(document, plan.surface)
+    audit_ranges(replace(_case(plan), plan=changed), findings)
+    return findings.failures
+
+
+@cache
+def _case(plan):
+    return examine(plan, seed=0, n_samples=100, threads=1)
 
 
 def test_the_audit_finds_nothing_in_a_true_plan(plan):
@@ -496,7 +504,7 @@ SPOILED = {
     "projector.max_incidence": lambda r: r["stated"].update(
         {"projector.max_incidence": 1.1}
     ),
-    "broken": lambda r: r.pop("sphere"),
+    "broken": lambda r: r["stated"].pop("standoff_play_m"),
 }
 
 
@@ -524,9 +532,8 @@ def test_the_audit_finds_a_surface_that_is_not_the_sphere(plan):
     mesh = plan.surface.mesh
     grown = replace(mesh, vertices=mesh.vertices * 1.0001)
     other = RigPlan.from_document(plan.to_document(), replace(plan.surface, mesh=grown))
-    ledger = Ledger(other.to_document())
-    audit_ranges(other, ledger)
-    assert any("surface.npz" in failure for failure in ledger.failures)
+    failures = audited(other, other.to_document())
+    assert any("surface.npz" in failure for failure in failures)
 
 
 def test_a_plan_of_a_mesh_has_no_such_claims(plan):

@@ -31,7 +31,7 @@ from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
-from planning.verify.audit.devices.device_claims import outside_by
+from planning.verify.audit.devices.workspace_claims import outside_by
 from tests.support.written import requirements_of
 
 EFFORT = Effort(finest=4, budget=1e7, shadows=0.0, most_samples=500)

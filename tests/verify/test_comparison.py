@@ -9,8 +9,8 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from planning.verify.audit.audit_samples import AuditSamples
-from planning.verify.audit.coverage.floors import receding
-from planning.verify.audit.predicates.predicates import AuditCamera, AuditProjector
+from planning.verify.audit.coverage.prediction import receding
+from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.reconstruction.check.accuracy import Accuracy
 from planning.verify.reconstruction.check.comparison import (
     Confusion,

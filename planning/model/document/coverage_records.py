@@ -39,7 +39,6 @@ class Coverage(Part):
         unreachable_inside_m2: The part of it that lies inside the body.
         blocked_by_body_m2: Unmeasured target area that each device's body stands
             before; absent where no device has a body.
-        lost_to_rings_m2: Target area that even rings measure and these don't.
         relaxations: What would let projectors reach enough.
         unmeasurable_by_cause: Lit target area that no reference camera measures.
         camera_relaxations: What would let cameras reach enough.
@@ -52,7 +51,6 @@ class Coverage(Part):
     unreachable_by_cause: dict[str, float]
     unreachable_inside_m2: float = 0.0
     blocked_by_body_m2: dict[str, float] = Field(default={})
-    lost_to_rings_m2: float = 0.0
     relaxations: tuple[Relaxation, ...] = ()
     unmeasurable_by_cause: dict[str, float] = Field(default={})
     camera_relaxations: tuple[Relaxation, ...] = ()

@@ -16,7 +16,6 @@ class CreasesRecord(Part):
     """Creases that a projector lights: their length and what rings cut off them."""
 
     length_m: float
-    max_slope_jump: float
     max_error_m: float
 
 
@@ -27,27 +26,21 @@ class RingsRecord(Part):
         kept_even: Whether they stay even since others would lose measured samples.
         n_even: How many evenly spaced rings there were.
         gap_m: Least and largest gap on the object; None: no ring lands on it.
-        error_tolerance_m: Error between rings that is accepted.
-        over_tolerance: Share of the target that strays by more.
-        limits_cross: Share that would even with rings as fine as can be told apart.
+        over_tolerance: Share of chords between rings that err by more than the accuracy
+            that was asked for, or than the check's 95th percentile.
     """
 
     spacing: Literal["uniform", "curvature"]
     kept_even: bool
     n_even: int
     gap_m: Interval | None
-    error_tolerance_m: float
-    error_p99_m: float | None
-    error_p99_even_m: float | None
     over_tolerance: float
-    limits_cross: float
     creases: CreasesRecord
 
 
 class RingSharesRecord(Part):
     """What becomes of each ring: shares of its azimuth, one number a ring."""
 
-    drawn: tuple[float, ...]
     on_object: tuple[float, ...]
     on_target: tuple[float, ...]
     measured: tuple[float, ...]

@@ -142,7 +142,7 @@ def region_records(
     )
 
 
-def coverage_record(claims: Claims, lost_to_rings_m2: float) -> Coverage:
+def coverage_record(claims: Claims) -> Coverage:
     """Return the plan's `coverage`, without what would help."""
     coverage = Coverage(
         samples=len(claims.target_samples),
@@ -151,7 +151,6 @@ def coverage_record(claims: Claims, lost_to_rings_m2: float) -> Coverage:
         uncovered_by_cause=claims.uncovered_by_cause,
         unreachable_by_cause=claims.unreachable_by_cause,
         unreachable_inside_m2=claims.unreachable_inside_m2,
-        lost_to_rings_m2=lost_to_rings_m2,
     )
     if not claims.blocked_by_body_m2:
         return coverage

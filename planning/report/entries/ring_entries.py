@@ -10,10 +10,8 @@ from planning.model.document.device_records import (
     RingsRecord,
 )
 from planning.model.plan import RigPlan
-from planning.report.claims import Claims, Devices
-from planning.rings.ring_stage import RingStage
-from planning.scene.measured import lit_samples, measured_by
-from planning.scene.scene import Scene
+from planning.report.claims import Devices
+from planning.rings.ring_stage import RingStage, tolerance_m
 
 # As many of the chords between rings may err by more than was asked.
 _STRAY = 0.01
@@ -31,18 +29,6 @@ def evenly_ringed(devices: Devices, stage: RingStage | None) -> Devices:
     return replace(devices, projectors=projectors)
 
 
-def lost_to_rings_m2(
-    scene: Scene, devices: Devices, stage: RingStage | None, claims: Claims
-) -> float:
-    """Return the target area that even rings measure and those of the plan don't."""
-    even = evenly_ringed(devices, stage).projectors
-    target = claims.target_samples
-    unmeasured = np.flatnonzero(~claims.measured_by.any(axis=1))
-    rows = lit_samples(scene, even, target.take(unmeasured))
-    lost = int(measured_by(scene, devices.cameras, rows).any(axis=1).sum())
-    return target.samples.weight * lost
-
-
 def rings_lines(plan: RigPlan) -> list[str]:
     """Return the summary's lines on rings; none for plans that don't speak of them."""
     records = plan.document.projectors
@@ -51,11 +37,8 @@ def rings_lines(plan: RigPlan) -> list[str]:
         if record.ring_shares is None:
             return []
         lines.append(_line(record, record.ring_shares))
-    lines += [note for record in records for note in _notes(record)]
-    lost = plan.coverage.lost_to_rings_m2
-    if lost > 0.0:
-        share = 100.0 * lost / plan.coverage.target.area_m2
-        lines.append(f"{share:.2f} % of the target is measured by even rings only")
+    tolerance = tolerance_m(plan.requirements)
+    lines += [note for record in records for note in _notes(record, tolerance)]
     return [f"{'RINGS' if k == 0 else '':<9}{line}" for k, line in enumerate(lines)]
 
 
@@ -79,7 +62,7 @@ def _line(record: ProjectorRecord, shares: RingSharesRecord) -> str:
     )
 
 
-def _notes(record: ProjectorRecord) -> list[str]:
+def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:
     name, rings = record.id, record.rings
     if rings is None:
         return []
@@ -89,8 +72,8 @@ def _notes(record: ProjectorRecord) -> list[str]:
     if rings.over_tolerance > _STRAY:
         notes.append(
             f"{name}: between rings {100 * rings.over_tolerance:.1f} % of the "
-            f"target strays more than {_MM * rings.error_tolerance_m:g} mm from a "
-            f"straight line: {_remedy(rings)}"
+            f"target strays more than {_MM * tolerance_m:g} mm from a straight line: "
+            f"{_remedy(rings)}"
         )
     creases = rings.creases
     if creases.length_m > 0.0:
@@ -102,7 +85,7 @@ def _notes(record: ProjectorRecord) -> list[str]:
 
 
 def _remedy(rings: RingsRecord) -> str:
-    if rings.limits_cross <= _STRAY and rings.spacing == "uniform":
+    if rings.spacing == "uniform" and not rings.kept_even:
         return 'write spacing = "curvature" under [rings]'
     return (
         "finer rings can't be told apart; a longer focal length, more views, or a "

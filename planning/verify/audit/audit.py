@@ -11,39 +11,49 @@ from planning.model.surface import Surface
 from planning.verify.audit.baselines.baseline_claims import audit_baselines
 from planning.verify.audit.baselines.range_claims import audit_ranges
 from planning.verify.audit.counts.certificate_claims import audit_certificates
-from planning.verify.audit.counts.consistency import audit_consistency
+from planning.verify.audit.counts.derived_claims import audit_derived
 from planning.verify.audit.counts.overlap_claims import audit_overlaps
 from planning.verify.audit.counts.route_claims import audit_routes
 from planning.verify.audit.counts.schedule_claims import audit_schedule
-from planning.verify.audit.counts.table_claims import audit_marginal, audit_rest
-from planning.verify.audit.coverage.area_claims import (
-    audit_areas,
-    audit_causes,
-    audit_contributions,
-    recomputed_areas,
-)
+from planning.verify.audit.counts.table_claims import audit_tables
+from planning.verify.audit.coverage.area_claims import audit_areas, recomputed_areas
 from planning.verify.audit.coverage.group_claims import audit_groups
 from planning.verify.audit.coverage.inside_claims import audit_inside
 from planning.verify.audit.coverage.margin_claims import audit_margins
 from planning.verify.audit.coverage.region_claims import audit_regions
-from planning.verify.audit.devices.body_claims import audit_blocked, audit_bodies
-from planning.verify.audit.devices.device_claims import audit_devices, audit_workspace
+from planning.verify.audit.devices.body_claims import audit_bodies
+from planning.verify.audit.devices.device_claims import audit_devices
 from planning.verify.audit.devices.existing_claims import audit_existing
+from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
-from planning.verify.audit.predicates.blocks import audit_room
-from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.recompute import (
-    Reach,
-    Recomputed,
-    reach_of,
-    recompute,
-)
 from planning.verify.audit.rings.ring_claims import audit_rings
 
-from .audit_samples import AuditSamples, draw_samples
-from .estimates import Estimator
-from .ledger import Ledger, as_number
+from .audit_case import examine
+from .audit_findings import AuditFindings
+from .audit_samples import AuditSamples
 from .unmet import unmet_requirements
+
+_CLAIMS = (
+    audit_devices,
+    audit_workspace,
+    audit_zones,
+    audit_existing,
+    audit_ranges,
+    audit_bodies,
+    audit_areas,
+    audit_inside,
+    audit_margins,
+    audit_regions,
+    audit_tables,
+    audit_certificates,
+    audit_routes,
+    audit_baselines,
+    audit_groups,
+    audit_overlaps,
+    audit_schedule,
+    audit_rings,
+    audit_derived,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,85 +115,27 @@ def audit_plan(
     Raises:
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
-    _require_whole(plan)
-    ledger = Ledger(plan.to_document())
-    target = plan.requirements.target
-    samples = draw_samples(plan.surface, target, n_samples, seed)
-    shadow = Shadow(plan.surface.mesh, threads=threads)
-    own = recompute(plan, samples, shadow)
-    reach = reach_of(plan, own, shadow, seed)
-    estimator = _estimator(plan, samples, ledger)
-    audit_devices(plan, ledger)
-    audit_workspace(plan, ledger)
-    audit_zones(plan, ledger)
-    audit_existing(plan, ledger)
-    audit_ranges(plan, ledger)
-    audit_bodies(plan, ledger)
-    audit_room(plan, shadow, ledger)
-    audit_areas(own, reach, estimator, ledger)
-    audit_causes(own, reach, estimator, ledger)
-    audit_blocked(plan, own, estimator, ledger)
-    audit_inside(plan, own, reach, shadow, ledger, seed=seed)
-    audit_contributions(plan, own, estimator, ledger)
-    audit_margins(plan, own, shadow, ledger)
-    audit_regions(plan, own, estimator, shadow, ledger)
-    audit_marginal(own, estimator, ledger)
-    audit_certificates(plan, own, estimator, ledger)
-    audit_routes(ledger)
-    audit_baselines(plan, ledger)
-    audit_groups(plan, own, estimator.n_claimed, ledger)
-    audit_overlaps(plan, shadow, estimator, ledger)
-    audit_schedule(plan, ledger)
-    audit_rings(plan, own, shadow, estimator, ledger, seed=seed)
-    audit_consistency(plan, ledger)
-    audit_rest(plan, ledger)
-    return _result(plan, own, reach, estimator, ledger)
-
-
-def _result(
-    plan: RigPlan, own: Recomputed, reach: Reach, estimator: Estimator, ledger: Ledger
-) -> Audit:
-    return Audit(
-        failures=ledger.failures,
-        unmet=unmet_requirements(plan),
-        areas=recomputed_areas(own, reach, estimator),
-        samples=own.samples,
-        lit=own.lit,
-        predicted=own.measured,
-        predicted_by=own.measured_by,
-        reachable_by_projectors=reach.projectors,
-        reachable_by_cameras=reach.cameras,
-    )
-
-
-def _estimator(plan: RigPlan, samples: AuditSamples, ledger: Ledger) -> Estimator:
-    claimed = as_number(ledger.read("coverage", "samples"))
-    ledger.holds(
-        claimed is not None and claimed >= 1,
-        "coverage.samples",
-        f"{ledger.read('coverage', 'samples')!r} must be the number of samples",
-    )
-    areas = plan.surface.mesh.face_areas
-    inside = plan.surface.target_faces(plan.requirements.target)
-    return Estimator(
-        samples, int(claimed or 0), float(areas.sum()), float(areas[inside].sum())
-    )
-
-
-def _require_whole(plan: RigPlan) -> None:
-    """Refuse a plan whose parts can't be read, so that no claim of it has a meaning."""
-    try:
-        pattern = plan.requirements.pattern
-        _ = plan.projectors, plan.cameras
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    if plan.requirements.pattern != "rings":
         raise PlanFileError(
-            f"broken plan ({type(error).__name__}: {error}); plan again"
-        ) from None
-    if pattern != "rings":
-        raise PlanFileError(
-            f"requirements.pattern is {pattern!r}; only 'rings' can be audited"
+            f"requirements.pattern is {plan.requirements.pattern!r}; only 'rings' can "
+            f"be audited"
         )
     _require_shapes(plan.surface)
+    case = examine(plan, seed=seed, n_samples=n_samples, threads=threads)
+    findings = AuditFindings()
+    for audit_claims in _CLAIMS:
+        audit_claims(case, findings)
+    return Audit(
+        failures=findings.failures,
+        unmet=unmet_requirements(plan),
+        areas=recomputed_areas(case),
+        samples=case.samples,
+        lit=case.actual.lit,
+        predicted=case.actual.measured,
+        predicted_by=case.actual.measured_by,
+        reachable_by_projectors=case.reachable.projectors,
+        reachable_by_cameras=case.reachable.cameras,
+    )
 
 
 def _require_shapes(surface: Surface) -> None:

@@ -39,15 +39,7 @@ class AuditSamples:
 
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "AuditSamples":
         """Return some of the samples, each still standing for the same area."""
-        return AuditSamples(
-            self.points[chosen],
-            self.normals[chosen],
-            self.faces[chosen],
-            self.steep[chosen],
-            self.region[chosen],
-            self.in_target[chosen],
-            self.weights[chosen],
-        )
+        return AuditSamples(*(column[chosen] for column in vars(self).values()))
 
 
 def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSamples:
@@ -76,23 +68,36 @@ def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSampl
     whole = not areas[~inside].sum() > 0.0
     parts = [(inside, n)] if whole else [(inside, (n + 1) // 2), (~inside, n // 2)]
     drawn = [_draw(surface, mask, mask is inside, count, rng) for mask, count in parts]
+    columns = zip(*(vars(part).values() for part in drawn), strict=True)
+    return AuditSamples(*(np.concatenate(column) for column in columns))
+
+
+def samples_on(
+    surface: Surface,
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    in_target: NDArray[np.bool_],
+    weights: NDArray[np.float64] | None = None,
+) -> AuditSamples:
+    """Return samples at points (n, 3) of given faces; each of weight 1 by default."""
     return AuditSamples(
-        *(np.concatenate(columns) for columns in zip(*drawn, strict=True))
+        points,
+        surface.mesh.face_normals[faces],
+        faces.astype(np.int64),
+        np.asarray(surface.steep[faces], dtype=np.float64),
+        np.asarray(surface.region[faces], dtype=np.int64),
+        in_target,
+        np.ones(len(faces)) if weights is None else weights,
     )
 
 
 def samples_at_centroids(surface: Surface, within: NDArray[np.bool_]) -> AuditSamples:
     """Return one sample at the centroid of each chosen face, weighing its area."""
-    faces = np.flatnonzero(within & (surface.mesh.face_areas > 0.0))
-    return AuditSamples(
-        surface.mesh.face_centroids[faces],
-        surface.mesh.face_normals[faces],
-        faces,
-        np.asarray(surface.steep[faces], dtype=np.float64),
-        np.asarray(surface.region[faces], dtype=np.int64),
-        np.ones(len(faces), dtype=bool),
-        surface.mesh.face_areas[faces],
-    )
+    areas = surface.mesh.face_areas
+    faces = np.flatnonzero(within & (areas > 0.0))
+    every = np.ones(len(faces), dtype=bool)
+    centroids = surface.mesh.face_centroids[faces]
+    return samples_on(surface, centroids, faces, every, areas[faces])
 
 
 def _draw(
@@ -101,17 +106,11 @@ def _draw(
     in_target: bool,
     n: int,
     rng: np.random.Generator,
-) -> tuple[NDArray[np.generic], ...]:
+) -> AuditSamples:
     areas = np.where(within, surface.mesh.face_areas, 0.0)
     total = float(areas.sum())
     faces = rng.choice(len(areas), size=n, p=areas / total)
     shares = rng.dirichlet((1.0, 1.0, 1.0), size=n)
-    return (
-        np.einsum("nk,nkd->nd", shares, surface.mesh.corners[faces]),
-        surface.mesh.face_normals[faces],
-        faces.astype(np.int64),
-        np.asarray(surface.steep[faces], dtype=np.float64),
-        np.asarray(surface.region[faces], dtype=np.int64),
-        np.full(n, in_target),
-        np.full(n, total / n),
-    )
+    points = np.einsum("nk,nkd->nd", shares, surface.mesh.corners[faces])
+    inside, weights = np.full(n, in_target), np.full(n, total / n)
+    return samples_on(surface, points, faces, inside, weights)

@@ -5,12 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .audit_findings import AuditFindings
 from .audit_samples import AuditSamples
 
 # What is promised: 1 percentage point of the area that a claim is a share of.
 POINT = 0.01
+# Room for the rounding of written numbers, as a share.
+ROUNDING = 1e-6
 # A plan that states fewer samples than this earns no more tolerance for it.
 _FEWEST_SAMPLES = 2000
+_Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,19 +33,36 @@ class Estimator:
     area_m2: float
     target_m2: float
 
-    def area(self, chosen: NDArray[np.bool_]) -> float:
+    def wholes(self) -> dict[str, tuple[_Flags, float]]:
+        """Return the samples and the area of `surface` and `target`."""
+        return {
+            "surface": (np.ones(len(self.samples), dtype=bool), self.area_m2),
+            "target": (self.samples.in_target, self.target_m2),
+        }
+
+    def area(self, chosen: _Flags) -> float:
         """Return the area that the chosen samples stand for, in [m²]."""
         return float(self.samples.weights[chosen].sum())
 
-    def tolerance(
+    def audit(
         self,
-        chosen: NDArray[np.bool_],
-        whole_m2: float,
-        share_of_m2: float | None = None,
-    ) -> float:
+        key: str,
+        claimed: object,
+        chosen: _Flags,
+        findings: AuditFindings,
+        *,
+        part: str = "target",
+    ) -> None:
+        """Hold a claimed area of `target` or `surface` against the chosen samples."""
+        within, whole = self.wholes()[part]
+        chosen = chosen & within
+        tolerance = self.tolerance(chosen, whole)
+        findings.number(key, claimed, self.area(chosen), tolerance)
+
+    def tolerance(self, chosen: _Flags, whole_m2: float) -> float:
         """Return how far a claimed area may lie from the recomputed one, in [m²].
 
-        1 % of `share_of_m2`, plus three standard errors of the difference of two
+        1 % of the whole, plus three standard errors of the difference of two
         estimates: the audit's, summed over its two parts, and the plan's. A share p of
         n samples has the variance p (1 - p)/n; one success and one failure are added to
         each count, so that an estimate of 0 or 1 isn't taken for certain.
@@ -49,22 +70,18 @@ class Estimator:
         Args:
             chosen: Samples that make up the recomputed area, shape (n,).
             whole_m2: Area of the part that both sample, in [m²].
-            share_of_m2: What the claim is a share of; default `whole_m2`.
         """
-        share_of = whole_m2 if share_of_m2 is None else share_of_m2
-        variance = self._own_variance(chosen)
-        n = max(self.n_claimed, _FEWEST_SAMPLES)
-        if whole_m2 > 0.0:
-            p = (n * self.area(chosen) / whole_m2 + 1.0) / (n + 2.0)
-            variance += whole_m2**2 * max(p * (1.0 - p), 0.0) / n
-        return POINT * share_of + 3.0 * float(np.sqrt(variance))
-
-    def _own_variance(self, chosen: NDArray[np.bool_]) -> float:
         variance = 0.0
-        for part in (self.samples.in_target, ~self.samples.in_target):
-            n = int(part.sum())
-            if n == 0 or not np.any(chosen & part):
-                continue
-            p = (float((chosen & part).sum()) + 1.0) / (n + 2.0)
-            variance += float(self.samples.weights[part].sum()) ** 2 * p * (1.0 - p) / n
-        return variance
+        for within in (self.samples.in_target, ~self.samples.in_target):
+            if np.any(chosen & within):
+                n, k = int(within.sum()), int((chosen & within).sum())
+                variance += self.area(within) ** 2 * _variance(k / n, n)
+        if whole_m2 > 0.0:
+            n = max(self.n_claimed, _FEWEST_SAMPLES)
+            variance += whole_m2**2 * _variance(self.area(chosen) / whole_m2, n)
+        return POINT * whole_m2 + 3.0 * float(np.sqrt(variance))
+
+
+def _variance(share: float, n: int) -> float:
+    p = (n * share + 1.0) / (n + 2.0)
+    return max(p * (1.0 - p), 0.0) / n

@@ -2,8 +2,6 @@
 
 from planning.model.plan import RigPlan
 
-from .ledger import as_number
-
 
 def unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
     """Return one sentence for each requirement on the target that isn't met.
@@ -13,33 +11,20 @@ def unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
     >= min_reachable x lit. Read from the claims, which the audit holds against its own
     figures apart.
     """
-    limits = plan.requirements
-    target = plan.to_document()["coverage"].get("target")
-    areas = target if isinstance(target, dict) else {}
+    limits, areas = plan.requirements, plan.coverage.target
+    by_projectors = ("reachable_by_projectors_m2", areas.reachable_by_projectors_m2)
+    by_cameras = ("reachable_by_cameras_m2", areas.reachable_by_cameras_m2)
+    lit, measured = ("lit_m2", areas.lit_m2), ("measured_m2", areas.measured_m2)
+    whole = ("area_m2", areas.area_m2)
     rules = (
-        (
-            "min_reachable",
-            "reachable_by_projectors_m2",
-            limits.min_reachable,
-            "area_m2",
-        ),
-        (
-            "dominant_coverage",
-            "lit_m2",
-            limits.dominant_coverage,
-            "reachable_by_projectors_m2",
-        ),
-        ("coverage", "measured_m2", limits.coverage, "reachable_by_cameras_m2"),
-        ("min_reachable", "reachable_by_cameras_m2", limits.min_reachable, "lit_m2"),
+        ("min_reachable", by_projectors, limits.min_reachable, whole),
+        ("dominant_coverage", lit, limits.dominant_coverage, by_projectors),
+        ("coverage", measured, limits.coverage, by_cameras),
+        ("min_reachable", by_cameras, limits.min_reachable, lit),
     )
-    sentences: list[str] = []
-    for name, part, share, whole in rules:
-        have, of = as_number(areas.get(part)), as_number(areas.get(whole))
-        if have is None or of is None:
-            continue
-        if not (of > 0.0 and have >= share * of * (1.0 - 1e-9)):
-            sentences.append(
-                f"requirements.{name}: {part} {have:.6g} m² is less than "
-                f"{share:g} x {whole} = {share * of:.6g} m²"
-            )
-    return tuple(sentences)
+    return tuple(
+        f"requirements.{name}: {part} {area:.6g} m² is less than {share:g} x {of} = "
+        f"{share * total:.6g} m²"
+        for name, (part, area), share, (of, total) in rules
+        if not (total > 0.0 and area >= share * total * (1.0 - 1e-9))
+    )

@@ -13,18 +13,17 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from planning.model.requirements import ProjectorLimits
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
-from planning.verify.audit.predicates.audit_optics import (
-    pixel_gradient,
-    ring_coordinate,
-    ring_gradient,
+from planning.verify.audit.predicates.audit_devices import (
+    AuditProjector,
+    light_from,
 )
+from planning.verify.audit.predicates.audit_optics import pixel_gradient
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     LIGHT_CAUSES,
     LIT,
     PAIR_CAUSES,
     SIGHT_CAUSES,
-    AuditProjector,
     light_steps,
 )
 from planning.verify.audit.predicates.recompute import recompute
@@ -122,18 +121,17 @@ def test_pixel_gradient_is_the_transposed_ray_derivative():
 
 def test_ring_gradient_is_the_slope_of_the_ring_coordinate():
     points = np.array([[0.1, -0.2, 0.9], [-0.03, 0.01, 1.2]])
-    for diverging in (True, False):
-        numeric = np.column_stack(
-            [
-                (
-                    ring_coordinate(points + 1e-6 * e, diverging)
-                    - ring_coordinate(points - 1e-6 * e, diverging)
-                )
-                / 2e-6
-                for e in np.eye(3)
-            ]
+    for device in (
+        PinholeModel(np.eye(3), (4, 3), (0.1, 2.0)),
+        ParallelModel((4, 3), 1e-3, (0.0, 2.0)),
+    ):
+        light = light_from(device, np.eye(4))
+        after, before = (
+            np.column_stack([light.coordinate(points + step) for step in steps])
+            for steps in (1e-6 * np.eye(3), -1e-6 * np.eye(3))
         )
-        np.testing.assert_allclose(ring_gradient(points, diverging), numeric, atol=1e-8)
+        numeric = (after - before) / 2e-6
+        np.testing.assert_allclose(light.gradient(points), numeric, atol=1e-8)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
@@ -220,8 +218,13 @@ def test_draws_are_uniform_and_split_between_target_and_rest(handmade):
     assert np.abs(off).max() < 1e-15
 
 
-def test_the_audit_imports_nothing_of_the_maker():
+def test_the_audit_imports_nothing_of_the_planner():
     allowed = {
+        "planning.model.document.baseline_records",
+        "planning.model.document.certificates",
+        "planning.model.document.coverage_records",
+        "planning.model.document.device_records",
+        "planning.model.document.range_records",
         "planning.model.planned",
         "planning.model.plan",
         "planning.model.requirements",

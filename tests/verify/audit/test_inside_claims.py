@@ -11,14 +11,16 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 from geometry.repair.hollow import MeshShell, measure_shell
 from geometry.shapes.primitives import sphere
+from planning.model.document.coverage_records import Coverage
+from planning.model.document.input_records import MeshRecord
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
 from planning.report.entries.device_entries import mesh_record
 from planning.report.summary.shortfall import shortfalls
 from planning.report.summary.summary import shell_line
+from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import draw_samples
 from planning.verify.audit.coverage.inside_claims import audit_inside
-from planning.verify.audit.ledger import Ledger
 from planning.verify.audit.predicates.occlusion import Shadow
 
 OUTER, INNER = sphere(0.1, subdivisions=3), sphere(0.096, subdivisions=3)
@@ -38,19 +40,28 @@ def surface(mesh: TriangleMesh) -> Surface:
 
 
 def found(mesh: TriangleMesh, document: dict[str, Any]) -> tuple[str, ...]:
-    plan: Any = SimpleNamespace(
-        document=document,
-        surface=surface(mesh),
-        requirements=SimpleNamespace(target="dominant"),
-    )
-    samples = draw_samples(plan.surface, "dominant", 20_000, 0)
+    samples = draw_samples(surface(mesh), "dominant", 20_000, 0)
     # Projectors reach the outer wall alone.
     reached = np.linalg.norm(samples.points, axis=1) > 0.0975
-    own: Any = SimpleNamespace(samples=samples)
-    reach: Any = SimpleNamespace(projectors=reached)
-    ledger = Ledger(document)
-    audit_inside(plan, own, reach, Shadow(mesh, threads=2), ledger, seed=0)
-    return ledger.failures
+    areas = {
+        "area_m2": mesh.area,
+        "target_m2": samples.weights[samples.in_target].sum(),
+    }
+    meshes = [MeshRecord.model_validate(entry) for entry in document["meshes"]]
+    coverage = Coverage.model_construct(**document["coverage"])
+    case: Any = SimpleNamespace(
+        plan=SimpleNamespace(
+            coverage=coverage, document=SimpleNamespace(meshes=meshes)
+        ),
+        samples=samples,
+        reachable=SimpleNamespace(projectors=reached),
+        estimator=SimpleNamespace(**areas),
+        shadow=Shadow(mesh, threads=2),
+        seed=0,
+    )
+    findings = AuditFindings()
+    audit_inside(case, findings)
+    return findings.failures
 
 
 @cache
@@ -90,7 +101,7 @@ def test_one_claim_alone_is_not_enough() -> None:
     document = claims(HOLLOW, INNER.area, dark_area())
     del document["meshes"][0]["shell"]
     (one,) = found(HOLLOW, document)
-    assert one.startswith("meshes.0.shell.inside_m2: None is claimed")
+    assert one.startswith("meshes.0.shell.inside_m2: claimed 0")
 
 
 def test_the_shell_is_told_with_wall_and_share() -> None:

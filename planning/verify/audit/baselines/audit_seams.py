@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.document.baseline_records import BaselineRow
 from planning.model.planned import PlannedCamera
 from planning.verify.audit.predicates.audit_optics import in_image, pixels_of
 
@@ -16,10 +16,12 @@ _STEPS = 2000
 _HALVINGS = 40
 # How near E a face must lie to lend its normal, as a share of the object's radius.
 _BESIDE = 0.15
+# Room for directions written with a few digits.
+_WRITTEN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class SeamPlane:
     """The plane through O1, E and O2; angles count from camera 1's side to camera 2's.
 
     With u_i from E to O_i, and axes and normals projected into the plane::
@@ -37,15 +39,14 @@ class Section:
         camera2: Second camera, which could stand farther away.
         meeting: E, shape (3,) [m].
         normals: Normals at E on camera 1's and on camera 2's side, shape (2, 3).
-        onward: Along the surface from camera 1's stretch into camera 2's, shape (3,);
-            None: turning leads from O1 to O2 the short way.
+        onward: Along the surface from camera 1's stretch into camera 2's, shape (3,).
     """
 
     camera1: PlannedCamera
     camera2: PlannedCamera
     meeting: NDArray[np.float64]
     normals: NDArray[np.float64]
-    onward: NDArray[np.float64] | None = None
+    onward: NDArray[np.float64]
 
     @property
     def to_first(self) -> NDArray[np.float64]:
@@ -62,8 +63,6 @@ class Section:
         """Unit normal of the plane; turning about it leads N1 towards onward, (3,)."""
         pole = np.cross(self.to_first, self.to_second)
         pole = pole / np.linalg.norm(pole)
-        if self.onward is None:
-            return pole
         return pole if np.cross(self.normals[0], self.onward) @ pole >= 0.0 else -pole
 
     @property
@@ -141,6 +140,18 @@ class Section:
         return _room(self.camera2, self.to_second, self.pole)
 
 
+def section_of(row: BaselineRow, cameras: Mapping[str, PlannedCamera]) -> SeamPlane:
+    """Return the plane that a row of `baselines` speaks of."""
+    one, two = row.cameras
+    return SeamPlane(
+        cameras[one],
+        cameras[two],
+        np.array(row.E),
+        np.array(row.normals),
+        np.array(row.onward),
+    )
+
+
 def _room(
     camera: PlannedCamera, to_centre: NDArray[np.float64], pole: NDArray[np.float64]
 ) -> float:
@@ -183,60 +194,32 @@ def _inside(
     return inside
 
 
-def normals_of_row(
-    row: Mapping[str, Any], meeting: NDArray[np.float64], mesh: TriangleMesh
-) -> NDArray[np.float64] | None:
-    """Return the normals that meet at E, shape (2, 3); None if they are strange.
-
-    The row names them, camera 1's side first; both must be those of faces beside E.
-    Where it names none the nearest face serves for both.
-    """
+def are_normals(
+    normals: NDArray[np.float64], meeting: NDArray[np.float64], mesh: TriangleMesh
+) -> bool:
+    """Return whether both normals (2, 3) are those of faces beside E."""
     apart = np.linalg.norm(mesh.face_centroids - meeting, axis=1)
-    if row.get("normals") is None:
-        return np.tile(mesh.face_normals[np.argmin(apart)], (2, 1))
-    normals = _vectors(row["normals"], (2, 3))
-    if normals is None:
-        return None
-    reach = np.linalg.norm(mesh.corners - mesh.face_centroids[:, None], axis=2).max(
-        axis=1
+    beside = mesh.face_normals[apart <= _reach(mesh) + _BESIDE * mesh.radius]
+    return all(
+        np.any(np.abs(beside - normal).max(axis=1) <= _WRITTEN) for normal in normals
     )
-    beside = mesh.face_normals[apart <= reach + _BESIDE * mesh.radius]
-    for normal in normals:
-        if not np.any(np.abs(beside - normal).max(axis=1) <= 1e-3):
-            return None
-    return normals
 
 
-def onward_of_row(
-    row: Mapping[str, Any], section: Section
-) -> NDArray[np.float64] | None:
-    """Return the row's direction along the surface; None if it isn't one.
+def is_onward(section: SeamPlane) -> bool:
+    """Return whether a section's `onward` runs along the surface.
 
     It must be a unit vector in the plane O1, E, O2, square to the projection of N1.
     """
-    onward = _vectors(row.get("onward"), (3,))
-    if onward is None:
-        return None
-    out = section.normals[0] - (section.normals[0] @ section.pole) * section.pole
-    size = float(np.linalg.norm(out))
-    square = max(abs(onward @ section.pole), abs(onward @ out) / max(size, 1e-9))
-    return onward if abs(np.linalg.norm(onward) - 1.0) <= 1e-3 >= square else None
-
-
-def _vectors(value: object, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
-    try:
-        vectors = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        return None
-    return vectors if vectors.shape == shape and np.isfinite(vectors).all() else None
+    onward, first = section.onward, section.normals[0]
+    out = first - (first @ section.pole) * section.pole
+    size = max(float(np.linalg.norm(out)), 1e-9)
+    square = max(abs(onward @ section.pole), abs(onward @ out) / size)
+    return bool(abs(np.linalg.norm(onward) - 1.0) <= _WRITTEN >= square)
 
 
 def distance_to_surface(mesh: TriangleMesh, point: NDArray[np.float64]) -> float:
     """Return the distance of a point from the faces in [m], infinite if over 1 mm."""
-    reach = np.linalg.norm(mesh.corners - mesh.face_centroids[:, None], axis=2).max(
-        axis=1
-    )
-    near = np.linalg.norm(mesh.face_centroids - point, axis=1) <= reach + 1e-3
+    near = np.linalg.norm(mesh.face_centroids - point, axis=1) <= _reach(mesh) + 1e-3
     corners = mesh.corners[near]
     if len(corners) == 0:
         return np.inf
@@ -252,3 +235,9 @@ def distance_to_surface(mesh: TriangleMesh, point: NDArray[np.float64]) -> float
     height = np.abs(((point - corners[:, 0]) * normals).sum(axis=1))
     best = np.where(above & np.any(normals != 0.0, axis=1), height, edges)
     return float(best.min())
+
+
+def _reach(mesh: TriangleMesh) -> NDArray[np.float64]:
+    """Largest distance of each face's corners from its centroid [m]."""
+    arms = mesh.corners - mesh.face_centroids[:, None]
+    return np.linalg.norm(arms, axis=2).max(axis=1)

@@ -1,303 +1,281 @@
 """Claims of the certificates: counts, bounds and what the plan itself refutes."""
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import RigPlan
+from planning.model.document.certificates import Certificate
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.verify.audit.coverage.area_claims import ROUNDING
-from planning.verify.audit.devices.existing_claims import droppable
-from planning.verify.audit.estimates import POINT, Estimator
-from planning.verify.audit.ledger import Ledger, as_number, entries, square_centimetres
-from planning.verify.audit.predicates.recompute import Recomputed
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
+from planning.verify.audit.estimates import POINT, ROUNDING
 
-from .count_claims import FEWEST_ROWS, audit_counts
+from .table_claims import marginal_of
 
-_STATUSES = ("optimal", "feasible", "infeasible")
+# Covers are chosen on fewer samples than areas are claimed from.
+_FEWEST_SAMPLES = 1000
 
 
-def audit_certificates(
-    plan: RigPlan, own: Recomputed, estimator: Estimator, ledger: Ledger
-) -> None:
+@dataclass(frozen=True, eq=False)
+class _Proof:
+    """A certificate with what the audit knows of it; areas are of the target.
+
+    Attributes:
+        kind: `projectors` or `cameras`.
+        claims: The certificate.
+        devices: Of the plan.
+        covers: Whether each device covers each sample of the target, (n_d, n).
+        reachable_m2: Claimed reachable area.
+        share: Of it that must be covered.
+        n_poses: Reference poses.
+        slack_m2: Tolerance of the area that the plan covers.
+    """
+
+    kind: str
+    claims: Certificate
+    devices: Sequence[PlannedProjector] | Sequence[PlannedCamera]
+    covers: NDArray[np.bool_]
+    reachable_m2: float
+    share: float
+    n_poses: int
+    slack_m2: float
+
+    @property
+    def key(self) -> str:
+        """Where the certificate stands."""
+        return f"certificates.{self.kind}"
+
+    @property
+    def count(self) -> int:
+        """Number of devices of the plan."""
+        return len(self.devices)
+
+
+def audit_certificates(case: AuditCase, findings: AuditFindings) -> None:
     """Check counts, bounds and statuses, and that the plan doesn't refute them."""
-    limits = plan.requirements
-    poses = {
-        "projectors": plan.surface.reference_projectors,
-        "cameras": plan.surface.reference_cameras,
-    }
-    for kind, devices, share, of, covers, area in (
+    proofs, limits = case.plan.document.certificates, case.plan.requirements
+    areas, surface = case.plan.coverage.target, case.plan.surface
+    target, estimator = case.samples.in_target, case.estimator
+    for kind, claims, devices, covers, reachable, share, poses in (
         (
             "projectors",
-            plan.projectors,
+            proofs.projectors,
+            case.plan.projectors,
+            case.actual.lit_by,
+            areas.reachable_by_projectors_m2,
             limits.dominant_coverage,
-            "reachable_by_projectors_m2",
-            own.lit_by,
-            own.lit,
+            surface.reference_projectors,
         ),
         (
             "cameras",
-            plan.cameras,
+            proofs.cameras,
+            case.plan.cameras,
+            case.actual.measured_by,
+            areas.reachable_by_cameras_m2,
             limits.coverage,
-            "reachable_by_cameras_m2",
-            own.measured_by,
-            own.measured,
+            surface.reference_cameras,
         ),
     ):
-        key = f"certificates.{kind}"
-        claims = ledger.read("certificates", kind)
-        if not ledger.holds(isinstance(claims, dict), key, "is missing"):
-            continue
-        ledger.number(f"{key}.count", claims.get("count"), float(len(covers)), 0.0, "")
-        _audit_bounds(key, claims, len(covers), ledger)
-        reachable = as_number(ledger.read("coverage", "target", of)) or 0.0
-        slack = estimator.tolerance(area & own.samples.in_target, estimator.target_m2)
-        _audit_candidates(key, claims, len(poses[kind]), ledger)
-        _audit_needed(key, claims, len(covers), ledger)
-        _audit_continuous(key, claims, ledger)
-        _audit_best_area(key, claims, reachable, estimator.target_m2, ledger)
-        _audit_one_fewer(key, claims, len(covers), slack, ledger)
-        audit_counts(key, claims, kind, estimator.target_m2, ledger)
-        _audit_bodies(key, claims, devices, ledger)
-        ledger.number(
-            f"{key}.required_m2", claims.get("required_m2"), share * reachable, slack
+        covers = covers & target
+        slack = estimator.tolerance(np.any(covers, axis=0), estimator.target_m2)
+        proof = _Proof(
+            kind, claims, devices, covers, reachable, share, len(poses), slack
         )
-        required = as_number(claims.get("required_m2"))
-        bound = _best_bound(claims)
-        if required is not None and bound is not None:
-            target = own.samples.in_target
-            spare = droppable(devices)
-            _audit_refuted(
-                key, covers & target, spare, bound, required + slack, estimator, ledger
-            )
+        _audit_counts(proof, findings)
+        _audit_continuous(proof, findings)
+        _audit_areas(proof, case, findings)
+        _audit_bodies(proof, findings)
+        _audit_refuted(proof, case, findings)
 
 
-def _audit_bounds(key: str, claims: dict[str, Any], count: int, ledger: Ledger) -> None:
-    status = claims.get("status")
-    ledger.holds(
-        status in _STATUSES, f"{key}.status", f"{status!r} isn't one of {_STATUSES}"
-    )
-    met = status != "infeasible"
-    for scope in ("candidates", "continuous"):
-        table = claims.get(scope)
-        if table is None and scope == "continuous":
-            continue
-        bound = as_number(table.get("lower_bound")) if isinstance(table, dict) else None
+def _audit_counts(proof: _Proof, findings: AuditFindings) -> None:
+    """Check count, bounds, status and what is needed against each other."""
+    key, claims, count = proof.key, proof.claims, proof.count
+    bound, needed = claims.candidates.lower_bound, claims.needed
+    # A proof over fewer candidates than the reference poses proves less.
+    offered = claims.candidates.n_candidates
+    name = f"{key}.candidates.n_candidates"
+    findings.number(f"{key}.count", claims.count, count, 0.0, "")
+    findings.number(name, offered, proof.n_poses, 0.0, "poses")
+    met = claims.status != "infeasible"
+    most = f"exceeds the count of {count}"
+    scopes = {"candidates": bound}
+    if claims.continuous is not None:
+        scopes["continuous"] = claims.continuous.lower_bound
+    for scope, least in scopes.items():
         name = f"{key}.{scope}.lower_bound"
-        if bound is None:
-            ledger.fail(name, "is missing")
-            continue
-        ledger.holds(bound >= 0, name, f"{bound:g} is negative")
-        if met:
-            ledger.holds(
-                bound <= count, name, f"{bound:g} exceeds the count of {count}"
-            )
-    best = _best_bound(claims)
-    if status == "optimal" and best is not None:
-        ledger.holds(
-            best == count,
-            f"{key}.status",
-            f"optimal is claimed, but {count} devices stand against a bound of "
-            f"{best:g}",
-        )
-
-
-def _audit_candidates(
-    key: str, claims: dict[str, Any], n_poses: int, ledger: Ledger
-) -> None:
-    """The candidates are the reference poses: a proof over fewer proves less."""
-    table = claims.get("candidates")
-    if isinstance(table, dict):
-        ledger.number(
-            f"{key}.candidates.n_candidates",
-            table.get("n_candidates"),
-            float(n_poses),
-            0.0,
-            "poses",
-        )
-
-
-def _audit_needed(key: str, claims: dict[str, Any], count: int, ledger: Ledger) -> None:
-    needed = claims.get("needed")
-    if not isinstance(needed, dict):
-        return
-    number = as_number(needed.get("count"))
-    bound = as_number(needed.get("lower_bound"))
-    if not ledger.holds(
-        number is not None and bound is not None,
-        f"{key}.needed",
-        f"{needed!r} must hold count and lower_bound",
-    ):
-        return
-    assert number is not None
-    assert bound is not None
-    met = claims.get("status") != "infeasible"
-    ledger.holds(
-        number == count if met else number >= count,
+        findings.holds(least >= 0, name, f"{least} is negative")
+        findings.holds(least <= count or not met, name, f"{least} {most}")
+    findings.holds(
+        claims.status != "optimal" or bound == count,
+        f"{key}.status",
+        f"optimal is claimed, but {count} devices stand against a bound of {bound}",
+    )
+    findings.holds(
+        needed.count == count if met else needed.count >= count,
         f"{key}.needed.count",
-        f"{number:g} is claimed for a plan of {count} that is {claims.get('status')!r}",
+        f"{needed.count} is claimed for a plan of {count} that is {claims.status!r}",
     )
-    ledger.holds(
-        bound <= number,
+    findings.holds(
+        needed.lower_bound <= needed.count,
         f"{key}.needed.lower_bound",
-        f"{bound:g} exceeds the count of {number:g}",
+        f"{needed.lower_bound} exceeds the count of {needed.count}",
     )
 
 
-def _audit_continuous(key: str, claims: dict[str, Any], ledger: Ledger) -> None:
+def _audit_continuous(proof: _Proof, findings: AuditFindings) -> None:
     """What holds for all poses holds for the candidates too, on equal samples."""
-    table, needed = claims.get("continuous"), claims.get("needed")
-    if not (isinstance(table, dict) and isinstance(needed, dict)):
+    claims, table = proof.claims, proof.claims.continuous
+    if table is None:
         return
-    same = table.get("n_samples", claims.get("n_samples")) == claims.get("n_samples")
-    everywhere = as_number(table.get("lower_bound"))
-    here = as_number(needed.get("lower_bound" if same else "count"))
-    if everywhere is not None and here is not None:
-        ledger.holds(
-            everywhere <= here,
-            f"{key}.continuous.lower_bound",
-            f"{everywhere:g} is claimed over all poses, but only {here:g} over the "
-            f"candidates, which are some of them",
-        )
-    if same:
-        _audit_fewer_anywhere(key, claims, table, ledger)
-
-
-def _audit_fewer_anywhere(
-    key: str, claims: dict[str, Any], table: dict[str, Any], ledger: Ledger
-) -> None:
-    """What one fewer covers anywhere at most, no candidates exceed."""
-    upper = as_number(table.get("one_fewer_upper_bound_m2"))
-    needed = as_number(claims["needed"].get("count"))
-    if upper is None or needed is None:
+    same = table.n_samples == claims.n_samples
+    here = claims.needed.lower_bound if same else claims.needed.count
+    findings.holds(
+        table.lower_bound <= here,
+        f"{proof.key}.continuous.lower_bound",
+        f"{table.lower_bound} is claimed over all poses, but only {here} over the "
+        f"candidates, which are some of them",
+    )
+    upper, fewer = table.one_fewer_upper_bound_m2, claims.needed.count - 1
+    if upper is None or not same:
         return
-    for row in entries(claims.get("by_count")):
-        value = as_number(row.get("value_m2"))
-        if row.get("count") != needed - 1 or value is None:
-            continue
-        ledger.holds(
-            value <= upper * (1.0 + ROUNDING),
-            f"{key}.continuous.one_fewer_upper_bound_m2",
-            f"{square_centimetres(upper)} is claimed over all poses, but "
-            f"{needed - 1:g} of the candidates cover {square_centimetres(value)}",
+    for entry in claims.by_count:
+        findings.holds(
+            entry.count != fewer or entry.value_m2 <= upper * (1.0 + ROUNDING),
+            f"{proof.key}.continuous.one_fewer_upper_bound_m2",
+            f"{square_centimetres(upper)} is claimed over all poses, but {fewer} of "
+            f"the candidates cover {square_centimetres(entry.value_m2)}",
         )
 
 
-def _audit_best_area(
-    key: str,
-    claims: dict[str, Any],
-    reachable: float,
-    whole: float,
-    ledger: Ledger,
-) -> None:
-    """value_m2 <= upper_bound_m2 <= what can be reached at all, as far as sampled."""
-    area = claims.get("best_area")
-    if not isinstance(area, dict):
-        return
-    value = as_number(area.get("value_m2"))
-    upper = as_number(area.get("upper_bound_m2"))
-    name = f"{key}.best_area"
-    if value is None or upper is None:
-        ledger.fail(name, f"{area!r} must hold value_m2 and upper_bound_m2")
-        return
-    ledger.holds(
-        0.0 <= value <= upper * (1.0 + ROUNDING),
+def _audit_areas(proof: _Proof, case: AuditCase, findings: AuditFindings) -> None:
+    """Check required_m2, best_area, one_fewer, by_count and the marginal table.
+
+    What a number of candidates covers at most bounds what they were found to cover,
+    and, but for sampling, what the marginal table says of as many: its entries for
+    other counts than the plan's speak of candidates, too.
+    """
+    key, claims, whole = proof.key, proof.claims, case.estimator.target_m2
+    required = proof.share * proof.reachable_m2
+    slack = proof.slack_m2
+    findings.number(f"{key}.required_m2", claims.required_m2, required, slack)
+    most = {entry.count: entry.upper_bound_m2 for entry in claims.by_count}
+    best, fewer, count = claims.best_area, claims.one_fewer, claims.count
+    for name, value, upper in (
+        ("best_area", best.value_m2, best.upper_bound_m2),
+        *(
+            (f"by_count: for {e.count}", e.value_m2, e.upper_bound_m2)
+            for e in claims.by_count
+        ),
+    ):
+        findings.holds(
+            0.0 <= value <= upper * (1.0 + ROUNDING),
+            f"{key}.{name}",
+            f"value_m2 {square_centimetres(value)} exceeds upper_bound_m2 "
+            f"{square_centimetres(upper)}",
+        )
+    name = f"{key}.best_area.upper_bound_m2"
+    room = _noise(proof, proof.reachable_m2, whole)
+    findings.holds(
+        best.upper_bound_m2 <= proof.reachable_m2 + room,
         name,
-        f"value_m2 {square_centimetres(value)} exceeds upper_bound_m2 "
-        f"{square_centimetres(upper)}",
+        f"{square_centimetres(best.upper_bound_m2)} exceeds the "
+        f"{square_centimetres(proof.reachable_m2)} that can be reached (tolerance "
+        f"{square_centimetres(room)})",
     )
-    n = max(as_number(claims.get("n_samples")) or 0.0, FEWEST_ROWS)
-    p = min(max(reachable / whole, 1.0 / n), 1.0 - 1.0 / n)
-    slack = whole * (POINT + 3.0 * float(np.sqrt(p * (1.0 - p) / n)))
-    ledger.holds(
-        upper <= reachable + slack,
-        f"{key}.best_area.upper_bound_m2",
-        f"{square_centimetres(upper)} exceeds the {square_centimetres(reachable)} "
-        f"that can be reached (tolerance {square_centimetres(slack)})",
-    )
+    if count in most:
+        findings.number(name, best.upper_bound_m2, most[count], ROUNDING * whole)
+    if fewer is not None:
+        _audit_one_fewer(
+            proof, fewer.upper_bound_m2, most.get(count - 1), whole, findings
+        )
+    for number, area in marginal_of(case.plan, proof.kind, "target"):
+        upper = most.get(number)
+        if upper is None or number == count:
+            continue
+        room = _noise(proof, upper, whole)
+        findings.holds(
+            area <= upper + room,
+            f"{key}.by_count",
+            f"at most {square_centimetres(upper)} are claimed for {number}, but "
+            f"marginal has {square_centimetres(area)} (tolerance "
+            f"{square_centimetres(room)})",
+        )
 
 
 def _audit_one_fewer(
-    key: str, claims: dict[str, Any], count: int, slack: float, ledger: Ledger
+    proof: _Proof,
+    upper: float,
+    listed: float | None,
+    whole: float,
+    findings: AuditFindings,
 ) -> None:
     """If no fewer devices suffice, the bound on one fewer must fall short too."""
-    table = claims.get("one_fewer")
-    if not isinstance(table, dict):
-        return
-    upper = as_number(table.get("upper_bound_m2"))
-    name = f"{key}.one_fewer.upper_bound_m2"
-    if upper is None or not upper >= 0.0:
-        ledger.fail(name, f"{table.get('upper_bound_m2')!r} must be an area")
-        return
-    required = as_number(claims.get("required_m2"))
-    if required is None or _best_bound(claims) != count:
-        return
-    ledger.holds(
-        upper <= required + slack,
+    name, claims = f"{proof.key}.one_fewer.upper_bound_m2", proof.claims
+    findings.holds(upper >= 0.0, name, f"{upper!r} must be an area")
+    if listed is not None:
+        findings.number(name, upper, listed, ROUNDING * whole)
+    fewest = claims.candidates.lower_bound == proof.count
+    findings.holds(
+        not fewest or upper <= claims.required_m2 + proof.slack_m2,
         name,
         f"{square_centimetres(upper)}, which is enough for the "
-        f"{square_centimetres(required)} required (tolerance "
-        f"{square_centimetres(slack)}), but {count} are claimed to be the fewest",
+        f"{square_centimetres(claims.required_m2)} required (tolerance "
+        f"{square_centimetres(proof.slack_m2)}), but {proof.count} are claimed to be "
+        f"the fewest",
     )
 
 
-def _audit_bodies(
-    key: str,
-    claims: dict[str, Any],
-    devices: Sequence[PlannedProjector] | Sequence[PlannedCamera],
-    ledger: Ledger,
-) -> None:
+def _noise(proof: _Proof, area_m2: float, whole: float) -> float:
+    """A point, and three standard errors of an area from the certificate's samples."""
+    n = max(proof.claims.n_samples, _FEWEST_SAMPLES)
+    p = min(max(area_m2 / whole, 1.0 / n), 1.0 - 1.0 / n)
+    return whole * (POINT + 3.0 * float(np.sqrt(p * (1.0 - p) / n)))
+
+
+def _audit_bodies(proof: _Proof, findings: AuditFindings) -> None:
     """Where planned devices have bodies the bounds must say that these are left out."""
-    bodied = any(d.body is not None and not d.existing for d in devices)
-    ledger.holds(
-        not bodied or "bounds_leave_out" in claims,
-        f"{key}.bounds_leave_out",
+    claims = proof.claims
+    bodied = any(d.body is not None and not d.existing for d in proof.devices)
+    findings.holds(
+        not bodied or claims.bounds_leave_out,
+        f"{proof.key}.bounds_leave_out",
         "is missing, but planned devices have bodies",
     )
-    if "but_for_bodies" in claims:
-        number, count = as_number(claims["but_for_bodies"]), as_number(claims["count"])
-        ledger.holds(
-            bodied and number is not None and number >= 1.0 and number == int(number),
-            f"{key}.but_for_bodies",
-            f"{claims['but_for_bodies']!r} must be a number of devices with bodies "
-            f"(the plan has {count:g})",
-        )
+    stated = "but_for_bodies" in claims.model_fields_set
+    findings.holds(
+        not stated or (bodied and claims.but_for_bodies >= 1),
+        f"{proof.key}.but_for_bodies",
+        f"{claims.but_for_bodies!r} must be a number of devices with bodies "
+        f"(the plan has {proof.count})",
+    )
 
 
-def _best_bound(claims: dict[str, Any]) -> float | None:
-    """The bound that speaks of the plan's own count; None if nothing was proved."""
-    table = claims.get("candidates")
-    return as_number(table.get("lower_bound")) if isinstance(table, dict) else None
-
-
-def _audit_refuted(
-    key: str,
-    covers: NDArray[np.bool_],
-    spare: list[int],
-    bound: float,
-    enough_m2: float,
-    estimator: Estimator,
-    ledger: Ledger,
-) -> None:
+def _audit_refuted(proof: _Proof, case: AuditCase, findings: AuditFindings) -> None:
     """A bound is false if the plan meets the requirement with fewer devices than that.
 
     Devices are left out one after the other, always the one that is missed least;
-    those that stand already belong to every cover that the bound speaks of.
+    existing ones belong to every cover that the bound speaks of.
     """
-    left, spare = list(range(len(covers))), list(spare)
-    while len(left) >= bound and spare:
+    bound = proof.claims.candidates.lower_bound
+    enough = proof.claims.required_m2 + proof.slack_m2
+    spare = [i for i, device in enumerate(proof.devices) if not device.existing]
+    staying = list(range(proof.count))
+    while len(staying) >= bound and spare:
         areas = [
-            estimator.area(np.any(covers[[i for i in left if i != out]], axis=0))
+            case.estimator.area(
+                np.any(proof.covers[[i for i in staying if i != out]], axis=0)
+            )
             for out in spare
         ]
         best = int(np.argmax(areas))
-        left.remove(spare.pop(best))
-        if len(left) < bound and not areas[best] <= enough_m2:
-            ledger.fail(
-                f"{key}.candidates.lower_bound",
-                f"{bound:g} is claimed, but {len(left)} of the plan's devices cover "
-                f"{areas[best]:.6g} m², more than the {enough_m2:.6g} m² required",
+        staying.remove(spare.pop(best))
+        if len(staying) < bound and areas[best] > enough:
+            findings.fail(
+                f"{proof.key}.candidates.lower_bound",
+                f"{bound} is claimed, but {len(staying)} of the plan's devices cover "
+                f"{areas[best]:.6g} m², more than the {enough:.6g} m² required",
             )
             return

@@ -1,91 +1,91 @@
 """Claims about which projectors fire together, from the overlaps of the same plan."""
 
-from planning.model.plan import RigPlan
-from planning.verify.audit.ledger import Ledger, as_number, entries
+from itertools import combinations
 
+from planning.model.document.coverage_records import ExposureSchedule, Overlap
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+
+_KEY = "firing_schedule"
 # Vertices coloured before a claim of exhaustion is taken as it is.
 _STEPS = 200_000
 
 
-def audit_schedule(plan: RigPlan, ledger: Ledger) -> None:
-    """Check `firing_schedule`: groups without an overlap, as few as is claimed.
+def audit_schedule(case: AuditCase, findings: AuditFindings) -> None:
+    """Check `firing_schedule` against the plan's overlaps."""
+    document = case.plan.document
+    if document.firing_schedule is None:
+        findings.fail(_KEY, "is missing")
+        return
+    names = [projector.id for projector in document.projectors]
+    audit_groups_of_light(names, document.overlaps, document.firing_schedule, findings)
+
+
+def audit_groups_of_light(
+    names: list[str],
+    overlaps: tuple[Overlap, ...],
+    schedule: ExposureSchedule,
+    findings: AuditFindings,
+) -> None:
+    """Check that groups have no overlap, and are as few as is claimed.
 
     Every projector fires once; two whose claimed overlap has an area never fire
     together. The groups are the fewest if as many projectors overlap pairwise
     (`clique`), or if no assignment to one group fewer is left (`exhaustion`), which is
     tried here too.
     """
-    names = [projector.id for projector in plan.projectors]
-    near = _overlapping(ledger, names)
-    key, groups = "firing_schedule", ledger.read("firing_schedule", "groups")
-    whole = isinstance(groups, list) and all(isinstance(g, list) and g for g in groups)
-    listed = [str(name) for group in groups for name in group] if whole else []
-    if not ledger.holds(
-        whole and sorted(listed) == sorted(names),
-        f"{key}.groups",
+    groups, near = schedule.groups, _overlapping(names, overlaps)
+    if not findings.holds(
+        all(groups)
+        and sorted(name for group in groups for name in group) == sorted(names),
+        f"{_KEY}.groups",
         f"{groups!r} must name each of {', '.join(names)} exactly once",
     ):
         return
     for group in groups:
-        for i, one in enumerate(group):
-            for other in group[i + 1 :]:
-                ledger.holds(
-                    other not in near[one],
-                    f"{key}.groups",
-                    f"{one} and {other} fire together, but by the plan's own overlaps "
-                    f"they light a surface in common",
-                )
-    stated = ledger.read(key, "n_groups")
-    ledger.holds(
-        stated == len(groups),
-        f"{key}.n_groups",
-        f"{stated!r} is claimed for {len(groups)} groups",
+        for one, other in combinations(group, 2):
+            findings.holds(
+                other not in near[one],
+                f"{_KEY}.groups",
+                f"{one} and {other} fire together, but by the plan's own overlaps "
+                f"they light a surface in common",
+            )
+    n, least, clique = len(groups), schedule.lower_bound, schedule.clique
+    findings.holds(
+        schedule.n_groups == n,
+        f"{_KEY}.n_groups",
+        f"{schedule.n_groups!r} is claimed for {n} groups",
     )
-    _audit_proof(near, len(groups), ledger)
-
-
-def _audit_proof(near: dict[str, set[str]], n: int, ledger: Ledger) -> None:
-    key, schedule = "firing_schedule", ledger.read("firing_schedule")
-    proof, least = schedule.get("proof"), as_number(schedule.get("lower_bound"))
-    clique = schedule.get("clique")
-    members = [str(m) for m in clique] if isinstance(clique, list) else []
-    pairwise = len(set(members)) == len(members) and all(
-        b in near.get(a, set()) for a in members for b in members if a != b
-    )
-    ledger.holds(
-        pairwise and all(member in near for member in members),
-        f"{key}.clique",
+    findings.holds(
+        len(set(clique)) == len(clique)
+        and set(clique) <= set(names)
+        and all(other in near[one] for one, other in combinations(clique, 2)),
+        f"{_KEY}.clique",
         f"{clique!r} must be projectors that overlap pairwise",
     )
-    ledger.holds(
-        least is not None and least <= n,
-        f"{key}.lower_bound",
-        f"{schedule.get('lower_bound')!r} for {n} groups",
-    )
+    findings.holds(least <= n, f"{_KEY}.lower_bound", f"{least!r} for {n} groups")
     proved = {
-        "clique": len(members) == n == least,
+        "clique": len(clique) == n == least,
         "exhaustion": least == n and not _colourable(near, n - 1),
-        "none": least == len(members),
+        "none": least == len(clique),
     }
-    ledger.holds(
-        proved.get(str(proof), False),
-        f"{key}.proof",
-        f"{proof!r} doesn't prove that {least} groups are needed",
+    findings.holds(
+        proved[schedule.proof],
+        f"{_KEY}.proof",
+        f"{schedule.proof!r} doesn't prove that {least} groups are needed",
     )
 
 
-def _overlapping(ledger: Ledger, names: list[str]) -> dict[str, set[str]]:
+def _overlapping(
+    names: list[str], overlaps: tuple[Overlap, ...]
+) -> dict[str, set[str]]:
     near: dict[str, set[str]] = {name: set() for name in names}
-    for row in entries(ledger.read("overlaps")):
-        pair = row.get("projectors")
-        areas = [
-            as_number(row.get(part)) or 0.0 for part in ("target_m2", "surface_m2")
-        ]
-        if isinstance(pair, list) and len(pair) == 2 and max(areas) > 0.0:
-            one, other = map(str, pair)
-            if one != other and one in near and other in near:
-                near[one].add(other)
-                near[other].add(one)
+    for overlap in overlaps:
+        one, other = overlap.projectors
+        lit = max(overlap.target_m2, overlap.surface_m2) > 0.0
+        if lit and one != other and {one, other} <= set(near):
+            near[one].add(other)
+            near[other].add(one)
     return near
 
 

@@ -1,187 +1,182 @@
 """Claims about areas: coverage, causes, and what each device contributes."""
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import RigPlan
-from planning.verify.audit.estimates import Estimator
-from planning.verify.audit.ledger import Ledger, as_number
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.estimates import ROUNDING
+from planning.verify.audit.predicates.audit_devices import light_starts
+from planning.verify.audit.predicates.blocks import block_of
 from planning.verify.audit.predicates.predicates import (
+    CAMERA_BODY,
     LIGHT_CAUSES,
-    LIT,
-    MEASURED,
     PAIR_CAUSES,
+    PROJECTOR_BODY,
     SIGHT_CAUSES,
 )
-from planning.verify.audit.predicates.recompute import Reach, Recomputed
 
-CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
-# Room for the rounding of written numbers, as a share.
-ROUNDING = 1e-6
-
-_ORDER = (
-    "measured_m2",
-    "reachable_by_cameras_m2",
-    "lit_m2",
-    "reachable_by_projectors_m2",
-    "area_m2",
-)
+_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
+_Flags = NDArray[np.bool_]
 
 
-def recomputed_areas(
-    own: Recomputed, reach: Reach, estimator: Estimator
-) -> dict[str, dict[str, float]]:
-    """Return AREAS of the surface and of the target, as `coverage` has them."""
-    masks = _masks(own, reach)
-    target = own.samples.in_target
-    wholes = {"surface": estimator.area_m2, "target": estimator.target_m2}
+def recomputed_areas(case: AuditCase) -> dict[str, dict[str, float]]:
+    """Return AREAS of the surface and of the target, as `coverage` has them [m²]."""
     return {
-        part: {"area_m2": wholes[part]}
+        part: {"area_m2": whole}
         | {
-            name: estimator.area(mask & (target if part == "target" else True))
-            for name, mask in masks.items()
+            name: case.estimator.area(chosen & within)
+            for name, chosen in _covered(case).items()
         }
-        for part in wholes
+        for part, (within, whole) in case.estimator.wholes().items()
     }
 
 
-def audit_areas(
-    own: Recomputed, reach: Reach, estimator: Estimator, ledger: Ledger
-) -> None:
-    """Check every entry of AREAS, in both directions, and their order."""
-    masks = _masks(own, reach)
-    parts = {
-        "surface": (np.ones(len(own.samples), dtype=bool), estimator.area_m2),
-        "target": (own.samples.in_target, estimator.target_m2),
+def audit_areas(case: AuditCase, findings: AuditFindings) -> None:
+    """Check every area of `coverage` and of devices, in both directions."""
+    samples = case.plan.coverage.samples
+    key = "coverage.samples"
+    findings.holds(samples >= 1, key, f"{samples!r} must be the number of samples")
+    _audit_wholes(case, findings)
+    _audit_causes(case, findings)
+    _audit_contributions(case, findings)
+    _audit_blocked(case, findings)
+
+
+def _covered(case: AuditCase) -> dict[str, _Flags]:
+    """Samples of each of AREAS but the whole, from the smallest to the largest."""
+    return {
+        "measured_m2": case.actual.measured,
+        "reachable_by_cameras_m2": case.reachable.cameras,
+        "lit_m2": case.actual.lit,
+        "reachable_by_projectors_m2": case.reachable.projectors,
     }
-    for part, (within, whole) in parts.items():
+
+
+def _audit_wholes(case: AuditCase, findings: AuditFindings) -> None:
+    """Check AREAS, and that each of them is part of the next, whatever the sampling."""
+    claims = {
+        "surface": case.plan.coverage.surface,
+        "target": case.plan.coverage.target,
+    }
+    for part, (_, whole) in case.estimator.wholes().items():
         key = f"coverage.{part}"
-        claims = ledger.read("coverage", part)
-        if not ledger.holds(isinstance(claims, dict), key, "is missing"):
-            continue
-        ledger.number(f"{key}.area_m2", claims.get("area_m2"), whole, ROUNDING * whole)
-        for name, mask in masks.items():
-            ledger.number(
-                f"{key}.{name}",
-                claims.get(name),
-                estimator.area(mask & within),
-                estimator.tolerance(mask & within, whole),
+        claimed = {name: getattr(claims[part], name) for name in _covered(case)}
+        claimed["area_m2"] = claims[part].area_m2
+        slack = ROUNDING * whole
+        findings.number(f"{key}.area_m2", claims[part].area_m2, whole, slack)
+        for name, chosen in _covered(case).items():
+            case.estimator.audit(
+                f"{key}.{name}", claimed[name], chosen, findings, part=part
             )
-        _audit_order(key, claims, whole, ledger)
+        for (smaller, low), (larger, high) in pairwise(claimed.items()):
+            findings.holds(
+                0.0 <= low <= high + slack,
+                f"{key}.{smaller}",
+                f"claimed {low:.6g} m², must lie between 0 and {larger} = "
+                f"{high:.6g} m²",
+            )
 
 
-def audit_causes(
-    own: Recomputed, reach: Reach, estimator: Estimator, ledger: Ledger
-) -> None:
-    """Check the split of what isn't measured, and of what no projector reaches."""
-    target = own.samples.in_target
+def _audit_causes(case: AuditCase, findings: AuditFindings) -> None:
+    """Check the split of what isn't measured, and of what no device reaches."""
+    claims, actual, reachable = case.plan.coverage, case.actual, case.reachable
+    areas = claims.target
     _audit_split(
+        case,
         "uncovered_by_cause",
-        CAUSES,
-        [target & (own.cause == index) for index in range(len(CAUSES))],
-        "measured_m2",
-        estimator,
-        ledger,
+        claims.uncovered_by_cause,
+        {cause: actual.cause == index for index, cause in enumerate(_CAUSES)},
+        areas.area_m2 - areas.measured_m2,
+        findings,
     )
-    dark = target & ~reach.projectors
+    dark = ~reachable.projectors
     _audit_split(
+        case,
         "unreachable_by_cause",
-        LIGHT_CAUSES,
-        [dark & (reach.furthest == index) for index in range(LIT)],
-        "reachable_by_projectors_m2",
-        estimator,
-        ledger,
+        claims.unreachable_by_cause,
+        {
+            cause: dark & (reachable.furthest == index)
+            for index, cause in enumerate(LIGHT_CAUSES)
+        },
+        areas.area_m2 - areas.reachable_by_projectors_m2,
+        findings,
     )
     # Only there where it is more than the requirement allows.
-    if ledger.read("coverage", "unmeasurable_by_cause") is not None:
-        beyond = target & own.lit & ~reach.cameras
+    if "unmeasurable_by_cause" in claims.model_fields_set:
+        beyond = actual.lit & ~reachable.cameras
         _audit_split(
+            case,
             "unmeasurable_by_cause",
-            SIGHT_CAUSES + PAIR_CAUSES,
-            [beyond & (reach.furthest_pair == index) for index in range(MEASURED)],
-            "reachable_by_cameras_m2",
-            estimator,
-            ledger,
-            whole="lit_m2",
-        )
-
-
-def audit_contributions(
-    plan: RigPlan, own: Recomputed, estimator: Estimator, ledger: Ledger
-) -> None:
-    """Check lit_area_m2, seen_area_m2 and sole_area_m2 of every device."""
-    target, whole = own.samples.in_target, estimator.target_m2
-    claims: list[tuple[str, Any, NDArray[np.bool_]]] = []
-    for row, entry in enumerate(plan.to_document()["projectors"]):
-        key = f"{entry['id']}.lit_area_m2"
-        claims.append((key, entry.get("lit_area_m2"), own.lit_by[row]))
-    for row, entry in enumerate(plan.to_document()["cameras"]):
-        seen = own.measured_by[row]
-        others = np.any(np.delete(own.measured_by, row, axis=0), axis=0)
-        key = f"{entry['id']}.seen_area_m2"
-        claims.append((key, entry.get("seen_area_m2"), seen))
-        key = f"{entry['id']}.sole_area_m2"
-        claims.append((key, entry.get("sole_area_m2"), seen & ~others))
-    for key, claimed, mask in claims:
-        chosen = mask & target
-        ledger.number(
-            key, claimed, estimator.area(chosen), estimator.tolerance(chosen, whole)
-        )
-
-
-def _masks(own: Recomputed, reach: Reach) -> dict[str, NDArray[np.bool_]]:
-    return {
-        "reachable_by_projectors_m2": reach.projectors,
-        "lit_m2": own.lit,
-        "reachable_by_cameras_m2": reach.cameras,
-        "measured_m2": own.measured,
-    }
-
-
-def _audit_order(
-    key: str, claims: dict[str, Any], whole: float, ledger: Ledger
-) -> None:
-    """Each area of AREAS is part of the next, whatever the sampling."""
-    for smaller, larger in pairwise(_ORDER):
-        low, high = as_number(claims.get(smaller)), as_number(claims.get(larger))
-        if low is None or high is None:
-            continue
-        ledger.holds(
-            0.0 <= low <= high + ROUNDING * whole,
-            f"{key}.{smaller}",
-            f"claimed {low:.6g} m², must lie between 0 and {larger} = {high:.6g} m²",
+            claims.unmeasurable_by_cause,
+            {
+                cause: beyond & (reachable.furthest_pair == index)
+                for index, cause in enumerate(SIGHT_CAUSES + PAIR_CAUSES)
+            },
+            areas.lit_m2 - areas.reachable_by_cameras_m2,
+            findings,
         )
 
 
 def _audit_split(
+    case: AuditCase,
     name: str,
-    causes: tuple[str, ...],
-    masks: list[NDArray[np.bool_]],
-    rest: str,
-    estimator: Estimator,
-    ledger: Ledger,
-    *,
-    whole: str = "area_m2",
+    split: Mapping[str, float],
+    causes: Mapping[str, _Flags],
+    total_m2: float,
+    findings: AuditFindings,
 ) -> None:
-    """Check a split of `whole` less `rest` by causes, part by part and as a sum."""
+    """Check a split of an area of the target by causes, one by one and as a sum."""
     key = f"coverage.{name}"
-    split = ledger.read("coverage", name)
-    if not ledger.holds(isinstance(split, dict), key, "is missing"):
-        return
     unknown = sorted(set(split) - set(causes))
-    ledger.holds(not unknown, key, f"causes that there are not: {', '.join(unknown)}")
-    target = estimator.target_m2
-    for cause, mask in zip(causes, masks, strict=True):
-        ledger.number(
-            f"{key}.{cause}",
-            split.get(cause, 0.0),
-            estimator.area(mask),
-            estimator.tolerance(mask, target),
-        )
-    total = sum(as_number(value) or 0.0 for value in split.values())
-    area = as_number(ledger.read("coverage", "target", whole)) or 0.0
-    done = as_number(ledger.read("coverage", "target", rest)) or 0.0
-    ledger.number(f"{key} (sum)", total, area - done, 1e-4 * target)
+    findings.holds(not unknown, key, f"causes that there are not: {', '.join(unknown)}")
+    for cause, chosen in causes.items():
+        claimed = split.get(cause, 0.0)
+        case.estimator.audit(f"{key}.{cause}", claimed, chosen, findings)
+    slack = 1e-4 * case.estimator.target_m2
+    findings.number(f"{key} (sum)", sum(split.values()), total_m2, slack)
+
+
+def _audit_contributions(case: AuditCase, findings: AuditFindings) -> None:
+    """Check lit_area_m2, seen_area_m2 and sole_area_m2 of every device."""
+    audit, document = case.estimator.audit, case.plan.document
+    for projector, lit in zip(document.projectors, case.actual.lit_by, strict=True):
+        audit(f"{projector.id}.lit_area_m2", projector.lit_area_m2, lit, findings)
+    together = case.actual.measured_by.sum(axis=0)
+    for camera, seen in zip(document.cameras, case.actual.measured_by, strict=True):
+        audit(f"{camera.id}.seen_area_m2", camera.seen_area_m2, seen, findings)
+        sole = seen & (together == 1)
+        audit(f"{camera.id}.sole_area_m2", camera.sole_area_m2, sole, findings)
+
+
+def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
+    """Check `blocked_by_body_m2`: what each body keeps from being measured.
+
+    The target area that isn't measured and where, for some projector or for some camera
+    that looks at it lit, the first limit that fails is a body, and this one in the way.
+    """
+    claims, actual = case.plan.coverage.blocked_by_body_m2, case.actual
+    devices = (*case.plan.projectors, *case.plan.cameras)
+    blocks = {d.id: block for d in devices if (block := block_of(d)) is not None}
+    key = "coverage.blocked_by_body_m2"
+    if not findings.holds(
+        set(claims) == set(blocks), key, f"must hold an area for each of {list(blocks)}"
+    ):
+        return
+    dark = actual.samples.in_target & ~actual.measured
+    seen_lit = actual.pairs.max(axis=0, initial=-1)
+    stopped = [
+        *(dark & (actual.light == PROJECTOR_BODY)),
+        *(dark & actual.lit & (seen_lit == CAMERA_BODY)),
+    ]
+    for name, block in blocks.items():
+        behind = np.zeros(len(dark), dtype=bool)
+        for device, flags in zip(devices, stopped, strict=True):
+            if device.id != name:
+                chosen = np.flatnonzero(flags)
+                points = actual.samples.points[chosen]
+                behind[chosen] |= block.meets(light_starts(device, points), points)
+        case.estimator.audit(f"{key}.{name}", claims[name], behind, findings)

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import RigPlan
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.estimates import POINT
-from planning.verify.audit.ledger import Ledger, as_number
+from planning.verify.audit.predicates.audit_optics import dot
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.recompute import Reach, Recomputed
 
 # As `docs/method/orientation.md` has them.
 _HIDDEN = 0.05
@@ -24,53 +24,40 @@ _ABOVE = 3e-6
 _PLANNER_SPOTS = 12_000
 
 
-def audit_inside(
-    plan: RigPlan,
-    own: Recomputed,
-    reach: Reach,
-    shadow: Shadow,
-    ledger: Ledger,
-    *,
-    seed: int,
-) -> None:
+def audit_inside(case: AuditCase, findings: AuditFindings) -> None:
     """Check the area that lies inside, and how much of it no projector reaches.
 
     A plan that states neither has nothing to check.
     """
-    claims = {
-        "meshes.0.shell.inside_m2": ledger.read("meshes", 0, "shell", "inside_m2"),
-        "coverage.unreachable_inside_m2": ledger.read(
-            "coverage", "unreachable_inside_m2"
-        ),
-    }
-    if all(claim is None for claim in claims.values()):
+    coverage, shell = case.plan.coverage, case.plan.document.meshes[0].shell
+    stated = coverage.model_fields_set | shell.model_fields_set
+    if stated.isdisjoint(("unreachable_inside_m2", "inside_m2")):
         return
-    every = -(-len(own.samples) // _MAX_SAMPLES)
-    chosen = np.arange(0, len(own.samples), every)
-    samples = own.samples.take(chosen)
-    dark = samples.in_target & ~reach.projectors[chosen]
-    inside, unsure = _inside(samples, shadow, np.random.default_rng((_STREAM, seed)))
-    open_surface = ledger.read("meshes", 0, "shell", "kind") == "open surface"
-    areas = plan.surface.mesh.face_areas
-    target = areas[plan.surface.target_faces(plan.requirements.target)].sum()
-    for (key, claimed), mask, within, whole in zip(
-        claims.items(),
-        (inside & (not open_surface), inside & dark),
-        (np.full(len(dark), not open_surface), dark),
-        (float(areas.sum()), float(target)),
-        strict=True,
+    every = -(-len(case.samples) // _MAX_SAMPLES)
+    chosen = np.arange(0, len(case.samples), every)
+    samples = case.samples.take(chosen)
+    dark = samples.in_target & ~case.reachable.projectors[chosen]
+    rng = np.random.default_rng((_STREAM, case.seed))
+    inside, unsure = _inside(samples, case.shadow, rng)
+    closed = np.full(len(dark), shell.kind != "open surface")
+    for key, claimed, within, whole in (
+        ("meshes.0.shell.inside_m2", shell.inside_m2, closed, case.estimator.area_m2),
+        (
+            "coverage.unreachable_inside_m2",
+            coverage.unreachable_inside_m2,
+            dark,
+            case.estimator.target_m2,
+        ),
     ):
-        part = samples.weights * mask
-        # Half of the samples, at worst, are of the part in question.
-        p = min(part.sum() * every / whole + 2.0 / len(chosen), 1.0)
-        error = np.sqrt(p * (1.0 - p) * (2.0 / len(chosen) + 1.0 / _PLANNER_SPOTS))
-        ledger.number(
-            key,
-            as_number(claimed),
-            float(part.sum()) * every,
-            (POINT + 3.0 * float(error)) * whole
-            + float(samples.weights[within & unsure].sum()) * every,
+        area, doubt = (
+            every * float(samples.weights[within & flags].sum())
+            for flags in (inside, unsure)
         )
+        # Half of the samples, at worst, are of the part in question.
+        p = min(area / whole + 2.0 / len(chosen), 1.0)
+        error = np.sqrt(p * (1.0 - p) * (2.0 / len(chosen) + 1.0 / _PLANNER_SPOTS))
+        tolerance = (POINT + 3.0 * float(error)) * whole + doubt
+        findings.number(key, claimed, area, tolerance)
 
 
 def _inside(
@@ -84,22 +71,23 @@ def _inside(
     down = samples.points - above * samples.normals
     below, depth = caster.first_hits(down, -samples.normals)
     normals = mesh.face_normals[below]
-    wall = (below >= 0) & (np.einsum("ij,ij->i", normals, samples.normals) < 0)
+    wall = (below >= 0) & (dot(normals, samples.normals) < 0)
     wall &= depth <= _THIN_DIAMETERS * 2.0 * mesh.radius
     inside = seen < _HIDDEN
-    rest = np.flatnonzero(wall & ~inside & (seen < _LESS_THAN_BEHIND))
-    back = down[rest] - depth[rest, None] * samples.normals[rest]
-    other = _free_share(back, normals[rest], shadow, rng)
-    limit = _LESS_THAN_BEHIND * other
-    inside[rest] = seen[rest] < limit
-    unsure = _near(seen, np.full(len(seen), _HIDDEN))
-    unsure[rest] |= _near(seen[rest], limit)
+    thin = np.flatnonzero(wall & ~inside & (seen < _LESS_THAN_BEHIND))
+    back = down[thin] - depth[thin, None] * samples.normals[thin]
+    limit = _LESS_THAN_BEHIND * _free_share(back, normals[thin], shadow, rng)
+    inside[thin] = seen[thin] < limit
+    unsure = _near(seen, _HIDDEN)
+    unsure[thin] |= _near(seen[thin], limit)
     # Just above a third a thin wall isn't compared here, but may be by the planner.
-    unsure |= wall & _near(seen, np.full(len(seen), _LESS_THAN_BEHIND))
+    unsure |= wall & _near(seen, _LESS_THAN_BEHIND)
     return inside, unsure
 
 
-def _near(seen: NDArray[np.float64], limit: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _near(
+    seen: NDArray[np.float64], limit: NDArray[np.float64] | float
+) -> NDArray[np.bool_]:
     """Whether a share of random rays may lie on the other side of a limit."""
     error = np.sqrt(np.maximum(limit * (1.0 - limit), 0.0) / _RAYS)
     return np.abs(seen - limit) < _SIGMAS * error

@@ -1,19 +1,34 @@
-"""What a plan's own poses should measure, without the audit of its claims."""
+"""What a plan's poses should measure: by its limits, and at all."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
+from planning.model.requirements import Requirements
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
+from planning.verify.audit.predicates.audit_devices import (
+    AuditCamera,
+    AuditProjector,
+    audit_cameras,
+    audit_projectors,
+)
+from planning.verify.audit.predicates.audit_optics import dot, towards
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import MEASURED
 from planning.verify.audit.predicates.recompute import recompute
 
+_INCIDENCE = float(np.deg2rad(85.0))
+# Below it hardly any label is right: study-reconstruction.md, section 3.2 [px].
+_PITCH_PX = 3.0
+# A decoder takes edges that recede faster along a ring for a step of depth: 65 degrees,
+# or 5 degrees less than the incidence at which the plan counts on cameras.
+_SLANT, _SLANT_MARGIN = float(np.deg2rad(65.0)), float(np.deg2rad(5.0))
+
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PredictedTarget:
     """Fresh samples of the target and what should be measured of them.
 
     Attributes:
@@ -29,7 +44,7 @@ class Prediction:
 
 def predict_measured(
     plan: RigPlan, *, seed: int, n_samples: int = 20_000, threads: int = 2
-) -> Prediction:
+) -> PredictedTarget:
     """Return what the poses of a plan should measure, with the audit's own code.
 
     Args:
@@ -43,6 +58,55 @@ def predict_measured(
     """
     drawn = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     samples = drawn.take(drawn.in_target)
-    own = recompute(plan, samples, Shadow(plan.surface.mesh, threads=threads))
-    by_pair = np.mean(own.pairs == MEASURED, axis=2)
-    return Prediction(samples, own.measured, by_pair)
+    actual = recompute(plan, samples, Shadow(plan.surface.mesh, threads=threads))
+    by_pair = np.mean(actual.pairs == MEASURED, axis=2)
+    return PredictedTarget(samples, actual.measured, by_pair)
+
+
+def possible_at_floors(
+    plan: RigPlan, samples: AuditSamples, *, threads: int
+) -> NDArray[np.bool_]:
+    """Return whether each camera could measure each sample, shape (n_c, n)."""
+    shadow = Shadow(plan.surface.mesh, threads=threads)
+    pairs = recompute(plan, samples, shadow, _at_floors(plan.requirements)).pairs
+    steepest = plan.requirements.camera.max_incidence - _SLANT_MARGIN
+    most = np.sin(max(steepest, _SLANT))
+    possible = np.zeros(pairs.shape[1:], dtype=bool)
+    for p, projector in enumerate(audit_projectors(plan)):
+        for c, camera in enumerate(audit_cameras(plan)):
+            able = np.flatnonzero(pairs[p, c] == MEASURED)
+            along = receding(projector, camera, samples.take(able))
+            possible[c, able[along <= most]] = True
+    return possible
+
+
+def receding(
+    projector: AuditProjector, camera: AuditCamera, samples: AuditSamples
+) -> NDArray[np.float64]:
+    """Return |r.T|, T = N x m / |N x m|: the sine of the slant along a ring, (n,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tangent = np.cross(samples.normals, projector.ring_gradient(samples.points))
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    rays, _ = towards(samples.points, camera.world_from_device[:3, 3])
+    return np.abs(dot(rays, tangent))
+
+
+def _at_floors(requirements: Requirements) -> Requirements:
+    """Return requirements with the limits at which light and edges fail in fact.
+
+    Planning limits are stricter, for accuracy: incidence 85 degrees instead, no tangent
+    limit, a pitch of 3 px, no limit on s_N or the sampling distance. |r.m| stays, since
+    the decoder keeps it (formulation.md, section 7).
+    """
+    return replace(
+        requirements,
+        projector=replace(
+            requirements.projector, max_incidence=_INCIDENCE, min_tangent_angle=0.0
+        ),
+        camera=replace(
+            requirements.camera, max_incidence=_INCIDENCE, max_sample_distance_m=None
+        ),
+        triangulation=replace(
+            requirements.triangulation, max_sigma_m=None, min_ring_pitch_px=_PITCH_PX
+        ),
+    )

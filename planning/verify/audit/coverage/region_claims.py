@@ -1,21 +1,16 @@
 """Claims about the dominant regions: their size, and who lights them how far."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import RigPlan
+from planning.model.document.coverage_records import RegionRecord
 from planning.model.requirements import ProjectorLimits
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, samples_at_centroids
-from planning.verify.audit.estimates import POINT, Estimator
-from planning.verify.audit.ledger import Ledger, as_number
-from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import LIGHT_CAUSES, light_steps
-from planning.verify.audit.predicates.recompute import Recomputed, audit_projectors
+from planning.verify.audit.estimates import POINT, ROUNDING
+from planning.verify.audit.predicates.predicates import OCCLUDED, light_steps
 
-from .area_claims import ROUNDING
 from .margin_claims import MARGIN_SLACK
 
 # Room for the rounding of a written direction or angle [rad].
@@ -23,91 +18,70 @@ _ANGLE = 1e-4
 _SELECTIONS = ("curvature", "faces", "vertex_weight")
 
 
-def audit_regions(
-    plan: RigPlan, own: Recomputed, estimator: Estimator, shadow: Shadow, ledger: Ledger
-) -> None:
+def audit_regions(case: AuditCase, findings: AuditFindings) -> None:
     """Check ids, area_m2, n_faces, normals, lit_by and lit_fraction of regions."""
-    centroids = samples_at_centroids(plan.surface, plan.surface.in_dominant)
-    able = _able(plan, centroids, shadow)
+    surface = case.plan.surface
+    centroids = samples_at_centroids(surface, surface.in_dominant)
+    lightable = _lightable(case, centroids)
+    listed = {region.id: region for region in case.plan.document.regions}
     numbers = {int(number) for number in centroids.region}
-    listed = _listed(plan.to_document()["regions"])
-    ledger.holds(
+    findings.holds(
         set(listed) == numbers,
         "regions",
         f"ids {sorted(listed)}, but surface.npz has {sorted(numbers)}",
     )
-    _audit_selection(plan, ledger)
+    _audit_selection(case, findings)
     for number in sorted(set(listed) & numbers):
-        key, claims = f"regions.{number}", listed[number]
-        inside = own.samples.region == number
-        _audit_size(plan, number, key, claims, ledger)
-        _audit_fraction(key, claims, inside, own, estimator, ledger)
-        could = np.any(able[:, centroids.region == number], axis=1)
-        _audit_lit_by(
-            plan, key, claims.get("lit_by"), could, own.server[inside], ledger
-        )
+        region, chosen = listed[number], centroids.region == number
+        _audit_size(case, region, findings)
+        _audit_fraction(case, region, findings)
+        _audit_lit_by(case, region, np.any(lightable[:, chosen], axis=1), findings)
 
 
-def _audit_selection(plan: RigPlan, ledger: Ledger) -> None:
+def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
     """Check what is said of the faces that were chosen; who chose them is no claim."""
-    claims = ledger.read("surface", "selection")
-    if claims is None:
+    selection, surface = case.plan.document.surface.selection, case.plan.surface
+    if selection is None:
         return
-    key, chosen = "surface.selection", plan.surface.region >= 0
-    area = float(plan.surface.mesh.face_areas[chosen].sum())
-    for name, own, slack, unit in (
-        ("n_faces", float(chosen.sum()), 0.0, ""),
-        ("area_m2", area, ROUNDING * area, "m²"),
-    ):
-        claimed = ledger.read("surface", "selection", name)
-        ledger.number(f"{key}.{name}", claimed, own, slack, unit)
-    kind = ledger.read("surface", "selection", "kind")
-    ledger.holds(
-        kind in _SELECTIONS, f"{key}.kind", f"is {kind!r}, must be one of {_SELECTIONS}"
+    key, chosen = "surface.selection", surface.region >= 0
+    area = float(surface.mesh.face_areas[chosen].sum())
+    findings.number(
+        f"{key}.n_faces", selection.n_faces, float(chosen.sum()), 0.0, "faces"
+    )
+    findings.number(f"{key}.area_m2", selection.area_m2, area, ROUNDING * area)
+    findings.holds(
+        selection.kind in _SELECTIONS,
+        f"{key}.kind",
+        f"is {selection.kind!r}, must be one of {_SELECTIONS}",
     )
 
 
-def _listed(regions: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
-    """Regions by the number that their faces carry; other ids count by their place."""
-    return {
-        entry["id"] if isinstance(entry.get("id"), int) else place: entry
-        for place, entry in enumerate(regions)
-    }
-
-
-def _able(plan: RigPlan, samples: AuditSamples, shadow: Shadow) -> NDArray[np.bool_]:
+def _lightable(case: AuditCase, samples: AuditSamples) -> NDArray[np.bool_]:
     """Whether each projector lights each sample but for shadows and 2 degrees.
 
-    Where this holds nowhere in a region, no sample of it, however few, can be served.
+    Where this holds nowhere in a region, no sample of it, however few, is assigned.
     """
-    limits = plan.requirements.projector
+    limits = case.plan.requirements.projector
     relaxed = ProjectorLimits(
         limits.max_incidence + MARGIN_SLACK, limits.min_tangent_angle - MARGIN_SLACK
     )
-    steps = [
-        light_steps(lamp, samples, relaxed, shadow) for lamp in audit_projectors(plan)
-    ]
-    return np.array(steps).reshape(-1, len(samples)) >= LIGHT_CAUSES.index(
-        "projector_occlusion"
-    )
+    steps = [light_steps(p, samples, relaxed, case.shadow) for p in case.projectors]
+    return np.array(steps).reshape(-1, len(samples)) >= OCCLUDED
 
 
-def _audit_size(
-    plan: RigPlan, number: int, key: str, claims: Mapping[str, Any], ledger: Ledger
-) -> None:
+def _audit_size(case: AuditCase, region: RegionRecord, findings: AuditFindings) -> None:
     """Exact sums over faces."""
-    mesh, faces = plan.surface.mesh, plan.surface.region == number
+    key, mesh = f"regions.{region.id}", case.plan.surface.mesh
+    faces = case.plan.surface.region == region.id
     area = float(mesh.face_areas[faces].sum())
-    ledger.number(f"{key}.area_m2", claims.get("area_m2"), area, ROUNDING * area)
-    ledger.number(f"{key}.n_faces", claims.get("n_faces"), float(faces.sum()), 0.0, "")
-    if claims.get("mean_normal") is None:
-        return
+    findings.number(f"{key}.area_m2", region.area_m2, area, ROUNDING * area)
+    findings.number(f"{key}.n_faces", region.n_faces, float(faces.sum()), 0.0, "")
     mean = mesh.face_areas[faces] @ mesh.face_normals[faces]
     length = float(np.linalg.norm(mean))
     if length > ROUNDING * area:
-        ledger.array(
+        findings.array(
             f"{key}.mean_normal",
-            claims["mean_normal"],
+            region.mean_normal,
             mean / length,
             _ANGLE,
             "the area-weighted mean of its faces' normals",
@@ -115,62 +89,55 @@ def _audit_size(
 
 
 def _audit_fraction(
-    key: str,
-    claims: Mapping[str, Any],
-    inside: NDArray[np.bool_],
-    own: Recomputed,
-    estimator: Estimator,
-    ledger: Ledger,
+    case: AuditCase, region: RegionRecord, findings: AuditFindings
 ) -> None:
     """Lit share of one region: both samplings are conditioned on falling into it.
 
     A region may hold a handful of samples, and there may be hundreds of them: the
     standard error is that of the pooled share, and four of them are tolerated.
     """
+    inside = case.samples.region == region.id
+    key, value = f"regions.{region.id}.lit_fraction", region.lit_fraction
     n = int(inside.sum())
-    value = as_number(claims.get("lit_fraction"))
-    if n == 0 or value is None or not 0.0 <= value <= 1.0:
-        ledger.holds(
-            value is not None and 0.0 <= value <= 1.0,
-            f"{key}.lit_fraction",
-            f"{claims.get('lit_fraction')!r} isn't a share",
-        )
+    if (
+        not findings.holds(0.0 <= value <= 1.0, key, f"{value!r} isn't a share")
+        or not n
+    ):
         return
-    fraction = float((inside & own.lit).sum()) / n
-    share = estimator.area(inside) / estimator.target_m2
-    n_claimed = max(estimator.n_claimed * share, 1.0)
+    fraction = float(case.actual.lit[inside].mean())
+    share = case.estimator.area(inside) / case.estimator.target_m2
+    n_claimed = max(case.estimator.n_claimed * share, 1.0)
     p = (fraction * n + value * n_claimed + 1.0) / (n + n_claimed + 2.0)
     error = float(np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / n_claimed)))
-    tolerance = POINT + 4.0 * error
-    ledger.number(f"{key}.lit_fraction", value, fraction, tolerance, "")
+    findings.number(key, value, fraction, POINT + 4.0 * error, "")
 
 
 def _audit_lit_by(
-    plan: RigPlan,
-    key: str,
-    lit_by: object,
-    could: NDArray[np.bool_],
-    server: NDArray[np.int64],
-    ledger: Ledger,
+    case: AuditCase,
+    region: RegionRecord,
+    lightable: NDArray[np.bool_],
+    findings: AuditFindings,
 ) -> None:
-    """Who clearly serves a part must be named; who can light none of it must not be."""
-    names = [projector.id for projector in plan.projectors]
-    if not isinstance(lit_by, list) or not set(lit_by) <= set(names):
-        ledger.fail(f"{key}.lit_by", f"{lit_by!r} must list ids of projectors")
+    """Primary projectors of a part must be named; who can light none of it must not."""
+    key, names = f"regions.{region.id}.lit_by", [p.id for p in case.plan.projectors]
+    if not set(region.lit_by) <= set(names):
+        findings.fail(key, f"{list(region.lit_by)!r} must list ids of projectors")
         return
-    n = max(len(server), 1)
-    for row, name in enumerate(names):
-        count = int((server == row).sum())
-        if name in lit_by:
-            ledger.holds(
-                count > 0 or could[row],
-                f"{key}.lit_by",
+    primary = case.actual.primary[case.samples.region == region.id]
+    n = max(len(primary), 1)
+    for p, name in enumerate(names):
+        count = int((primary == p).sum())
+        if name in region.lit_by:
+            findings.holds(
+                count > 0 or lightable[p],
+                key,
                 f"{name} is named, but can light no part of the region",
             )
             continue
         allowed = POINT + 3.0 * float(np.sqrt(count + 1.0)) / n
-        ledger.holds(
+        findings.holds(
             count / n <= allowed,
-            f"{key}.lit_by",
-            f"{name} isn't named, but serves {100 * count / n:.3g} % of the region",
+            key,
+            f"{name} isn't named, but {100 * count / n:.3g} % of the region is "
+            f"assigned to it",
         )

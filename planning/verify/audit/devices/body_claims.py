@@ -1,5 +1,7 @@
-"""Claims about bodies: whose they are, and how much each keeps from being measured."""
+"""Claims about bodies: whose they are, and what they must keep off."""
 
+from collections.abc import Mapping
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -7,92 +9,115 @@ import numpy as np
 from planning.model.bodies import Body
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
-from planning.verify.audit.estimates import Estimator
-from planning.verify.audit.ledger import Ledger, entries
-from planning.verify.audit.predicates.blocks import block_of, way_to
-from planning.verify.audit.predicates.predicates import CAMERA_BODY, LIT, PROJECTOR_BODY
-from planning.verify.audit.predicates.recompute import Recomputed
+from planning.model.zones import Box
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.predicates.audit_optics import in_frame
+from planning.verify.audit.predicates.blocks import Block, block_of, touches
 
 _ROUNDING = 1e-9
 
 
-def audit_bodies(plan: RigPlan, ledger: Ledger) -> None:
+def audit_bodies(case: AuditCase, findings: AuditFindings) -> None:
+    """Check whose bodies they are, and that they keep off what they must."""
+    _audit_sources(case.plan, findings)
+    _audit_clearance(case, findings)
+
+
+def _audit_sources(plan: RigPlan, findings: AuditFindings) -> None:
     """Check that each device's body is that of the rig, or of its own entry there."""
-    own = {str(t.get("name")): t for t in entries(ledger.read("rig", "existing"))}
-    for kind in ("projector", "camera"):
-        figures = ledger.read("rig", kind, "figures", "body")
-        _same(f"rig.{kind}.body", ledger.read("rig", kind, "body"), figures, ledger)
+    rig = plan.document.rig
+    by_kind = {
+        "projector": rig.projector.figures.body,
+        "camera": rig.camera.figures.body,
+    }
+    by_name = {str(table.get("name")): table.get("body") for table in rig.existing}
+    for kind, model in (("projector", rig.projector), ("camera", rig.camera)):
+        _audit_body(f"rig.{kind}.body", model.body, by_kind[kind], findings)
     for device in (*plan.projectors, *plan.cameras):
         kind = "camera" if isinstance(device, PlannedCamera) else "projector"
-        stated = own.get(device.existing, {}).get("body")
-        stated = stated or ledger.read("rig", kind, "figures", "body")
-        _same(f"{device.id}.body", _plain(device.body), stated, ledger)
-    for place, device in enumerate(plan.requirements.existing):
-        stated = own.get(device.name, {}).get("body")
-        stated = stated or ledger.read("rig", device.kind, "figures", "body")
+        stated = by_name.get(device.existing) or by_kind[kind]
+        _audit_body(f"{device.id}.body", device.body, stated, findings)
+    for place, existing in enumerate(plan.requirements.existing):
+        stated = by_name.get(existing.name) or by_kind[existing.kind]
         key = f"requirements.existing.{place}.body"
-        _same(key, _plain(device.body), stated, ledger)
+        _audit_body(key, existing.body, stated, findings)
 
 
-def audit_blocked(
-    plan: RigPlan, own: Recomputed, estimator: Estimator, ledger: Ledger
+def _audit_body(
+    key: str,
+    body: Body | None,
+    stated: Mapping[str, Any] | None,
+    findings: AuditFindings,
 ) -> None:
-    """Check `blocked_by_body_m2`: what each body keeps from being measured.
-
-    The target area that isn't measured and where, for some projector or for some camera
-    that looks at it lit, the first limit that fails is a body, and this one in the way.
-    """
-    claims = ledger.read("coverage", "blocked_by_body_m2") or {}
-    devices = (*plan.projectors, *plan.cameras)
-    names = sorted(device.id for device in devices if device.body is not None)
-    key = "coverage.blocked_by_body_m2"
-    if not ledger.holds(
-        isinstance(claims, dict) and sorted(claims) == names,
-        key,
-        f"must hold an area for each of {names}",
-    ):
+    """Compare a body in metres with the millimetres of the rig file."""
+    if body is None or stated is None:
+        findings.holds(
+            body is None and stated is None,
+            key,
+            f"{body!r} is claimed, but the rig file has {stated!r}",
+        )
         return
-    dark = own.samples.in_target & ~own.measured
-    stopped = [dark & (light == PROJECTOR_BODY) for light in own.light]
-    for c in range(len(plan.cameras)):
-        best = own.pairs[:, c].max(axis=0, initial=-1)
-        lit = np.any(own.light == LIT, axis=0)
-        stopped.append(dark & lit & (best == CAMERA_BODY))
-    for device in devices:
-        block = block_of(device)
-        if block is None:
-            continue
-        found = np.zeros(len(own.samples), dtype=bool)
-        for other, rows in zip(devices, stopped, strict=True):
-            if other.id != device.id:
-                chosen = np.flatnonzero(rows)
-                points = own.samples.points[chosen]
-                found[chosen] |= block.meets(way_to(other, points), points)
-        ledger.number(
-            f"{key}.{device.id}",
-            claims[device.id],
-            estimator.area(found),
-            estimator.tolerance(found, estimator.target_m2),
+    for name, claimed, whose, unit in (
+        ("centre_m", body.centre_m, "centre_mm", 1e-3),
+        ("half_m", body.half_m, "size_mm", 0.5e-3),
+    ):
+        truth = unit * np.array(stated[whose], dtype=np.float64)
+        findings.array(f"{key}.{name}", claimed, truth, _ROUNDING, whose)
+
+
+def _audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
+    """Check that bodies keep off each other, the object, the floor and the zones.
+
+    Floor and zones don't bind existing devices.
+    """
+    devices = (*case.plan.projectors, *case.plan.cameras)
+    blocks = [(device, block_of(device)) for device in devices]
+    solid = [(device, block.shrunk()) for device, block in blocks if block is not None]
+    for (_, one), (_, other) in combinations(solid, 2):
+        key = f"{one.name}.body"
+        findings.holds(
+            not one.overlaps(other), key, f"overlaps the body of {other.name}"
+        )
+    for device, block in solid:
+        findings.holds(
+            not touches(block, case.shadow.caster),
+            f"{device.id}.body",
+            "touches the object; it must stand off it",
+        )
+        if not device.existing:
+            _audit_zones(f"{device.id}.body", block, case.plan, findings)
+
+
+def _audit_zones(
+    key: str, block: Block, plan: RigPlan, findings: AuditFindings
+) -> None:
+    space = plan.requirements.workspace
+    offsets = block.corners - np.array(space.centre)
+    if space.floor_m is not None:
+        lowest = float((offsets @ np.array(space.up)).min())
+        findings.holds(
+            lowest >= space.floor_m,
+            key,
+            f"reaches {1e3 * (space.floor_m - lowest):.3g} mm below the floor",
+        )
+    if space.box is not None:
+        room = _zone(space.box, plan)
+        beyond = np.abs(in_frame(room.world_from_box, block.corners)) - room.half
+        out = float(beyond.max())
+        findings.holds(
+            out <= 0.0, key, f"reaches {1e3 * out:.3g} mm out of requirements' box"
+        )
+    for zone in space.keep_out:
+        findings.holds(
+            not block.overlaps(_zone(zone, plan)),
+            key,
+            f"reaches into the keep-out volume {zone.name!r}",
         )
 
 
-def _plain(body: Body | None) -> dict[str, Any] | None:
-    if body is None:
-        return None
-    return {"centre_m": list(body.centre_m), "half_m": list(body.half_m)}
-
-
-def _same(key: str, body: object, stated: object, ledger: Ledger) -> None:
-    """Compare a body in metres with the millimetres of the rig file."""
-    both = isinstance(body, dict), isinstance(stated, dict)
-    if not ledger.holds(
-        both[0] == both[1], key, f"{body!r} is claimed, but the rig file has {stated!r}"
-    ):
-        return
-    if isinstance(body, dict) and isinstance(stated, dict):
-        for name, whose, unit in (
-            ("centre_m", "centre_mm", 1e-3),
-            ("half_m", "size_mm", 0.5e-3),
-        ):
-            truth = np.asarray(stated.get(whose), dtype=np.float64) * unit
-            ledger.array(f"{key}.{name}", body.get(name), truth, _ROUNDING, whose)
+def _zone(zone: Box, plan: RigPlan) -> Block:
+    frame = np.eye(4)
+    frame[:3, :3] = np.array(zone.axes).T
+    frame[:3, 3] = np.array(plan.requirements.workspace.centre) + zone.centre_m
+    return Block(zone.name, frame, np.array(zone.half_m))

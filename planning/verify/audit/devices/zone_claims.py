@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
-from planning.verify.audit.ledger import Ledger, as_number, entries
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
 
+_Array = NDArray[np.float64]
+_KEY = "requirements.workspace"
 _ROUNDING = 1e-9
 
 
-def zone_excess(
-    offsets: NDArray[np.float64], space: Workspace
-) -> list[NDArray[np.float64]]:
+def zone_excess(offsets: _Array, space: Workspace) -> list[_Array]:
     """Return how far positions break each kind of zone, each (n,) [m]; <= 0 if kept.
 
     Outside the box or the nearest mounting plane by the farthest face that they lie
@@ -26,132 +26,125 @@ def zone_excess(
         offsets: Positions less the centre of the workspace, shape (n, 3).
         space: The workspace claimed.
     """
-    found = [_room_inside(zone, offsets) for zone in space.keep_out]
+    excess = [_depth_inside(zone, offsets) for zone in space.keep_out]
     if space.box is not None:
-        found.append(-_room_inside(space.box, offsets))
+        excess.append(-_depth_inside(space.box, offsets))
     if space.mounting:
-        beyond = [-_room_inside(plane, offsets) for plane in space.mounting]
-        found.append(np.min(beyond, axis=0))
-    return found
+        beyond = [-_depth_inside(plane, offsets) for plane in space.mounting]
+        excess.append(np.min(beyond, axis=0))
+    return excess
 
 
-def audit_zones(plan: RigPlan, ledger: Ledger) -> None:
-    """Check that the zones are boxes, and those of the rig."""
-    space = plan.requirements.workspace
-    key = "requirements.workspace"
-    rig = ledger.read("rig", "workspace")
-    rig = rig if isinstance(rig, dict) else {}
-    room = [] if space.box is None else [space.box]
-    for name, boxes in (
-        ("box", room),
-        ("keep_out", space.keep_out),
-        ("mounting", space.mounting),
+def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
+    """Check that the zones are boxes, and floor, radii and zones those of the rig."""
+    space, rig = case.plan.requirements.workspace, case.plan.document.rig
+    _audit_shell(case, findings)
+    tables: Mapping[str, Any] = rig.workspace
+    rooms = [tables] if "min_mm" in tables else []
+    for name, boxes, stated, same in (
+        ("box", [] if space.box is None else [space.box], rooms, _audit_room),
+        ("keep_out", space.keep_out, tables.get("keep_out") or [], _audit_volume),
+        ("mounting", space.mounting, tables.get("mounting") or [], _audit_plane),
     ):
-        stated = [rig] if name == "box" and "min_mm" in rig else entries(rig.get(name))
-        ledger.holds(
+        findings.holds(
             len(boxes) == len(stated),
-            f"{key}.{name}",
+            f"{_KEY}.{name}",
             f"holds {len(boxes)}, but rig.workspace states {len(stated)}",
         )
         for place, box in enumerate(boxes):
-            _audit_box(f"{key}.{name}.{place}", box, ledger)
-    _audit_stated(space, rig, ledger)
-    _audit_shell(space, rig, ledger)
+            _audit_box(f"{_KEY}.{name}.{place}", box, findings)
+        for place, (box, table) in enumerate(zip(boxes, stated, strict=False)):
+            same(f"{_KEY}.{name}.{place}", box, table, findings)
 
 
-def _audit_shell(space: Workspace, rig: Mapping[str, Any], ledger: Ledger) -> None:
-    """Compare floor and radii with the rig's: s + R -+ p, side by side from s - p."""
-    key = "requirements.workspace"
-    floor = as_number(rig.get("floor_mm"))
-    stated = None if floor is None else floor * 1e-3
-    ledger.holds(
-        not rig
+def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
+    """Compare floor and radii with the rig's: s + R -+ p, tiled from s - p."""
+    space, rig = case.plan.requirements.workspace, case.plan.document.rig
+    floor = rig.workspace.get("floor_mm")
+    stated = None if floor is None else 1e-3 * floor
+    findings.holds(
+        not rig.workspace
         or (
             (space.floor_m is None) == (stated is None)
             and abs((space.floor_m or 0.0) - (stated or 0.0)) <= _ROUNDING
         ),
-        f"{key}.floor_m",
+        f"{_KEY}.floor_m",
         f"{space.floor_m!r} m, but rig.workspace states {stated!r} m",
     )
-    standoff, play = (
-        as_number(ledger.read("rig", name))
-        for name in ("standoff_m", "standoff_play_m")
-    )
+    standoff, play = rig.standoff_m, rig.standoff_play_m
     if standoff is None or play is None:
         return
     middle = standoff + space.object_radius_m
-    for kind, radius, own in (
+    for kind, radius, tiled in (
         ("projector", space.projector_radius_m, space.projector_standoff_m),
         ("camera", space.camera_radius_m, space.camera_standoff_m),
     ):
-        low = middle if own is None else standoff
-        truth = np.array([low - play, middle + play])
-        name = f"{key}.{kind}_radius_m"
-        ledger.array(name, list(radius), truth, _ROUNDING, "by rig.standoff_m")
-        ledger.holds(
-            own is None or abs(own - standoff) <= _ROUNDING,
-            f"{key}.{kind}_standoff_m",
-            f"{own!r} m, but rig.standoff_m is {standoff:g} m",
+        low = middle if tiled is None else standoff
+        truth = [low - play, middle + play]
+        key = f"{_KEY}.{kind}_radius_m"
+        findings.array(key, radius, truth, _ROUNDING, "by rig.standoff_m")
+        findings.holds(
+            tiled is None or abs(tiled - standoff) <= _ROUNDING,
+            f"{_KEY}.{kind}_standoff_m",
+            f"{tiled!r} m, but rig.standoff_m is {standoff:g} m",
         )
 
 
-def _room_inside(box: Box, offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+def _depth_inside(box: Box, offsets: _Array) -> _Array:
     """Least distance to any of the six planes, negative beyond one, shape (n,)."""
-    room = np.full(len(offsets), np.inf)
-    for direction, half in zip(box.axes, box.half_m, strict=True):
-        along = offsets @ np.array(direction) - np.dot(box.centre_m, direction)
-        room = np.minimum(room, np.minimum(half - along, half + along))
-    return room
+    local = (offsets - np.array(box.centre_m)) @ np.array(box.axes).T
+    return np.min(np.array(box.half_m) - np.abs(local), axis=1)
 
 
-def _audit_box(key: str, box: Box, ledger: Ledger) -> None:
+def _audit_box(key: str, box: Box, findings: AuditFindings) -> None:
     turn = np.array(box.axes)
     error = float(np.abs(turn @ turn.T - np.eye(3)).max())
-    ledger.holds(
+    findings.holds(
         error <= _ROUNDING and np.linalg.det(turn) > 0.0,
         f"{key}.axes",
         f"are no rotation: A A^T differs from the identity by {error:.2g}",
     )
-    ledger.holds(
-        all(half > 0.0 for half in box.half_m),
+    findings.holds(
+        min(box.half_m) > 0.0,
         f"{key}.half_m",
         f"{list(box.half_m)} m must be positive",
     )
 
 
-def _audit_stated(space: Workspace, rig: Mapping[str, Any], ledger: Ledger) -> None:
-    """Compare each zone with the millimetres and degrees of the rig."""
-    key = "requirements.workspace"
-    if space.box is not None and "min_mm" in rig:
-        low, high = np.array(rig["min_mm"]) * 1e-3, np.array(rig["max_mm"]) * 1e-3
-        stated = _corners(np.eye(3), 0.5 * (low + high), 0.5 * (high - low))
-        _same(f"{key}.box", space.box, stated, ledger)
-    for place, (box, table) in enumerate(
-        zip(space.keep_out, entries(rig.get("keep_out")), strict=False)
-    ):
-        turn = _turned(np.radians(table["turn_deg"]))
-        half = np.array(table["size_mm"]) * 0.5e-3
-        stated = _corners(turn, np.array(table["centre_mm"]) * 1e-3, half)
-        _same(f"{key}.keep_out.{place}", box, stated, ledger)
-    for place, (box, table) in enumerate(
-        zip(space.mounting, entries(rig.get("mounting")), strict=False)
-    ):
-        _audit_plane(f"{key}.mounting.{place}", box, table, ledger)
+def _audit_room(
+    key: str, box: Box, table: Mapping[str, Any], findings: AuditFindings
+) -> None:
+    low, high = np.array(table["min_mm"]), np.array(table["max_mm"])
+    corners = _corners(np.eye(3), 0.5e-3 * (low + high), 0.5e-3 * (high - low))
+    _audit_corners(key.removesuffix(".0"), box, corners, findings)
 
 
-def _audit_plane(key: str, box: Box, table: Mapping[str, Any], ledger: Ledger) -> None:
+def _audit_volume(
+    key: str, box: Box, table: Mapping[str, Any], findings: AuditFindings
+) -> None:
+    turn = _turned(np.radians(table["turn_deg"]))
+    centre, half = (
+        1e-3 * np.array(table["centre_mm"]),
+        0.5e-3 * np.array(table["size_mm"]),
+    )
+    _audit_corners(key, box, _corners(turn, centre, half), findings)
+
+
+def _audit_plane(
+    key: str, box: Box, table: Mapping[str, Any], findings: AuditFindings
+) -> None:
     normal = np.array(table["normal"], dtype=np.float64)
     sizes = [*table["extent_mm"], table["thickness_mm"]]
     for name, claimed, truth in (
-        ("centre_m", box.centre_m, np.array(table["centre_mm"]) * 1e-3),
-        ("half_m", box.half_m, np.array(sizes) * 0.5e-3),
+        ("centre_m", box.centre_m, 1e-3 * np.array(table["centre_mm"])),
+        ("half_m", box.half_m, 0.5e-3 * np.array(sizes)),
         ("axes.2", box.axes[2], normal / np.linalg.norm(normal)),
     ):
         whose = "that of rig.workspace"
-        ledger.array(f"{key}.{name}", list(claimed), truth, _ROUNDING, whose)
+        findings.array(f"{key}.{name}", claimed, truth, _ROUNDING, whose)
     if table.get("along") is not None:
         off = float(np.dot(box.axes[1], table["along"]))
-        ledger.holds(
+        findings.holds(
             abs(off) <= _ROUNDING * float(np.linalg.norm(table["along"]))
             and np.dot(box.axes[0], table["along"]) > 0.0,
             f"{key}.axes.0",
@@ -159,7 +152,7 @@ def _audit_plane(key: str, box: Box, table: Mapping[str, Any], ledger: Ledger) -
         )
 
 
-def _turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned(angles: _Array) -> _Array:
     """Rz Ry Rx: turns about the fixed x, y and z axes, one after the other."""
     turn = np.eye(3)
     for axis, angle in enumerate(angles):
@@ -171,20 +164,18 @@ def _turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     return turn
 
 
-def _corners(
-    turn: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    half: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _corners(turn: _Array, centre: _Array, half: _Array) -> _Array:
     """The eight corners, first axis slowest, shape (8, 3)."""
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij"))
     return centre + (signs.reshape(3, -1).T * half) @ turn.T
 
 
-def _same(key: str, box: Box, stated: NDArray[np.float64], ledger: Ledger) -> None:
-    own = _corners(np.array(box.axes).T, np.array(box.centre_m), np.array(box.half_m))
-    off = float(np.abs(own - stated).max())
-    ledger.holds(
+def _audit_corners(key: str, box: Box, stated: _Array, findings: AuditFindings) -> None:
+    claimed = _corners(
+        np.array(box.axes).T, np.array(box.centre_m), np.array(box.half_m)
+    )
+    off = float(np.abs(claimed - stated).max())
+    findings.holds(
         off <= _ROUNDING,
         key,
         f"{box.name!r} differs from rig.workspace's by {1e3 * off:.3g} mm at a corner",

@@ -1,7 +1,7 @@
-"""Projection, lens distortion and ring coordinate, written anew for the audit.
+"""Projection and lens distortion, written anew for the audit.
 
-Where the maker of a plan differentiates by hand, this module differentiates its own
-projection numerically: an error of sign or of order shows as a difference of areas.
+Where the planner differentiates by hand, this module differentiates its own projection
+numerically: an error of sign or of order shows as a difference of areas.
 """
 
 import numpy as np
@@ -10,6 +10,21 @@ from numpy.typing import NDArray
 from geometry.devices import PinholeModel
 
 _STEP = 1e-5
+
+
+def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the scalar products of vectors (n, 3), shape (n,)."""
+    return np.einsum("ij,ij->i", a, b)
+
+
+def towards(
+    points: NDArray[np.float64], origin: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return unit directions from an origin to points (n, 3), and distances (n,)."""
+    offset = points - origin
+    length = np.linalg.norm(offset, axis=1)
+    with np.errstate(invalid="ignore"):
+        return offset / length[:, None], length
 
 
 def in_frame(
@@ -80,31 +95,7 @@ def pixel_gradient(
         for e in (e1, e2)
     )
     determinant = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    p = np.einsum("ij,ij->i", e1, across)
-    q = np.einsum("ij,ij->i", e2, across)
+    p, q = dot(e1, across), dot(e2, across)
     g_u = (p * b[:, 1] - q * a[:, 1]) / determinant
     g_v = (q * a[:, 0] - p * b[:, 0]) / determinant
     return np.column_stack([g_u, g_v])
-
-
-def ring_coordinate(ring: NDArray[np.float64], diverging: bool) -> NDArray[np.float64]:
-    """Return the coordinate c that is constant on each ring surface, (n, 3) to (n,).
-
-    c = sqrt(x^2 + y^2) for cylinders (parallel light), divided by z for cones.
-    """
-    radius = np.hypot(ring[:, 0], ring[:, 1])
-    return radius / ring[:, 2] if diverging else radius
-
-
-def ring_gradient(ring: NDArray[np.float64], diverging: bool) -> NDArray[np.float64]:
-    """Return the gradient of the ring coordinate in the ring frame, (n, 3) [1/m or 1].
-
-    The normal of the ring surface is m = grad c / |grad c|, and rings whose coordinates
-    differ by `gap` stand gap / |grad c| apart: both kinds of light in one rule.
-    """
-    radius = np.hypot(ring[:, 0], ring[:, 1])
-    outward = ring[:, :2] / radius[:, None]
-    if not diverging:
-        return np.column_stack([outward, np.zeros(len(ring))])
-    z = ring[:, 2]
-    return np.column_stack([outward / z[:, None], -radius / z**2])

@@ -6,22 +6,17 @@ products of the line with these ``|(m x d)_i| > h_j |d_k| + h_k |d_j|``. Two box
 a point iff an edge of one meets the other.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel
-from planning.model.bodies import Body
+from geometry.rays.rays import RayCaster
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.zones import Box
-from planning.verify.audit.ledger import Ledger
 
 from .audit_optics import in_frame
-from .occlusion import Shadow
 
 _Array = NDArray[np.float64]
 _Device = PlannedProjector | PlannedCamera
@@ -84,36 +79,47 @@ class Block:
 
 def block_of(device: _Device) -> Block | None:
     """Return a device's body in the world; None where it has none."""
-    return _placed(device.id, device.body, device.world_from_device)
+    if device.body is None:
+        return None
+    pose = device.world_from_device
+    frame = pose.copy()
+    frame[:3, 3] += pose[:3, :3] @ np.array(device.body.centre_m)
+    return Block(device.id, frame, np.array(device.body.half_m))
 
 
-def blocks_beside(plan: RigPlan, own: _Device) -> tuple[Block, ...]:
+def bodies_but(plan: RigPlan, device: _Device) -> tuple[Block, ...]:
     """Return the bodies of all devices of a plan but one."""
     every = (*plan.projectors, *plan.cameras)
-    found = (block_of(device) for device in every if device.id != own.id)
-    return tuple(block for block in found if block is not None)
+    return _bodies(other for other in every if other.id != device.id)
 
 
-def blocks_before(plan: RigPlan, kind: str, pose: _Array) -> tuple[Block, ...]:
-    """Return the bodies among which a reference pose reaches what it does.
+def bodies_of_reference(
+    plan: RigPlan, kind: str, poses: _Array
+) -> list[tuple[Block, ...]]:
+    """Return the bodies among which each reference pose covers what it does.
 
-    Those of devices that stand already, and for a camera those of the projectors.
+    Those of existing devices, and for a camera those of the projectors.
 
     Args:
         plan: The plan.
         kind: `projector` or `camera`.
-        pose: Of the reference device; a device of its kind that stands there is itself.
+        poses: Of the reference devices, (n, 4, 4); a device of their kind that stands
+            at one of them is itself.
     """
     cameras = [camera for camera in plan.cameras if camera.existing]
     projectors = [p for p in plan.projectors if kind == "camera" or p.existing]
-    alike = projectors if kind == "projector" else cameras
-    itself = {
-        device.id
-        for device in alike
-        if np.abs(device.world_from_device - pose).max() <= _POSE
-    }
-    found = (block_of(d) for d in (*projectors, *cameras) if d.id not in itself)
-    return tuple(block for block in found if block is not None)
+    others, alike = cameras, projectors
+    if kind == "camera":
+        others, alike = projectors, cameras
+    return [
+        _bodies(
+            [
+                *(d for d in alike if np.abs(d.world_from_device - pose).max() > _POSE),
+                *others,
+            ]
+        )
+        for pose in poses
+    ]
 
 
 def free_of(
@@ -127,50 +133,9 @@ def free_of(
     return free
 
 
-def way_to(device: _Device, points: _Array) -> _Array:
-    """Return where light to points leaves a device, or views from them end, (n, 3)."""
-    pose = device.world_from_device
-    if isinstance(device.device, ParallelModel):
-        local = in_frame(pose, points)
-        local[:, 2] = 0.0
-        return local @ pose[:3, :3].T + pose[:3, 3]
-    return np.broadcast_to(pose[:3, 3], points.shape)
-
-
-def audit_room(plan: RigPlan, shadow: Shadow, ledger: Ledger) -> None:
-    """Check that bodies keep off each other, the object, the floor and the zones.
-
-    Floor and zones don't bind devices that stand already.
-    """
-    devices = (*plan.projectors, *plan.cameras)
-    blocks = [(device, block_of(device)) for device in devices]
-    standing = [(d, block.shrunk()) for d, block in blocks if block is not None]
-    for (_, one), (_, other) in combinations(standing, 2):
-        ledger.holds(
-            not one.overlaps(other),
-            f"{one.name}.body",
-            f"overlaps the body of {other.name}",
-        )
-    for device, block in standing:
-        key = f"{device.id}.body"
-        ledger.holds(
-            not _touches(block, shadow), key, "touches the object; it must stand off it"
-        )
-        if not device.existing:
-            _audit_zones(key, block, plan, ledger)
-
-
-def _placed(name: str, body: Body | None, pose: _Array) -> Block | None:
-    if body is None:
-        return None
-    frame = pose.copy()
-    frame[:3, 3] += pose[:3, :3] @ np.array(body.centre_m)
-    return Block(name, frame, np.array(body.half_m))
-
-
-def _touches(block: Block, shadow: Shadow) -> bool:
-    """An edge of the mesh meets the box, or an edge of the box a face of the mesh."""
-    corners = shadow.caster.mesh.corners
+def touches(block: Block, caster: RayCaster) -> bool:
+    """Return whether a body meets a mesh: an edge of either a face of the other."""
+    corners = caster.mesh.corners
     for k in range(3):
         if block.meets(corners[:, k], corners[:, (k + 1) % 3]).any():
             return True
@@ -180,37 +145,10 @@ def _touches(block: Block, shadow: Shadow) -> bool:
     # Of a body that rounding alone makes no edge is left.
     long = length > 0.0
     along = way[long] / length[long, None]
-    _, distance = shadow.caster.first_hits(starts[long], along)
+    _, distance = caster.first_hits(starts[long], along)
     return bool(np.any(distance <= length[long]))
 
 
-def _audit_zones(key: str, block: Block, plan: RigPlan, ledger: Ledger) -> None:
-    space = plan.requirements.workspace
-    offsets = block.corners - np.array(space.centre)
-    if space.floor_m is not None:
-        lowest = float((offsets @ np.array(space.up)).min())
-        ledger.holds(
-            lowest >= space.floor_m,
-            key,
-            f"reaches {1e3 * (space.floor_m - lowest):.3g} mm below the floor",
-        )
-    if space.box is not None:
-        room = _zone(space.box, plan)
-        beyond = np.abs(in_frame(room.world_from_box, block.corners)) - room.half
-        out = float(beyond.max())
-        ledger.holds(
-            out <= 0.0, key, f"reaches {1e3 * out:.3g} mm out of requirements' box"
-        )
-    for zone in space.keep_out:
-        ledger.holds(
-            not block.overlaps(_zone(zone, plan)),
-            key,
-            f"reaches into the keep-out volume {zone.name!r}",
-        )
-
-
-def _zone(zone: Box, plan: RigPlan) -> Block:
-    frame = np.eye(4)
-    frame[:3, :3] = np.array(zone.axes).T
-    frame[:3, 3] = np.array(plan.requirements.workspace.centre) + zone.centre_m
-    return Block(zone.name, frame, np.array(zone.half_m))
+def _bodies(devices: Iterable[_Device]) -> tuple[Block, ...]:
+    blocks = (block_of(device) for device in devices)
+    return tuple(block for block in blocks if block is not None)

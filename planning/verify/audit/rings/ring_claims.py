@@ -1,191 +1,128 @@
-"""Claims about rings: spacing, shares, errors between them, and what they cost."""
+"""Claims about a projector's rings: how they are spaced, and what they leave out."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.plan import RigPlan
-from planning.model.requirements import Requirements
-from planning.verify.audit.estimates import Estimator
-from planning.verify.audit.ledger import Ledger, as_number
-from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import (
-    MEASURED,
-    SEEN,
-    AuditProjector,
-    pair_steps,
-)
-from planning.verify.audit.predicates.recompute import (
-    Recomputed,
-    audit_cameras,
-    audit_projectors,
-)
+from planning.model.document.device_records import RingsRecord
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.estimates import POINT, ROUNDING
+from planning.verify.audit.predicates.audit_devices import AuditProjector
 
-from .chords import Chords, counted_chords, random_beam
-from .creases import audit_creases, find_creases
-from .ring_gaps import audit_gaps, audit_spacing
-from .ring_light import RingLight, gap_about
+from .chord_claims import ROWS, strays
+from .crease_claims import audit_creases, creases_of
+from .ring_extremes import audit_extreme
+from .ring_grid import AZIMUTHS, RingGrid, cast_rings
 from .share_claims import audit_ring_shares
 
-_STREAM = 20_151_104
-_RAYS = 60_000
-_LEVEL = 0.99
-_DEVIATIONS = 4.0
-# Beside sampling: of a share of chords, and of a quantile of their errors.
-_SHARE, _RELATIVE = 0.004, 0.05
-# The largest hundredth of fewer chords is a chord or two, where a few lie together
-# between creases: nothing to hold a claim against.
-_LEAST_CHORDS = 200
-# Chords side by side bend alike: so many say as much as one that stands alone.
-_ALIKE = 2.0
-# On a plane errors are roundings, and no claim.
-_FLAT_M = 1e-9
+# Of the chords, poses rounded after rings were spaced may turn so many.
+_STRAY_SLACK = 0.005
 
 
-def audit_rings(
-    plan: RigPlan,
-    own: Recomputed,
-    shadow: Shadow,
-    estimator: Estimator,
-    ledger: Ledger,
-    *,
-    seed: int,
-) -> None:
-    """Check `rings` and `ring_shares` of every projector, and `lost_to_rings_m2`.
+def audit_rings(case: AuditCase, findings: AuditFindings) -> None:
+    """Check `rings` and `ring_shares` of every projector.
 
     A plan that has none of them claims nothing; one that has some must have all.
     `rings` may be null in a run that was cut.
-
-    Args:
-        plan: The plan.
-        own: What its devices measure of the audit's samples.
-        shadow: Occlusion.
-        estimator: Of areas.
-        ledger: Takes the false claims.
-        seed: Of the rays.
     """
-    entries = plan.to_document()["projectors"]
-    spoken = [key in e for e in entries for key in ("rings", "ring_shares")]
-    lost = ledger.read("coverage", "lost_to_rings_m2")
-    if lost is None and not any(spoken):
+    records = case.plan.document.projectors
+    if all(record.rings is None and record.ring_shares is None for record in records):
         return
-    light = RingLight(plan, shadow)
-    audit_ring_shares(plan, light, seed, ledger)
-    rng = np.random.default_rng((_STREAM, seed))
-    creases = find_creases(plan.surface.mesh, rng)
-    wish = ledger.read("rig", "rings", "spacing")
-    every_even: list[NDArray[np.float64]] = []
-    for row, (entry, lamp) in enumerate(zip(entries, light.lamps, strict=True)):
-        key, rings = f"{entry['id']}.rings", entry.get("rings")
-        every_even.append(lamp.radii)
-        if not isinstance(rings, dict):
-            ledger.holds(
-                rings is None and plan.to_document()["truncated"], key, "is missing"
-            )
+    creases = creases_of(case.plan.surface)
+    for record, projector in zip(records, case.projectors, strict=True):
+        shares, rings = record.ring_shares, record.rings
+        key = f"{record.id}.ring_shares"
+        if findings.holds(shares, key, "is missing") and shares is not None:
+            audit_ring_shares(key, shares, case, projector, findings)
+        key = f"{record.id}.rings"
+        if rings is None:
+            findings.holds(case.plan.document.truncated, key, "is missing")
             continue
-        even = audit_spacing(key, rings, lamp, wish, ledger)
+        even = _audit_spacing(key, rings, projector, case, findings)
         if even is None:
             continue
-        every_even[row] = even
-        beam = random_beam(light, lamp, 0.5 * even[0], rng)
-        audit_gaps(key, rings, lamp, even, beam.strikes, ledger, light, rng)
-        theta = plan.requirements.projector.max_incidence
-        chords = counted_chords(light, beam, even[0], creases.points, theta)
-        _audit_errors(key, rings, lamp, even[0], chords, plan.requirements, ledger)
-        claims = rings.get("creases")
-        audit_creases(
-            f"{key}.creases", claims, lamp, light, plan.surface.mesh, creases, ledger
-        )
-    found = _lost(plan, own, every_even)
-    ledger.number(
-        "coverage.lost_to_rings_m2",
-        lost,
-        estimator.area(found),
-        estimator.tolerance(found, estimator.target_m2),
-    )
+        rows = np.arange(1, ROWS * len(even) + 1) * (even[0] / ROWS)
+        grid = cast_rings(case, projector, rows)
+        _audit_gaps(key, rings, even, grid, findings)
+        limits = case.plan.requirements
+        sigma = limits.triangulation.max_sigma_m
+        tolerance = limits.check.max_p95_m if sigma is None else sigma
+        share = strays(grid, creases, limits.projector.max_incidence, tolerance)
+        name, claimed = f"{key}.over_tolerance", rings.over_tolerance
+        findings.number(name, claimed, share, _STRAY_SLACK, "of the chords")
+        name = f"{key}.creases"
+        audit_creases(name, rings.creases, case, projector, creases, findings)
 
 
-def _audit_errors(
+def _audit_spacing(
     key: str,
-    rings: Mapping[str, Any],
-    lamp: AuditProjector,
-    even: float,
-    chords: Chords,
-    limits: Requirements,
-    ledger: Ledger,
-) -> None:
-    """Check the errors between rings: e over one even gap, times (gap / even gap)^2."""
-    asked = limits.triangulation.max_sigma_m
-    tolerance = limits.check.max_p95_m if asked is None else asked
-    ledger.number(
-        f"{key}.error_tolerance_m",
-        rings.get("error_tolerance_m"),
-        tolerance,
-        1e-9,
-        "m",
+    rings: RingsRecord,
+    projector: AuditProjector,
+    case: AuditCase,
+    findings: AuditFindings,
+) -> NDArray[np.float64] | None:
+    """Check `spacing`, `kept_even` and `n_even`; return the radii of even rings."""
+    wish = case.plan.document.rig.rings.get("spacing")
+    spacing, count = rings.spacing, rings.n_even
+    findings.holds(
+        spacing == "uniform" or wish != "uniform",
+        f"{key}.spacing",
+        f"{spacing!r} is claimed, but rig.rings.spacing is {wish!r}",
     )
-    shrunk = (gap_about(lamp.radii, chords.middles) / even) ** 2
-    own = chords.errors * shrunk
-    _audit_quantile(f"{key}.error_p99_m", rings.get("error_p99_m"), own, ledger)
-    _audit_quantile(
-        f"{key}.error_p99_even_m", rings.get("error_p99_even_m"), chords.errors, ledger
+    findings.holds(
+        rings.kept_even is (spacing == "uniform" and wish == "curvature"),
+        f"{key}.kept_even",
+        f"{rings.kept_even!r} is claimed where rings are {spacing!r} and "
+        f"rig.rings.spacing is {wish!r}",
     )
-    share = float(np.mean(own > tolerance)) if len(own) else 0.0
-    over = as_number(rings.get("over_tolerance"))
-    # A share of few chords is uncertain in the plan, too.
-    likely = min(max(share, over or 0.0), 1.0)
-    slack = _SHARE + _DEVIATIONS * float(
-        np.sqrt(likely * len(own) + 1.0) / (len(own) + 2.0)
+    name = f"{key}.n_even"
+    if not findings.holds(count >= 2, name, f"{count!r} must be at least 2 rings"):
+        return None
+    even = float(projector.radii[-1]) * np.arange(1, count + 1) / count
+    findings.holds(
+        spacing != "uniform"
+        or (
+            len(even) == len(projector.radii)
+            and np.allclose(projector.radii, even, rtol=0.0, atol=ROUNDING * even[-1])
+        ),
+        f"{key}.n_even",
+        f"the {len(projector.radii)} ring_radii aren't {count} at equal steps, but "
+        f"'uniform' is claimed",
     )
-    ledger.number(f"{key}.over_tolerance", over, share, slack, "of the chords")
-    # How fine rings may be hangs on samples of the planner's; they are no finer.
-    cross = as_number(rings.get("limits_cross"))
-    ledger.holds(
-        cross is not None and 0.0 <= cross <= (over or 0.0) + _SHARE,
-        f"{key}.limits_cross",
-        f"{rings.get('limits_cross')!r} is claimed, must lie between 0 and "
-        f"over_tolerance = {over!r}",
-    )
+    return even
 
 
-def _audit_quantile(
-    key: str, claimed: object, errors: NDArray[np.float64], ledger: Ledger
+def _audit_gaps(
+    key: str,
+    rings: RingsRecord,
+    even: NDArray[np.float64],
+    grid: RingGrid,
+    findings: AuditFindings,
 ) -> None:
-    """Check that 99 % of the errors are no larger than claimed, and no 99.x % are."""
-    n, value = len(errors), as_number(claimed)
-    if n < _LEAST_CHORDS or (claimed is None and float(errors.max()) <= _FLAT_M):
-        # On flat surface the plan may have met no chord at all.
+    """Check `gap_m`, the least and largest distance of rings on lit surface.
+
+    No gap there is wider than an even one: that bounds `n_even`.
+    """
+    # Rounding decides whether the last row lies inside the last ring.
+    inner = grid.rays < (len(grid.coordinates) - 1) * AZIMUTHS
+    points = grid.samples.points[grid.lit & inner]
+    gaps = grid.projector.ring_spacing(points)
+    wide = replace(grid.projector, radii=even).ring_spacing(points)
+    share = float(np.mean(gaps > wide * (1.0 + ROUNDING))) if len(gaps) else 0.0
+    findings.holds(
+        share <= POINT,
+        f"{key}.n_even",
+        f"{len(even)} even rings stand closer than the plan's on {100 * share:.3g} % "
+        f"of its light on the surface, nowhere may they",
+    )
+    if len(gaps) == 0:
         return
-    alone = n / _ALIKE
-    noise = _SHARE / 2.0 + _DEVIATIONS * float(np.sqrt(_LEVEL * (1.0 - _LEVEL) / alone))
-    low = float(np.quantile(errors, max(_LEVEL - noise, 0.0))) * (1.0 - _RELATIVE)
-    high = float(np.quantile(errors, min(_LEVEL + noise, 1.0))) * (1.0 + _RELATIVE)
-    if _LEVEL + noise >= 1.0:
-        # Too few chords to bound what they haven't met.
-        high = np.inf
-    ledger.holds(
-        value is not None and low - _FLAT_M <= value <= high + _FLAT_M,
-        key,
-        f"claimed {claimed!r} m, recomputed {np.quantile(errors, _LEVEL):.6g} m, "
-        f"accepted {low:.6g} to {high:.6g} m",
-    )
-
-
-def _lost(
-    plan: RigPlan, own: Recomputed, even: list[NDArray[np.float64]]
-) -> NDArray[np.bool_]:
-    """Whether only even rings would measure each sample of the target, (n,)."""
-    lost = np.zeros(len(own.samples), dtype=bool)
-    left = own.samples.in_target & ~own.measured
-    for row, (lamp, radii) in enumerate(zip(audit_projectors(plan), even, strict=True)):
-        evenly = replace(lamp, radii=radii)
-        for column, eye in enumerate(audit_cameras(plan)):
-            seen = np.flatnonzero(left & (own.pairs[row, column] >= SEEN))
-            steps = pair_steps(
-                evenly, eye, own.samples.take(seen), plan.requirements.triangulation
-            )
-            lost[seen] |= steps == MEASURED - SEEN
-    return lost
+    if rings.gap_m is None:
+        findings.fail(f"{key}.gap_m", "is missing")
+        return
+    alike = np.ones(len(gaps))
+    for place, largest in enumerate((False, True)):
+        name, claimed = f"{key}.gap_m.{place}", rings.gap_m[place]
+        audit_extreme(name, claimed, gaps, alike, findings, largest=largest)

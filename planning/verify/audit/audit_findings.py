@@ -1,26 +1,21 @@
-"""Collects false claims as sentences, and reads claims without trusting them."""
+"""Audit findings: the false claims of a plan, each as a sentence."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 
-class Ledger:
-    """The list of false claims of one plan.
+class AuditFindings:
+    """The false claims of one plan: key, what is claimed, and what is true."""
 
-    Args:
-        document: The plan's JSON document.
-    """
-
-    def __init__(self, document: Mapping[str, Any]) -> None:
-        self._document = document
+    def __init__(self) -> None:
         self._failures: list[str] = []
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """One sentence for each false claim, in the order found."""
+        """One sentence for each false claim, in the order in which they were met."""
         return tuple(self._failures)
 
     def fail(self, key: str, sentence: str) -> None:
@@ -33,14 +28,15 @@ class Ledger:
             self.fail(key, sentence)
         return bool(truth)
 
-    def read(self, *path: str | int) -> Any:  # noqa: ANN401 - any JSON value
-        """Return the value at a path of the document, None where there is none."""
-        value: Any = self._document
-        for step in path:
-            try:
-                value = value[step]
-            except (KeyError, IndexError, TypeError):
-                return None
+    def is_number(
+        self, key: str, claimed: object, recomputed: float, unit: str
+    ) -> float | None:
+        """Return a claimed number; None, and a false claim, where it isn't one."""
+        value = as_number(claimed)
+        if value is None:
+            self.fail(
+                key, f"{claimed!r} is claimed, recomputed {recomputed:.6g} {unit}"
+            )
         return value
 
     def number(
@@ -52,37 +48,45 @@ class Ledger:
         unit: str = "m²",
     ) -> bool:
         """Note a false claim unless a number is claimed within a tolerance."""
-        value = as_number(claimed)
-        if value is None:
-            self.fail(
-                key, f"{claimed!r} is claimed, recomputed {recomputed:.6g} {unit}"
-            )
-            return False
-        return self.holds(
+        value = self.is_number(key, claimed, recomputed, unit)
+        return value is not None and self.holds(
             abs(value - recomputed) <= tolerance,
             key,
             f"claimed {value:.6g} {unit}, recomputed {recomputed:.6g} {unit}, "
             f"tolerance {tolerance:.2g} {unit}".replace(" ,", ",").rstrip(),
         )
 
+    def numbers(
+        self,
+        key: str,
+        claims: Mapping[str, Any],
+        recomputed: Mapping[str, float],
+        tolerance: float,
+        unit: str,
+    ) -> None:
+        """Note each number of a table that isn't claimed within a tolerance."""
+        for name, truth in recomputed.items():
+            self.number(f"{key}.{name}", claims.get(name), truth, tolerance, unit)
+
     def array(
         self,
         key: str,
         claimed: object,
-        truth: NDArray[np.float64],
+        truth: ArrayLike,
         tolerance: float,
         whose: str,
     ) -> bool:
         """Note a false claim unless an array equals its source within a tolerance."""
+        expected = np.asarray(truth, dtype=np.float64)
         try:
             value = np.asarray(claimed, dtype=np.float64)
         except (TypeError, ValueError):
             value = np.full(1, np.nan)
-        same = value.shape == truth.shape and bool(
-            np.all(np.abs(value - truth) <= tolerance)
+        same = value.shape == expected.shape and bool(
+            np.all(np.abs(value - expected) <= tolerance)
         )
         return self.holds(
-            same, key, f"claimed {claimed!r}, but {whose} is {truth.tolist()}"
+            same, key, f"claimed {claimed!r}, but {whose} is {expected.tolist()}"
         )
 
 

@@ -1,0 +1,167 @@
+"""Claims about the workspace: its shell, its values, and the poses offered in it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.plan import RigPlan
+from planning.model.requirements import Workspace
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.predicates.audit_devices import (
+    DivergingRays,
+    ParallelRays,
+    light_from,
+)
+
+from .zone_claims import zone_excess
+
+_ROUNDING = 1e-6
+_KEY = "requirements.workspace"
+# Positions are written to 0.01 mm, so one on the border may lie outside by as much.
+POSITION_M = 2e-5
+# A pose that is that of an existing device.
+SAME_POSE = 1e-9
+
+
+def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
+    """Check the workspace against the surface, and the reference poses against it."""
+    space, surface = case.plan.requirements.workspace, case.plan.surface
+    slack = _ROUNDING * max(1.0, float(np.abs(surface.mesh.bounds).max()))
+    findings.array(
+        f"{_KEY}.centre",
+        list(space.centre),
+        surface.mesh.centre,
+        slack,
+        "the centre of the smallest ball that holds the surface",
+    )
+    radius = surface.mesh.radius
+    findings.number(
+        f"{_KEY}.object_radius_m", space.object_radius_m, radius, slack, "m"
+    )
+    _audit_values(space, findings)
+    for kind, poses, stated, shell in (
+        (
+            "projector",
+            surface.reference_projectors,
+            space.n_reference_projectors,
+            space.projector_radius_m,
+        ),
+        (
+            "camera",
+            surface.reference_cameras,
+            space.n_reference_cameras,
+            space.camera_radius_m,
+        ),
+    ):
+        findings.holds(
+            len(poses) == stated,
+            f"{_KEY}.n_reference_{kind}s",
+            f"{stated} reference poses are claimed, surface.npz holds {len(poses)}",
+        )
+        key, movable = (
+            f"surface.npz reference_{kind}s",
+            _movable(poses, kind, case.plan),
+        )
+        audit_poses(key, movable, findings)
+        excess = outside_by(movable[:, :3, 3], shell, space)
+        count = int((~(excess <= POSITION_M)).sum())
+        findings.holds(
+            count == 0,
+            key,
+            f"{count} of {len(movable)} poses lie outside {_KEY}, by up to "
+            f"{1e3 * float(excess.max(initial=0.0)):.3g} mm",
+        )
+    key = "surface.npz reference_rings"
+    audit_poses(key, surface.reference_rings, findings)
+    if case.plan.projectors:
+        device = case.plan.projectors[0].device
+        light = light_from(device, surface.reference_projectors)
+        audit_ring_frames(key, light, surface.reference_rings, findings)
+
+
+def outside_by(
+    positions: NDArray[np.float64], shell: tuple[float, float], space: Workspace
+) -> NDArray[np.float64]:
+    """Return how far positions (n, 3) lie outside the workspace, <= 0 inside, (n,) [m].
+
+    The largest of the amounts by which |Q - c| misses its range, Q stands behind the
+    cone (times |Q - c|), below the floor, and where its zones don't let it.
+    """
+    offset = positions - np.array(space.centre)
+    distance = np.linalg.norm(offset, axis=1)
+    axis = np.array(space.axis) / np.linalg.norm(space.axis)
+    along = offset @ axis
+    across = np.linalg.norm(offset - along[:, None] * axis, axis=1)
+    beyond = (np.arctan2(across, along) - space.half_angle) * distance
+    excess = [shell[0] - distance, distance - shell[1], beyond]
+    if space.floor_m is not None:
+        excess.append(space.floor_m - offset @ np.array(space.up))
+    excess += zone_excess(offset, space)
+    return np.max(excess, axis=0)
+
+
+def audit_poses(key: str, poses: NDArray[np.float64], findings: AuditFindings) -> None:
+    """Check that (n, 4, 4) are rigid: R R^T = 1, det R > 0 and 0 0 0 1 below."""
+    turn = poses[:, :3, :3]
+    error = np.abs(turn @ np.swapaxes(turn, 1, 2) - np.eye(3)).max(initial=0.0)
+    findings.holds(
+        error <= _ROUNDING and np.all(np.linalg.det(turn) > 0.0),
+        key,
+        f"isn't a rotation: R R^T differs from the identity by {error:.2g} "
+        f"(tolerance {_ROUNDING:g}), or det R < 0",
+    )
+    rigid = np.all(poses[:, 3] == np.array([0.0, 0.0, 0.0, 1.0]))
+    findings.holds(rigid, key, "lacks a rigid last row, 0 0 0 1")
+
+
+def audit_ring_frames(
+    key: str,
+    light: DivergingRays | ParallelRays,
+    frames: NDArray[np.float64],
+    findings: AuditFindings,
+) -> None:
+    """Check that cones of rings share the optical centre, or cylinders the axis."""
+    off = float(np.abs(light.ring_frame_fault(frames)).max(initial=0.0))
+    findings.holds(
+        off <= _ROUNDING,
+        key,
+        f"ring frames leave the optical centre, the panel plane or the axis of the "
+        f"light by up to {off:.3g}",
+    )
+
+
+def _audit_values(space: Workspace, findings: AuditFindings) -> None:
+    for name, vector in (("up", space.up), ("axis", space.axis)):
+        length = float(np.linalg.norm(vector))
+        findings.holds(
+            abs(length - 1.0) <= _ROUNDING,
+            f"{_KEY}.{name}",
+            f"{list(vector)} must be a unit vector, its length is {length:.6g}",
+        )
+    findings.holds(
+        0.0 < space.half_angle <= math.pi + 1e-9,
+        f"{_KEY}.half_angle",
+        f"{space.half_angle:.6g} rad must lie in (0, pi]",
+    )
+    for name, shell in (
+        ("projector_radius_m", space.projector_radius_m),
+        ("camera_radius_m", space.camera_radius_m),
+    ):
+        findings.holds(
+            0.0 < shell[0] <= shell[1],
+            f"{_KEY}.{name}",
+            f"{list(shell)} m must be positive and rise",
+        )
+
+
+def _movable(
+    poses: NDArray[np.float64], kind: str, plan: RigPlan
+) -> NDArray[np.float64]:
+    """The poses (n, 4, 4) that aren't those of existing devices."""
+    movable = np.ones(len(poses), dtype=bool)
+    for device in plan.requirements.existing_of(kind):
+        off = np.abs(poses - np.array(device.world_from_device)).max(axis=(1, 2))
+        movable &= off > SAME_POSE
+    return poses[movable]
