@@ -83,15 +83,15 @@ class BaselineSamples:
             least_lit: How many samples must stay lit.
         """
         none = np.zeros((len(self.lit.target), len(cameras)), dtype=bool)
-        scene, rows = self.scene, self.lit
+        scene, samples = self.scene, self.lit
         if moves_bodies(cameras):
             scene = scene.among((*self.projectors, *cameras))
-            lit = lit_among(self.projectors, rows, cameras)
+            lit = lit_among(self.projectors, samples, cameras)
             fits = not any(lacks_clearance(scene, camera) for camera in cameras)
             if not fits or lit.any(axis=1).sum() < least_lit:
                 return none
-            rows = replace(rows, lit=lit)
-        measured = measured_by(scene, cameras, rows)
+            samples = replace(samples, lit=lit)
+        measured = measured_by(scene, cameras, samples)
         if self.covered is not None:
             beyond = np.count_nonzero(measured.any(axis=1) & ~self.covered)
             if beyond > _BEYOND * np.count_nonzero(self.covered):

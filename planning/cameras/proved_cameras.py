@@ -25,7 +25,7 @@ def bound_stage(
 
     Args:
         scene: Surface and requirements.
-        stage: Cameras from the cover, for the projectors and ring axes of its rows.
+        stage: Cameras from the cover, for the projectors and ring axes of its samples.
         device: Optics of the cameras.
         effort: What to spend.
     """

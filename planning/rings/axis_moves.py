@@ -45,13 +45,13 @@ def move_ring_axes(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     cameras: Sequence[PlannedCamera],
-    rows: LitSamples,
+    samples: LitSamples,
 ) -> tuple[PlannedProjector, ...]:
     """Return the projectors with the ring axes under which errors are smallest.
 
     Each projector in turn solves the axis program over samples that it lights; the
     whole way is tried, then a half and a quarter. A move counts only if no fewer
-    samples are measured, neither of the rows nor of fresh ones, all that is lit of the
+    samples are measured, neither of these nor of fresh ones, all that is lit of the
     surface stays inside the largest ring, and more are measured or the rms of s_N of
     each sample's best pair falls.
 
@@ -59,10 +59,10 @@ def move_ring_axes(
         scene: Surface and requirements.
         projectors: As planned, with even rings.
         cameras: As planned.
-        rows: Lit samples that the cameras were chosen on.
+        samples: Lit samples that the cameras were chosen on.
     """
     fresh = lit_samples(scene, projectors, scene.target_samples(_FRESH, _STREAM))
-    judges = tuple(AxisJudge(scene, projectors, cameras, r) for r in (rows, fresh))
+    judges = tuple(AxisJudge(scene, projectors, cameras, r) for r in (samples, fresh))
     around = lit_samples(scene, projectors, scene.surface_samples(_FRESH, _STREAM + 1))
     points = around.target.samples.points
     held = [points[around.lit[:, p]] for p in range(len(projectors))]
@@ -81,10 +81,10 @@ class AxisJudge:
         scene: Scene,
         projectors: Sequence[PlannedProjector],
         cameras: Sequence[PlannedCamera],
-        rows: LitSamples,
+        samples: LitSamples,
     ) -> None:
-        self.scene, self.rows = scene, rows
-        self.views = tuple(view_of(scene, c, rows.target) for c in cameras)
+        self.scene, self.samples = scene, samples
+        self.views = tuple(view_of(scene, c, samples.target) for c in cameras)
         self.sigma = np.stack(
             [self.sigma_with(projector, p) for p, projector in enumerate(projectors)]
         )
@@ -92,11 +92,11 @@ class AxisJudge:
     def sigma_with(self, projector: PlannedProjector, p: int) -> NDArray[np.float64]:
         """Least s_N of projector p over the cameras in [m]; inf if not measured."""
         limits = self.scene.requirements.triangulation
-        points = self.rows.target.samples.points
-        rows = self.rows.with_surfaces(p, code_surfaces(projector, points))
-        least = np.full(len(rows.target), np.inf)
+        points = self.samples.target.samples.points
+        samples = self.samples.with_surfaces(p, code_surfaces(projector, points))
+        least = np.full(len(samples.target), np.inf)
         for seen in self.views:
-            for pair in pairs_of(limits, rows, seen, projectors=[p]):
+            for pair in pairs_of(limits, samples, seen, projectors=[p]):
                 good = pair.samples[pair.measured]
                 found = pair.quality.sigma[pair.measured]
                 least[good] = np.minimum(least[good], found)
@@ -112,14 +112,14 @@ class AxisJudge:
         self, projector: PlannedProjector, p: int, sigma: NDArray[np.float64]
     ) -> None:
         """Go on with another axis of projector p, and `with_axis` of it."""
-        points = self.rows.target.samples.points
-        self.rows = self.rows.with_surfaces(p, code_surfaces(projector, points))
+        points = self.samples.target.samples.points
+        self.samples = self.samples.with_surfaces(p, code_surfaces(projector, points))
         self.sigma = sigma
 
     def holds(self, projector: PlannedProjector, p: int) -> bool:
         """Whether what a projector lights is inside its largest ring."""
         return inside_rings(
-            projector, self.rows.target.samples.points[self.rows.lit[:, p]]
+            projector, self.samples.target.samples.points[self.samples.lit[:, p]]
         )
 
 
@@ -133,18 +133,18 @@ def _move(
     scene, projector = judges[0].scene, moved[p]
     scene.check_cancelled()
     for axis in proposals(
-        axis_program(scene, moved, p, judges[0].rows, judges[0].views)
+        axis_program(scene, moved, p, judges[0].samples, judges[0].views)
     ):
         frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
-        offered = replace(projector, world_from_ring=frame)
-        lit = all(judge.holds(offered, p) for judge in judges)
-        if not (lit and inside_rings(offered, held)):
+        trial_axis = replace(projector, world_from_ring=frame)
+        lit = all(judge.holds(trial_axis, p) for judge in judges)
+        if not (lit and inside_rings(trial_axis, held)):
             continue
-        trials = [judge.with_axis(offered, p) for judge in judges]
+        trials = [judge.with_axis(trial_axis, p) for judge in judges]
         if better(trials, [judge.sigma for judge in judges]):
-            moved[p] = offered
+            moved[p] = trial_axis
             for judge, trial in zip(judges, trials, strict=True):
-                judge.keep(offered, p, trial)
+                judge.keep(trial_axis, p, trial)
             return True
     return False
 
@@ -191,7 +191,7 @@ def axis_program(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     p: int,
-    rows: LitSamples,
+    samples: LitSamples,
     views: Sequence[ViewedSamples],
 ) -> AxisProgram:
     """State the axis program of projector p.
@@ -200,17 +200,17 @@ def axis_program(
         scene: Surface and requirements.
         projectors: As they stand, with even rings.
         p: Whose axis moves.
-        rows: Samples that they light.
+        samples: Samples that they light.
         views: How each camera sees them.
     """
     limits, projector = scene.requirements.triangulation, projectors[p]
     pose, device = projector.world_from_device, projector.device
     middle = ring_frame(pose, device, 0.0, 0.0)
     turn, into = middle[:3, :3], inverse(middle)
-    lit = np.flatnonzero(rows.lit[:, p])
+    lit = np.flatnonzero(samples.lit[:, p])
     chosen = lit[:: max(1, -(-len(lit) // _ROWS))]
-    points = rows.target.samples.points
-    normals = rows.target.samples.normals[chosen]
+    points = samples.target.samples.points
+    normals = samples.target.samples.normals[chosen]
     seen = [view.take(chosen) for view in views]
     rays = np.stack([view.rays for view in seen], axis=1)
     facing = np.stack([view.facing for view in seen], axis=1)
@@ -220,8 +220,8 @@ def axis_program(
     spread += facing[:, :, None, None] * np.eye(3)
     jacobians = np.stack([view.jacobian for view in seen], axis=1)
     slopes = np.einsum("ikja,ikjl->ikal", jacobians, spread)
-    noise = limits.noise_px / np.maximum(rows.lights[p].incidence_cos[chosen], 1e-9)
-    few, others = taken(rows, chosen, rows.lit), np.zeros(len(chosen))
+    noise = limits.noise_px / np.maximum(samples.lights[p].incidence_cos[chosen], 1e-9)
+    few, others = taken(samples, chosen, samples.lit), np.zeros(len(chosen))
     among = [q for q in range(len(projectors)) if q != p]
     for view in seen:
         for pair in pairs_of(limits, few, view, projectors=among):

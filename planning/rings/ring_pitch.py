@@ -25,7 +25,7 @@ def best_pitch(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     views: Sequence[ViewedSamples],
-    rows: LitSamples,
+    samples: LitSamples,
 ) -> NDArray[np.float64]:
     """Return each projector's largest pitch among the cameras that measure a sample.
 
@@ -33,17 +33,17 @@ def best_pitch(
         scene: Surface and limits.
         projectors: With their rings.
         views: What each camera sees of the samples.
-        rows: Lit samples; their light is used, their rings are computed anew.
+        samples: Lit samples; their light is used, their rings are computed anew.
 
     Returns:
         In [px], 0 where no pair of this projector measures, shape (n, n_projectors).
     """
     for p, projector in enumerate(projectors):
-        points = rows.target.samples.points
-        rows = rows.with_surfaces(p, code_surfaces(projector, points))
-    best = np.zeros((len(rows.target), len(projectors)))
+        points = samples.target.samples.points
+        samples = samples.with_surfaces(p, code_surfaces(projector, points))
+    best = np.zeros((len(samples.target), len(projectors)))
     for seen in views:
-        for pair in pairs_of(scene.requirements.triangulation, rows, seen):
+        for pair in pairs_of(scene.requirements.triangulation, samples, seen):
             pitch = np.where(pair.measured, pair.quality.pitch, 0.0)
             table = best[:, pair.projector]
             table[pair.samples] = np.maximum(table[pair.samples], pitch)
@@ -53,17 +53,18 @@ def best_pitch(
 def users(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    rows: LitSamples,
+    samples: LitSamples,
     pitch: NDArray[np.float64],
 ) -> NDArray[np.int64]:
     """Return the projector that each sample is measured by, -1 for none, shape (n,).
 
-    The one that serves it, if a camera measures the sample with it, else the one whose
-    rings lie widest in some camera's image.
+    The one that it is assigned to, if a camera measures it with that, else the one
+    whose rings lie widest in some camera's image.
     """
-    served = assigned_projectors(rows.lit, margins_of(scene, projectors, rows.target))
-    own = pitch[np.arange(len(served)), served] > 0
-    best = np.where(own, served, np.argmax(pitch, axis=1))
+    margins = margins_of(scene, projectors, samples.target)
+    assigned = assigned_projectors(samples.lit, margins)
+    measured = pitch[np.arange(len(assigned)), assigned] > 0
+    best = np.where(measured, assigned, np.argmax(pitch, axis=1))
     return np.where(pitch.max(axis=1) > 0, best, -1)
 
 
@@ -132,13 +133,13 @@ def widest_gap(
     It is the distance tau within which a check must find a point. Where nothing is
     lit, the spacing over all samples stands in.
     """
-    rows = lit_samples(scene, projectors, target)
-    if not len(rows.target):
+    samples = lit_samples(scene, projectors, target)
+    if not len(samples.target):
         rings = [code_surfaces(p, target.samples.points) for p in projectors]
         return float(max(ring.spacing.max() for ring in rings))
     return float(
         max(
-            ring.spacing[rows.lit[:, p]].max(initial=0.0)
-            for p, ring in enumerate(rows.rings)
+            ring.spacing[samples.lit[:, p]].max(initial=0.0)
+            for p, ring in enumerate(samples.rings)
         )
     )

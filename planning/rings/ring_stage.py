@@ -55,7 +55,7 @@ class RingStage:
 class _Draw:
     """Lit samples of target and surface, how cameras see them, and their best pitch."""
 
-    rows: LitSamples
+    samples: LitSamples
     views: tuple[ViewedSamples, ...]
     pitch: NDArray[np.float64]
 
@@ -121,12 +121,12 @@ def _spaced(
     """
     every, tolerance = range(len(even)), tolerance_m(scene.requirements)
     draw = _draw(scene, even, cameras, 0)
-    binding = _binding(scene, even, draw, np.ones(len(draw.rows.target), dtype=bool))
+    binding = _binding(scene, even, draw, np.ones(len(draw.samples.target), dtype=bool))
     lost = np.zeros(0, dtype=bool)
     final = even
     for attempt in range(1, _ROUNDS + 1):
         beams = tuple(
-            beam.with_lit(_lit_at(beam, draw.rows, p)).bound(
+            beam.with_lit(_lit_at(beam, draw.samples, p)).bound(
                 binding[p][0], binding[p][1], least_pitch_px(scene)
             )
             for p, beam in enumerate(beams)
@@ -158,9 +158,9 @@ def _draw(
         scene.target_samples(_SAMPLES, stream),
         scene.surface_samples(_SAMPLES, stream + 1),
     )
-    rows = lit_samples(scene, even, both)
-    views = tuple(view_of(scene, c, rows.target) for c in cameras)
-    return _Draw(rows, views, best_pitch(scene, even, views, rows))
+    samples = lit_samples(scene, even, both)
+    views = tuple(view_of(scene, c, samples.target) for c in cameras)
+    return _Draw(samples, views, best_pitch(scene, even, views, samples))
 
 
 def _binding(
@@ -170,8 +170,8 @@ def _binding(
     chosen: NDArray[np.bool_],
 ) -> list[NDArray[np.float64]]:
     """Ring coordinates and pitches of chosen samples, by their user, (2, n) each."""
-    user = np.where(chosen, users(scene, even, draw.rows, draw.pitch), -1)
-    points = draw.rows.target.samples.points
+    user = np.where(chosen, users(scene, even, draw.samples, draw.pitch), -1)
+    points = draw.samples.target.samples.points
     return [
         np.stack(
             [
@@ -183,15 +183,17 @@ def _binding(
     ]
 
 
-def _lit_at(beam: RingBeam, rows: LitSamples, p: int) -> NDArray[np.float64]:
-    return ring_coordinate(beam.projector, rows.target.samples.points[rows.lit[:, p]])
+def _lit_at(beam: RingBeam, samples: LitSamples, p: int) -> NDArray[np.float64]:
+    return ring_coordinate(
+        beam.projector, samples.target.samples.points[samples.lit[:, p]]
+    )
 
 
 def _lost(
     scene: Scene, draw: _Draw, projectors: Sequence[PlannedProjector]
 ) -> NDArray[np.bool_]:
     """Samples that even rings measure and these don't, shape (n,)."""
-    after = best_pitch(scene, projectors, draw.views, draw.rows)
+    after = best_pitch(scene, projectors, draw.views, draw.samples)
     return np.asarray((draw.pitch > 0).any(axis=1) & ~(after > 0).any(axis=1))
 
 

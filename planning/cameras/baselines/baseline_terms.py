@@ -256,7 +256,7 @@ def best_rings(
     """Return the ring normals that measure samples best, and what s_N and pitch ask.
 
     With g = J_r^T v, |g| = c |v| / f, where c is 1 on the optical axis and hardly
-    changes as the camera slides; so the limits become m.r >= q t |v| and
+    changes as the camera moves; so the limits become m.r >= q t |v| and
     -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f).
 
     Args:
