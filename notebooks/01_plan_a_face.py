@@ -69,14 +69,13 @@ draw_mesh(
 # %%
 plan = plan_rig(mesh, load_rig("default"), max_projectors=3, seed=0)
 for kind in ("projectors", "cameras"):
-    proof = plan.to_document()["certificates"][kind]
+    proof = getattr(plan.document.certificates, kind)
     print(
-        f"{proof['count']} {kind}; at least {proof['candidates']['lower_bound']} are "
-        f"needed over {proof['candidates']['n_candidates']} candidates "
-        f"and {proof['n_samples']} samples ({proof['status']})"
+        f"{proof.count} {kind}; at least {proof.candidates.lower_bound} are "
+        f"needed over {proof.candidates.n_candidates} candidates "
+        f"and {proof.n_samples} samples ({proof.status})"
     )
-target = plan.to_document()["coverage"]["target"]
-print({key: f"{1e4 * value:.1f} cm²" for key, value in target.items()})
+print({key: f"{1e4 * value:.1f} cm²" for key, value in plan.coverage.target})
 
 # %%
 draw_rig(plan, face_status=face_status(plan))
@@ -88,8 +87,8 @@ draw_rig(plan, face_status=face_status(plan))
 # triangulated them, by code that shares nothing with the planner:
 
 # %%
-check = plan.to_document()["reconstruction"]
-{key: check[key] for key in ("accuracy_rms_m", "accuracy_p95_m", "predicted_missing")}
+check = plan.document.reconstruction
+check.accuracy_rms_m, check.accuracy_p95_m, check.predicted_missing
 
 # %% [markdown]
 # A plan is two files. Whoever receives them can recompute every claim:

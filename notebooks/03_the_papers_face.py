@@ -114,13 +114,13 @@ try:
 except RequirementError as error:
     plan = error.plan
     print("\n".join(error.shortfalls))
-target = plan.to_document()["coverage"]["target"]
-print({key: f"{1e4 * value:.1f} cm²" for key, value in target.items()})
-check = plan.to_document()["reconstruction"]
-print({key: check[key] for key in ("n_points", "accuracy_rms_m", "accuracy_p95_m")})
+target = plan.coverage.target
+print({key: f"{1e4 * value:.1f} cm²" for key, value in target})
+check = plan.document.reconstruction
+print(check.n_points, check.accuracy_rms_m, check.accuracy_p95_m)
 draw_rig(plan, face_status=face_status(plan))
 
 # %%
 assert shot.labels.wrong < 0.002 * shot.labels.n
 assert outcome.union.errors.rest_m < 0.2e-3
-assert target["lit_m2"] < 0.6 * target["area_m2"]
+assert target.lit_m2 < 0.6 * target.area_m2

@@ -32,7 +32,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.all_poses import Effort
 from planning.proofs.selection import required_samples
-from planning.report.summary.summary import _routes
+from planning.report.summary.proof_lines import route_lines
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
@@ -295,14 +295,14 @@ def test_a_plan_by_the_papers_route_alone_bears_the_audit(planned):
 def test_the_summary_tells_both_counts_and_why(handmade):
     told = Routes("both", 3, 4, "cover", "fewer; so").counts()
     proof = handmade.build_plan().document.certificates.cameras
-    (line,) = _routes(proof.changed(routes=told))
+    (line,) = route_lines(proof.changed(routes=told))
     assert re.search(
         r"3 by the cover, 4 by the paper.*taken the cover.*fewer; so", line
     )
     told = Routes("paper", None, 4, "paper", "").counts()
-    (alone,) = _routes(proof.changed(routes=told))
+    (alone,) = route_lines(proof.changed(routes=told))
     assert alone.endswith("4 by the paper's largest baselines")
-    assert _routes(proof) == []
+    assert route_lines(proof) == []
 
 
 def _failures(routes, **proof):

@@ -129,9 +129,5 @@ def test_areas_of_tiny_parts_are_told_in_square_millimetres():
         "99 mm²",
         "1.2 cm²",
     ]
-    areas = {"area_m2": 4e-6, "lit_m2": 3e-6}
-    assert _cell(areas, "lit_m2").split() == ["3.0", "mm²", "75.0", "%"]
-    assert _cell({"area_m2": 0.4, "lit_m2": 0.3}, "lit_m2").split()[:2] == [
-        "3000.0",
-        "cm²",
-    ]
+    assert _cell(3e-6, 4e-6).split() == ["3.0", "mm²", "75.0", "%"]
+    assert _cell(0.3, 0.4).split()[:2] == ["3000.0", "cm²"]

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import (
     Areas,
     CameraMarginal,
@@ -22,6 +21,7 @@ from planning.report.entries.range_entries import summary_lines
 from planning.report.entries.ring_entries import rings_lines
 
 from .check_lines import check_lines
+from .proof_lines import proof_lines
 from .shortfall import causes_line
 
 _AXES = "xyz"
@@ -40,7 +40,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     parts = [
         _head(plan),
         _devices(plan),
-        _proofs(plan),
+        proof_lines(plan, _regions(plan)),
         _coverage(plan),
         *_ranges(plan),
         *_rings(plan),
@@ -70,16 +70,6 @@ def _head(plan: RigPlan) -> str:
         f"{shell_line(mesh)}"
         f"         devices may stand in {where}"
     )
-
-
-_EXCLUDED = {
-    "projector_beam": "lie outside the beam",
-    "projector_range": "out of range",
-    "projector_incidence": "beyond the incidence limit",
-    "tangent_angle": "too near the steep direction",
-    "projector_occlusion": "in shadow",
-    "projector_body": "behind a device's body",
-}
 
 
 def shell_line(mesh: MeshRecord) -> str:
@@ -196,109 +186,6 @@ def aim_angles(
 
 def _middle(device: PlannedProjector | PlannedCamera) -> NDArray[np.float64]:
     return device.world_from_device[:3, :3] @ device.device.middle_ray
-
-
-def _proofs(plan: RigPlan) -> str:
-    asked = plan.requirements
-    proofs = plan.document.certificates
-    lines = [
-        _proof("projector", proofs.projectors, asked.dominant_coverage, "light"),
-        _continuous(proofs.projectors, _freedom(plan)),
-        _proof("camera", proofs.cameras, asked.coverage, "measure")
-        + " (given these projectors)",
-        _continuous(proofs.cameras, "position, aim and roll"),
-        *_routes(proofs.cameras),
-        f"         {_regions(plan)}",
-        *_excluded(proofs.projectors),
-    ]
-    return "\n" + "\n".join(lines)
-
-
-def _routes(proof: Certificate) -> list[str]:
-    """Return how many cameras either route needs and which is taken, in a line."""
-    routes = proof.routes
-    if routes is None:
-        return []
-    names = {"cover": "the cover", "paper": "the paper's largest baselines"}
-    counts = [
-        f"{'none' if count is None else count} by {names[kind]}"
-        for kind, count in (("cover", routes.cover), ("paper", routes.paper))
-        if routes.asked in (kind, "both")
-    ]
-    told = f"ROUTES   cameras: {', '.join(counts)}"
-    if routes.asked != "both":
-        return [told]
-    return [f"{told}; taken {names[routes.taken]}: {routes.why}"]
-
-
-def _excluded(proof: Certificate) -> list[str]:
-    """Return which limit of eq. (2) took how many pairs of pose and sample, in a line.
-
-    A pair counts for the first limit that it fails, in the order in which they stand.
-    """
-    pairs = proof.n_samples * proof.candidates.n_candidates
-    excluded = proof.excluded_pairs
-    if not excluded or not pairs:
-        return []
-    told = [
-        f"{100.0 * excluded[cause] / pairs:.1f} % {words}"
-        for cause, words in _EXCLUDED.items()
-        if cause in excluded
-    ]
-    lit = 100.0 * (1.0 - sum(excluded.values()) / pairs)
-    return [
-        f"         of {pairs:,} pairs of pose and sample {', '.join(told)}; "
-        f"{lit:.1f} % are lit"
-    ]
-
-
-def _proof(kind: str, proof: Certificate, share: float, verb: str) -> str:
-    candidates, needed, count = proof.candidates, proof.needed, proof.count
-    scope = (
-        f"to {verb} {100 * share:g} % of what the {candidates.n_candidates} "
-        f"candidate poses reach of {proof.n_samples} samples{_given(proof)}"
-    )
-    name = f"{kind}s"
-    if needed.count > count:
-        have = f"at least {needed.lower_bound} {name} are needed"
-        enough = f"{needed.count} suffice"
-        if needed.count <= proof.but_for_bodies:
-            enough += " but for their bodies"
-        return f"PROVED   {have}, {enough}, {scope}"
-    if proof.status == "optimal":
-        one = count == 1
-        return (
-            f"PROVED   {count} {kind if one else name} {'is' if one else 'are'} the "
-            f"fewest {scope}"
-        )
-    least = candidates.lower_bound
-    return f"BOUND    {count} {name}; at least {least} are needed {scope}"
-
-
-def _given(proof: Certificate) -> str:
-    return f", given {proof.given} existing" if proof.given else ""
-
-
-def _freedom(plan: RigPlan) -> str:
-    """Return what of a projector's pose counts for its light."""
-    parallel = plan.projectors[0].light == "parallel"
-    return "direction" if parallel else "position and aim"
-
-
-def _continuous(proof: Certificate, poses: str) -> str:
-    """Return what was proved over all poses of the workspace, in a line."""
-    bound = proof.continuous
-    if bound is None:
-        return f"         nothing is proved over every {poses} in the workspace"
-    scope = (
-        f"over every {poses} in the workspace, for {bound.n_samples} samples"
-        f"{_given(proof)}"
-    )
-    blind = "" if bound.occlusion else ", shadows left out"
-    least = bound.lower_bound
-    if least >= proof.needed.count:
-        return f"PROVED   fewer are too few {scope}{blind}"
-    return f"BOUND    at least {least} are needed {scope}{blind}"
 
 
 def _coverage(plan: RigPlan) -> str:
