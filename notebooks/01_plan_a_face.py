@@ -88,7 +88,7 @@ draw_rig(plan, face_status=face_status(plan))
 
 # %%
 check = plan.document.reconstruction
-check.accuracy_rms_m, check.accuracy_p95_m, check.predicted_missing
+print(check.accuracy_rms_m, check.accuracy_p95_m, check.predicted_missing)
 
 # %% [markdown]
 # A plan is two files. Whoever receives them can recompute every claim:
