@@ -19,7 +19,7 @@ from planning.model.requirements import (
 )
 from planning.scene.workspace.zone_conflicts import check_zones
 
-from .rig_tables import CheckTable, LimitsTable, RigTable
+from .rig_tables import LimitsTable, RigTable
 from .wishes import Wishes
 from .zone_tables import build_zones
 
@@ -71,6 +71,10 @@ def build_requirements(
         wishes.up,
         overflowing,
     )
+    written = table.check.model_dump()
+    checked: dict[str, Any] = {
+        key.replace("_mm", "_m"): _si(key, written[key]) for key in written
+    }
     return Requirements(
         max_projectors=wishes.max_projectors,
         max_cameras=wishes.max_cameras,
@@ -86,7 +90,7 @@ def build_requirements(
         projector=_limits_of(ProjectorLimits, table.limits, "projector_"),
         camera=_limits_of(CameraLimits, table.limits, "camera_"),
         triangulation=_triangulation_limits(table.limits, wishes.accuracy_mm),
-        check=_check_limits(table.check, tau_m),
+        check=CheckLimits(**checked, tau_m=tau_m),
         workspace=workspace,
     )
 
@@ -106,7 +110,7 @@ def build_workspace(
 
         s + R - p <= |Q - centre| <= s + R + p
 
-    Over an object that is wider than their field devices stand side by side, s from
+    Over an object that is wider than their field they are tiled, s from
     the part of it that they look at, which may be as near to the centre as it likes::
 
         s - p <= |Q - centre| <= s + R + p
@@ -201,17 +205,6 @@ def _triangulation_limits(
         return limits
     _check_positive("accuracy_mm", accuracy_mm)
     return replace(limits, max_sigma_m=accuracy_mm * 1e-3)
-
-
-def _check_limits(check: CheckTable, tau_m: float) -> CheckLimits:
-    return CheckLimits(
-        max_rms_m=check.max_rms_mm * 1e-3,
-        max_p95_m=check.max_p95_mm * 1e-3,
-        max_bias_m=check.max_bias_mm * 1e-3,
-        tau_m=tau_m,
-        min_completeness=check.min_completeness,
-        max_predicted_missing=check.max_predicted_missing,
-    )
 
 
 def _three(
