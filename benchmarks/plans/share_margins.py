@@ -13,7 +13,7 @@ comes near: both are compared.
 
 With `--axes`: measured / lit of the target for three projectors and three cameras, and
 rms and 95th percentile of the error s_N on what is measured, on fresh samples: with
-every ring axis in the middle of its beam, with the azimuths that `ring_axes` chooses,
+every ring axis in the middle of its beam, at the tilt that the rig states,
 and with the axes that the program moves; and the CPU seconds of these two searches,
 covers included.
 """
@@ -147,7 +147,7 @@ def _number(ready: Prepared) -> int:
 
 def _print_axes(given: argparse.Namespace) -> None:
     print(
-        "| mesh | light | axis in the middle | azimuth turned | program | projectors, "
+        "| mesh | light | axis in the middle | tilt of the rig | program | projectors, "
         "cameras | CPU s |\n|---|---|---|---|---|---|---|"
     )
     for name, mesh, up in _meshes(given.names):
