@@ -1,1 +1,1 @@
-"""From a draft to a plan: claims recomputed, entries written, summary and advice."""
+"""From a partial plan to a plan: claims recomputed, entries, summary and advice."""

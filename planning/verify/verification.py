@@ -124,7 +124,8 @@ def verify_plan(
         failures += differs
         if differs and _comparable(mesh, plan.surface.mesh):
             truth = _with_mesh(truth or plan, mesh)
-    recorded = plan.to_document()["reconstruction"]
+    record = plan.document.reconstruction
+    recorded = None if record is None else record.to_document()
     failures += contradictions(recorded)
     if not check_pixels:
         return Verification(tuple(failures), audit, None)
@@ -133,7 +134,7 @@ def verify_plan(
         # What is recorded is of the rig as planned.
         return Verification((*failures, *found.failures), audit, found)
     false = compare_figures(recorded, found.to_document())
-    reported = recorded is not None and recorded.get("passed") is False
+    reported = record is not None and not record.passed
     if reported and not false:
         return Verification(tuple(failures), audit, found, found.failures)
     return Verification((*failures, *found.failures, *false), audit, found)
