@@ -1,8 +1,5 @@
 """Audit findings: the false claims of a plan, each as a sentence."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -28,45 +25,24 @@ class AuditFindings:
             self.fail(key, sentence)
         return bool(truth)
 
-    def is_number(
-        self, key: str, claimed: object, recomputed: float, unit: str
-    ) -> float | None:
-        """Return a claimed number; None, and a false claim, where it isn't one."""
-        value = as_number(claimed)
-        if value is None:
-            self.fail(
-                key, f"{claimed!r} is claimed, recomputed {recomputed:.6g} {unit}"
-            )
-        return value
-
     def number(
         self,
         key: str,
-        claimed: object,
+        claimed: float | None,
         recomputed: float,
         tolerance: float,
         unit: str = "m²",
     ) -> bool:
         """Note a false claim unless a number is claimed within a tolerance."""
-        value = self.is_number(key, claimed, recomputed, unit)
-        return value is not None and self.holds(
-            abs(value - recomputed) <= tolerance,
+        if claimed is None:
+            self.fail(key, f"None is claimed, recomputed {recomputed:.6g} {unit}")
+            return False
+        return self.holds(
+            abs(claimed - recomputed) <= tolerance,
             key,
-            f"claimed {value:.6g} {unit}, recomputed {recomputed:.6g} {unit}, "
+            f"claimed {claimed:.6g} {unit}, recomputed {recomputed:.6g} {unit}, "
             f"tolerance {tolerance:.2g} {unit}".replace(" ,", ",").rstrip(),
         )
-
-    def numbers(
-        self,
-        key: str,
-        claims: Mapping[str, Any],
-        recomputed: Mapping[str, float],
-        tolerance: float,
-        unit: str,
-    ) -> None:
-        """Note each number of a table that isn't claimed within a tolerance."""
-        for name, truth in recomputed.items():
-            self.number(f"{key}.{name}", claims.get(name), truth, tolerance, unit)
 
     def array(
         self,
@@ -90,20 +66,6 @@ class AuditFindings:
         )
 
 
-def as_number(value: object) -> float | None:
-    """Return a finite number of the document as float; None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return None
-    return float(value) if np.isfinite(value) else None
-
-
 def square_centimetres(area_m2: float) -> str:
     """Return an area as a person reads it: in cm², with two decimals."""
     return f"{1e4 * area_m2:.2f} cm²"
-
-
-def entries(value: object) -> Sequence[Mapping[str, Any]]:
-    """Return the tables of a list of the document; anything else is left out."""
-    if not isinstance(value, list):
-        return ()
-    return [item for item in value if isinstance(item, dict)]

@@ -47,7 +47,7 @@ class Estimator:
     def audit(
         self,
         key: str,
-        claimed: object,
+        claimed: float,
         chosen: _Flags,
         findings: AuditFindings,
         *,
