@@ -21,8 +21,7 @@ from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
-from planning.proofs import camera_bound, projector_bound
-from planning.proofs.selection import larger
+from planning.proofs.candidate_certificate import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.what_helps import falls_short
@@ -31,6 +30,7 @@ from planning.rings.ring_stage import space_rings
 from planning.scene.scene import Scene
 
 from .prepare import Prepared
+from .proofs import camera_bound, projector_bound
 
 
 def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:

@@ -10,12 +10,11 @@ from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
+from planning.proofs.candidate_certificate import BODIES_LEFT_OUT, certificate
 from planning.proofs.conflicts import Interference, resolve_others
 from planning.proofs.selection import (
-    BODIES_LEFT_OUT,
     CandidateCover,
     Selection,
-    certificate,
     marginals,
     others_instead,
     select_fewest,

@@ -9,19 +9,13 @@ from numpy.typing import NDArray
 
 from planning.model.document.certificates import Certificate
 from planning.model.planned import PlannedProjector
+from planning.proofs.candidate_certificate import BODIES_LEFT_OUT, certificate
 from planning.proofs.conflicts import (
     ProjectorInterference,
     resolve_conflicts,
     resolve_others,
 )
-from planning.proofs.selection import (
-    BODIES_LEFT_OUT,
-    Selection,
-    certificate,
-    fewest_count,
-    marginals,
-    select_fewest,
-)
+from planning.proofs.selection import Selection, fewest_count, marginals, select_fewest
 from planning.scene.lighting import lit_margins
 from planning.scene.limits import projector_limits
 from planning.scene.scene import Scene

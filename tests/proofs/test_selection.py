@@ -5,12 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from planning.proofs.selection import (
-    CandidateCover,
-    certificate,
-    marginals,
-    select_fewest,
-)
+from planning.proofs.candidate_certificate import certificate
+from planning.proofs.selection import CandidateCover, marginals, select_fewest
 
 
 def brute(covers, required, count):

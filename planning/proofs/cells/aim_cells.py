@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.directions.cube_map import FACES, CubeMap, quarters
-from solvers.bit_rows import GrowingArray, pack_rows, parts, unpack_rows, words_for
+from solvers.bit_rows import GrowingArray, pack_rows, parts, unpack_rows
 from solvers.cells.cell_tree import CellBatch
 
+from .grown_tree import GrownTree
 from .position_cells import PAIRS, PositionTree
 from .shell_cells import directions_of
 
@@ -25,7 +26,7 @@ _ROUNDING = 1e-9
 _EVERY = -1
 
 
-class AimTree:
+class AimTree(GrownTree):
     """Cells of positions and aims, made when they are asked for.
 
     Args:
@@ -37,14 +38,12 @@ class AimTree:
     def __init__(
         self, positions: PositionTree, half_angle: float, *, finest: int
     ) -> None:
-        self.n_rows = positions.n_rows
+        super().__init__(positions.n_rows)
         self.positions, self._beta, self._finest = positions, half_angle, finest
         self._cubes = [CubeMap(1 << level) for level in range(finest + 1)]
-        self._made: dict[int, NDArray[np.int64]] = {}
         none = np.empty(0, dtype=np.int64)
         self._place, self._level = GrowingArray(none), GrowingArray(none)
         self._aim = GrowingArray(none)
-        self._rows = GrowingArray(np.empty((0, words_for(self.n_rows)), np.uint64))
         batch = positions.roots()
         every = np.full(batch.cells.size, _EVERY)
         self._roots = self._append(batch.cells, every, 0 * every, batch.rows)
@@ -53,16 +52,6 @@ class AimTree:
         """Return the roots of the positions, with every aim."""
         rows = self._rows.values[self._roots]
         return CellBatch(self._roots, np.full(self._roots.size, -1), rows)
-
-    def children(self, cells: NDArray[np.int64], /) -> CellBatch:
-        """Return the parts of each cell, by aim or by position."""
-        new = np.array([c for c in cells if int(c) not in self._made], dtype=np.int64)
-        if new.size:
-            self._split(np.unique(new))
-        made = [self._made[int(cell)] for cell in cells]
-        parents = np.repeat(np.arange(cells.size), [part.size for part in made])
-        names = np.concatenate([np.empty(0, dtype=np.int64), *made])
-        return CellBatch(names, parents, self._rows.values[names])
 
     def cells(
         self, names: NDArray[np.int64]
@@ -78,6 +67,7 @@ class AimTree:
         )
 
     def _split(self, names: NDArray[np.int64]) -> None:
+        names = np.unique(names)
         place, level, _ = self.cells(names)
         turning = (self._open_by_aim(level) > self.positions.widths(place)) & (
             level < self._finest

@@ -20,6 +20,7 @@ from planning.scene.workspace.zone_limits import may_hold
 from solvers.bit_rows import GrowingArray, parts, words_for
 from solvers.cells.cell_tree import CellBatch
 
+from .grown_tree import GrownTree
 from .shell_cells import Directions, Seen, ShellCells, directions_of, seen_from
 
 _ROUNDING = 1e-9
@@ -48,7 +49,7 @@ class CellLimits(Protocol):
         ...
 
 
-class PositionTree:
+class PositionTree(GrownTree):
     """Cells of positions, made when they are asked for.
 
     Args:
@@ -72,18 +73,16 @@ class PositionTree:
         finest: int,
         limits: CellLimits | None = None,
     ) -> None:
-        self.n_rows = len(points)
+        super().__init__(len(points))
         self._workspace, self._range = workspace, range_m
         self._points = points - np.array(workspace.centre)
         self._reach = float(np.linalg.norm(self._points, axis=1).max(initial=0.0))
         self._maps, self._finest, self._limits = maps, finest, limits
         self._cubes = [CubeMap(1 << level) for level in range(finest + 1)]
-        self._made: dict[int, NDArray[np.int64]] = {}
         none = np.empty(0, dtype=np.int64)
         zero = np.empty(0)
         self._level, self._cell = GrowingArray(none), GrowingArray(none)
         self._low, self._high = GrowingArray(zero), GrowingArray(zero)
-        self._rows = GrowingArray(np.empty((0, words_for(self.n_rows)), np.uint64))
         low, high = radius_m
         cells = ShellCells(
             np.zeros(FACES, dtype=np.int64),
@@ -98,16 +97,6 @@ class PositionTree:
         """Return the six faces, over all radii."""
         rows = self._rows.values[self._roots]
         return CellBatch(self._roots, np.full(FACES, -1), rows)
-
-    def children(self, cells: NDArray[np.int64], /) -> CellBatch:
-        """Return the four parts of each cell, or its inner and outer half."""
-        new = np.array([c for c in cells if int(c) not in self._made], dtype=np.int64)
-        if new.size:
-            self._split(new)
-        made = [self._made[int(cell)] for cell in cells]
-        parents = np.repeat(np.arange(cells.size), [part.size for part in made])
-        names = np.concatenate([np.empty(0, dtype=np.int64), *made])
-        return CellBatch(names, parents, self._rows.values[names])
 
     def spread_cells(self) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
         """Return the cells made so far that aren't split, and their rows."""

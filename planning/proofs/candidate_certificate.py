@@ -1,0 +1,129 @@
+"""The certificate of a cover over candidates, and of one device more."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol, TypeVar
+
+from planning.model.document.certificates import (
+    BestArea,
+    CandidateBound,
+    Certificate,
+    CountArea,
+    NeededCount,
+    OneFewer,
+)
+
+from .selection import Marginals, Selection
+
+# What a certificate says where chosen devices have bodies.
+BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
+
+
+def certificate(
+    selection: Selection,
+    others: Marginals,
+    *,
+    n_rows: int,
+    row_area_m2: float,
+    n_candidates: int,
+    given: int = 0,
+) -> Certificate:
+    """Return the plan's certificate: what was proved, and over what.
+
+    With devices given, its bounds count them, and speak of covers that hold them.
+    """
+    count = len(selection.chosen)
+    by_count = tuple(
+        CountArea(
+            count=n, value_m2=rows * row_area_m2, upper_bound_m2=bound * row_area_m2
+        )
+        for n, (rows, bound) in sorted(others.n_covered.items())
+    )
+    proof = Certificate(
+        count=count,
+        status=selection.status,
+        required_m2=selection.required * row_area_m2,
+        n_samples=n_rows,
+        candidates=CandidateBound(
+            lower_bound=min(selection.lower_bound, count),
+            n_candidates=n_candidates,
+            proof=selection.proof,
+        ),
+        continuous=None,
+        greedy_count=others.greedy,
+        needed=NeededCount(count=selection.needed, lower_bound=selection.lower_bound),
+        by_count=by_count,
+        best_area=_best_area(by_count, count),
+        one_fewer=_one_fewer(by_count, count, given),
+    )
+    if given:
+        proof = proof.changed(given=given)
+    if selection.but_for_bodies is not None:
+        proof = proof.changed(but_for_bodies=selection.but_for_bodies)
+    return proof
+
+
+def _best_area(by_count: tuple[CountArea, ...], count: int) -> BestArea:
+    """What so many devices cover among the candidates."""
+    (row,) = (row for row in by_count if row.count == count)
+    return BestArea(
+        value_m2=row.value_m2, upper_bound_m2=row.upper_bound_m2, scope="candidates"
+    )
+
+
+def _one_fewer(
+    by_count: tuple[CountArea, ...], count: int, given: int
+) -> OneFewer | None:
+    """What one device fewer covers at most; None where all stand already."""
+    if count <= given:
+        return None
+    most = (row.upper_bound_m2 for row in by_count if row.count == count - 1)
+    return OneFewer(upper_bound_m2=next(most, 0.0), scope="candidates")
+
+
+class PlannedStage(Protocol):
+    """What projector and camera stages have in common."""
+
+    @property
+    def certificate(self) -> Certificate:
+        """What was proved."""
+        ...
+
+    @property
+    def by_count(self) -> Mapping[int, Sequence[Any]]:
+        """Best devices for each number of them."""
+        ...
+
+
+_S = TypeVar("_S", bound=PlannedStage)
+
+
+def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | None:
+    """Return a stage whose certificate counts one device more, if that is possible.
+
+    Only for a cover that met its own rows: one that is short of devices anyway has
+    said so.
+
+    Args:
+        stage: Projector or camera stage, a dataclass.
+        present: Devices in it now.
+        allowed: Devices at most; None for no limit.
+    """
+    count, before = len(present) + 1, stage.certificate
+    met = before.status != "infeasible"
+    if not met or count not in stage.by_count or (allowed or count) < count:
+        return None
+    if len(stage.by_count[count]) < count:
+        return None
+    proof = before.changed(
+        count=count,
+        status="feasible",
+        needed=before.needed.changed(count=count),
+        best_area=_best_area(before.by_count, count),
+        one_fewer=_one_fewer(before.by_count, count, before.given),
+    )
+    if before.continuous is not None:
+        # It bounded one fewer than before.
+        unknown = before.continuous.changed(one_fewer_upper_bound_m2=None)
+        proof = proof.changed(continuous=unknown)
+    return replace(stage, certificate=proof)  # type: ignore[type-var]
