@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_camera, make_requirements, make_scene
 from support.plain_shapes import box
 
 from geometry.shapes.primitives import sphere
@@ -28,16 +29,14 @@ from planning.cameras.routes import Routes
 from planning.model.bodies import Body
 from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.all_poses import Effort
 from planning.proofs.selection import required_samples
 from planning.report.summary.proof_lines import route_lines
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.counts.route_claims import audit_route_counts
@@ -57,19 +56,14 @@ def _few_rows():
 @pytest.fixture(scope="module")
 def ball():
     mesh, rig = sphere(RADIUS, subdivisions=4), load_rig("default")
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=6, target="surface", dominant_coverage=0.6),
-        tau_m=0.004,
-    )
-    n, eye = len(mesh.faces), np.eye(4)
-    scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
+    required = make_requirements(mesh, rig, max_projectors=6, dominant_coverage=0.6)
+    eye = np.eye(4)
+    scene = make_scene(mesh, required)
     lens, radii = rig.projector_device(), uniform_radii(0.3, 0.0035)
     template = PlannedProjector("", rig.light, eye, eye, lens, radii)
     offset = (rig.ring_tilt_rad, -np.pi / 2)
     stage = plan_projectors(scene, template, 120, ring_offset=offset, rounds=1)
-    camera = PlannedCamera("", eye, rig.camera_device())
+    camera = make_camera(rig)
     return scene, stage.projectors, camera
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from support.factories import make_requirements
 from support.plain_shapes import box, cylinder, grid, joined
 
 from geometry.mesh.mesh import TriangleMesh
@@ -118,11 +119,8 @@ def test_sphere_in_diverging_light_takes_caps_that_are_smaller():
         cap = theta - np.arcsin(0.08 / distance * np.sin(theta))
         return 0.5 * (1.0 - np.cos(cap))
 
-    required = load_rig("default", light="diverging").requirements(
-        ball.centre,
-        ball.radius,
-        Wishes(max_projectors=9, target="surface"),
-        tau_m=0.004,
+    required = make_requirements(
+        ball, load_rig("default", light="diverging"), max_projectors=9
     )
     near, far = required.workspace.projector_radius_m
     at_most, at_least = share_at(far), share_at(0.5 * (near + far))

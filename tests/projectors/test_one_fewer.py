@@ -9,20 +9,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.margin_search import widest_between
 from planning.projectors.one_fewer import one_fewer
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
-from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 
 OFFSET = (0.0, 0.0)
@@ -32,21 +30,12 @@ OFFSET = (0.0, 0.0)
 def ball():
     mesh = sphere(0.1, subdivisions=4)
     rig = load_rig("default", light="parallel")
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=9, target="surface"),
-        tau_m=0.004,
-    )
+    required = make_requirements(mesh, rig, max_projectors=9)
     limits = replace(required.projector, max_incidence=np.radians(45.0))
     required = replace(required, projector=limits, dominant_coverage=0.875)
-    n = len(mesh.faces)
-    scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    scene = make_scene(mesh, required)
     radii = uniform_radii(0.15, 0.0035)
-    eye = np.eye(4)
-    return scene, PlannedProjector(
-        "", "parallel", eye, eye, rig.projector_device(), radii
-    )
+    return scene, make_projector(rig, radii)
 
 
 @pytest.fixture(scope="module")

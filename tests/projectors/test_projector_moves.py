@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_projector, make_requirements, make_scene
 from support.plain_shapes import box
 
 from geometry.mesh.mesh import TriangleMesh
@@ -15,11 +16,9 @@ from planning.projectors.projector_poses import _between, widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
-from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 
 
@@ -37,12 +36,10 @@ def shaded():
         np.concatenate([plate.faces, lid.faces + len(plate.vertices)]),
     )
     rig = load_rig("default")
-    required = rig.requirements(
-        mesh.centre, mesh.radius, Wishes(max_projectors=1), tau_m=0.004
-    )
+    required = make_requirements(mesh, rig, max_projectors=1, target=None)
     ours = (mesh.face_normals[:, 2] > 0.9) & (mesh.face_centroids[:, 2] < 0.01)
     region = np.where(ours, 0, -1)
-    scene = Scene(mesh, region, np.zeros((len(region), 3)), required, 0, 1)
+    scene = make_scene(mesh, required, region=region)
     turn = np.radians(50.0)
     outwards = np.array([np.sin(turn), 0.0, np.cos(turn)])
     radius = float(np.mean(required.workspace.projector_radius_m))
@@ -88,22 +85,14 @@ def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     """
     mesh = sphere(0.06, subdivisions=3)
     rig = load_rig("default", light="parallel")
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=4, target="surface"),
-        tau_m=0.004,
-    )
+    required = make_requirements(mesh, rig, max_projectors=4)
     cone = replace(
         required.workspace, axis=(0.0, -1.0, 0.0), half_angle=float(np.radians(40.0))
     )
     required = replace(required, workspace=cone, dominant_coverage=0.85)
-    n = len(mesh.faces)
-    scene = Scene(mesh, np.zeros(n, dtype=int), np.zeros((n, 3)), required, 0, 1)
-    eye = np.eye(4)
-    template = PlannedProjector(
-        "", "parallel", eye, eye, rig.projector_device(), uniform_radii(0.2, 0.0035)
-    )
+    whole = np.zeros(len(mesh.faces), dtype=int)
+    scene = make_scene(mesh, required, region=whole)
+    template = make_projector(rig, uniform_radii(0.2, 0.0035))
     stage = plan_projectors(scene, template, 400, ring_offset=(0.14, -1.57), rounds=1)
     moved = widen_margins(scene, stage)
     before = margins(scene, stage, stage.projectors)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_requirements, make_scene
 from support.plain_shapes import box, cylinder, grid, joined
 
 from geometry.devices import PinholeModel
@@ -40,12 +41,10 @@ from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.scene.lights import LightOnSamples
 from planning.scene.limits import camera_limits, pair_limits
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.patterns.code_surfaces import CodeSurfaces
-from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
 
@@ -61,12 +60,7 @@ def attack_cameras(benchmark_module):
 def scene_of(mesh, *, existing=(), coverage=None, limits=None, **workspace):
     """The whole surface is the target; `limits` change those of triangulation."""
     rig = load_rig("default")
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=9, target="surface", coverage=coverage),
-        tau_m=0.004,
-    )
+    required = make_requirements(mesh, rig, max_projectors=9, coverage=coverage)
     limits = dict(limits or {})
     incidence = limits.pop("max_incidence", required.camera.max_incidence)
     finest = limits.pop("max_sample_distance_m", None)
@@ -79,8 +73,7 @@ def scene_of(mesh, *, existing=(), coverage=None, limits=None, **workspace):
         workspace=replace(required.workspace, **workspace),
         existing=tuple(existing),
     )
-    n = len(mesh.faces)
-    return Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    return make_scene(mesh, required)
 
 
 def projectors_at(*positions):

@@ -5,19 +5,18 @@ from dataclasses import replace
 import igl
 import numpy as np
 import pytest
+from support.factories import make_projector, make_requirements, make_scene
 from support.plain_shapes import box, cylinder, grid, joined, torus
 
 from geometry.directions.cube_map import CubeMap
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
 from planning.model.zones import Box
 from planning.proofs import projector_bound as continuous
 from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.projector_bound import DEFAULT, bound_projectors
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
@@ -34,12 +33,7 @@ def shifted(mesh: TriangleMesh, by: tuple[float, float, float]) -> TriangleMesh:
 def stage_for(mesh, light, *, tangent_deg=0.0, steep=(0.0, 0.0, 0.0), **workspace):
     """A scene whose target is the whole surface, and a projector without a pose."""
     rig = load_rig("default", light=light)
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=9, target="surface"),
-        tau_m=0.004,
-    )
+    required = make_requirements(mesh, rig, max_projectors=9)
     required = replace(
         required,
         projector=replace(
@@ -47,13 +41,11 @@ def stage_for(mesh, light, *, tangent_deg=0.0, steep=(0.0, 0.0, 0.0), **workspac
         ),
         workspace=replace(required.workspace, **workspace),
     )
-    n = len(mesh.faces)
     t1 = np.cross(mesh.face_normals, np.array(steep))
     length = np.linalg.norm(t1, axis=1, keepdims=True)
     t1 = np.divide(t1, length, out=np.zeros_like(t1), where=length > 0)
-    scene = Scene(mesh, np.full(n, -1), t1, required, 0, 2)
-    eye = np.eye(4)
-    return scene, PlannedProjector("", light, eye, eye, rig.projector_device(), RADII)
+    scene = make_scene(mesh, required, steep=t1)
+    return scene, make_projector(rig, RADII)
 
 
 def question(required, count, n_samples=300, sample_area_m2=1e-6):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.factories import make_requirements, make_scene
 from support.plain_shapes import grid
 
 from geometry.mesh.mesh import TriangleMesh
@@ -34,7 +35,6 @@ from planning.rig.wishes import Wishes
 from planning.scene.camera_views import CandidateViews
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import furthest_failure, lit_samples, measured_by
-from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 
@@ -59,14 +59,8 @@ def rig(tmp_path_factory):
 def world(rig):
     """A ball under two projectors, seen by cameras that hold it, nearly or not."""
     ball = sphere(0.1, subdivisions=3)
-    required = rig.requirements(
-        ball.centre,
-        ball.radius,
-        Wishes(max_projectors=1, target="surface"),
-        tau_m=0.004,
-    )
-    n = len(ball.faces)
-    scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
+    required = make_requirements(ball, rig, max_projectors=1)
+    scene = make_scene(ball, required)
     up = np.array([0.0, 0.0, 1.0])
     device = rig.projector_device()
     stands = np.array([[0.0, -1.1, 0.1], [0.5, -1.0, -0.2]])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_requirements, make_scene
 from support.plain_shapes import box, grid, joined
 
 from geometry.devices import ParallelModel
@@ -15,8 +16,6 @@ from planning.model.ring_frame import ring_frame
 from planning.report.entries.exposure import schedule_line
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
-from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
@@ -33,14 +32,8 @@ WIDE = ParallelModel((2000, 2000), 2e-4, (0.8, 1.2))
 
 def scene_of(mesh, light="parallel"):
     rig = load_rig("default", light=light)
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=9, target="surface"),
-        tau_m=0.004,
-    )
-    n = len(mesh.faces)
-    return Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    required = make_requirements(mesh, rig, max_projectors=9)
+    return make_scene(mesh, required)
 
 
 def beams(*positions, device=WIDE, aims=None, light="parallel"):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_requirements, make_scene
 from support.plain_shapes import grid
 
 from geometry.shapes.primitives import sphere
@@ -13,8 +14,6 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
-from planning.scene.scene import Scene
 
 
 def plan(small_job, tmp_path, monkeypatch, mesh, rig, words=()):
@@ -82,14 +81,8 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
     """A beam of 60 mm on a ball of 100: caps of asin 0.6 = 36.9 degrees, not 60."""
     ball = sphere(0.1, subdivisions=3)
     rig = load_rig("default", light="parallel")
-    required = rig.requirements(
-        ball.centre,
-        ball.radius,
-        Wishes(max_projectors=14, target="surface", dominant_coverage=0.5),
-        tau_m=0.004,
-    )
-    n = len(ball.faces)
-    scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    required = make_requirements(ball, rig, max_projectors=14, dominant_coverage=0.5)
+    scene = make_scene(ball, required)
     beam = replace(rig.projector_device(), beam_radius=0.06)
     eye, radii = np.eye(4), np.array([0.1, 0.3])
     template = PlannedProjector("", "parallel", eye, eye, beam, radii)

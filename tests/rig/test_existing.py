@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from support.factories import make_projector, make_requirements, make_scene
 from support.plain_shapes import box
 
 from geometry.shapes.primitives import sphere
@@ -13,7 +14,7 @@ from planning import load_rig, plan_rig
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan
 from planning.model.plan_errors import RequirementError
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera
 from planning.model.requirements import Existing
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
@@ -23,7 +24,6 @@ from planning.proofs.selection import CandidateCover, marginals, select_fewest
 from planning.report.claims import Devices, make_claims
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
-from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
 from tests.support.written import requirements_of
 
@@ -151,24 +151,16 @@ def ball_scene(existing):
     """A sphere of which 48 % are asked: two caps of 60 degrees, a quarter each."""
     ball = sphere(0.08, subdivisions=4)
     rig = load_rig("default", light="parallel")
-    required = rig.requirements(
-        ball.centre,
-        ball.radius,
-        Wishes(max_projectors=9, target="surface"),
-        tau_m=0.004,
-    )
+    required = make_requirements(ball, rig, max_projectors=9)
     required = replace(
         required,
         projector=replace(required.projector, min_tangent_angle=0.0),
         dominant_coverage=0.48,
         existing=tuple(existing),
     )
-    n = len(ball.faces)
-    scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
-    eye, radii = np.eye(4), np.array([0.1, 0.45])
-    return scene, PlannedProjector(
-        "", "parallel", eye, eye, rig.projector_device(), radii
-    )
+    scene = make_scene(ball, required)
+    radii = np.array([0.1, 0.45])
+    return scene, make_projector(rig, radii)
 
 
 def shining(name, towards, aside=0.0):

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.factories import make_camera, make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import (
@@ -18,10 +19,8 @@ from planning.cameras.camera_stage import (
     proves_as_much,
     with_cameras,
 )
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.rings.axis_moves import (
     AxisJudge,
     axis_program,
@@ -35,7 +34,6 @@ from planning.scene.limits import camera_limits
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.patterns.ring_pattern import ring_coordinate
-from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores
 
@@ -48,26 +46,19 @@ def ball(request):
     """A ball, two projectors beside each other, and cameras chosen for them."""
     mesh = sphere(RADIUS, subdivisions=3)
     rig = load_rig("default", light=request.param)
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=2, target="surface", coverage=0.8),
-        tau_m=0.004,
-    )
-    n = len(mesh.faces)
-    scene = Scene(mesh, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    required = make_requirements(mesh, rig, max_projectors=2, coverage=0.8)
+    scene = make_scene(mesh, required)
     parallel = rig.light == "parallel"
     tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
-    eye = np.eye(4)
-    template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
+    template = make_projector(rig, radii)
     offered = projector_candidates(
         template, required.workspace, 100, ring_offset=(tilt, -np.pi / 2)
     )
     stands = np.stack([p.world_from_device[:3, 3] - mesh.centre for p in offered])
     wanted = np.array([[0.88, -0.46, 0.1], [0.92, 0.38, 0.1]])
     projectors = tuple(offered[i] for i in np.argmax(wanted @ stands.T, axis=1))
-    camera = PlannedCamera("", eye, rig.camera_device())
+    camera = make_camera(rig)
     cover = plan_cameras(scene, projectors, camera_candidate_views(scene, camera, 60))
     return scene, projectors, cover
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.factories import make_camera, make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import (
@@ -9,17 +10,14 @@ from planning.cameras.camera_cover import (
     camera_stage,
     plan_cameras,
 )
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.advice.projector_relaxations import reachability_relaxations
 from planning.report.claims import Devices, make_claims
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.rings.ring_pitch import widest_gap
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lighting import lit_stages, margins_of
 from planning.scene.samples import merged
-from planning.scene.scene import Scene
 
 RADIUS = 0.1
 
@@ -28,14 +26,8 @@ RADIUS = 0.1
 def scene(request):
     ball = sphere(RADIUS, subdivisions=4)
     rig = load_rig("default", light=request.param)
-    required = rig.requirements(
-        ball.centre,
-        ball.radius,
-        Wishes(max_projectors=6, target="surface", dominant_coverage=0.6),
-        tau_m=0.004,
-    )
-    n = len(ball.faces)
-    made = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    required = make_requirements(ball, rig, max_projectors=6, dominant_coverage=0.6)
+    made = make_scene(ball, required)
     return rig, made
 
 
@@ -45,10 +37,9 @@ def stages(scene):
     parallel = rig.light == "parallel"
     tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
-    eye = np.eye(4)
-    template = PlannedProjector("", rig.light, eye, eye, rig.projector_device(), radii)
+    template = make_projector(rig, radii)
     projectors = plan_projectors(made, template, 200, ring_offset=(tilt, -np.pi / 2))
-    camera = PlannedCamera("", eye, rig.camera_device())
+    camera = make_camera(rig)
     offered = camera_candidate_views(made, camera, 160)
     cover = plan_cameras(made, projectors.projectors, offered)
     cameras = camera_stage(made, cover)

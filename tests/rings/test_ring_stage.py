@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_scene
 from support.plain_shapes import box
 
 from geometry.devices import PinholeModel
@@ -25,7 +26,6 @@ from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns.pattern import code_surfaces
-from planning.scene.scene import Scene
 
 RADIUS = 0.1
 AWAY = 1.1
@@ -44,8 +44,7 @@ def made(light, *, tilt_deg=0.0, mesh=None):
     required = rig.requirements(
         np.zeros(3), RADIUS, Wishes(max_projectors=1, target="surface"), tau_m=0.004
     )
-    n = len(ball.faces)
-    scene = Scene(ball, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
+    scene = make_scene(ball, required)
     device = rig.projector_device()
     pose = look_at(np.array([0.0, -AWAY, 0.0]), np.zeros(3), UP)
     tilt = np.deg2rad(tilt_deg)

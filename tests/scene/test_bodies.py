@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
+from support.factories import make_requirements, make_scene
 from support.plain_shapes import grid
 
 from geometry.devices import ParallelModel, PinholeModel
@@ -46,7 +47,6 @@ from planning.scene.lighting import lit_stages
 from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import bodies_of
-from planning.scene.scene import Scene
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.blocks import Block, block_of
@@ -163,14 +163,8 @@ def camera(x=0.02, y=0.01, z=0.6, *, body=HOUSING, name="C1"):
 @pytest.fixture(scope="module")
 def scene():
     plate = grid(0.5, 0.5, divisions=(20, 20))
-    required = load_rig().requirements(
-        plate.centre,
-        plate.radius,
-        Wishes(max_projectors=3, target="surface"),
-        tau_m=0.003,
-    )
-    n = len(plate.faces)
-    return Scene(plate, np.full(n, -1), np.zeros((n, 3)), required, 0, 1)
+    required = make_requirements(plate, load_rig(), max_projectors=3, tau_m=0.003)
+    return make_scene(plate, required)
 
 
 def shadow_of_housing(light):

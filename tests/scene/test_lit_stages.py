@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.factories import make_requirements, make_scene
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
@@ -14,7 +15,6 @@ from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.claims import Devices, _reachable_by_projectors
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
 from planning.scene.lighting import lit_stages
@@ -22,7 +22,6 @@ from planning.scene.lights import light_on
 from planning.scene.limits import projector_limits
 from planning.scene.patterns.ring_pattern import ring_coordinate
 from planning.scene.samples import Target
-from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 
 
@@ -35,14 +34,8 @@ def test_candidates_together_light_what_each_lights_alone(light):
         np.concatenate([ball.faces, ball.faces + len(ball.vertices)]),
     )
     rig = load_rig("default", light=light)
-    required = rig.requirements(
-        pair.centre,
-        pair.radius,
-        Wishes(max_projectors=6, target="surface"),
-        tau_m=0.004,
-    )
-    n = len(pair.faces)
-    scene = Scene(pair, np.full(n, -1), np.zeros((n, 3)), required, 0, 2)
+    required = make_requirements(pair, rig, max_projectors=6)
+    scene = make_scene(pair, required)
     eye = np.eye(4)
     radii = uniform_radii(0.45 if light == "diverging" else 0.3, 0.0035)
     device = rig.projector_device()

@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.cells.shell_cells import spread
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
-from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 
 POSES = 2000
@@ -51,21 +49,13 @@ SHAPES = {"sphere": sphere(0.06, subdivisions=3), "notched box": notched_box()}
 
 def made(mesh, light, attack_cells):
     rig = load_rig("default", light=light)
-    required = rig.requirements(
-        mesh.centre,
-        mesh.radius,
-        Wishes(max_projectors=9, target="surface"),
-        tau_m=0.004,
-    )
+    required = make_requirements(mesh, rig, max_projectors=9)
     limits = replace(required.projector, min_tangent_angle=np.radians(40.0))
     required = replace(required, projector=limits)
     steep = np.cross(mesh.face_normals, [0.3, 0.2, 1.0])
     steep /= np.linalg.norm(steep, axis=1)[:, None]
-    scene = Scene(mesh, np.full(len(steep), -1), steep, required, 0, 2)
-    eye = np.eye(4)
-    template = PlannedProjector(
-        "", light, eye, eye, rig.projector_device(), np.array([0.1, 0.4])
-    )
+    scene = make_scene(mesh, required, steep=steep)
+    template = make_projector(rig, np.array([0.1, 0.4]))
     scene, template = attack_cells.fitted(
         scene, template, "close" if light == "diverging" else "default"
     )
