@@ -118,19 +118,19 @@ def verify_plan(
     seed = plan.document.seed if seed is None else seed
     say("audit: recomputing every claim on fresh samples")
     audit = audit_plan(plan, seed=seed, threads=threads)
-    failures = list(audit.failures)
+    failures, other = list(audit.failures), None
     if mesh is not None:
         differs = compare_meshes(mesh, plan.surface.mesh)
         failures += differs
         if differs and _comparable(mesh, plan.surface.mesh):
-            truth = _with_mesh(truth or plan, mesh)
+            other = mesh
     record = plan.document.reconstruction
     recorded = None if record is None else record.to_document()
     failures += contradictions(recorded)
     if not check_pixels:
         return Verification(tuple(failures), audit, None)
-    found = _reconstruct(plan, audit, truth, seed, threads, say)
-    if truth is not None:
+    found = _reconstruct(plan, audit, truth, other, seed, threads, say)
+    if truth is not None or other is not None:
         # What is recorded is of the rig as planned.
         return Verification((*failures, *found.failures), audit, found)
     false = compare_figures(recorded, found.to_document())
@@ -181,19 +181,6 @@ def _comparable(mesh: TriangleMesh, surface: TriangleMesh) -> bool:
     return low <= mesh.radius / surface.radius <= high and apart <= surface.radius
 
 
-def _with_mesh(plan: RigPlan, mesh: TriangleMesh) -> RigPlan:
-    """Return the devices of a plan about another object."""
-    n = len(mesh.faces)
-    surface = replace(
-        plan.surface,
-        mesh=mesh,
-        member=np.zeros(n, dtype=np.int64),
-        region=np.full(n, -1, dtype=np.int64),
-        steep=np.zeros((n, 3)),
-    )
-    return RigPlan(plan.document, surface)
-
-
 def _silent(line: str) -> None:
     """Report to nobody."""
 
@@ -202,6 +189,7 @@ def _reconstruct(
     plan: RigPlan,
     audit: Audit,
     truth: RigPlan | None,
+    mesh: TriangleMesh | None,
     seed: int,
     threads: int,
     say: Callable[[str], None],
@@ -212,12 +200,15 @@ def _reconstruct(
     from planning.verify.reconstruction.check.comparison import compare
     from planning.verify.reconstruction.scanner import Scanner
 
+    standing = None if truth is None and mesh is None else Scanner.of(truth or plan)
+    if standing is not None and mesh is not None:
+        standing = replace(standing, mesh=mesh)
     inside, predicted = audit.in_target()
     found = reconstruct(
         Scanner.of(plan),
         seed=seed,
         threads=threads,
-        truth=None if truth is None else Scanner.of(truth),
+        truth=standing,
         expected=Expected(_bare(inside), predicted),
         progress=lambda done, total: say(f"pixels: pair {done} of {total}"),
     )
