@@ -245,14 +245,8 @@ def camera_stage(
     if cover.interference is not None:
         n = len(cover.selection.chosen)
         others = resolve_others(cover.interference, candidates, others, n)
-    proof = certificate(
-        cover.selection,
-        others,
-        n_rows=len(cover.samples.target),
-        row_area_m2=cover.samples.target.samples.weight,
-        n_candidates=len(cover.candidates.cameras),
-        given=candidates.n_existing,
-    )
+    area = cover.samples.target.samples.weight
+    proof = certificate(candidates, cover.selection, others, area)
     if cover.has_bodies:
         proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
     by_count = {n: cover.among_candidates(of) for n, of in others.by_count.items()}

@@ -210,14 +210,7 @@ def _stage(
         most_area = selection.chosen
     others = marginals(cover, selection)
     others = resolve_others(crowd, cover, others, len(selection.chosen))
-    proof = certificate(
-        selection,
-        others,
-        n_rows=len(samples),
-        row_area_m2=samples.samples.weight,
-        n_candidates=len(candidates.projectors),
-        given=candidates.n_existing,
-    )
+    proof = certificate(cover, selection, others, samples.samples.weight)
     if crowd.bodied:
         proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
     proof = proof.changed(

@@ -13,37 +13,43 @@ from planning.model.document.certificates import (
     OneFewer,
 )
 
-from .selection import Marginals, Selection
+from .selection import CandidateCover, Marginals, Selection
 
 # What a certificate says where chosen devices have bodies.
 BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
 
 
 def certificate(
+    cover: CandidateCover,
     selection: Selection,
     others: Marginals,
-    *,
-    n_rows: int,
-    row_area_m2: float,
-    n_candidates: int,
-    given: int = 0,
+    sample_area_m2: float,
 ) -> Certificate:
     """Return the plan's certificate: what was proved, and over what.
 
-    With devices given, its bounds count them, and speak of covers that hold them.
+    With existing devices, its bounds count them, and speak of covers that hold them.
+
+    Args:
+        cover: What candidates cover.
+        selection: Candidates taken.
+        others: The best candidates of other counts.
+        sample_area_m2: Area that a sample stands for.
     """
-    count = len(selection.chosen)
+    n_samples, n_candidates = cover.covers.shape
+    count, existing = len(selection.chosen), cover.n_existing
     by_count = tuple(
         CountArea(
-            count=n, value_m2=rows * row_area_m2, upper_bound_m2=bound * row_area_m2
+            count=n,
+            value_m2=covered * sample_area_m2,
+            upper_bound_m2=bound * sample_area_m2,
         )
-        for n, (rows, bound) in sorted(others.n_covered.items())
+        for n, (covered, bound) in sorted(others.n_covered.items())
     )
     proof = Certificate(
         count=count,
         status=selection.status,
-        required_m2=selection.required * row_area_m2,
-        n_samples=n_rows,
+        required_m2=selection.required * sample_area_m2,
+        n_samples=n_samples,
         candidates=CandidateBound(
             lower_bound=min(selection.lower_bound, count),
             n_candidates=n_candidates,
@@ -54,10 +60,10 @@ def certificate(
         needed=NeededCount(count=selection.needed, lower_bound=selection.lower_bound),
         by_count=by_count,
         best_area=_best_area(by_count, count),
-        one_fewer=_one_fewer(by_count, count, given),
+        one_fewer=_one_fewer(by_count, count, existing),
     )
-    if given:
-        proof = proof.changed(given=given)
+    if existing:
+        proof = proof.changed(given=existing)
     if selection.but_for_bodies is not None:
         proof = proof.changed(but_for_bodies=selection.but_for_bodies)
     return proof
@@ -72,10 +78,10 @@ def _best_area(by_count: tuple[CountArea, ...], count: int) -> BestArea:
 
 
 def _one_fewer(
-    by_count: tuple[CountArea, ...], count: int, given: int
+    by_count: tuple[CountArea, ...], count: int, n_existing: int
 ) -> OneFewer | None:
     """What one device fewer covers at most; None where all stand already."""
-    if count <= given:
+    if count <= n_existing:
         return None
     most = (row.upper_bound_m2 for row in by_count if row.count == count - 1)
     return OneFewer(upper_bound_m2=next(most, 0.0), scope="candidates")
