@@ -133,8 +133,7 @@ def with_few_samples() -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def few() -> Generator[None]:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("planning.report.claims.N_SAMPLES", 3000)
-            patch.setattr("planning.report.entries.overlaps.N_SAMPLES", 3000)
+            _load("fewer_samples").draw_fewer(patch, claims=3000, overlaps=3000)
             yield
 
     return few

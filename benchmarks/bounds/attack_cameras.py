@@ -44,6 +44,7 @@ from planning.proofs.camera_bound import CameraCells
 from planning.proofs.cells.image_cone import image_cone
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
+from planning.scene.draws import Draw
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
 from planning.stages import first_projectors
@@ -221,7 +222,7 @@ def main() -> int:
         order = PlanRequest(mesh, load_rig("default"), wishes)
         ready = prepared(order, Stopwatch())
         projectors = widen_margins(ready.scene, first_projectors(ready, Stopwatch()))
-        target = ready.scene.target_samples(given.rows, _STREAM)
+        target = ready.scene.target_samples(Draw(given.rows, _STREAM))
         rows = lit_samples(ready.scene, projectors, target)
         for lens in given.lens:
             device = lens_of(order.rig.camera_device(), lens)

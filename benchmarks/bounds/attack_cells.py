@@ -49,6 +49,7 @@ from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.projector_bound import bound_projectors
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
+from planning.scene.draws import Draw
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -384,7 +385,7 @@ def main() -> int:
             for light in given.light:
                 begin = time.perf_counter()
                 scene, template = _scene(mesh, light, up, fit)
-                rows = scene.target_samples(given.rows, _STREAM)
+                rows = scene.target_samples(Draw(given.rows, _STREAM))
                 tree = tree_of(scene, template, rows, given.finest)
                 head = f"| {path.name} | {len(mesh.faces):,} | {light} | {fit} |"
                 if tree is None:

@@ -44,6 +44,7 @@ from planning.projectors.projector_stage import ProjectorStage
 from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.rig.wishes import Wishes
+from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.stages import first_projectors, polished
@@ -176,7 +177,7 @@ def _by_default(job: Job) -> Found:
     routes, proof = after.routes, after.certificate
     assert routes is not None
     rows = lit_samples(
-        scene, solution.projectors, scene.target_samples(_FRESH, _STREAM)
+        scene, solution.projectors, scene.target_samples(Draw(_FRESH, _STREAM))
     )
     reached = measured_by(scene, before.reference, rows).any(axis=1)
     shares = [

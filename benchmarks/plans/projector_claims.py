@@ -31,6 +31,7 @@ from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.share_margin import margin_at_share
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.samples import Target
@@ -97,7 +98,7 @@ def _row(ready: Prepared) -> tuple[str, int]:
         )
         for projector in posed
     ]
-    target = scene.target_samples(ROWS, STREAM)
+    target = scene.target_samples(Draw(ROWS, STREAM))
     said = lit_stages(scene, written, target) == projector_limits.LIT
     samples = _for_the_audit(target)
     shadow = Shadow(scene.mesh, threads=scene.threads)

@@ -43,6 +43,7 @@ from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import required_samples
 from planning.rings.axis_moves import AxisJudge
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.measured import lit_samples
@@ -194,7 +195,7 @@ def _quality(
     cameras: tuple[PlannedCamera, ...],
 ) -> str:
     """Measured / lit, and the rms and 95th percentile of s_N in micrometres."""
-    rows = lit_samples(scene, projectors, scene.target_samples(ROWS, 900))
+    rows = lit_samples(scene, projectors, scene.target_samples(Draw(ROWS, 900)))
     sigma = AxisJudge(scene, projectors, cameras, rows).sigma.min(axis=0)
     known = 1e6 * sigma[np.isfinite(sigma)]
     return (

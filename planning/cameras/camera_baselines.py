@@ -16,16 +16,13 @@ from planning.cameras.baselines.widest_baselines import (
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.clearance import lacks_clearance
+from planning.scene.draws import DRAWS
 from planning.scene.measured import LitSamples, lit_samples, measured_by
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.scene import Scene
 
 from .camera_bodies import lit_among
 
-_SAMPLES = 6000
-_STREAM = 300
-# Samples that confirm a move which those did not forbid.
-_CONFIRMING = 16_000
 # What candidates cover is the measure of all claims: cameras may measure this share of
 # it more, no further. Where candidates cover nearly all that is lit none can.
 _BEYOND, _NEARLY = 0.002, 0.97
@@ -111,7 +108,7 @@ def baseline_samples(
         scene: With the bodies of the projectors.
         projectors: As planned, with their rings.
     """
-    lit = lit_samples(scene, projectors, scene.target_samples(_SAMPLES, _STREAM))
+    lit = lit_samples(scene, projectors, scene.target_samples(DRAWS.baselines))
     return BaselineSamples(scene, tuple(projectors), lit)
 
 
@@ -175,7 +172,7 @@ def _confirming(
     @cache
     def drawn() -> tuple[BaselineSamples, int]:
         scene, projectors = samples.scene, samples.projectors
-        target = scene.target_samples(_CONFIRMING, _STREAM + 1)
+        target = scene.target_samples(DRAWS.confirming_baselines)
         more = BaselineSamples(
             scene, projectors, lit_samples(scene, projectors, target)
         )

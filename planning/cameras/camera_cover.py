@@ -21,6 +21,7 @@ from planning.proofs.selection import (
 )
 from planning.scene.camera_views import CandidateViews
 from planning.scene.clearance import candidates_with_clearance
+from planning.scene.draws import DRAWS
 from planning.scene.existing import existing_cameras
 from planning.scene.limits import pair_limits
 from planning.scene.measured import (
@@ -35,10 +36,7 @@ from planning.scene.workspace.candidates import camera_candidates
 
 from .routes import Routes
 
-_SAMPLES = 2000
-_FRESH_SAMPLES = 4000
 _ROUNDS = 3
-_STREAM = 200
 
 
 class NothingMeasuredError(InfeasibleLimitsError):
@@ -180,13 +178,13 @@ def confirmed_cover(
     Raises:
         NothingMeasuredError: If no candidate measures any lit sample.
     """
-    target = scene.target_samples(_SAMPLES, _STREAM)
+    target = scene.target_samples(DRAWS.cameras)
     samples, measured = measured_samples(scene, projectors, candidates, target)
     for attempt in range(1, _ROUNDS):
         cover = choose(samples, measured)
         if cover.selection.status == "infeasible":
             return cover
-        fresh = scene.target_samples(_FRESH_SAMPLES, _STREAM + attempt)
+        fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
         _, seen = _measured(scene, projectors, cover.candidates, fresh)
         covered = seen[:, cover.selection.chosen].any(axis=1).sum()
         if covered >= scene.requirements.coverage * seen.any(axis=1).sum():
@@ -215,7 +213,7 @@ def measured_samples(
         NothingMeasuredError: If no candidate measures any; it names the limits that
             stop most samples.
     """
-    target = target or scene.target_samples(_SAMPLES, _STREAM)
+    target = target or scene.target_samples(DRAWS.cameras)
     samples, measured = _measured(scene, projectors, candidates, target)
     if not measured.any():
         message = _nothing_measured(scene, candidates.cameras, samples)

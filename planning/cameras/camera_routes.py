@@ -28,6 +28,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
 from planning.scene.camera_views import CandidateViews
 from planning.scene.clearance import with_clearance
+from planning.scene.draws import DRAWS
 from planning.scene.measured import measured_by
 from planning.scene.scene import Scene
 
@@ -52,7 +53,6 @@ _Projectors = tuple[PlannedProjector, ...]
 # A smallest baseline counts as clearly larger from this ratio on.
 _CLEARLY = 1.1
 # Samples on which seams are looked for.
-_SAMPLES = 2000
 
 
 def cover_by_cover(
@@ -219,7 +219,7 @@ def _with_more(
 def _at_limit(scene: Scene, cover: CameraCover) -> tuple[PlannedCamera, ...]:
     """Poses at d_max from each neighbour among the cover's cameras."""
     n = len(cover.samples.target)
-    some = np.arange(0, n, -(-n // _SAMPLES))
+    some = np.arange(0, n, -(-n // DRAWS.routes))
     samples = cover.samples.target.take(some).samples
     poses = limit_poses(
         cover.cameras,

@@ -16,6 +16,7 @@ from planning.proofs.conflicts import (
     resolve_others,
 )
 from planning.proofs.selection import Selection, fewest_count, marginals, select_fewest
+from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins
 from planning.scene.limits import projector_limits
 from planning.scene.scene import Scene
@@ -25,13 +26,9 @@ from .candidate_set import CandidateSet, CandidateSource
 from .one_fewer import one_fewer
 from .share_margin import widest_selection
 
-_SAMPLES = 2000
-_FRESH_SAMPLES = 4000
 _ROUNDS = 3
 # Times the candidates of a lattice from which one projector fewer is looked for.
 _FINER = 4
-# Streams of random samples: those of the cover, then fresh ones for each round.
-_STREAM = 100
 # Counted work of the cover about which more candidates are offered.
 _SEEDS_BUDGET = 2e8
 # Counted work of the cover whose count is kept, where less left it unproved.
@@ -88,7 +85,7 @@ def plan_projectors(
         NothingLitError: If no candidate lights any sample.
     """
     source = CandidateSource(scene, template, ring_offset)
-    samples = scene.target_samples(_SAMPLES, _STREAM)
+    samples = scene.target_samples(DRAWS.projectors)
     candidates = CandidateSet.over(scene, samples, source.lattice(n_candidates))
     candidates.refuse_dark()
     n_lattice = len(candidates.projectors)
@@ -106,7 +103,9 @@ def plan_projectors(
         candidates, selection = _fewest(
             source, candidates, n_lattice, finer, thorough=attempt == 1
         )
-        fresh = candidates.on(scene.target_samples(_FRESH_SAMPLES, _STREAM + attempt))
+        fresh = candidates.on(
+            scene.target_samples(DRAWS.fresh_projectors.later(attempt))
+        )
         confirmed = fresh.cover.confirms(selection.chosen)
         if confirmed or selection.status == "infeasible" or attempt == rounds:
             break

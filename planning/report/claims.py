@@ -11,6 +11,7 @@ from planning.model.document.coverage_records import Areas
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import lighting
 from planning.scene.camera_views import view_of
+from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages, margins_of
 from planning.scene.limits import camera_limits, pair_limits, projector_limits
 from planning.scene.limits.projector_limits import INCIDENCE, LIT
@@ -23,10 +24,6 @@ from planning.scene.measured import (
 from planning.scene.placed_bodies import Device, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-
-N_SAMPLES = 12_000
-_TARGET_STREAM = 900
-_SURFACE_STREAM = 901
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +83,7 @@ class Claims:
 def make_claims(scene: Scene, devices: Devices) -> Claims:
     """Recompute every area from poses as they will be written."""
     planned = scene.among((*devices.projectors, *devices.cameras))
-    target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
+    target = scene.target_samples(DRAWS.claims)
     weight = target.samples.weight
     stages = lit_stages(planned, devices.projectors, target)
     lit = stages == LIT
@@ -143,15 +140,15 @@ def _union(
     scene: Scene, covered: Callable[[Target], NDArray[np.bool_]]
 ) -> tuple[float, float]:
     sets = (
-        scene.target_samples(N_SAMPLES, _TARGET_STREAM),
-        scene.surface_samples(N_SAMPLES, _SURFACE_STREAM),
+        scene.target_samples(DRAWS.claims),
+        scene.surface_samples(DRAWS.claims),
     )
     a, b = (float(s.samples.weight * covered(s).sum()) for s in sets)
     return a, b
 
 
 def _surface_areas(scene: Scene, devices: Devices) -> Areas:
-    surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
+    surface = scene.surface_samples(DRAWS.claims)
     planned = scene.among((*devices.projectors, *devices.cameras))
     lit = lit_stages(planned, devices.projectors, surface) == LIT
     measured = _any(_measured_by(planned, devices, surface, lit))

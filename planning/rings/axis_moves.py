@@ -15,6 +15,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
 from planning.model.ring_frame import ring_frame
 from planning.scene.camera_views import view_of
+from planning.scene.draws import DRAWS
 from planning.scene.limits import camera_limits
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import PairQuality
@@ -29,10 +30,6 @@ from .ring_radii import ring_axis, ring_frame_of_axis
 
 _SWEEPS = 2
 _STEPS = (1.0, 0.5, 0.25)
-# Samples that a program sees; the decision sees all.
-_ROWS = 250
-_FRESH = 4000
-_STREAM = 250
 # Fresh samples reach a little farther than those that the program holds.
 _RING_SHARE = 0.99
 # Errors that shrink by less aren't worth another axis.
@@ -61,9 +58,9 @@ def move_ring_axes(
         cameras: As planned.
         samples: Lit samples that the cameras were chosen on.
     """
-    fresh = lit_samples(scene, projectors, scene.target_samples(_FRESH, _STREAM))
+    fresh = lit_samples(scene, projectors, scene.target_samples(DRAWS.axes))
     judges = tuple(AxisJudge(scene, projectors, cameras, r) for r in (samples, fresh))
-    around = lit_samples(scene, projectors, scene.surface_samples(_FRESH, _STREAM + 1))
+    around = lit_samples(scene, projectors, scene.surface_samples(DRAWS.axes))
     points = around.target.samples.points
     held = [points[around.lit[:, p]] for p in range(len(projectors))]
     moved = list(projectors)
@@ -208,7 +205,7 @@ def axis_program(
     middle = ring_frame(pose, device, 0.0, 0.0)
     turn, into = middle[:3, :3], inverse(middle)
     lit = np.flatnonzero(samples.lit[:, p])
-    chosen = lit[:: max(1, -(-len(lit) // _ROWS))]
+    chosen = lit[:: max(1, -(-len(lit) // DRAWS.axis_program))]
     points = samples.target.samples.points
     normals = samples.target.samples.normals[chosen]
     seen = [view.take(chosen) for view in views]

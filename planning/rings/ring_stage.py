@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 from planning.scene.camera_views import view_of
+from planning.scene.draws import DRAWS
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.patterns.pattern import code_surfaces
@@ -31,8 +32,6 @@ from .ring_pitch import best_pitch, users
 
 Spacing = Literal["uniform", "curvature"]
 
-_SAMPLES = 6000
-_STREAM = 400
 _ROUNDS = 3
 
 
@@ -153,10 +152,10 @@ def _draw(
     number: int,
 ) -> _Draw:
     """Samples of the target and of the surface: what is claimed of either counts."""
-    stream = _STREAM + 2 * number
+    fresh = DRAWS.rings.later(2 * number)
     both = merged(
-        scene.target_samples(_SAMPLES, stream),
-        scene.surface_samples(_SAMPLES, stream + 1),
+        scene.target_samples(fresh),
+        scene.surface_samples(fresh),
     )
     samples = lit_samples(scene, even, both)
     views = tuple(view_of(scene, c, samples.target) for c in cameras)

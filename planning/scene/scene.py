@@ -14,6 +14,7 @@ from geometry.mesh.sampling import sample_surface
 from geometry.rays.visibility import Visibility
 from geometry.repair.hollow import MeshShell, measure_shell
 from planning.model.requirements import Requirements, Workspace
+from planning.scene.draws import DRAWS, Draw
 from planning.scene.workspace.view_tiles import Site
 
 from .placed_bodies import Device, PlacedBody, bodies_of, existing_bodies
@@ -23,9 +24,6 @@ Kind = Literal["projector", "camera"]
 
 # Positions are written to 0.01 mm; twice the half diagonal of that cube.
 _ROUNDING_M = 2e-5
-# Enough that no part of a field's size goes without.
-_SITE_SAMPLES = 2000
-_SITE_STREAM = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,13 +87,13 @@ class Scene:
             return np.ones(len(self.mesh.faces), dtype=bool)
         return self.region >= 0
 
-    def target_samples(self, n: int, stream: int) -> Target:
-        """Return n area-true samples of the target; each stream is a fresh draw."""
-        return self._samples(n, stream, self.target_faces)
+    def target_samples(self, draw: Draw) -> Target:
+        """Return area-true samples of the target."""
+        return self._samples(draw, self.target_faces)
 
-    def surface_samples(self, n: int, stream: int) -> Target:
-        """Return n area-true samples of the whole surface."""
-        return self._samples(n, stream, None)
+    def surface_samples(self, draw: Draw) -> Target:
+        """Return area-true samples of the whole surface, by the draw's next stream."""
+        return self._samples(draw.later(1), None)
 
     def site(self, kind: Kind, device: PinholeModel | ParallelModel) -> Site | None:
         """Return what devices stand over side by side; None where the object fits.
@@ -112,11 +110,13 @@ class Scene:
         )
         if standoff is None:
             return None
-        samples = self.target_samples(_SITE_SAMPLES, _SITE_STREAM).samples
+        samples = self.target_samples(DRAWS.site).samples
         return Site(device, space, radius, standoff, samples, limits.max_incidence)
 
-    def _samples(self, n: int, stream: int, within: NDArray[np.bool_] | None) -> Target:
+    def _samples(self, draw: Draw, within: NDArray[np.bool_] | None) -> Target:
         # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.
-        seed = int(np.random.SeedSequence([self.seed, stream]).generate_state(1)[0])
-        samples = sample_surface(self.mesh, n, seed=seed, within=within)
+        seed = int(
+            np.random.SeedSequence([self.seed, draw.stream]).generate_state(1)[0]
+        )
+        samples = sample_surface(self.mesh, draw.count, seed=seed, within=within)
         return Target(samples, self.steep[samples.faces])

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.factories import make_camera, make_requirements, make_scene
+from support.fewer_samples import draw_fewer
 from support.plain_shapes import box
 
 from geometry.shapes.primitives import sphere
@@ -36,6 +37,7 @@ from planning.proofs.selection import required_samples
 from planning.report.summary.proof_lines import route_lines
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
+from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_findings import AuditFindings
@@ -48,8 +50,7 @@ RADIUS = 0.1
 def _few_rows():
     """Fewer samples than a plan rests on: the questions here aren't of exactness."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planning.cameras.camera_cover._SAMPLES", 800)
-        patch.setattr("planning.cameras.camera_cover._FRESH_SAMPLES", 1500)
+        draw_fewer(patch, cameras=800, fresh_cameras=1500)
         yield
 
 
@@ -100,7 +101,7 @@ def test_fewer_by_the_paper_join_the_candidates_and_the_proof(ball, coarse):
     assert proof["candidates"]["lower_bound"] <= 3
     assert proof["candidates"]["n_candidates"] == len(better.candidates.cameras) > 16
     # The three are among what was proved over, and measure what is asked of all of it.
-    rows = lit_samples(scene, projectors, scene.target_samples(6000, 901))
+    rows = lit_samples(scene, projectors, scene.target_samples(Draw(6000, 901)))
     held = measured_by(scene, better.candidates.cameras, rows)
     share = held[:, better.selection.chosen].any(axis=1).sum() / held.any(axis=1).sum()
     assert share >= 0.94
@@ -181,7 +182,7 @@ def test_what_no_camera_sees_is_refused(ball):
 def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
     ball, fine, monkeypatch
 ):
-    monkeypatch.setattr("planning.cameras.camera_baselines._SAMPLES", 600)
+    draw_fewer(monkeypatch, baselines=600)
     scene, projectors, _ = ball
     cover, _, routes = fine
     stage = camera_stage(scene, cover)
@@ -206,7 +207,7 @@ def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
 
     Cameras that slid to where more is measured would owe 95 % of that, too.
     """
-    monkeypatch.setattr("planning.cameras.camera_baselines._SAMPLES", 1500)
+    draw_fewer(monkeypatch, baselines=1500)
     scene, projectors, camera = ball
     short = replace(camera, device=replace(camera.device, range_m=(1.0, 1.03)))
     cover = cover_by_cover(scene, projectors, camera_candidate_views(scene, short, 12))

@@ -21,8 +21,8 @@ VOLATILE = ("created", "command", "timings_s", "cost")
 
 
 # A quarter of the samples behind claims: no test of this file is about their number.
-FEW = "import planning.report.claims as a, planning.report.entries.overlaps as b\n"
-FEW += "a.N_SAMPLES = b.N_SAMPLES = 3000\n"
+FEW = "from planning.scene.draws import DRAWS, Draw\n"
+FEW += "vars(DRAWS).update(claims=Draw(3000, 900), overlaps=Draw(3000, 902))\n"
 
 
 def run(*words, cwd, threads=None, before=""):

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.fewer_samples import draw_fewer
 from support.plain_shapes import box
 
 from geometry.devices import PinholeModel
@@ -17,9 +18,9 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.rays import visibility
 from geometry.shapes.primitives import sphere
 from planning import pipeline
-from planning.report import claims
 from planning.report.assemble import write_plan
 from planning.rig.rig import load_rig
+from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns.code_surfaces import CodeSurfaces
 from planning.scene.patterns.ring_pattern import RingPattern
@@ -66,7 +67,7 @@ min_reachable = 0.1
 def fewer_samples():
     """A flipped sign moves areas by far more than a sixth of the samples can hide."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims, "N_SAMPLES", 2000)
+        draw_fewer(patch, claims=2000)
         yield
 
 
@@ -146,7 +147,7 @@ def test_a_sign_flipped_in_the_ring_normal_is_seen(made, monkeypatch):
     takes its place: of those that were on offer, that to which it matters most.
     """
     plan, (draft, clock) = made
-    samples = draft.scene.target_samples(500, 5)
+    samples = draft.scene.target_samples(Draw(500, 5))
     offered = draft.camera_stage.reference
     right = RingPattern.surfaces
 

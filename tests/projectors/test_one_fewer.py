@@ -19,6 +19,7 @@ from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.workspace.candidates import projector_candidates
@@ -44,7 +45,7 @@ def lattice(ball):
     poses = projector_candidates(
         template, scene.requirements.workspace, 40, ring_offset=OFFSET
     )
-    samples = scene.target_samples(2000, 100)
+    samples = scene.target_samples(Draw(2000, 100))
     return CandidateSource(scene, template), CandidateSet.over(scene, samples, poses)
 
 

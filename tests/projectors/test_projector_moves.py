@@ -17,6 +17,7 @@ from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.workspace.candidates import aimed_poses
@@ -55,7 +56,7 @@ def shaded():
         device,
         uniform_radii(0.6, 0.0035),
     )
-    rows = scene.target_samples(800, 1)
+    rows = scene.target_samples(Draw(800, 1))
     candidates = CandidateSet.over(scene, rows, (start,))
     return scene, ProjectorStage((start,), candidates, {}, {}, (start,))
 

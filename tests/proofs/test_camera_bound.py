@@ -41,6 +41,7 @@ from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
+from planning.scene.draws import Draw
 from planning.scene.lights import LightOnSamples
 from planning.scene.limits import camera_limits, pair_limits
 from planning.scene.measured import LitSamples, lit_samples
@@ -93,7 +94,7 @@ def lens(focal_px=3478.0, distortion=(0.0,) * 5):
 
 def everything_lit(scene, n):
     """Rows on which neither light nor rings forbid anything."""
-    target = scene.target_samples(n, 3)
+    target = scene.target_samples(Draw(n, 3))
     normals, one = target.samples.normals, np.ones(n)
     across = np.cross(normals, [0.3, 0.5, 0.8])
     across /= np.linalg.norm(across, axis=1)[:, None]
@@ -137,7 +138,7 @@ LENSES = {
 def shown(mesh, device, limits):
     scene = scene_of(mesh, limits=limits)
     projectors = projectors_at((0.3, -1.0, 0.4), (-0.6, 0.2, 0.9))
-    rows = lit_samples(scene, projectors, scene.target_samples(250, 5))
+    rows = lit_samples(scene, projectors, scene.target_samples(Draw(250, 5)))
     return scene, projectors, rows
 
 

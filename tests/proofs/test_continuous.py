@@ -17,6 +17,7 @@ from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.projector_bound import DEFAULT, bound_projectors
 from planning.rig.rig import load_rig
+from planning.scene.draws import Draw
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
@@ -54,7 +55,7 @@ def question(required, count, n_samples=300, sample_area_m2=1e-6):
 
 def bounded(mesh, light, share, count, effort=QUICK, n=400, **options):
     scene, template = stage_for(mesh, light, **options)
-    rows = scene.target_samples(n, 3)
+    rows = scene.target_samples(Draw(n, 3))
     required = int(np.ceil(share * n - 1e-9))
     asked = question(required, count, n, rows.samples.weight)
     return bound_projectors(scene, template, rows, asked, effort)
@@ -143,7 +144,7 @@ def test_no_pose_lights_what_its_cells_lack(name, light, tangent_deg):
     scene, template = stage_for(
         SHAPES[name], light, tangent_deg=tangent_deg, steep=(0.3, 0.2, 1.0)
     )
-    rows = scene.target_samples(300, 5)
+    rows = scene.target_samples(Draw(300, 5))
     found = bound_projectors(scene, template, rows, question(250, 9), QUICK)
     assert found.shadows
     tree = found.found.tree
@@ -174,7 +175,7 @@ def test_no_pose_lights_what_its_cells_lack(name, light, tangent_deg):
 def test_a_cell_with_a_sample_too_few_is_caught():
     """The attack above sees a superset that isn't one."""
     scene, template = stage_for(SHAPES["ring"], "parallel")
-    rows = scene.target_samples(300, 5)
+    rows = scene.target_samples(Draw(300, 5))
     found = bound_projectors(scene, template, rows, question(250, 9), QUICK)
     tree = found.found.tree
     towards = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
@@ -195,7 +196,7 @@ def test_cells_hold_the_cone_and_what_is_over_the_floor(light):
     axis = np.array([0.6, 0.0, 0.8])
     options = {"axis": tuple(axis), "half_angle": 0.9, "floor_m": 0.3}
     scene, template = stage_for(mesh, light, **options)
-    rows = scene.target_samples(200, 5)
+    rows = scene.target_samples(Draw(200, 5))
     found = bound_projectors(scene, template, rows, question(100, 3), QUICK)
     tree, workspace = found.found.tree, scene.requirements.workspace
     near, far = workspace.projector_radius_m
@@ -250,7 +251,7 @@ def test_rooms_planes_and_keep_out_volumes_empty_cells_and_only_theirs(light):
         "keep_out": (Box("lamp", (0.4, 0.0, 1.0), (0.35, 1.0, 0.5), axes),),
     }
     scene, template = stage_for(SHAPES["ring"], light, **options)
-    rows = scene.target_samples(200, 5)
+    rows = scene.target_samples(Draw(200, 5))
     found = bound_projectors(scene, template, rows, question(100, 3), QUICK)
     tree, workspace = found.found.tree, scene.requirements.workspace
     near, far = workspace.projector_radius_m
@@ -377,7 +378,7 @@ def test_the_entry_says_what_was_proved():
 def test_cells_that_are_left_are_where_the_better_cover_is():
     """Two poses light a cube; a cover of three is improved where the cells point."""
     scene, template = stage_for(box((0.1, 0.1, 0.1), divisions=4), "parallel")
-    rows = scene.target_samples(600, 3)
+    rows = scene.target_samples(Draw(600, 3))
     found = bound_projectors(scene, template, rows, question(600, 3), DEFAULT)
     assert found.found.lower_bound == 2
     corners = np.abs(found.directions)

@@ -33,6 +33,7 @@ from planning.rig import optics
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.scene.camera_views import CandidateViews
+from planning.scene.draws import Draw
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import furthest_failure, lit_samples, measured_by
 from planning.scene.workspace.candidates import aimed_poses
@@ -77,7 +78,7 @@ def world(rig):
         )
         for light in lights
     )
-    rows = lit_samples(scene, [projector, second], scene.target_samples(400, 7))
+    rows = lit_samples(scene, [projector, second], scene.target_samples(Draw(400, 7)))
     places = [(0.6, -0.9, 0.1), (-0.4, -1.0, 0.6), (0.6, -0.9, -0.3)]
     aims = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.1), (0.25, 0.165, 0.0)]
     assert len(rows.target) > 60

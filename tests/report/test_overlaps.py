@@ -16,6 +16,7 @@ from planning.model.ring_frame import ring_frame
 from planning.report.entries.exposure import schedule_line
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.rig.rig import load_rig
+from planning.scene.draws import Draw
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
@@ -76,7 +77,7 @@ def test_plates_back_to_back_are_lit_together(light):
     assert schedule["groups"] == [["P1", "P2"]]
     assert (schedule["n_groups"], schedule["proof"]) == (1, "clique")
     # Each does put light on its own side.
-    areas = shared_areas(scene, projectors, scene.surface_samples(2000, 1))
+    areas = shared_areas(scene, projectors, scene.surface_samples(Draw(2000, 0)))
     assert np.diag(areas) == pytest.approx([0.01, 0.01], rel=0.03)
 
 
@@ -139,7 +140,7 @@ def test_what_is_drawn_beyond_the_last_ring_spoils_codes_too():
     lens = 2 * r**2 * np.arccos(d / (2 * r)) - d / 2 * np.sqrt(4 * r**2 - d**2)
     assert entry["surface_m2"] == pytest.approx(lens, rel=0.15)
     # The audit's own predicate says the same.
-    own = scene.surface_samples(20_000, 3).samples
+    own = scene.surface_samples(Draw(20_000, 2)).samples
     n = len(own.points)
     steep, ones = np.zeros((n, 3)), np.ones(n)
     samples = AuditSamples(
@@ -162,7 +163,7 @@ def test_shadow_is_no_light():
     plate = grid(0.2, 0.2, divisions=(3, 3))
     scene = scene_of(joined(plate, lifted))
     (above,) = beams((0, 0, 1))
-    samples = scene.surface_samples(12_000, 1)
+    samples = scene.surface_samples(Draw(12_000, 0))
     assert shared_areas(scene, [above], samples)[0, 0] == pytest.approx(0.04, rel=0.01)
 
 

@@ -30,6 +30,7 @@ from planning.rings.axis_moves import (
 )
 from planning.rings.ring_radii import ring_axis, ring_frame_of_axis, uniform_radii
 from planning.scene import measurability
+from planning.scene.draws import Draw
 from planning.scene.limits import camera_limits
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns.pattern import code_surfaces
@@ -80,7 +81,7 @@ def moved(ball):
 
 def test_errors_fall_and_nothing_is_lost(ball, moved):
     scene, projectors, cover = ball
-    for target in (cover.samples.target, scene.target_samples(3000, 77)):
+    for target in (cover.samples.target, scene.target_samples(Draw(3000, 77))):
         (kept, before, lit), (now, after, still_lit) = (
             errors(scene, p, cover.cameras, target) for p in (projectors, moved)
         )
@@ -146,7 +147,7 @@ def test_fresh_samples_stay_inside_the_last_ring_too(ball):
     """A dozen rows reach less far than all that is lit: they would let the axis go."""
     scene, projectors, cover = ball
     few = cover.samples.target.take(np.arange(0, len(cover.samples.target), 150))
-    every = scene.target_samples(4000, 250)
+    every = scene.target_samples(Draw(4000, 250))
     lit = lit_samples(scene, projectors, every)
     points = lit.target.samples.points
     tight = [
@@ -163,12 +164,12 @@ def test_what_is_lit_beside_the_target_stays_lit_too(ball):
     required = replace(whole.requirements, target="dominant")
     region = np.where(towards > 0.9, 0, -1)
     scene = replace(whole, region=region, requirements=required)
-    around = lit_samples(scene, projectors, scene.surface_samples(4000, 251))
+    around = lit_samples(scene, projectors, scene.surface_samples(Draw(4000, 250)))
     points = around.target.samples.points
     tight = [
         _with_last_ring(p, points[around.lit[:, i]]) for i, p in enumerate(projectors)
     ]
-    rows = lit_samples(scene, tight, scene.target_samples(500, 9))
+    rows = lit_samples(scene, tight, scene.target_samples(Draw(500, 9)))
     after = move_ring_axes(scene, tight, cover.cameras, rows)
     assert any(new is not old for new, old in zip(after, tight, strict=True))
     assert np.array_equal(lit_samples(scene, after, around.target).lit, around.lit)

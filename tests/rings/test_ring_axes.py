@@ -16,6 +16,7 @@ from planning.report.claims import Devices, make_claims
 from planning.rig.rig import load_rig
 from planning.rings.ring_pitch import widest_gap
 from planning.rings.ring_radii import uniform_radii
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages, margins_of
 from planning.scene.samples import merged
 
@@ -56,7 +57,7 @@ def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
 
 def test_widest_gap_is_that_of_the_farthest_lit_sample(stages):
     made, projectors, _, _ = stages
-    target = made.target_samples(3000, 8)
+    target = made.target_samples(Draw(3000, 8))
     gap = widest_gap(made, projectors.projectors, target)
     radii = projectors.projectors[0].ring_radii
     step = radii[1] - radii[0]
@@ -95,7 +96,7 @@ def test_no_relaxation_is_offered_where_nothing_is_out_of_reach(stages):
 
 def test_merged_samples_stand_for_the_same_area(stages):
     made, projectors, _, _ = stages
-    a, b = made.target_samples(500, 1), made.target_samples(1500, 2)
+    a, b = made.target_samples(Draw(500, 1)), made.target_samples(Draw(1500, 2))
     both = merged(a, b)
     assert len(both) == 2000
     assert both.samples.weight * 2000 == pytest.approx(a.samples.weight * 500)

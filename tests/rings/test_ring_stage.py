@@ -24,6 +24,7 @@ from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
+from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns.pattern import code_surfaces
 
@@ -101,7 +102,7 @@ def test_what_even_rings_measure_stays_measured(bench, spaced):
     final = spaced.projectors[0]
     assert spaced.reports[0]["spacing"] == "curvature"
     assert final.ring_radii[-1] == even.ring_radii[-1]
-    target = scene.target_samples(4000, 77)
+    target = scene.target_samples(Draw(4000, 77))
     before = measured(scene, even, cameras, target)
     after = measured(scene, final, cameras, target)
     assert before.sum() > 200
@@ -115,7 +116,7 @@ def test_rings_to_spare_go_to_flat_surface_too():
     scene, even, cameras = made("diverging", tilt_deg=8.0, mesh=box((0.1, 0.1, 0.1)))
     final = space_rings(scene, [even], cameras, "curvature").projectors[0]
     assert len(final.ring_radii) <= len(even.ring_radii)
-    target = scene.target_samples(2000, 78)
+    target = scene.target_samples(Draw(2000, 78))
     gap = {p: widest_gap(scene, [p], target) for p in (even, final)}
     assert gap[final] < 0.9 * gap[even]
 
@@ -123,12 +124,12 @@ def test_rings_to_spare_go_to_flat_surface_too():
 def test_gaps_on_lit_samples_lie_between_their_limits(bench, spaced):
     scene, even, _ = bench
     final = spaced.projectors[0]
-    rows = lit_samples(scene, [even], scene.target_samples(4000, 78))
+    rows = lit_samples(scene, [even], scene.target_samples(Draw(4000, 78)))
     points = rows.target.samples.points
     gap, before = (code_surfaces(p, points).spacing for p in (final, even))
     assert np.all(gap <= before * (1.0 + 1e-9))
     assert gap.min() < 0.8 * before.min()
-    target = scene.target_samples(4000, 79)
+    target = scene.target_samples(Draw(4000, 79))
     tau, tau_even = (widest_gap(scene, [p], target) for p in (final, even))
     assert tau <= tau_even * (1.0 + 1e-9)
     drawable = projector_gaps(even, final.ring_radii) / ring_pitch._ROOM
@@ -187,7 +188,7 @@ def test_rings_that_would_lose_samples_are_not_taken(bench, monkeypatch):
 
 def test_the_best_pitch_is_that_of_a_loop_over_pairs(bench):
     scene, projector, cameras = bench
-    rows = lit_samples(scene, [projector], scene.target_samples(300, 80))
+    rows = lit_samples(scene, [projector], scene.target_samples(Draw(300, 80)))
     views = [
         measurability.view(c, rows.target, scene.requirements.camera, scene.visibility)
         for c in cameras

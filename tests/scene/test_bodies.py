@@ -43,6 +43,7 @@ from planning.scene.clearance import (
     check_existing_clearance,
     lacks_clearance,
 )
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.measured import lit_samples, measured_by
@@ -191,7 +192,7 @@ def audit_samples(target):
 def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
     low, high = shadow_of_housing(light)
     lamp, eye = projector(light=light), camera()
-    target = scene.target_samples(4000, 7)
+    target = scene.target_samples(Draw(4000, 7))
     points = target.samples.points
     dark = np.all((points[:, :2] > low) & (points[:, :2] < high), axis=1)
     area = np.prod(high - low)
@@ -233,7 +234,7 @@ def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
 def test_a_body_before_a_camera_hides_the_same_rectangle_but_never_its_own(scene):
     low, high = shadow_of_housing("diverging")
     blind, eye = camera(0.0, 0.0, 1.0, body=None, name="C2"), camera()
-    target = scene.target_samples(3000, 8)
+    target = scene.target_samples(Draw(3000, 8))
     points = target.samples.points
     dark = np.all((points[:, :2] > low) & (points[:, :2] < high), axis=1)
     among = scene.among([blind, eye])
@@ -428,7 +429,7 @@ def test_without_bodies_nothing_is_looked_at():
 def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
     places = [(0.02, 0.01, 0.6), (0.6, 0.0, 1.0), (0.68, 0.0, 1.0), (0.3, 0.0, 1.0)]
     lamp, eyes = projector(), [camera(*place) for place in places]
-    rows = lit_samples(scene, [lamp], scene.target_samples(2000, 9))
+    rows = lit_samples(scene, [lamp], scene.target_samples(Draw(2000, 9)))
     measured = np.ones((len(rows.target), len(eyes)), dtype=bool)
     low, high = shadow_of_housing("diverging")
     points = rows.target.samples.points[:, :2]
@@ -454,7 +455,7 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
 
 def test_moves_into_anothers_body_or_beam_are_refused(scene):
     lamps = [projector(body=HOUSING), projector(0.3, body=HOUSING, name="P2")]
-    rows = scene.target_samples(500, 10)
+    rows = scene.target_samples(Draw(500, 10))
     state = _Lit(scene, rows, lamps, np.ones(len(rows), dtype=bool))
     beside = state.with_moved(1, projector(0.11, body=HOUSING))
     assert np.isfinite(beside).all()
@@ -552,7 +553,7 @@ def test_the_edges_of_a_body_are_drawn_where_it_is(scene):
     corners = {tuple(corner) for corner in np.round(edges, 9).tolist()}
     expected = bodies_of([camera()])[0].box.corners
     assert corners == {tuple(corner) for corner in np.round(expected, 9).tolist()}
-    assert len(housed.body) == len(bare.body) + 6
+    assert len(housed.body) == len(bare.body) + 12
 
 
 def test_the_bodies_of_all_devices_but_ones_own_stand(scene):
@@ -571,7 +572,7 @@ def test_the_bodies_of_all_devices_but_ones_own_stand(scene):
 
 def test_where_every_camera_keeps_something_dark_the_bodies_are_blamed(scene):
     lamp, eyes = projector(), [camera(0.02, 0.01, 0.6), camera(-0.02, 0.0, 0.6)]
-    rows = lit_samples(scene, [lamp], scene.target_samples(500, 9))
+    rows = lit_samples(scene, [lamp], scene.target_samples(Draw(500, 9)))
     measured = np.ones((len(rows.target), len(eyes)), dtype=bool)
     selection = select_fewest(CandidateCover(measured, 0.95))
     offered = SimpleNamespace(cameras=eyes)

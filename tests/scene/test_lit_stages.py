@@ -17,6 +17,7 @@ from planning.report.claims import Devices, _reachable_by_projectors
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.lights import light_on
 from planning.scene.limits import projector_limits
@@ -43,7 +44,7 @@ def test_candidates_together_light_what_each_lights_alone(light):
     offered = projector_candidates(
         template, required.workspace, 60, ring_offset=(0.0, 0.0)
     )
-    rows = scene.target_samples(1500, 7)
+    rows = scene.target_samples(Draw(1500, 7))
     limits = required.projector
     alone = [
         lighting.first_failure(one, rows, limits, scene.visibility) for one in offered

@@ -27,6 +27,7 @@ from planning.report.advice.wider_field import wider_field
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
+from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards
@@ -138,7 +139,7 @@ def test_two_beams_that_leave_a_gap_are_moved_together():
     scene, template, offset = readied(
         grid(1.4, 0.55, divisions=(6, 4)), "parallel", 15.0, half_angle=0.3
     )
-    rows = scene.target_samples(1000, 100)
+    rows = scene.target_samples(Draw(1000, 100))
     turn = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, -1.0]])
     apart = []
     for x in (-0.44, 0.0, 0.44):
@@ -176,7 +177,7 @@ def test_offers_towards_a_direction_look_beside_the_centre_too():
     assert np.allclose(poses[:, :3, 2], [0.0, -0.6, -0.8])
     assert poses[:, 0, 3].min() < -0.5
     assert poses[:, 0, 3].max() > 0.5
-    rows = scene.target_samples(300, 7)
+    rows = scene.target_samples(Draw(300, 7))
     assert np.any(lit_stages(scene, found, rows) == LIT, axis=1).all()
 
 
@@ -300,7 +301,7 @@ def test_devices_side_by_side_stand_where_the_workspace_lets_them(light, zones):
         # Those that look at the centre stand off the ball about the object.
         away = np.linalg.norm(places[:40] - np.array(space.centre), axis=1)
         assert np.allclose(away, 1.0 + space.object_radius_m)
-    rows = scene.target_samples(100, 7)
+    rows = scene.target_samples(Draw(100, 7))
     assert np.all(np.any(lit_stages(scene, found, rows) == LIT, axis=1))
     beside = poses_beside(
         site, np.stack([p.world_from_device for p in found[::40]]), 20, reach=0.2

@@ -28,6 +28,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection, required_samples
 from planning.scene.camera_views import CandidateViews
 from planning.scene.clearance import with_clearance
+from planning.scene.draws import DRAWS
 from planning.scene.existing import movable
 from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
@@ -38,7 +39,6 @@ from .paper_route import PaperRoute, paper_route
 from .route_problem import Cameras, RouteProblem
 
 # Samples that the route looks at; what it ends with is judged on all.
-_SAMPLES = 1500
 # Baseline programs each time baselines are maximised; they are most of what the route
 # costs.
 _PROGRAMS = 4
@@ -143,7 +143,9 @@ def route_among(
     Raises:
         InfeasibleLimitsError: If the route comes by no camera.
     """
-    some = np.arange(0, len(samples.target), -(-len(samples.target) // _SAMPLES))
+    some = np.arange(
+        0, len(samples.target), -(-len(samples.target) // DRAWS.paper_route)
+    )
     few = taken(samples, some, samples.lit)
     reachable = np.any(measured[some], axis=1)
     required = required_samples(reachable, scene.requirements.coverage)

@@ -19,6 +19,7 @@ from planning.model.planned import PlannedCamera
 from planning.proofs.selection import required_samples
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
+from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.limits.limit import LimitRelaxation
@@ -31,9 +32,7 @@ from .demands import demands
 from .least_changes import Share, covers_enough, least_changes
 from .rig_facts import relaxations_of_cameras
 
-# Samples that covers are looked for on, and what they cover beyond the requirement, so
-# that fresh samples confirm it.
-_SAMPLES = 2000
+# What covers cover beyond the requirement, so that fresh samples confirm it.
 _SPARE = 0.003
 
 
@@ -129,7 +128,7 @@ def for_so_many(
         count: Cameras that are allowed.
     """
     lit = stage.cover.samples
-    rows = taken(lit, np.arange(min(len(lit.target), _SAMPLES)), lit.lit)
+    rows = taken(lit, np.arange(min(len(lit.target), DRAWS.fewer_devices)), lit.lit)
     relaxations = relaxations_of_cameras(rig, scene.requirements)
     asked = np.stack(
         [demands(scene, camera, rows, relaxations).asked for camera in stage.reference],

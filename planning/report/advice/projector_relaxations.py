@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import NothingLitError
 from planning.scene import lighting
+from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -22,10 +23,6 @@ from planning.scene.workspace.candidates import projector_candidates
 from .demands import light_demands
 from .least_changes import Share, least_changes
 from .rig_facts import relaxations_of_projectors
-
-_SAMPLES, _STREAM = 800, 950
-# Of the samples, where nothing at all is lit.
-_DARK_SAMPLES = 400
 
 
 def reachability_relaxations(
@@ -45,7 +42,7 @@ def reachability_relaxations(
         smallest gain first: `change`, `reachable_share`. A limit gives way as far as
         `min_reachable` needs, or else as far as it helps.
     """
-    target = scene.target_samples(_SAMPLES, _STREAM)
+    target = scene.target_samples(DRAWS.relaxations)
     n, dark = len(target), _unlit(scene, reference, target)
     share = Share(n, n - len(dark), scene.requirements.min_reachable)
     gained = _least(scene, reference, target.take(dark), share.wanted)
@@ -73,7 +70,7 @@ def nothing_lit(scene: Scene, error: NothingLitError) -> str:
         error: What was offered, and which limits forbid it.
     """
     offered = error.candidates
-    dark = offered.samples.take(np.arange(min(len(offered.samples), _DARK_SAMPLES)))
+    dark = offered.samples.take(np.arange(min(len(offered.samples), DRAWS.dark)))
     if helps := _least(scene, offered.projectors, dark, 1):
         return f"the least that lights any of it: {'; or '.join(helps)}"
     return (

@@ -15,6 +15,7 @@ import numpy as np
 from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.selection import required_samples
+from planning.scene.draws import DRAWS
 from planning.scene.limits.limit import widened
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
@@ -24,7 +25,6 @@ from .demands import light_demands
 from .least_changes import covers_enough
 from .rig_facts import relaxations_of_projectors
 
-_SAMPLES = 2000
 # Poses for larger tiles: so many times as wide and high, so many that look at the
 # centre.
 _TIMES = (2, 3)
@@ -48,7 +48,7 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
     if site is None:
         return None
     candidates = stage.candidates
-    n = min(len(candidates.samples), _SAMPLES)
+    n = min(len(candidates.samples), DRAWS.fewer_devices)
     target = candidates.samples.take(np.arange(n))
     (field,) = (
         relaxation

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from planning.model.document.coverage_records import ExposureSchedule, Overlap
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
-from planning.report.claims import N_SAMPLES
 from planning.scene import lighting
+from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns.pattern import pattern_of
 from planning.scene.samples import Target
@@ -34,16 +34,14 @@ from .exposure import exposure_schedule
 
 # Rays and rounding can't tell on which side light passes that runs along a face.
 _ANY_LIGHT = ProjectorLimits(float(np.radians(89.0)), 0.0)
-_TARGET_STREAM = 902
-_SURFACE_STREAM = 903
 
 
 def overlap_records(
     scene: Scene, projectors: Sequence[PlannedProjector]
 ) -> tuple[tuple[Overlap, ...], ExposureSchedule]:
     """Return the plan's `overlaps` and `firing_schedule`, from fresh samples."""
-    target = scene.target_samples(N_SAMPLES, _TARGET_STREAM)
-    surface = scene.surface_samples(N_SAMPLES, _SURFACE_STREAM)
+    target = scene.target_samples(DRAWS.overlaps)
+    surface = scene.surface_samples(DRAWS.overlaps)
     on_target = shared_areas(scene, projectors, target)
     on_surface = shared_areas(scene, projectors, surface)
     names = [projector.id for projector in projectors]

@@ -12,6 +12,7 @@ from planning.proofs.cells.direction_cells import DirectionTree
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.cells.shell_cells import spread
 from planning.rig.rig import load_rig
+from planning.scene.draws import Draw
 from solvers.bit_rows import pack_rows, unpack_rows
 
 POSES = 2000
@@ -59,7 +60,7 @@ def made(mesh, light, attack_cells):
     scene, template = attack_cells.fitted(
         scene, template, "close" if light == "diverging" else "default"
     )
-    rows = scene.target_samples(128, 5)
+    rows = scene.target_samples(Draw(128, 5))
     tree = attack_cells.tree_of(scene, template, rows, 4)
     assert tree is not None
     return scene, template, rows, tree

@@ -1,0 +1,70 @@
+"""How many samples each question looks at, and which random streams are its own.
+
+A sample that one question was fitted to can't confirm the answer, so no two questions
+share a stream.
+"""
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Area-true samples of the target, or of the whole surface.
+
+    Attributes:
+        count: Samples.
+        stream: Of the target's; the whole surface has the next one.
+    """
+
+    count: int
+    stream: int
+
+    def later(self, streams: int) -> "Draw":
+        """Return the draw from a stream so many further on."""
+        return replace(self, stream=self.stream + streams)
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Every draw of a plan, and how many of drawn samples slower steps look at.
+
+    Attributes:
+        site: What stands out of an object wider than the field.
+        projectors: Of the projectors' cover.
+        fresh_projectors: That confirm it; a stream further on each round.
+        cameras: Of the cameras' cover.
+        fresh_cameras: That confirm it, likewise.
+        axes: That confirm ring axes.
+        baselines: That moved cameras are judged on.
+        confirming_baselines: That confirm a move which those did not forbid.
+        rings: Of a round of ring spacing, two streams further on each round.
+        claims: That areas in the plan are computed from.
+        overlaps: That shared areas are computed from.
+        relaxations: That relaxations of projectors are found on.
+        dark: At most, where nothing at all is lit.
+        fewer_devices: At most, for what would let fewer devices be enough.
+        routes: At most, for routes of baselines.
+        paper_route: At most, for the paper's route.
+        axis_program: At most, for the program of one ring axis.
+    """
+
+    site: Draw = Draw(2000, 50)
+    projectors: Draw = Draw(2000, 100)
+    fresh_projectors: Draw = Draw(4000, 100)
+    cameras: Draw = Draw(2000, 200)
+    fresh_cameras: Draw = Draw(4000, 200)
+    axes: Draw = Draw(4000, 250)
+    baselines: Draw = Draw(6000, 300)
+    confirming_baselines: Draw = Draw(16_000, 301)
+    rings: Draw = Draw(6000, 400)
+    claims: Draw = Draw(12_000, 900)
+    overlaps: Draw = Draw(12_000, 902)
+    relaxations: Draw = Draw(800, 950)
+    dark: int = 400
+    fewer_devices: int = 2000
+    routes: int = 2000
+    paper_route: int = 1500
+    axis_program: int = 250
+
+
+DRAWS = Draws()
