@@ -116,7 +116,7 @@ def _jobs(folder: Path) -> Iterator[tuple[str, list[str]]]:
     yield "face.obj", sample
     (folder / "room.toml").write_text(ROOM)
     yield "face.obj, room and bodies", [*sample, "--rig", str(folder / "room.toml")]
-    (folder / "ranges.csv").write_text(_ranges())
+    (folder / "ranges.csv").write_text(range_observations())
     yield "ranges", ["--ranges", str(folder / "ranges.csv")]
     for name, words in JOBS.items():
         path = SHARED / name.split(",")[0]
@@ -126,7 +126,7 @@ def _jobs(folder: Path) -> Iterator[tuple[str, list[str]]]:
             print(f"{name}: skipped, {path.name} is absent", file=sys.stderr)
 
 
-def _ranges() -> str:
+def range_observations() -> str:
     """Twelve points of a ball of 90 mm, seen from two views, ranged from one."""
     lines = ["point,x_mm,y_mm,z_mm,dx,dy,dz,sigma_deg,range_mm,sigma_mm"]
     for index in range(12):
