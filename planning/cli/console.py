@@ -1,18 +1,80 @@
-"""What the commands share: progress on stderr, JSON on stdout, how many threads."""
+"""What the commands share: options, progress, output, and how errors end a run.
+
+Imported by `plan --help`, so nothing heavy is.
+"""
 
 import json
+import math
 import os
-from collections.abc import Mapping
-from typing import Any
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NoReturn
 
 import click
 
 from planning.model.progress import Report
 
+_Command = Callable[..., Any]
+# As in sysexits.h: a bug of ours, nothing that the user did.
+_INTERNAL = 70
+
+debug_option = click.option(
+    "--debug", is_flag=True, help="Tracebacks instead of one-line errors."
+)
+threads_option = click.option(
+    "--threads",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Worker threads; no result depends on it [default: all cores].",
+)
+
+
+def output_options(command: _Command) -> _Command:
+    """Add what every command that computes says of its output."""
+    for option in (
+        debug_option,
+        click.option("--quiet", is_flag=True, help="No progress on stderr."),
+        click.option(
+            "--json", "as_json", is_flag=True, help="One JSON object on stdout."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+class Positive(click.FloatRange):
+    """A positive number, perhaps with a largest; NaN and infinity are none."""
+
+    def __init__(self, largest: float | None = None) -> None:
+        super().__init__(0.0, largest, min_open=True)
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401
+        """Return the number, or fail as usage."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} isn't a finite number.", param, ctx)
+        return number
+
 
 def reporter(*, quiet: bool) -> Report | None:
     """Return what writes a line of progress to stderr; None if nothing shall."""
     return None if quiet else lambda line: click.echo(f"plan: {line}", err=True)
+
+
+def say(report: Report | None, *lines: str) -> None:
+    """Report lines of progress, if anybody listens."""
+    if report is not None:
+        for line in lines:
+            report(line)
 
 
 def cores() -> int:
@@ -23,3 +85,67 @@ def cores() -> int:
 def print_json(document: Mapping[str, Any]) -> None:
     """Write one JSON object to stdout."""
     click.echo(json.dumps(document, indent=1, allow_nan=False))
+
+
+@contextmanager
+def writable(folder: Path) -> Generator[None]:
+    """Fail before the work, not after it; leave no empty folder where it fails.
+
+    Raises:
+        click.UsageError: If nothing can be written into the folder.
+    """
+    missing = [f for f in (folder, *folder.parents) if not f.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise click.UsageError(
+            f"can't write to {folder}: {error.strerror}; choose another folder with -o"
+        ) from None
+    try:
+        yield
+    except BaseException:
+        for made in missing:
+            with suppress(OSError):
+                made.rmdir()
+        raise
+
+
+def run(command: Callable[[], int], *, debug: bool) -> None:
+    """Run a command; turn our own errors into one line and the documented exit code."""
+    from geometry.mesh.mesh import MeshError
+    from planning.model.errors import PlanningError
+
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.exit(command())
+    except KeyboardInterrupt:
+        stop("interrupted before a first plan stood; nothing was written", 130)
+    except BrokenPipeError:
+        # Whoever reads stdout has had enough; Python must not complain at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except (PlanningError, MeshError, OSError) as error:
+        if debug:
+            raise
+        stop(str(error), 2 if isinstance(error, OSError) else _exit_code(error))
+    except Exception as error:
+        if debug or isinstance(error, click.ClickException):
+            raise
+        name = type(error).__name__
+        stop(
+            f"internal error ({name}: {error}); this is a bug: run again with --debug "
+            f"and report it",
+            _INTERNAL,
+        )
+
+
+def _exit_code(error: Exception) -> int:
+    return int(getattr(error, "exit_code", 3))
+
+
+def stop(message: str, code: int) -> NoReturn:
+    """Write one line to stderr and leave with an exit code."""
+    click.echo(f"plan: {' '.join(message.split())}", err=True)
+    sys.exit(code)

@@ -38,7 +38,7 @@ from planning.verify.reconstruction.cloud_file import (
     remove_cloud,
 )
 
-from .writable import writable
+from .console import print_json, reporter, say, writable
 
 _MM = LengthUnit("mm", 1e-3)
 _EXPERIMENTS = {"box": box_experiment, "face": face_experiment}
@@ -51,16 +51,12 @@ def experiment_command(options: Mapping[str, Any]) -> int:
     experiment = experiment_of(options)
     folder = Path(options["output"] or f"{experiment.name}-experiment")
     photometry = replace(DARK, ambient=options["ambient"] or 0.0)
-    seed, quiet = options["seed"] or 0, options["quiet"]
-    threads = options["threads"] or 2
+    seed, threads = options["seed"] or 0, options["threads"] or 2
+    report = reporter(quiet=options["quiet"])
     prior = None
     if options["single_shot"]:
         near = 1e-3 * (options["prior_mm"] or _PRIOR_MM)
         prior = Prior.moved(experiment.mesh, near)
-
-    def say(line: str) -> None:
-        if not quiet:
-            click.echo(f"plan: {line}", err=True)
 
     with writable(folder):
         outcome = run_experiment(
@@ -69,13 +65,13 @@ def experiment_command(options: Mapping[str, Any]) -> int:
             seed=seed,
             threads=threads,
             prior=prior,
-            progress=lambda done, total: say(f"pair {done} of {total}"),
+            progress=lambda done, total: say(report, f"pair {done} of {total}"),
         )
         doubled = None
         if options["second_sequence"]:
-            say("second sequence")
+            say(report, "second sequence")
             doubled = double_density(outcome, seed=seed, threads=threads)
-        say("drawing")
+        say(report, "drawing")
         files = _save(outcome, doubled, folder)
     _print(outcome, doubled, files, as_json=options["as_json"])
     return 0
@@ -131,8 +127,7 @@ def _print(
     outcome: Outcome, doubled: Doubled | None, files: list[str], *, as_json: bool
 ) -> None:
     if as_json:
-        document = _document(outcome, doubled) | {"files": files}
-        click.echo(json.dumps(document, indent=1, allow_nan=False))
+        print_json(_document(outcome, doubled) | {"files": files})
         return
     click.echo("\n".join(outcome_lines(outcome)))
     if doubled is not None:

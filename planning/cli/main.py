@@ -10,11 +10,10 @@ from typing import NoReturn
 
 import click
 
+from .console import stop
+from .declared.other_declared import rigs, sample, schema, verify
 from .declared.plan_declared import rig_command
 from .declared.reconstruct_declared import reconstruct
-from .declared.small_declared import rigs, sample, schema
-from .declared.verify_declared import verify
-from .running import stop
 
 _NOT_BUILT = {
     "report": "writes one self-contained HTML file",

@@ -29,8 +29,7 @@ from planning.verify.reconstruction.patterns.pattern_files import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .console import cores, print_json, reporter
-from .writable import writable
+from .console import cores, print_json, reporter, say, writable
 
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
@@ -41,15 +40,14 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
     with writable(folder):
         rig = load_rig(options["rig_name"], light=options["light"])
-        if report is not None:
-            report(f"reading {path}")
+        say(report, f"reading {path}")
         selection = weight = None
         if options["ranges"] is not None:
             surface = read_ranges(path)
-            _say_lines(report, ranges_lines(surface))
+            say(report, *ranges_lines(surface))
         else:
             surface = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
-            _say_size(report, surface)
+            say(report, *_size_lines(surface))
             selection, weight = _interest(options, surface, report)
         wishes = Wishes(**{key: options[key] for key in Wishes.__dataclass_fields__})
         missed: tuple[str, ...] = ()
@@ -70,7 +68,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
             plan = plan_requested(
                 request,
                 check=not options["no_check"],
-                time_limit=_left(options["time_limit"], begin),
+                time_limit=_remaining(options["time_limit"], begin),
                 progress=report,
             )
         except RequirementError as error:
@@ -97,41 +95,33 @@ def _interest(
     if options["weight"] is not None:
         weight = read_weight(options["weight"], mesh)
     interest = selection or weight
-    if interest is not None and report is not None:
+    if interest is not None:
         share = mesh.face_areas[interest.chosen].sum() / mesh.area
-        report(
+        say(
+            report,
             f"{interest.source}: {interest.chosen.sum()} of {len(mesh.faces)} "
-            f"triangles are the target, {share:.1%} of the area"
+            f"triangles are the target, {share:.1%} of the area",
         )
         if interest.n_removed:
-            report(f"  {interest.n_removed} chosen faces were removed by repair")
+            say(report, f"  {interest.n_removed} chosen faces were removed by repair")
     return selection, weight
 
 
-def _left(limit: float | None, begin: float) -> float | None:
+def _remaining(limit: float | None, begin: float) -> float | None:
     """What is left of a time limit; reading the mesh counts too."""
     if limit is None:
         return None
     return max(limit - (time.monotonic() - begin), 1e-9)
 
 
-def _say_size(report: Report | None, mesh: Any) -> None:  # noqa: ANN401
-    if report is None:
-        return
-    size = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
+def _size_lines(mesh: TriangleMesh) -> list[str]:
+    x, y, z = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
     source = mesh.source
-    report(
-        f"{source.path}: {size[0]:.1f} x {size[1]:.1f} x {size[2]:.1f} mm "
-        f"(unit {source.unit}), {len(mesh.faces)} faces"
-    )
-    for repair in source.repairs:
-        report(f"  repaired: {repair.kind}, {repair.count}")
-
-
-def _say_lines(report: Report | None, lines: Sequence[str]) -> None:
-    if report is not None:
-        for line in lines:
-            report(line)
+    return [
+        f"{source.path}: {x:.1f} x {y:.1f} x {z:.1f} mm (unit {source.unit}), "
+        f"{len(mesh.faces)} faces",
+        *(f"  repaired: {repair.kind}, {repair.count}" for repair in source.repairs),
+    ]
 
 
 def _save(
@@ -139,8 +129,7 @@ def _save(
 ) -> list[str]:
     names = [folder / name for name in ("plan.json", "surface.npz", "rig.png")]
     plan.save(names[0])
-    if report is not None:
-        report("drawing")
+    say(report, "drawing")
     save_rig_picture(plan, names[2], face_status=face_status(plan))
     if patterns:
         names.append(write_patterns(Scanner.of(plan), folder))

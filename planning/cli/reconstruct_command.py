@@ -4,7 +4,6 @@ Exit: 0 reconstructed within the limits of the check, 1 a limit is missed or the
 is smaller than asked, 2 unwritable, 3 a bad plan, calibration or folder of captures.
 """
 
-import json
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,6 +15,7 @@ from geometry.mesh.sampling import SurfaceSamples
 from planning.model.errors import CapturesError
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
+from planning.model.words import count_words, error_words
 from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.captures.calibration_file import calibrated
 from planning.verify.reconstruction.captures.captured import (
@@ -24,7 +24,7 @@ from planning.verify.reconstruction.captures.captured import (
 )
 from planning.verify.reconstruction.captures.captures import CaptureFolder
 from planning.verify.reconstruction.check.accuracy import Expected
-from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.cloud_file import (
     CloudFile,
     LengthUnit,
@@ -35,9 +35,7 @@ from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
 )
 
-from .console import cores, reporter
-from .reconstruct_summary import summary
-from .writable import writable
+from .console import cores, print_json, reporter, say, writable
 
 CLOUD = "cloud.ply"
 # How near the object is taken to lie to the mesh that labels single images.
@@ -53,18 +51,18 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
     folder = Path(options["output"] or path.parent)
     if options["captures"] is not None:
         CaptureFolder(options["captures"], scanner).require()
-    with ExitStack() as kept:
-        for needed in (folder, options["save_captures"]):
-            if needed is not None:
-                kept.enter_context(writable(needed))
+    with ExitStack() as folders:
+        for place in (folder, options["save_captures"]):
+            if place is not None:
+                folders.enter_context(writable(place))
         try:
-            found = _reconstruct(plan, scanner, options, report)
+            result = _reconstruct(plan, scanner, options, report)
         except CapturesError:
             remove_cloud(folder / CLOUD)
             raise
-        file = _save(plan, found, folder / CLOUD)
-    _print(plan, found, file, folder / CLOUD, as_json=options["as_json"])
-    return 0 if found.passed else 1
+        file = _save(plan, result, folder / CLOUD)
+    _print(plan, result, file, folder / CLOUD, as_json=options["as_json"])
+    return 0 if result.passed else 1
 
 
 def _reconstruct(
@@ -78,11 +76,11 @@ def _reconstruct(
     threads = options["threads"] or cores()
     mounted = options["calibration"]
     mounted = None if mounted is None else calibrated(scanner, mounted)
-    _say(report, "predicting what the plan's poses measure")
+    say(report, "predicting what the plan's poses measure")
     expected = _expected(plan, seed, threads)
 
     def progress(done: int, total: int) -> None:
-        _say(report, f"pair {done} of {total}")
+        say(report, f"pair {done} of {total}")
 
     if options["single_shot"]:
         return reconstruct_single_shot(
@@ -111,44 +109,93 @@ def _reconstruct(
 
 
 def _expected(plan: RigPlan, seed: int, threads: int) -> Expected:
-    found = predict_measured(plan, seed=seed, threads=threads)
-    inside = found.samples
+    predicted = predict_measured(plan, seed=seed, threads=threads)
+    inside = predicted.samples
     samples = SurfaceSamples(
         inside.points, inside.normals, inside.faces, float(inside.weights[0])
     )
-    return Expected(samples, found.measured, found.by_pair)
+    return Expected(samples, predicted.measured, predicted.by_pair)
 
 
-def _save(plan: RigPlan, found: Reconstruction, path: Path) -> CloudFile | None:
+def _save(plan: RigPlan, result: Reconstruction, path: Path) -> CloudFile | None:
     """Write the cloud; without points none, and none of an earlier run stays."""
-    if not found.n_merged:
+    if not result.n_merged:
         remove_cloud(path)
         return None
-    file = CloudFile.of(found.merged, LengthUnit.of(plan.document.meshes[0]))
+    file = CloudFile.of(result.merged, LengthUnit.of(plan.document.meshes[0]))
     file.save(path)
     return file
 
 
 def _print(
     plan: RigPlan,
-    found: Reconstruction,
+    result: Reconstruction,
     file: CloudFile | None,
     path: Path,
     *,
     as_json: bool,
 ) -> None:
     if not as_json:
-        click.echo(summary(plan, found, file, path))
+        click.echo(_summary(plan, result, file, path))
         return
-    document = found.to_document() | {
-        "pairs": [vars(pair) for pair in found.pairs],
+    document = result.to_document() | {
+        "pairs": [vars(pair) for pair in result.pairs],
         "cloud": None if file is None else str(path),
         "unit": None if file is None else file.unit.name,
         "colour_range": None if file is None else list(file.limits),
     }
-    click.echo(json.dumps(document, indent=1, allow_nan=False))
+    print_json(document)
 
 
-def _say(report: Report | None, line: str) -> None:
-    if report is not None:
-        report(line)
+def _summary(
+    plan: RigPlan, result: Reconstruction, file: CloudFile | None, path: Path
+) -> str:
+    """Return the result in a few lines; the verdict is the last."""
+    lines = [_pair_line(pair) for pair in result.pairs]
+    lines += _figures(plan, result)
+    if file is None:
+        lines.append("cloud    none was written")
+    else:
+        lines += [
+            f"cloud    {path}: {len(file.rows)} points, positions in {file.unit.name}",
+            f"colours  sigma along the normal: {file.legend}",
+        ]
+    lines += [f"not met: {sentence}" for sentence in result.failures]
+    missed = count_words(len(result.failures), "failure")
+    lines.append(
+        "reconstructed: every limit of the check is kept"
+        if result.passed
+        else f"NOT reconstructed as planned: {missed}"
+    )
+    return "\n".join(lines)
+
+
+def _pair_line(pair: PairCount) -> str:
+    left_out = sum(pair.rejected.values())
+    return (
+        f"{pair.projector} with {pair.camera}: {pair.n_points} points of "
+        f"{pair.n_edges} edges, {left_out} left out, {pair.lit_pixels} pixels lit"
+    )
+
+
+def _figures(plan: RigPlan, result: Reconstruction) -> list[str]:
+    limits = plan.requirements.check
+    if result.accuracy is None:
+        return []
+    accuracy, complete = result.accuracy, result.completeness
+    near = ", ".join(
+        f"{share:.1%} within {1e3 * tau:.1f} mm"
+        for tau, share in zip(complete.thresholds_m, complete.fractions, strict=True)
+    )
+    missing = complete.predicted_missing
+    lines = [
+        f"merged   {result.n_merged} points of {result.n_points}, "
+        f"{result.redundant_fraction:.1%} redundant",
+        "accuracy against the mesh: "
+        f"{error_words(accuracy.rms_m, accuracy.p95_m, accuracy.bias_m, limits)}, "
+        f"max {1e3 * accuracy.max_m:.3f}",
+        f"completeness of the target predicted measured: {near}",
+    ]
+    if missing is not None:
+        lines[-1] += f"; {missing:.2%} missing ({limits.max_predicted_missing:.0%})"
+    return lines

@@ -10,6 +10,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
+from planning.model.words import count_words
 from planning.verify.audit.audit import Audit, audit_plan
 from planning.verify.audit.figure_claims import compare_figures, contradictions
 
@@ -77,12 +78,11 @@ class Verification:
         lines.append(_pixels_line(self.reconstruction))
         lines += [f"not met: {sentence}" for sentence in self.unmet]
         lines += [f"FALSE: {sentence}" for sentence in self.failures]
-        count = len(self.failures)
-        found = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
+        pixels = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
         lines.append(
-            f"verified: every claim holds ({found})"
+            f"verified: every claim holds ({pixels})"
             if self.passed
-            else f"NOT verified: {count} failure{'s' * (count > 1)}"
+            else f"NOT verified: {count_words(len(self.failures), 'failure')}"
         )
         return "\n".join(lines)
 

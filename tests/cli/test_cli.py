@@ -12,7 +12,7 @@ import pytest
 
 import planning
 from planning.cli.main import main
-from planning.cli.sample import write_sample
+from planning.cli.other_commands import write_sample
 from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -146,7 +146,7 @@ def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(
     )
     # What is false shows without the pixels, which the good plan was held against.
     audit_alone = partial(verify_plan, check_pixels=False)
-    monkeypatch.setattr("planning.cli.verify_command.verify_plan", audit_alone)
+    monkeypatch.setattr("planning.cli.other_commands.verify_plan", audit_alone)
     code, out, err = in_process(monkeypatch, capsys, "verify", spoiled, "--quiet")
     assert (code, err) == (1, "")
     assert "measured_m2" in out
@@ -167,7 +167,7 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
     code = (
         "import planning.cli.plan_command as c, sys\n"
         "def stop(*a, **k): raise KeyboardInterrupt\n"
-        "c.plan_rig = stop\n"
+        "c.plan_requested = stop\n"
         f"sys.argv = ['plan', '--mesh', {str(face)!r}, '--max-projectors', '3']\n"
         "from planning.cli.main import main; main()"
     )

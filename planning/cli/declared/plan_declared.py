@@ -7,8 +7,7 @@ from typing import Any
 
 import click
 
-from planning.cli.options import Positive, output_options, threads_option
-from planning.cli.running import run
+from planning.cli.console import Positive, output_options, run, threads_option
 
 
 class DefaultCommand(click.Command):

@@ -1,0 +1,84 @@
+"""`plan verify`, `plan rigs`, `plan schema` and `plan sample`: their options."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from planning.cli.console import debug_option, output_options, run, threads_option
+
+
+@click.command()
+@click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
+@click.option(
+    "--mesh",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Hold the plan's surface against this mesh; if it differs, render with it.",
+)
+@click.option(
+    "--truth",
+    type=click.Path(path_type=Path),
+    metavar="other-plan.json",
+    help="Render with another plan's devices and surface: what really stands there.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), help="Of the audit [default: the plan's]."
+)
+@threads_option
+@output_options
+def verify(**options: Any) -> None:  # noqa: ANN401
+    """Recompute every claim from the files alone, then check from pixels."""
+    from planning.cli.other_commands import verify_command
+
+    run(lambda: verify_command(options), debug=options["debug"])
+
+
+@click.command()
+@debug_option
+def rigs(debug: bool) -> None:
+    """List the rigs that need no file, with the source of every number."""
+    from planning.cli.other_commands import rigs_command
+
+    run(rigs_command, debug=debug)
+
+
+@click.command()
+@debug_option
+def schema(debug: bool) -> None:
+    """Print the JSON Schema of plan.json."""
+    from planning.cli.other_commands import schema_command
+
+    run(schema_command, debug=debug)
+
+
+@click.command()
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default="face.obj",
+    show_default=True,
+    metavar="FILE",
+    help="Where it goes.",
+)
+@click.option(
+    "--faces",
+    type=click.IntRange(500, 2_000_000),
+    default=40_000,
+    show_default=True,
+    metavar="N",
+    help="Triangles of the closed head, about; the neck is then cut open.",
+)
+@click.option(
+    "--variant",
+    type=click.IntRange(0),
+    metavar="SEED",
+    help="Another head of the population [default: the mean head].",
+)
+@debug_option
+def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
+    """Write the sample head, an OBJ file in millimetres."""
+    from planning.cli.other_commands import sample_command
+
+    run(lambda: sample_command(output, faces, variant), debug=debug)
