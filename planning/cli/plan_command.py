@@ -115,8 +115,10 @@ def _remaining(limit: float | None, begin: float) -> float | None:
 
 
 def _size_lines(mesh: TriangleMesh) -> list[str]:
-    x, y, z = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
     source = mesh.source
+    if source is None:
+        return []
+    x, y, z = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
     return [
         f"{source.path}: {x:.1f} x {y:.1f} x {z:.1f} mm (unit {source.unit}), "
         f"{len(mesh.faces)} faces",
