@@ -40,7 +40,7 @@ from planning.model.requirements import Workspace
 from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.all_poses import Effort
-from planning.proofs.camera_bound import CameraCells
+from planning.proofs.camera_bound import camera_trees
 from planning.proofs.cells.image_cone import image_cone
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
@@ -194,13 +194,13 @@ def trees_of(
 ) -> dict[str, Tree]:
     """Return the planner's cells; without shadows only, where it leaves these out."""
     effort = Effort(finest=finest, aims=aims, maps=finest, budget=1.0, shadows=np.inf)
-    cells = CameraCells(scene, device, rows, effort)
-    found: dict[str, Tree] = {"without shadows": cells.without_shadows}
-    if cells.shadows:
-        found["among shadows"] = cells.among_shadows()
-    if cells.field_binds:
-        found["by aim"] = cells.by_aim()
-    return found
+    names = ("without shadows", "among shadows", "by aim")
+    trees = camera_trees(scene, device, rows, effort)
+    return {
+        name: tree
+        for name, (tree, shadows) in zip(names, trees, strict=False)
+        if shadows or name != "among shadows"
+    }
 
 
 def main() -> int:

@@ -10,9 +10,8 @@ Shadows are counted only if the bound without them stays below the count: they c
 most, and what is proved without them holds with them. So with cells by aim.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
@@ -21,16 +20,17 @@ from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
 from geometry.mesh.tensors import lengths
-from planning.proofs.cells.aim_cells import AimTree
-from planning.proofs.cells.image_cone import image_cone
-from planning.proofs.cells.measurable_cells import MeasurableCells
-from planning.proofs.cells.position_cells import PositionTree
 from planning.scene.measured import LitSamples
+from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.cells.cell_bound import CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
-from .optimistic_coverage import mesh_reach, open_samples
+from .cells.aim_cells import AimTree
+from .cells.direction_cells import mesh_reach, open_samples
+from .cells.image_cone import image_cone
+from .cells.measurable_cells import MeasurableCells
+from .cells.position_cells import PositionTree
 
 DEFAULT = Effort(
     finest=7, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
@@ -58,21 +58,26 @@ def bound_cameras(
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, aims=None, shadows=0.0)
-    cells = CameraCells(scene, device, samples, effort)
-    found, shadows = question.searched(cells.without_shadows, effort.budget), False
-    for tree in cells.finer:
-        if found.status is CellStatus.PROVED:
+    trees = camera_trees(scene, device, samples, effort)
+    tree, shadows = next(trees)
+    best = question.searched(tree, effort.budget)
+    for tree, among_shadows in trees:
+        if best.status is CellStatus.PROVED:
             break
-        better = question.searched(tree(), effort.budget)
+        better = question.searched(tree, effort.budget)
         # Cut short, a finer search may have proved less.
-        if better.lower_bound >= found.lower_bound:
-            found, shadows = better, cells.shadows
-    shadows = shadows or found.status is CellStatus.PROVED
-    return ContinuousBound(question, found, shadows, np.empty((0, 3)))
+        if better.lower_bound >= best.lower_bound:
+            best, shadows = better, among_shadows
+    shadows = shadows or best.status is CellStatus.PROVED
+    return ContinuousBound(question, best, shadows, np.empty((0, 3)))
 
 
-class CameraCells:
-    """The trees that are searched, one after the other; each made when it is wanted.
+def camera_trees(
+    scene: Scene, device: PinholeModel, samples: LitSamples, effort: Effort
+) -> Iterator[tuple[PositionTree | AimTree, bool]]:
+    """Yield the trees to search, and whether shadows are counted in each.
+
+    Cells of positions; finer ones among shadows; the same by aim, if that is of use.
 
     Args:
         scene: Surface and requirements.
@@ -80,74 +85,39 @@ class CameraCells:
         samples: With light and rings on them.
         effort: How fine they are.
     """
+    space, drawn = scene.requirements.workspace, samples.target.samples
+    limits = MeasurableCells(
+        samples, scene.requirements, device, check_cancelled=scene.check_cancelled
+    )
 
-    def __init__(
-        self,
-        scene: Scene,
-        device: PinholeModel,
-        samples: LitSamples,
-        effort: Effort,
-    ) -> None:
-        self._scene, self._device, self._samples = scene, device, samples
-        self._effort = effort
-        self._limits = MeasurableCells(
-            samples, scene.requirements, device, check_cancelled=scene.check_cancelled
-        )
-        near = scene.requirements.workspace.camera_radius_m[0]
-        pairs = len(samples.target) * len(scene.mesh.faces)
-        self.shadows = pairs <= effort.shadows and near >= mesh_reach(scene)
-
-    @property
-    def without_shadows(self) -> PositionTree:
-        """Cells of positions without shadows."""
-        return self._positions(self._effort.finest, None)
-
-    @property
-    def finer(self) -> list[Callable[[], PositionTree | AimTree]]:
-        """Finer cells among shadows; then cells by aim, where that is of any use."""
-        found: list[Callable[[], PositionTree | AimTree]] = [self.among_shadows]
-        if self._effort.aims is not None and self.field_binds:
-            found.append(self.by_aim)
-        return found
-
-    def among_shadows(self) -> PositionTree:
-        """Return finer cells of positions, among shadows if these count."""
-        return self._positions(self._effort.finest + 1, self._maps)
-
-    def by_aim(self) -> AimTree:
-        """Return the same, cut by aim as well."""
-        assert self._effort.aims is not None
-        half = image_cone(self._device).half_angle
-        return AimTree(self.among_shadows(), half, finest=self._effort.aims)
-
-    @property
-    def field_binds(self) -> bool:
-        """Whether a camera that looks at the centre may miss some sample."""
-        space = self._scene.requirements.workspace
-        offsets = self._samples.target.samples.points - np.array(space.centre)
-        reach = float(lengths(offsets).max())
-        return not self._device.holds_ball(reach, space.camera_radius_m[0])
-
-    def _positions(self, finest: int, maps: WidenedMaps | None) -> PositionTree:
-        space = self._scene.requirements.workspace
+    def positions(finest: int, maps: WidenedMaps | None) -> PositionTree:
+        radius = space.camera_radius_m
         return PositionTree(
             space,
-            space.camera_radius_m,
-            self._device.range_m,
-            self._samples.target.samples.points,
+            radius,
+            device.range_m,
+            drawn.points,
             maps,
             finest=finest,
-            limits=self._limits,
+            limits=limits,
         )
 
-    @cached_property
-    def _maps(self) -> WidenedMaps | None:
-        if not self.shadows:
-            return None
-        cube = CubeMap(1 << self._effort.maps)
-        # Of the direction itself, cameras have no limit but incidence.
-        limits = DirectionLimits(self._scene.requirements.camera.max_incidence, 0.0)
-        opened = open_samples(
-            self._scene, limits, self._samples.target, cube, shadows=True
-        )
-        return WidenedMaps(opened, cube)
+    yield positions(effort.finest, None), False
+    near = space.camera_radius_m[0]
+    shadows = len(samples.target) * len(
+        scene.mesh.faces
+    ) <= effort.shadows and near >= mesh_reach(scene)
+    maps = _shadow_maps(scene, samples.target, effort.maps) if shadows else None
+    yield positions(effort.finest + 1, maps), shadows
+    reach = float(lengths(drawn.points - np.array(space.centre)).max())
+    # Where a camera that looks at the centre misses no sample, aims forbid nothing.
+    if effort.aims is not None and not device.holds_ball(reach, near):
+        finer = positions(effort.finest + 1, maps)
+        yield AimTree(finer, image_cone(device).half_angle, finest=effort.aims), shadows
+
+
+def _shadow_maps(scene: Scene, samples: Target, finest: int) -> WidenedMaps:
+    """Directions that are open to samples; incidence is cameras' only limit of them."""
+    cube = CubeMap(1 << finest)
+    limits = DirectionLimits(scene.requirements.camera.max_incidence, 0.0)
+    return WidenedMaps(open_samples(scene, limits, samples, cube, shadows=True), cube)

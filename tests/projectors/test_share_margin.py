@@ -44,7 +44,7 @@ def test_no_other_selection_has_more_margin(seed, given):
     lit = int(np.isfinite(margin[:, chosen]).any(axis=1).sum())
     if lit < required:
         pytest.skip("these four light too little to begin with")
-    found = widest_selection(margin, chosen, required, seed=0, given=given)
+    found = widest_selection(margin, chosen, required, seed=0, n_existing=given)
     assert len(found) == count
     assert set(range(given)) <= set(found.tolist())
     best = max(

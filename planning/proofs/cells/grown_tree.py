@@ -1,34 +1,84 @@
-"""A tree of cells that are made when they are asked for."""
+"""A tree of cells that are made when they are asked for, and kept."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.bit_rows import GrowingArray, words_for
+from solvers.bit_rows import GrowingArray, pack_rows, unpack_rows, words_for
 from solvers.cells.cell_tree import CellBatch
 
 
-class GrownTree:
+class GrownTree(ABC):
     """Keeps the cells made so far, and the bit row of each.
 
     Args:
+        roots: What says where the cells are that hold every pose, an array each.
         n_rows: Number of samples.
     """
 
-    def __init__(self, n_rows: int) -> None:
-        self.n_rows = n_rows
+    def __init__(self, roots: Sequence[NDArray[Any]], n_rows: int) -> None:
+        self.n_rows, self._n_roots = n_rows, len(roots[0])
         self._made: dict[int, NDArray[np.int64]] = {}
         self._rows = GrowingArray(np.empty((0, words_for(n_rows)), np.uint64))
+        self._columns = [GrowingArray(column[:0]) for column in roots]
+        self._append(roots, np.ones((self._n_roots, n_rows), dtype=bool))
+
+    def roots(self) -> CellBatch:
+        """Return the cells that hold every pose."""
+        n = self._n_roots
+        return CellBatch(np.arange(n), np.full(n, -1), self._rows.values[:n])
 
     def children(self, cells: NDArray[np.int64], /) -> CellBatch:
         """Return the parts of each cell."""
         new = np.array([c for c in cells if int(c) not in self._made], dtype=np.int64)
         if new.size:
-            self._split(new)
+            self._grow(new)
         made = [self._made[int(cell)] for cell in cells]
-        parents = np.repeat(np.arange(cells.size), [part.size for part in made])
+        parents = np.repeat(np.arange(cells.size), [names.size for names in made])
         names = np.concatenate([np.empty(0, dtype=np.int64), *made])
         return CellBatch(names, parents, self._rows.values[names])
 
-    def _split(self, names: NDArray[np.int64]) -> None:
+    def cells(self, names: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+        """Return where cells are, by their names."""
+        return tuple(column.values[names] for column in self._columns)
+
+    def covered(self, names: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return the samples of cells, by their names, shape (n, n_rows)."""
+        return unpack_rows(self._rows.values[names], self.n_rows)
+
+    def _grow(self, names: NDArray[np.int64]) -> None:
         """Make the parts of cells, and note them."""
-        raise NotImplementedError
+        owner, columns = self._parts(names)
+        order = np.argsort(owner, kind="stable")
+        owner = owner[order]
+        may = self.covered(names[owner])
+        made = self._append([column[order] for column in columns], may)
+        starts = np.searchsorted(owner, np.arange(names.size + 1))
+        for k, name in enumerate(names):
+            self._made[int(name)] = made[starts[k] : starts[k + 1]]
+
+    def _append(
+        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
+    ) -> NDArray[np.int64]:
+        """Keep cells, with those of the samples of their parents that they cover."""
+        first = self._rows.size
+        rows = pack_rows(self._coverage(columns, may))
+        for column, values in zip(self._columns, columns, strict=True):
+            column.append(values)
+        self._rows.append(rows)
+        return np.arange(first, self._rows.size)
+
+    @abstractmethod
+    def _parts(
+        self, names: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Sequence[NDArray[Any]]]:
+        """Return the parts of cells: positions of their parents, and where they are."""
+
+    @abstractmethod
+    def _coverage(
+        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Return which samples, of those that may be covered, cells cover."""

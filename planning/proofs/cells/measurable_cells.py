@@ -38,28 +38,28 @@ class MeasurableCells:
     """Says which samples a camera in a cell may measure; the `limits` of its tree.
 
     Args:
-        rows: Lit samples, with light and rings of every projector on them.
+        samples: Lit samples, with light and rings of every projector on them.
         required: Limits of camera and triangulation.
         device: Optics of the camera.
-        pulse: Called between pieces of work.
+        check_cancelled: Called between pieces of work.
     """
 
     def __init__(
         self,
-        rows: LitSamples,
+        samples: LitSamples,
         required: Requirements,
         device: PinholeModel,
         *,
         check_cancelled: Callable[[], None] = lambda: None,
     ) -> None:
-        self._pulse = check_cancelled
+        self._check_cancelled = check_cancelled
         self._camera, self._pair = required.camera, required.triangulation
         self._image, self._focal = image_cone(device), device.focal_px
-        normals = rows.target.samples.normals
-        self._normals, self._lit = normals, rows.lit
-        self._across = np.stack([ring.normals for ring in rows.rings])
-        self._spacing = np.stack([ring.spacing for ring in rows.rings])
-        cosines = np.stack([light.incidence_cos for light in rows.lights])
+        normals = samples.target.samples.normals
+        self._normals, self._lit = normals, samples.lit
+        self._across = np.stack([ring.normals for ring in samples.rings])
+        self._spacing = np.stack([ring.spacing for ring in samples.rings])
+        cosines = np.stack([light.incidence_cos for light in samples.lights])
         self._noise = self._pair.noise_px / np.maximum(cosines, 1e-9)
         along = np.cross(normals, self._across)
         self._width = np.linalg.norm(along, axis=2)
@@ -72,51 +72,35 @@ class MeasurableCells:
         nearest: _Array,
         psi: _Array,
     ) -> NDArray[np.bool_]:
-        """Return which samples a camera in a cell may measure, as `CellLimits` says."""
-        self._pulse()
+        """Return which samples a camera in a cell may measure, each with its cell.
+
+        Args:
+            samples: Their numbers, shape (k,).
+            towards: Unit directions from them to the cell's middle, shape (k, 3).
+            nearest: No place of the cell is nearer to them, in [m], shape (k,).
+            psi: Angle about `towards` that holds the cell [rad], shape (k,).
+        """
+        self._check_cancelled()
         cosine, sine = np.cos(psi), np.sin(psi)
         facing = _nearest(_dot(self._normals[samples], towards), cosine, sine)
         depth = nearest * np.cos(self._image.off_axis)
         cell = CellView(facing, depth, self._focal)
         seen = may_hold(CAMERA_LIMITS, cell, self._camera, len(samples))
-        some = np.flatnonzero(seen)
-        found = np.zeros(samples.size, dtype=bool)
-        found[some] = self._paired(
-            samples[some],
-            towards[some],
-            nearest[some],
-            facing[some],
-            cosine[some],
-            sine[some],
-        )
-        return found
-
-    def _paired(
-        self,
-        samples: NDArray[np.int64],
-        towards: _Array,
-        nearest: _Array,
-        facing: _Array,
-        cosine: _Array,
-        sine: _Array,
-    ) -> NDArray[np.bool_]:
-        """Return which samples some projector may measure with the camera."""
-        found = np.zeros(samples.size, dtype=bool)
+        admitted = np.zeros(samples.size, dtype=bool)
         for p in range(self._lit.shape[1]):
-            left = np.flatnonzero(self._lit[samples, p] & ~found)
-            own, u = samples[left], towards[left]
-            c, s = cosine[left], sine[left]
-            crossing = _nearest(np.abs(_dot(self._across[p, own], u)), c, s)
-            turn = _least_sine(np.abs(_dot(self._along[p, own], u)), c, s)
-            g = nearest[left] * self._image.least_turn * self._width[p, own] * turn
-            noise, spacing = self._noise[p, own], self._spacing[p, own]
-            cell = PairCell(crossing, facing[left], g, noise, spacing)
-            found[left] = may_hold(PAIR_LIMITS, cell, self._pair, len(own))
-        return found
+            at = np.flatnonzero(self._lit[samples, p] & seen & ~admitted)
+            k, u, c, s = samples[at], towards[at], cosine[at], sine[at]
+            crossing = _nearest(np.abs(_dot(self._across[p, k], u)), c, s)
+            turn = _least_sine(np.abs(_dot(self._along[p, k], u)), c, s)
+            g = nearest[at] * self._image.least_turn * self._width[p, k] * turn
+            noise, spacing = self._noise[p, k], self._spacing[p, k]
+            pair = PairCell(crossing, facing[at], g, noise, spacing)
+            admitted[at] = may_hold(PAIR_LIMITS, pair, self._pair, len(k))
+        return admitted
 
 
 def _nearest(c: _Array, cosine: _Array, sine: _Array) -> _Array:
-    """Return the largest cosine within psi of a direction whose own is c."""
+    """Return the largest cosine within psi of a direction whose cosine is c."""
     s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
     return np.where(c >= cosine, 1.0, c * cosine + s * sine)
 

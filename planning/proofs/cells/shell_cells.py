@@ -8,7 +8,7 @@ angle about e, h half the interval, so::
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,7 @@ from geometry.mesh.tensors import lengths
 _ROUNDING = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class ShellCells:
+class ShellCells(NamedTuple):
     """Cells of a shell.
 
     Attributes:
@@ -35,73 +34,28 @@ class ShellCells:
     low_m: NDArray[np.float64]
     high_m: NDArray[np.float64]
 
-    def take(self, some: NDArray[np.int64] | NDArray[np.bool_]) -> "ShellCells":
-        """Return some of the cells."""
-        return ShellCells(
-            self.level[some], self.cell[some], self.low_m[some], self.high_m[some]
-        )
+    def take(self, chosen: NDArray[np.int64]) -> "ShellCells":
+        """Return the chosen cells."""
+        return ShellCells(*(column[chosen] for column in self))
 
     def quartered(self) -> "ShellCells":
         """Return the four parts of each cell's directions."""
         four = self.take(np.repeat(np.arange(self.cell.size), 4))
-        parts = quarters(self.level, self.cell).ravel()
-        return ShellCells(four.level + 1, parts, four.low_m, four.high_m)
+        cell = quarters(self.level, self.cell).ravel()
+        return four._replace(level=four.level + 1, cell=cell)
 
     def halved(self) -> "ShellCells":
         """Return the inner and the outer half of each cell."""
-        two = np.repeat(np.arange(self.cell.size), 2)
-        taken, outer = self.take(two), np.arange(two.size) % 2 == 1
-        middle = 0.5 * (taken.low_m + taken.high_m)
-        return ShellCells(
-            taken.level,
-            taken.cell,
-            np.where(outer, middle, taken.low_m),
-            np.where(outer, taken.high_m, middle),
-        )
-
-    def joined(self, more: "ShellCells") -> "ShellCells":
-        """Return both as one."""
-        return ShellCells(
-            np.concatenate([self.level, more.level]),
-            np.concatenate([self.cell, more.cell]),
-            np.concatenate([self.low_m, more.low_m]),
-            np.concatenate([self.high_m, more.high_m]),
+        two = self.take(np.repeat(np.arange(self.cell.size), 2))
+        outer = np.arange(two.cell.size) % 2 == 1
+        middle = 0.5 * (two.low_m + two.high_m)
+        return two._replace(
+            low_m=np.where(outer, middle, two.low_m),
+            high_m=np.where(outer, two.high_m, middle),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Directions:
-    """Cells of directions, of cube maps of any level.
-
-    Attributes:
-        middles: Unit directions of their middles, shape (n, 3).
-        radii: Angle about them that holds the cell [rad], shape (n,).
-    """
-
-    middles: NDArray[np.float64]
-    radii: NDArray[np.float64]
-
-
-def directions_of(
-    cubes: Sequence[CubeMap], level: NDArray[np.int64], cell: NDArray[np.int64]
-) -> Directions:
-    """Return cells of the cube maps of 1, 2, 4, ... cells an edge.
-
-    Args:
-        cubes: One of each level.
-        level: Of each cell, shape (n,).
-        cell: Its number on that map, shape (n,).
-    """
-    found = Directions(np.empty((cell.size, 3)), np.empty(cell.size))
-    for own in np.unique(level):
-        some = level == own
-        found.middles[some] = cubes[own].centres[cell[some]]
-        found.radii[some] = cubes[own].radii[cell[some]]
-    return found
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(NamedTuple):
     """Cells as samples see them, a pair each.
 
     Attributes:
@@ -116,30 +70,49 @@ class Seen:
     extent: NDArray[np.float64]
     psi: NDArray[np.float64]
 
-    def take(self, some: NDArray[np.int64]) -> "Seen":
-        """Return some of the pairs."""
-        return Seen(
-            self.towards[some], self.distance[some], self.extent[some], self.psi[some]
-        )
+    def take(self, chosen: NDArray[np.int64]) -> "Seen":
+        """Return the chosen pairs."""
+        return Seen(*(column[chosen] for column in self))
+
+
+def directions_of(
+    cubes: Sequence[CubeMap], level: NDArray[np.int64], cell: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return unit middles of cells, and the angle about each that holds the cell.
+
+    Args:
+        cubes: Cube maps of 1, 2, 4, ... cells an edge.
+        level: Of each cell, shape (n,).
+        cell: Its number on that map, shape (n,).
+
+    Returns:
+        Shapes (n, 3) and (n,), the latter in [rad].
+    """
+    middles, radii = np.empty((cell.size, 3)), np.empty(cell.size)
+    for k in np.unique(level):
+        at = level == k
+        middles[at] = cubes[k].centres[cell[at]]
+        radii[at] = cubes[k].radii[cell[at]]
+    return middles, radii
 
 
 def seen_from(
     cells: ShellCells,
-    directions: Directions,
+    directions: tuple[NDArray[np.float64], NDArray[np.float64]],
     at: NDArray[np.int64],
     points: NDArray[np.float64],
 ) -> Seen:
     """Return how points see cells.
 
     Args:
-        cells: Some cells.
-        directions: Theirs.
+        cells: The cells.
+        directions: Theirs, as `directions_of` returns them.
         at: Position of each pair's cell among them, shape (k,).
         points: Of each pair, relative to the centre in [m], shape (k, 3).
     """
     half = 0.5 * (cells.high_m - cells.low_m)
-    side = 2.0 * cells.high_m * np.sin(0.5 * directions.radii)
-    outwards = directions.middles
+    outwards, radii = directions
+    side = 2.0 * cells.high_m * np.sin(0.5 * radii)
     middle = 0.5 * (cells.low_m + cells.high_m)[:, None] * outwards
     towards = middle[at] - points
     distance = lengths(towards)
