@@ -34,8 +34,8 @@ from planning.model.plan_errors import RequirementError
 from planning.pipeline import plan_rig
 from planning.rig.rig import load_rig
 from planning.verify.reconstruction.check.accuracy import measure_accuracy
-from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.single_shot.single_shot import shoot_rig
 
 _MM = 1e3

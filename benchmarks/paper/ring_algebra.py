@@ -20,6 +20,7 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
 from planning.verify.reconstruction.light_laws import LIGHTS, LightName
+from planning.verify.reconstruction.patterns.ring_patterns import DrawnRings
 
 MIN_CONDITIONING = 0.1
 _POINTS_A_POSE = 2000
@@ -118,8 +119,9 @@ def _projector(
         shift[:3, :3] = _about(np.array([*turn, 0.0]))
         matrix = np.array([[1800.0, 0.0, 639.5], [0.0, 1800.0, 399.5], [0.0, 0.0, 1.0]])
         resolution, beam = (1280, 800), None
+    none = DrawnRings(LIGHTS[light], np.zeros(0))
     calibration = ProjectorCalibration(
-        "P1", LIGHTS[light], pose, pose @ shift, matrix, resolution, beam
+        "P1", none.light, pose, pose @ shift, matrix, resolution, beam, none
     )
     return calibration, off
 

@@ -23,10 +23,7 @@ from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import read_ranges
-from planning.verify.reconstruction.patterns.pattern_files import (
-    remove_patterns,
-    write_patterns,
-)
+from planning.verify.reconstruction.pattern_files import remove_patterns, write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 
 from .console import cores, print_json, reporter, say, writable

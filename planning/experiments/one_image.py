@@ -104,7 +104,7 @@ def true_labels(
     rays = camera.rays(pixels)
     faces, away = caster.first_hits(camera.centre, rays)
     points = camera.centre + np.where(faces >= 0, away, 0.0)[:, None] * rays
-    local, radii = projector.to_ring(points), projector.radii
+    local, radii = projector.to_ring(points), projector.pattern.radii
     rho = projector.ring_coordinate(points)
     ring = np.argmin(np.abs(rho[:, None] - radii), axis=1)
     on_ring = (faces >= 0) & (np.abs(rho - radii[ring]) <= width)

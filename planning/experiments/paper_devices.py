@@ -11,6 +11,7 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.light_laws import LIGHTS, LightName
+from planning.verify.reconstruction.patterns.ring_patterns import DrawnRings
 
 UP = np.array([0.0, 0.0, 1.0])
 # Both projectors of the paper have 1024 x 768 px, the cameras 1280 x 720 px.
@@ -83,8 +84,9 @@ def placed_projector(
     matrix = np.diag([scale, scale, 1.0])
     matrix[:2, 2] = 0.5 * (width - 1), 0.5 * (height - 1)
     radii = radii_m / STANDOFF_M if diverging else radii_m
+    drawn = DrawnRings(LIGHTS[light], radii)
     return ProjectorCalibration(
-        name, LIGHTS[light], pose, pose, matrix, PROJECTOR_PX, None, radii
+        name, drawn.light, pose, pose, matrix, PROJECTOR_PX, None, drawn
     )
 
 

@@ -56,7 +56,7 @@ def ring_outcomes(scanner: Scanner, cloud: Cloud) -> tuple[RingOutcome, ...]:
     cameras = scanner.cameras
     outcomes: list[RingOutcome] = []
     for p, projector in enumerate(scanner.projectors):
-        for k, radius in enumerate(projector.radii):
+        for k, radius in enumerate(projector.pattern.radii):
             points, normals = _landed(projector, float(radius), caster)
             seen = [_shows(camera, points, normals, caster) for camera in cameras]
             own = [
@@ -115,7 +115,7 @@ def _lights(
     pixels, _ = projector.panel(points)
     _, beams, away = projector.aim(points)
     lit = projector.in_panel(pixels)
-    lit &= projector.ring_coordinate(points) <= projector.radii[-1]
+    lit &= projector.ring_coordinate(points) <= projector.pattern.radii[-1]
     lit &= np.einsum("ij,ij->i", normals, beams) < 0.0
     return lit & ~_blocked(points, -beams, away, caster)
 

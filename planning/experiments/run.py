@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
 from planning.verify.reconstruction.arrays import Mask
-from planning.verify.reconstruction.check.check import conclude, reconstruct
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.reconstruct import conclude, reconstruct
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import Progress
 from planning.verify.reconstruction.single_shot.single_shot import (

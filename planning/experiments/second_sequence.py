@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array
-from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.scanner import Scanner
 
 from .point_errors import MeasuredErrors, measured
@@ -38,7 +38,10 @@ def midway(radii: Array) -> Array:
 
 def second_sequence(scanner: Scanner) -> Scanner:
     """Return a rig whose projectors draw their rings midway between its own."""
-    shifted = [replace(one, radii=midway(one.radii)) for one in scanner.projectors]
+    shifted = [
+        replace(one, pattern=replace(one.pattern, radii=midway(one.pattern.radii)))
+        for one in scanner.projectors
+    ]
     return replace(scanner, projectors=tuple(shifted))
 
 

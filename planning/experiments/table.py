@@ -122,7 +122,7 @@ def outcome_document(outcome: Outcome) -> dict[str, Any]:
                 **_device_document(one),
                 "light": one.light.name,
                 "world_from_ring": one.world_from_ring.tolist(),
-                "ring_radii": one.radii.tolist(),
+                "ring_radii": one.pattern.radii.tolist(),
             }
             for one in scanner.projectors
         ],

@@ -17,8 +17,8 @@ from planning.verify.audit.figure_claims import compare_figures, contradictions
 if TYPE_CHECKING:
     from geometry.mesh.sampling import SurfaceSamples
     from planning.verify.audit.audit_samples import AuditSamples
-    from planning.verify.reconstruction.check.check import Reconstruction
     from planning.verify.reconstruction.check.comparison import PredictedSamples
+    from planning.verify.reconstruction.reconstruct import Reconstruction
 
 _MM = 1e3
 _MESH_SAMPLES = 2000
@@ -196,8 +196,8 @@ def _reconstruct(
 ) -> Reconstruction:
     """Run the simulated reconstruction on the audit's own samples."""
     from planning.verify.reconstruction.check.accuracy import Expected
-    from planning.verify.reconstruction.check.check import reconstruct
     from planning.verify.reconstruction.check.comparison import compare
+    from planning.verify.reconstruction.reconstruct import reconstruct
     from planning.verify.reconstruction.scanner import Scanner
 
     standing = None if truth is None and mesh is None else Scanner.of(truth or plan)

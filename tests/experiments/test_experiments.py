@@ -43,14 +43,13 @@ from planning.experiments.setups import (
 from planning.experiments.table import outcome_document, outcome_lines
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.check.accuracy import measure_accuracy
-from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
+from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.render import render_lines
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
 from planning.verify.reconstruction.scanner import Scanner
-from planning.verify.reconstruction.single_shot.ring_lines import line_patterns
 from planning.verify.reconstruction.single_shot.single_shot import (
     drawn_lines,
     shoot_rig,
@@ -108,7 +107,7 @@ def test_what_the_paper_prints_is_kept():
     np.testing.assert_allclose(face.optics.field_m, [0.160, 0.090])
     assert face.light == "parallel"
     diverging = face_experiment(light="diverging")
-    tangents = diverging.scanner.projectors[0].radii
+    tangents = diverging.scanner.projectors[0].pattern.radii
     np.testing.assert_allclose(tangents * 1.0, FACE_RADII_M)
 
 
@@ -179,7 +178,7 @@ def test_points_of_the_second_projector_come_into_the_frame_of_the_first_by_eq_6
     ).everything
     first, second = experiment.scanner.projectors
     y2 = second.to_ring(cloud.points)
-    radii = experiment.scanner.projectors[1].radii[cloud.ring]
+    radii = experiment.scanner.projectors[1].pattern.radii[cloud.ring]
     across = np.hypot(y2[:, 0], y2[:, 1])
     on_ring = across / y2[:, 2] if light == "diverging" else across
     np.testing.assert_allclose(on_ring, radii, atol=1e-9)
@@ -332,7 +331,7 @@ def test_a_second_sequence_doubles_the_density(of_box):
     for before, after in zip(
         of_box.experiment.scanner.projectors, shifted.projectors, strict=True
     ):
-        np.testing.assert_allclose(after.radii, before.radii - 0.006)
+        np.testing.assert_allclose(after.pattern.radii, before.pattern.radii - 0.006)
     doubled = double_density(of_box, threads=1)
     first, both = doubled.first, doubled.both
     assert 1.8 < len(both.cloud) / len(first.cloud) < 2.2
@@ -439,7 +438,7 @@ def test_light_of_both_projectors_adds_up_in_one_image():
     seen = view(camera, experiment.mesh, caster, CLEAN)
     shown = []
     for projector in experiment.scanner.projectors:
-        lines = line_patterns(projector.pattern_for(camera), 1e-3)
+        lines = projector.pattern_for(camera).lines(1e-3)
         shown.append(Shown(projector, projector, lines, caster))
     both, one, other = (
         render_lines(seen, some, CLEAN, (0,)).stack[0].ravel().astype(float)

@@ -12,9 +12,10 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
+from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.check.accuracy import Expected
-from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.scanner import Scanner
 from support.bare_plan import bare_plan
 
@@ -44,6 +45,11 @@ def bumpy_sphere(radius: float, *, subdivisions: int = 5) -> TriangleMesh:
     x, y, z = ball.vertices.T
     wave = 0.05 * np.sin(5.0 * x) * np.cos(4.0 * y + 1.0) + 0.04 * np.sin(6.0 * z)
     return TriangleMesh(radius * (1.0 + wave)[:, None] * ball.vertices, ball.faces)
+
+
+def ringed(projector: ProjectorCalibration, radii: np.ndarray) -> ProjectorCalibration:
+    """A projector that draws other rings."""
+    return replace(projector, pattern=replace(projector.pattern, radii=radii))
 
 
 def direction(azimuth_deg: float, elevation_deg: float) -> np.ndarray:

@@ -5,14 +5,17 @@ that a mistake in one shows against the other. Pixels follow OpenCV: the centre 
 top-left pixel is (0, 0).
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from geometry.devices import ParallelModel
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.verify.reconstruction.patterns.pattern_images import PatternSequence
 from planning.verify.reconstruction.patterns.ring_patterns import (
+    PATTERNS,
     DrawnRings,
     RingsForCamera,
 )
@@ -125,7 +128,7 @@ class ProjectorCalibration:
             (x, y) in [m], 1 / pixel pitch on the diagonal.
         resolution: Width and height in [px].
         beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
-        radii: Of the ring edges that it draws, as in `DrawnRings`, shape (n_rings,).
+        pattern: What it draws.
         body: Its housing; None: it takes no room.
     """
 
@@ -136,7 +139,7 @@ class ProjectorCalibration:
     matrix: Array
     resolution: tuple[int, int]
     beam_radius: float | None
-    radii: Array = field(default_factory=lambda: np.zeros(0))
+    pattern: DrawnRings
     body: Body | None = None
 
     @property
@@ -149,16 +152,14 @@ class ProjectorCalibration:
         """Direction of the optical axis in the world, shape (3,)."""
         return self.world_from_device[:3, 2]
 
-    @property
-    def pattern(self) -> DrawnRings:
-        """What it draws."""
-        return DrawnRings(self.light, self.radii)
-
     def pattern_for(self, camera: CameraCalibration) -> RingsForCamera:
-        """Return what it draws with the root disc of a camera."""
-        return RingsForCamera(
-            self.light, self.radii, self.to_ring(camera.centre[None])[0]
-        )
+        """Return what it draws as a camera's decoder reads it."""
+        return self.pattern.seen_from(self.to_ring(camera.centre[None])[0])
+
+    def sequence(self, cameras: Sequence[CameraCalibration]) -> PatternSequence:
+        """Return all that it shows for the cameras of a rig, one or more."""
+        each = {camera.id: self.pattern_for(camera) for camera in cameras}
+        return PatternSequence(self, self.pattern, each)
 
     def aim(self, points: Array) -> tuple[Array, Array, Array]:
         """Return where the light of world points starts, its directions and lengths."""
@@ -269,6 +270,6 @@ def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
         matrix,
         device.resolution,
         beam_radius,
-        projector.ring_radii,
+        PATTERNS["rings"](LIGHTS[projector.light], projector.ring_radii),
         projector.body,
     )

@@ -34,7 +34,7 @@ def _without_causes():
     """Leave out the search for causes, which takes longer than all the rest here."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "planning.verify.reconstruction.check.check.explained", lambda said, _: said
+            "planning.verify.reconstruction.reconstruct.explained", lambda said, _: said
         )
         yield
 

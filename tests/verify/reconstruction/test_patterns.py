@@ -10,10 +10,7 @@ import pytest
 from PIL import Image
 
 from planning.model.plan import RigPlan
-from planning.verify.reconstruction.patterns.pattern_files import (
-    remove_patterns,
-    write_patterns,
-)
+from planning.verify.reconstruction.pattern_files import remove_patterns, write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 
 

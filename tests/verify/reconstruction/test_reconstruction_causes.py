@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.reconstruction_rigs import changed, reconstruct_plan
+from support.reconstruction_rigs import changed, reconstruct_plan, ringed
 
 from geometry.mesh.sampling import sample_surface
 from geometry.shapes.primitives import sphere
@@ -17,13 +17,13 @@ from planning.verify.reconstruction.calibration import (
     calibrate_projector,
 )
 from planning.verify.reconstruction.check.accuracy import Expected
-from planning.verify.reconstruction.check.check import reconstruct
 from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import CAUSES, Decoded
 from planning.verify.reconstruction.faults.causes import rejection
 from planning.verify.reconstruction.faults.inaccurate import wrong_roots
 from planning.verify.reconstruction.faults.supposed import Evidence, Supposed, places
+from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.scanner import Scanner
 
 FOCAL = 1400.0
@@ -104,7 +104,7 @@ def test_only_a_point_whose_ray_meets_its_ring_on_the_mesh_has_a_wrong_root(plan
     )
     order = np.argsort(rho)
     for shift, share in ((0.0, 1.0), (2e-3, None)):
-        drawn = replace(scanner.projectors[0], radii=rho[order] + shift)
+        drawn = ringed(scanner.projectors[0], rho[order] + shift)
         marked = replace(scanner, projectors=(drawn, *scanner.projectors[1:]))
         pair = replace(Decoded.nothing(), cloud=cloud.take(order))
         pair = replace(pair, cloud=replace(pair.cloud, ring=cloud.ring))

@@ -1,9 +1,8 @@
 """Where two projectors' light falls: thresholds, both tests, light that adds up."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from support.reconstruction_rigs import ringed
 from support.white_frames import balanced_accuracy, best_threshold, render_whites
 
 from geometry.mesh.mesh import TriangleMesh
@@ -129,7 +128,7 @@ def test_light_falls_where_a_sphere_faces_it(plan):
         # Just above the facets the light may still graze one.
         assert np.all(lit[cosine > 0.1])
         assert not np.any(lit[cosine < np.cos(np.deg2rad(89.0))])
-        none = light_falls(replace(device, radii=1e-6 * HALF), caster, points, normals)
+        none = light_falls(ringed(device, 1e-6 * HALF), caster, points, normals)
         assert not none.any()
 
 
@@ -154,5 +153,5 @@ def test_light_does_not_fall_behind_a_sphere(rigs):
     caster = RayCaster(two.surface.mesh, threads=1)
     normals = np.array([towards, towards, rigs.direction(35.0, 5.0)])
     points = np.array([0.06, 0.0, 0.0])[:, None] * towards + 0.02 * normals
-    lit = light_falls(replace(device, radii=HALF), caster, points, normals)
+    lit = light_falls(ringed(device, HALF), caster, points, normals)
     assert lit.tolist() == [True, False, False]

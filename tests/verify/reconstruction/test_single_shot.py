@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import ndtr
+from support.reconstruction_rigs import ringed
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
@@ -16,12 +17,13 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
 from planning.verify.reconstruction.light_laws import LIGHTS
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
-from planning.verify.reconstruction.single_shot.prior_labels import label_by_prior
-from planning.verify.reconstruction.single_shot.ring_lines import (
-    find_lines,
-    line_patterns,
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    DrawnRings,
+    Frames,
+    RingsForCamera,
 )
+from planning.verify.reconstruction.single_shot.prior_labels import label_by_prior
+from planning.verify.reconstruction.single_shot.ring_lines import find_lines
 
 UP = np.array([0.0, 0.0, 1.0])
 BALL = 0.06
@@ -73,11 +75,11 @@ def test_what_is_faint_or_an_edge_is_no_line():
 
 def test_lines_alternate_with_gaps_and_must_fit_between_rings():
     patterns = RingsForCamera(LIGHTS["parallel"], np.array([0.02, 0.05]), np.zeros(3))
-    lines = line_patterns(patterns, 0.002)
+    lines = patterns.lines(0.002)
     np.testing.assert_allclose(lines.radii, [0.019, 0.021, 0.049, 0.051])
     for width in (0.0, np.nan, 0.031, 0.041):
         with pytest.raises(ValueError, match="narrower than the least gap"):
-            line_patterns(patterns, width)
+            patterns.lines(width)
 
 
 def rig(light: str) -> PairCalibration:
@@ -85,8 +87,9 @@ def rig(light: str) -> PairCalibration:
     pose = look_at(np.array([0.0, -1.0, 0.0]), np.zeros(3), UP)
     scale = 5000.0 if light == "parallel" else 2500.0
     matrix = np.array([[scale, 0, 499.5], [0, scale, 499.5], [0, 0, 1.0]])
+    rings = DrawnRings(LIGHTS[light], RADII[light])
     projector = ProjectorCalibration(
-        "P1", LIGHTS[light], pose, pose, matrix, (1000, 1000), None
+        "P1", rings.light, pose, pose, matrix, (1000, 1000), None, rings
     )
     a = np.deg2rad(35.0)
     eye = np.array([np.sin(a), -np.cos(a) * 0.95, np.cos(a) * 0.3])
@@ -122,7 +125,7 @@ def ring_points(light: str):
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     seen = np.einsum("ij,ij->i", rays, points) < -0.3 * BALL
     points, ring, rays = points[seen], ring[seen], rays[seen]
-    patterns = replace(pair.projector, radii=radii).pattern_for(pair.camera)
+    patterns = ringed(pair.projector, radii).pattern_for(pair.camera)
     local = pair.projector.to_ring(points)
     plane = local[:, :2] / (local[:, 2:] if light == "diverging" else 1.0)
     root = np.where(patterns.root_side(plane) > 0.0, 1, -1)

@@ -9,7 +9,10 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
 from planning.verify.reconstruction.light_laws import LIGHTS
-from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    DrawnRings,
+    RingsForCamera,
+)
 
 
 def random_turn(rng: np.random.Generator) -> np.ndarray:
@@ -25,8 +28,9 @@ def random_pose(rng: np.random.Generator, reach: float) -> np.ndarray:
 
 
 def projector_of(light: str, world_from_ring: np.ndarray) -> ProjectorCalibration:
+    frame, none = world_from_ring, DrawnRings(LIGHTS[light], np.zeros(0))
     return ProjectorCalibration(
-        "P1", LIGHTS[light], world_from_ring, world_from_ring, np.eye(3), (9, 9), None
+        "P1", none.light, frame, frame, np.eye(3), (9, 9), None, none
     )
 
 

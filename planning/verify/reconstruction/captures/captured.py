@@ -12,7 +12,6 @@ import numpy as np
 from planning.model.errors import CapturesError
 from planning.verify.reconstruction.arrays import Images
 from planning.verify.reconstruction.check.accuracy import Expected
-from planning.verify.reconstruction.check.check import conclude
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import (
     Decoded,
@@ -22,8 +21,8 @@ from planning.verify.reconstruction.decode.decode import (
 )
 from planning.verify.reconstruction.decode.inspection import DarkError, inspect
 from planning.verify.reconstruction.faults.causes import rejection
-from planning.verify.reconstruction.patterns.pattern_frames import PatternSequence
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
+from planning.verify.reconstruction.reconstruct import conclude
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import (
     Progress,
@@ -163,7 +162,7 @@ class _Inspection:
     def frames(self, pair: PairIndex, read: Callable[[], Images]) -> Frames | None:
         """Return what may be decoded of a pair's images; None: nothing."""
         p, c = pair
-        sequence = PatternSequence.of(self._plan.projectors[p], self._plan.cameras)
+        sequence = self._plan.projectors[p].sequence(self._plan.cameras)
         names = sequence.frame_names(self._plan.cameras[c].id)
         try:
             inspected = inspect(read(), self.patterns(pair), names)

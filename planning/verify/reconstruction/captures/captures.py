@@ -15,7 +15,7 @@ from PIL import Image
 from planning.model.errors import CapturesError
 from planning.model.files import write_together
 from planning.verify.reconstruction.arrays import Images
-from planning.verify.reconstruction.patterns.pattern_frames import PatternSequence
+from planning.verify.reconstruction.patterns.pattern_images import PatternSequence
 from planning.verify.reconstruction.patterns.ring_patterns import Frames
 from planning.verify.reconstruction.scanner import Scanner
 
@@ -50,7 +50,7 @@ class CaptureFolder:
         return self._sequence(p).frame_names(self.plan.cameras[c].id)
 
     def _sequence(self, p: int) -> PatternSequence:
-        return PatternSequence.of(self.plan.projectors[p], self.plan.cameras)
+        return self.plan.projectors[p].sequence(self.plan.cameras)
 
     def require(self) -> None:
         """Refuse a folder that holds none of the cameras.

@@ -116,9 +116,9 @@ def decode(
     """
     if len(frames.stack) != patterns.n_frames:
         raise ValueError(
-            f"{len(frames.stack)} frames, but {len(patterns.radii)} rings are coded in "
-            f"{patterns.n_frames}: white, black, {patterns.n_bits} bits and the root "
-            f"disc, each with its inverse"
+            f"{len(frames.stack)} frames, but {patterns.n_annuli - 1} rings are coded "
+            f"in {patterns.n_frames}: white, black, {patterns.n_bits} bits and the "
+            f"root disc, each with its inverse"
         )
     edges, lit_pixels = find_edges(frames, patterns)
     saturated = np.argwhere(frames.stack[0] >= SATURATED)[:, ::-1] + np.array(
@@ -162,7 +162,7 @@ def measure_edges(
     """
     camera, projector = calibration.camera, calibration.projector
     rays = camera.rays(edges.pixels)
-    radii = patterns.radii[edges.rings]
+    radii = patterns.coordinate(edges.rings)
     hits = intersect_rings(camera.centre, rays, radii, edges.roots, projector)
     length, across = _chains(edges, hits, camera.focal_px, max_slant)
     causes = {
@@ -211,7 +211,7 @@ def _doubtful_root(
         return np.zeros(len(edges), dtype=bool)
 
     def fits(roots: NDArray[np.int8]) -> Mask:
-        radii = patterns.radii[edges.rings]
+        radii = patterns.coordinate(edges.rings)
         points = intersect_rings(camera.centre, rays, radii, roots, projector).points
         local = projector.to_ring(points)
         inside = projector.in_panel(projector.panel(points)[0], 1.0)

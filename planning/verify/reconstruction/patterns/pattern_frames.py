@@ -1,22 +1,9 @@
-"""The frames that a projector shows, in order: what each means to a decoder.
+"""The frames that a projector shows: what each means, and what they are drawn on."""
 
-What is drawn is defined once, in `ring_patterns`, which the check renders.
-"""
-
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
+from typing import Literal, Protocol
 
-import numpy as np
-
-from planning.verify.reconstruction.arrays import Mask
-from planning.verify.reconstruction.calibration import (
-    CameraCalibration,
-    ProjectorCalibration,
-)
-
-from .ring_patterns import RingsForCamera
+from planning.verify.reconstruction.arrays import Array
 
 Kind = Literal["white", "black", "bit", "root"]
 
@@ -47,47 +34,23 @@ class Frame:
         return f"{name}-inverse" if self.inverse else name
 
 
-@dataclass(frozen=True, eq=False)
-class PatternSequence:
-    """All that one projector shows.
+class Panel(Protocol):
+    """A projector's image, and where its pixels lie in the plane of the pattern."""
 
-    Attributes:
-        projector: As the patterns are drawn for it.
-        discs: Of each camera by its id: what is drawn, with its root disc.
-    """
+    @property
+    def resolution(self) -> tuple[int, int]:
+        """Width and height in [px]."""
+        ...
 
-    projector: ProjectorCalibration
-    discs: dict[str, RingsForCamera]
+    @property
+    def beam_radius(self) -> float | None:
+        """Radius of a parallel beam [m]; None: none."""
+        ...
 
-    @classmethod
-    def of(
-        cls, projector: ProjectorCalibration, cameras: Sequence[CameraCalibration]
-    ) -> "PatternSequence":
-        """Return what a projector shows for the cameras of a rig, one or more."""
-        discs = {camera.id: projector.pattern_for(camera) for camera in cameras}
-        return cls(projector, discs)
+    def ring_plane(self, pixels: Array) -> Array:
+        """Return where pixels (n, 2) lie in the plane that is drawn in, (n, 2)."""
+        ...
 
-    @cached_property
-    def frames(self) -> tuple[Frame, ...]:
-        """White, black, each bit and its inverse, each camera's disc and inverse."""
-        frames = [Frame(0, "white"), Frame(1, "black")]
-        for bit in range(self.projector.pattern.n_bits):
-            for inverse in (False, True):
-                frames.append(Frame(len(frames), "bit", bit=bit, inverse=inverse))
-        for camera in self.discs:
-            for inverse in (False, True):
-                frames.append(
-                    Frame(len(frames), "root", camera=camera, inverse=inverse)
-                )
-        return tuple(frames)
-
-    def frame_names(self, camera: str) -> tuple[str, ...]:
-        """Return the names of the frames that a camera's decoder reads, in order."""
-        return tuple(f.name for f in self.frames if f.camera in (None, camera))
-
-    def annulus_levels(self, frame: Frame) -> Mask:
-        """Return whether each annulus is bright in a white, black or bit frame."""
-        pattern = self.projector.pattern
-        if frame.bit is not None:
-            return (pattern.bit(frame.bit) > 0.5) != frame.inverse
-        return np.full(pattern.n_annuli, frame.kind == "white")
+    def panel_coordinates(self, pixels: Array) -> Array:
+        """Return panel coordinates (n, 2) of pixels (n, 2)."""
+        ...

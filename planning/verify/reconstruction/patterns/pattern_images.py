@@ -14,11 +14,35 @@ from numpy.typing import NDArray
 
 from planning.verify.reconstruction.arrays import Array, Grey
 
-from .pattern_frames import Frame, PatternSequence
-from .ring_patterns import RingsForCamera
+from .pattern_frames import Frame, Panel
+from .ring_patterns import DrawnRings, RingsForCamera
 
 _WHITE = 255.0
 _NEIGHBOURS = (slice(None, -1), slice(1, None))
+
+
+@dataclass(frozen=True, eq=False)
+class PatternSequence:
+    """All that one projector shows.
+
+    Attributes:
+        panel: Of the projector, as the patterns are drawn for it.
+        pattern: What is drawn.
+        discs: The same with the root disc of each camera, by its id.
+    """
+
+    panel: Panel
+    pattern: DrawnRings
+    discs: dict[str, RingsForCamera]
+
+    @cached_property
+    def frames(self) -> tuple[Frame, ...]:
+        """What is shown, in order."""
+        return self.pattern.frames(self.discs)
+
+    def frame_names(self, camera: str) -> tuple[str, ...]:
+        """Return the names of the frames that a camera's decoder reads, in order."""
+        return tuple(f.name for f in self.frames if f.camera in (None, camera))
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +71,7 @@ class PatternCanvas:
             assert frame.camera is not None
             outside = self._outside[frame.camera]
             return self.within + self.beyond - outside if frame.inverse else outside
-        bright = self.sequence.annulus_levels(frame).astype(np.uint8)
+        bright = self.sequence.pattern.bright(frame).astype(np.uint8)
         inside = self.within * bright[:-1].take(self.edge)
         return inside + self.beyond * bright[1:].take(self.edge)
 
@@ -64,21 +88,20 @@ class PatternCanvas:
 
 def canvas(sequence: PatternSequence) -> PatternCanvas:
     """Return where a projector's pixels lie among its rings."""
-    projector = sequence.projector
-    patterns = projector.pattern
-    width, height = projector.resolution
+    panel, patterns = sequence.panel, sequence.pattern
+    width, height = panel.resolution
     v, u = np.indices((height, width), dtype=np.float64)
     pixels = np.column_stack([u.ravel(), v.ravel()])
-    x, y = (part.reshape(height, width) for part in projector.ring_plane(pixels).T)
+    x, y = (part.reshape(height, width) for part in panel.ring_plane(pixels).T)
     rho = np.hypot(x, y)
     slope = _slope(rho)
     radii = patterns.radii
     edge = np.searchsorted(0.5 * (radii[1:] + radii[:-1]), rho)
     drawn = _share(patterns.outer_radius - rho, slope)
-    if projector.beam_radius is not None:
-        flat = projector.panel_coordinates(pixels)
+    if panel.beam_radius is not None:
+        flat = panel.panel_coordinates(pixels)
         away = np.hypot(flat[:, 0], flat[:, 1]).reshape(height, width)
-        drawn = drawn * _share(projector.beam_radius - away, _slope(away))
+        drawn = drawn * _share(panel.beam_radius - away, _slope(away))
     white = np.rint(_WHITE * drawn).astype(np.uint8)
     beyond = np.rint(white * _share(rho - radii[edge], slope)).astype(np.uint8)
     return PatternCanvas(sequence, x, y, edge, white - beyond, beyond)

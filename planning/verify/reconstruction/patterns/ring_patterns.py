@@ -5,19 +5,24 @@ camera the disc that tells the two roots of its rays apart, with its inverse: in
 ``2 ceil(log2 N) + 2 + 2 n_cameras`` frames for N annuli, one more than rings.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
-from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices
+from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.light_laws import LightLaw
+
+from .pattern_frames import Frame
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnRings:
-    """What one projector draws.
+    """What one projector draws: its frames, how they look, what a decoder reads.
 
     Attributes:
         light: Its light.
@@ -65,11 +70,84 @@ class DrawnRings:
         """Return whether each annulus is bright in the frame of a bit, (n_annuli,)."""
         return ((self.codes >> bit) & 1).astype(np.float32)
 
-    @property
-    def steps(self) -> Array:
-        """Distance of each ring from the next one inwards, shape (n,)."""
+    def entry(self) -> dict[str, Any]:
+        """Return what decoders elsewhere must know of it, as plain JSON values."""
+        return {
+            "n_annuli": self.n_annuli,
+            "n_bits": self.n_bits,
+            "outer_radius": self.outer_radius,
+            "ring_radii": self.radii.tolist(),
+            "flipping_bit": self.flipping_bit.tolist(),
+        }
+
+    def frames(self, cameras: Iterable[str]) -> tuple[Frame, ...]:
+        """Return white, black, each bit and its inverse, each camera's disc and so."""
+        coded = [Frame(0, "bit", bit=bit) for bit in range(self.n_bits)]
+        coded += [Frame(0, "root", camera=camera) for camera in cameras]
+        both = [replace(one, inverse=dark) for one in coded for dark in (False, True)]
+        shown = [Frame(0, "white"), Frame(0, "black"), *both]
+        return tuple(replace(one, number=n) for n, one in enumerate(shown))
+
+    def bright(self, frame: Frame) -> Mask:
+        """Return whether each annulus is bright in a white, black or bit frame."""
+        if frame.bit is not None:
+            return (self.bit(frame.bit) > 0.5) != frame.inverse
+        return np.full(self.n_annuli, frame.kind == "white")
+
+    def gaps_m(self, rings: NDArray[np.integer], depth: Array) -> Array:
+        """Return how far rings are from the next one inwards, at depths z [m], (n,)."""
         first = self.radii[0] - (self.radii[1] - self.radii[0])
-        return np.diff(self.radii, prepend=first)
+        steps = np.diff(self.radii, prepend=first)
+        return self.light.across_m(steps[rings], self.radii[rings], depth)
+
+    def coordinate(self, rings: NDArray[np.integer]) -> Array:
+        """Return |p| on some of its ring edges, shape (n,)."""
+        return self.radii[rings]
+
+    def blurred(self, rho: Array, spread: Array) -> tuple[Indices, Array, Array, Array]:
+        """Return how blurred light falls where |p| is rho, shape (n,) each.
+
+        Args:
+            rho: |p|, shape (n,).
+            spread: Standard deviation of the blur, in the unit of rho, shape (n,).
+
+        Returns:
+            Annulus; share of the light from the next one inwards, and outwards; share
+            that is drawn at all.
+        """
+        annulus = np.searchsorted(self.radii, rho)
+        edges = np.concatenate([[-np.inf], self.radii, [np.inf]])
+        inner = ndtr((edges[annulus] - rho) / spread)
+        outer = ndtr((rho - edges[annulus + 1]) / spread)
+        return annulus, inner, outer, ndtr((self.outer_radius - rho) / spread)
+
+    def lines(self, width: float) -> Self:
+        """Return rings whose odd annuli are bright lines on these.
+
+        Args:
+            width: Of a line, in the unit of the radii.
+
+        Raises:
+            ValueError: If lines would touch each other or the centre.
+        """
+        half = 0.5 * width
+        radii = (self.radii[:, None] + np.array([-half, half])).ravel()
+        if not (width > 0.0 and np.all(np.diff(radii, prepend=0.0) > 0.0)):
+            raise ValueError(
+                f"lines of width {width:.4g} must be positive and narrower than the "
+                f"least gap between rings, {self.least_gap:.4g}, in the unit of the "
+                f"radii"
+            )
+        return replace(self, radii=radii)
+
+    @property
+    def least_gap(self) -> float:
+        """Least distance of a ring from the next one, or from the centre."""
+        return float(np.diff(self.radii, prepend=0.0).min())
+
+    def seen_from(self, camera_in_ring: Array) -> "RingsForCamera":
+        """Return it with the root disc of a camera, which stands there [m], (3,)."""
+        return RingsForCamera(self.light, self.radii, camera_in_ring)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,3 +199,7 @@ class Frames:
 
     stack: Images
     corner: tuple[int, int]
+
+
+# What a plan may have its projectors draw, by name: from their light and their radii.
+PATTERNS: dict[str, Callable[[LightLaw, Array], DrawnRings]] = {"rings": DrawnRings}

@@ -101,15 +101,13 @@ class Shown:
             square = square + self.defocus.blur_m(depth) ** 2
         blur = np.sqrt(square + pixel**2 * np.maximum(stretch, 0.0))
         spread = law.per_metre(rho, depth) * blur
-        annulus = np.searchsorted(patterns.radii, rho)
-        edges = np.concatenate([[-np.inf], patterns.radii, [np.inf]])
-        drawn = ndtr((patterns.outer_radius - rho) / spread)
+        annulus, inner, outer, drawn = patterns.blurred(rho, spread)
         light = RenderedLight(
             lit,
             (seen.albedo[lit] * cosine * drawn).astype(np.float32),
             annulus,
-            ndtr((edges[annulus] - rho) / spread).astype(np.float32),
-            ndtr((rho - edges[annulus + 1]) / spread).astype(np.float32),
+            inner.astype(np.float32),
+            outer.astype(np.float32),
             ndtr(patterns.root_side(plane) / spread).astype(np.float32),
         )
         return light, depth

@@ -1,16 +1,16 @@
-"""One image of bright rings: how it is drawn, and where its lines run to sub-pixel.
+"""Where the lines of one image of bright rings run, to sub-pixel.
 
 Lines are found after Steger, "An unbiased detector of curvilinear structures", IEEE
 PAMI 20(2), 1998: where the image, smoothed at the scale of the line, has a ridge.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import convolve, gaussian_filter1d, map_coordinates
 
 from planning.verify.reconstruction.arrays import Array, Mask
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
+from planning.verify.reconstruction.patterns.ring_patterns import Frames
 
 # Least brightness of a line above what lies beside it, in grey levels and in noises.
 _MIN_CONTRAST = 10.0
@@ -41,27 +41,6 @@ class RingLines:
 
     def __len__(self) -> int:
         return len(self.pixels)
-
-
-def line_patterns(patterns: RingsForCamera, width: float) -> RingsForCamera:
-    """Return patterns whose odd annuli are bright lines on the rings.
-
-    Args:
-        patterns: Whose rings are the middles of the lines.
-        width: Of a line, in the unit of the radii.
-
-    Raises:
-        ValueError: If lines would touch each other or the centre.
-    """
-    half = 0.5 * width
-    radii = (patterns.radii[:, None] + np.array([-half, half])).ravel()
-    if not (width > 0.0 and np.all(np.diff(radii, prepend=0.0) > 0.0)):
-        gap = float(np.diff(patterns.radii, prepend=0.0).min())
-        raise ValueError(
-            f"lines of width {width:.4g} must be positive and narrower than the least "
-            f"gap between rings, {gap:.4g}, in the unit of the radii"
-        )
-    return replace(patterns, radii=radii)
 
 
 def find_lines(frames: Frames, width_px: float) -> RingLines:

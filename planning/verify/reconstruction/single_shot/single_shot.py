@@ -15,7 +15,6 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.check.accuracy import Expected
-from planning.verify.reconstruction.check.check import conclude
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.decode.decode import (
     Decoded,
@@ -25,13 +24,14 @@ from planning.verify.reconstruction.decode.decode import (
 )
 from planning.verify.reconstruction.decode.edges import ImageEdges
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
+from planning.verify.reconstruction.reconstruct import conclude
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_lines
 from planning.verify.reconstruction.render.rendered import Progress, RenderedScene
 from planning.verify.reconstruction.scanner import Scanner
 
 from .prior_labels import PriorLabels, label_by_prior
-from .ring_lines import RingLines, find_lines, line_patterns
+from .ring_lines import RingLines, find_lines
 
 # Drawn width of a ring at the object [m]: 4 blurs of a projector; and at most this
 # share of the least gap between rings.
@@ -158,9 +158,8 @@ def drawn_lines(
     """Return the width of a projector's lines, in the unit of its radii, and them."""
     depth = (mesh.centre - projector.centre)[None] @ projector.axis
     width = _LINE_M * float(projector.light.shrink(depth)[0])
-    gap = float(np.diff(patterns.radii, prepend=0.0).min())
-    width = min(width, _MAX_SHARE * gap)
-    return width, line_patterns(patterns, width)
+    width = min(width, _MAX_SHARE * patterns.least_gap)
+    return width, patterns.lines(width)
 
 
 def decode_single_shot(

@@ -3,7 +3,14 @@
 import numpy as np
 
 from geometry.mesh.sampling import sample_surface
-from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.check.accuracy import (
+    Expected,
+    judge,
+    measure_accuracy,
+    measure_completeness,
+)
+from planning.verify.reconstruction.check.merge import merge
+from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.faults.causes import (
     MeasuredClouds,
@@ -16,11 +23,9 @@ from planning.verify.reconstruction.render.rendered import (
     Spent,
     decode_rendered,
 )
-from planning.verify.reconstruction.scanner import Scanner
 
-from .accuracy import Expected, judge, measure_accuracy, measure_completeness
-from .merge import merge
-from .result import PairCount, Reconstruction
+from .cloud import Cloud
+from .scanner import Scanner
 
 _DEFAULT_SAMPLES = 20_000
 
@@ -134,8 +139,7 @@ def _ring_gap(plan: Scanner, cloud: Cloud) -> tuple[float, float]:
     for p, projector in enumerate(plan.projectors):
         chosen = cloud.projector == p
         rings, depth = cloud.ring[chosen], projector.to_ring(cloud.points[chosen])[:, 2]
-        step, radii = projector.pattern.steps[rings], projector.radii[rings]
-        gaps[chosen] = projector.light.across_m(step, radii, depth)
+        gaps[chosen] = projector.pattern.gaps_m(rings, depth)
     centres = np.array([camera.centre for camera in plan.cameras])
     focal = np.array([camera.focal_px for camera in plan.cameras])
     reach = np.linalg.norm(cloud.points - centres[cloud.camera], axis=1)

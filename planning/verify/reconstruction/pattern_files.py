@@ -8,10 +8,10 @@ from typing import Any, BinaryIO
 from PIL import Image
 
 from planning.model.files import write_together
-from planning.verify.reconstruction.scanner import Scanner
+from planning.verify.reconstruction.patterns.pattern_frames import Frame
+from planning.verify.reconstruction.patterns.pattern_images import PatternCanvas, canvas
 
-from .pattern_frames import Frame, PatternSequence
-from .pattern_images import PatternCanvas, canvas
+from .scanner import Scanner
 
 FOLDER = "patterns"
 _MANIFEST = "sequence.json"
@@ -53,14 +53,26 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
     files: dict[Path, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
     for projector in scanner.projectors:
-        sequence = PatternSequence.of(projector, scanner.cameras)
+        sequence = projector.sequence(scanner.cameras)
         drawn = canvas(sequence)
         (place / projector.id).mkdir(parents=True, exist_ok=True)
         for frame in sequence.frames:
             path = place / projector.id / f"{frame.name}.png"
             files[path] = _png_writer(drawn, frame)
-        entries.append(_entry(sequence))
-    text = json.dumps(_manifest(entries), indent=1, allow_nan=False) + "\n"
+        entries.append(
+            {
+                "id": projector.id,
+                "light": projector.light.name,
+                "resolution": list(projector.resolution),
+                **projector.pattern.entry(),
+                "frames": [
+                    {"png": f"{projector.id}/{frame.name}.png", **vars(frame)}
+                    for frame in sequence.frames
+                ],
+            }
+        )
+    manifest = {"format": _SECTION, "version": 1, **_NOTES, "projectors": entries}
+    text = json.dumps(manifest, indent=1, allow_nan=False) + "\n"
     files[place / _MANIFEST] = lambda file: file.write(text.encode())
     write_together(files)
     _remove(before - set(files))
@@ -72,29 +84,6 @@ def remove_patterns(folder: Path) -> None:
     place = folder / FOLDER
     listed = _listed(place)
     _remove(listed | ({place / _MANIFEST} if listed else set()))
-
-
-def _manifest(entries: list[dict[str, Any]]) -> dict[str, Any]:
-    return {"format": _SECTION, "version": 1, **_NOTES, "projectors": entries}
-
-
-def _entry(sequence: PatternSequence) -> dict[str, Any]:
-    projector = sequence.projector
-    rings = projector.pattern
-    return {
-        "id": projector.id,
-        "light": projector.light.name,
-        "resolution": list(projector.resolution),
-        "n_annuli": rings.n_annuli,
-        "n_bits": rings.n_bits,
-        "outer_radius": rings.outer_radius,
-        "ring_radii": rings.radii.tolist(),
-        "flipping_bit": rings.flipping_bit.tolist(),
-        "frames": [
-            {"png": f"{projector.id}/{frame.name}.png", **vars(frame)}
-            for frame in sequence.frames
-        ],
-    }
 
 
 def _png_writer(drawn: PatternCanvas, frame: Frame) -> Callable[[BinaryIO], object]:
