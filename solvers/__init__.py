@@ -8,7 +8,6 @@ from ._siblings import check_siblings
 if TYPE_CHECKING:
     from solvers.cells.cell_bound import bound_count as bound_count
     from solvers.cells.cell_problem import CellProblem as CellProblem
-    from solvers.cells.cell_tree import ArrayTree as ArrayTree
     from solvers.covers.cover import CoverSolution as CoverSolution
     from solvers.covers.cover import solve_cover as solve_cover
     from solvers.covers.cover import solve_max_coverage as solve_max_coverage
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
-    "ArrayTree": "cells.cell_tree",
     "CellProblem": "cells.cell_problem",
     "CoverProblem": "covers.cover_problem",
     "CoverSolution": "covers.cover",
@@ -28,7 +26,6 @@ _EXPORTS = {
     "solve_max_coverage": "covers.cover",
 }
 __all__ = [
-    "ArrayTree",
     "CellProblem",
     "CoverProblem",
     "CoverSolution",

@@ -8,7 +8,6 @@ from solvers.covers.bounds.lagrangian import ascend
 from solvers.covers.bounds.mixed_integer import fits, linear_multipliers, solve_integer
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import cost_bound
-from solvers.covers.multi.multicover import fewest_multicover
 from solvers.covers.search.neighbourhood import cheapest, greedy
 from solvers.status import SolveStatus, WorkBudget
 
@@ -32,7 +31,11 @@ def cheapest_sets(
             most weight, the bound that of any cover.
     """
     start = greedy(cover, NONE, budget)
-    few = None if max_sets is None else _fewest(cover, budget, seed, max_sets)
+    few = None
+    if max_sets is not None:
+        # Whether so few can do at all.
+        part = budget.part(0.3 * budget.units)
+        few = fewest_sets(cover, part, seed=seed, max_sets=max_sets, heaviest=False)
     if few is not None and few.status is SolveStatus.INFEASIBLE:
         lower, _ = _linear_bound(cover, budget, np.inf, None)
         return replace(few, lower_bound=lower)
@@ -66,16 +69,6 @@ def cheapest_sets(
     status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
     proof = proof if settled else cut_short(proof, budget)
     return CountAnswer(status, selected, cost if settled else lower, proof)
-
-
-def _fewest(
-    cover: ReducedCover, budget: WorkBudget, seed: int, max_sets: int
-) -> CountAnswer:
-    """Return the fewest sets, to know whether so few can do at all."""
-    counted = replace(cover, costs=np.ones(cover.n_sets))
-    search = fewest_sets if cover.simple else fewest_multicover
-    part = budget.part(0.3 * budget.units)
-    return search(counted, part, seed=seed, max_sets=max_sets, heaviest=False)
 
 
 def _linear_bound(

@@ -1,35 +1,36 @@
-"""Fewest sets, and most weight of K sets: the order in which the methods are tried.
+"""Fewest sets: the order in which the methods are tried.
 
-From above: greedy, swaps, large-neighbourhood search. From below: Lagrangian bound,
-then exact search, over pairs or over groups of alike sets. Each spends a share of one
-counted budget.
+From above: greedy, then swaps (`neighbourhood`) or, where rows have several needs or
+row sets, exchanges. From below: Lagrangian bound, then exact search, over pairs or over
+groups of alike sets, then HiGHS' branch and bound. Covers of every row have searches
+of their own (``full``). Each method offers a smaller cover or proves one set more, says
+how, and spends a share of one counted budget.
 """
 
-from collections.abc import Callable
+import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solvers.covers.bounds.lagrangian import ascend, tighten
+from solvers.covers.bounds.mixed_integer import fits, solve_integer
 from solvers.covers.bounds.reductions import ReducedCover
-from solvers.covers.bounds.relaxation import coverage_bounds, tighten
-from solvers.covers.exact.group_branching import best_by_groups
-from solvers.covers.exact.incumbent import ExactSearch
-from solvers.covers.exact.pairs import best_pair, pair_proof
+from solvers.covers.bounds.relaxation import count_bound
+from solvers.covers.exact.pairs import any_pair, pair_proof
 from solvers.covers.full.full_cover import fewest_full
-from solvers.covers.search.neighbourhood import greedy, most_coverage, prune
+from solvers.covers.search.exchanges import exchange, worth_of
+from solvers.covers.search.neighbourhood import greedy, most_coverage, moves, prune
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import NONE, CountAnswer, WeightAnswer, cut_short
-from .count_ledger import CountLedger
+from .answers import INTEGER_PROOF, NONE, CountAnswer, ExactSearch, better, cut_short
+from .heaviest import exact_search, heavier, most_weight
 
-# Moves before a bound is asked whether more are worth it; after that, for each set.
-_FIRST_MOVES = 60
-_MOVES_A_SET = 50
-# Pairs are exhausted by a matrix product; groups are for more sets.
-_LEAST_GROUPED = 3
 # Work after which the first bounds are asked whether more search is worth it.
 _FIRST_UNITS = 4e8
+# Sets of which all selections are looked at where the cover isn't simple.
+_PAIR = 2
+# Share of the budget that more weight at the same count may cost on top.
+_HEAVIEST = 0.3
 
 
 def fewest_sets(
@@ -40,142 +41,142 @@ def fewest_sets(
     max_sets: int | None = None,
     heaviest: bool = True,
 ) -> CountAnswer:
-    """Find the fewest sets that reach the required weight, with a lower bound.
+    """Find the fewest sets that meet what is required, with a lower bound.
 
     Args:
-        cover: A cover whose sets together reach the required weight.
+        cover: A cover whose sets together meet the requirements; costs don't count.
         budget: Counted work.
-        seed: Seed of the neighbourhood search.
+        seed: Seed of the searches.
         max_sets: Sets allowed.
         heaviest: Whether to look for more weight at the same count.
     """
-    cover = replace(cover, costs=np.ones(cover.n_sets))
-    ledger = CountLedger(cover, prune(cover, greedy(cover, NONE, budget)), max_sets)
+    cover, whole = replace(cover, costs=np.ones(cover.n_sets)), budget.units
+    search = _CountSearch(cover, budget, seed, max_sets)
+    if cover.simple and cover.full:
+        known = search.selected
+        full = fewest_full(cover, budget, seed=seed, start=known, lower=search.lower)
+        search.selected = full.selected
+        search.prove(int(full.lower_bound), full.proof)
+        return search.closed(heaviest=False)
+    first = min(0.02 * whole, _FIRST_UNITS) if cover.simple else 0.2 * whole
+    search.improve(budget.part(first), seed)
+    search.by_multipliers(budget.part(0.25 * whole))
+    if cover.simple:
+        search.improve(budget.part(0.15 * whole), seed)
+    search.by_tuples()
+    if not search.settled and fits(cover):
+        search.by_integers()
+    again = seed
+    while cover.simple and not search.settled and not budget.exhausted:
+        again += 1
+        search.improve(budget, again)
+    return search.closed(heaviest=heaviest)
 
-    def heavier(
-        n_sets: int, start: NDArray[np.int64], part: WorkBudget
-    ) -> NDArray[np.int64]:
-        return most_weight(cover, n_sets, part, seed=seed, start=start).selected
 
-    if cover.full:
-        full = fewest_full(
-            cover, budget, seed=seed, start=ledger.selected, lower=ledger.lower
-        )
-        ledger.selected = full.selected
-        ledger.prove(int(full.lower_bound), full.proof)
-        return ledger.closed(heavier, budget, heaviest=False)
-    _improve(ledger, budget.part(min(0.02 * budget.units, _FIRST_UNITS)), seed)
-    ascending = budget.part(0.25 * budget.units)
-    multipliers = ledger.by_multipliers(
-        lambda n_sets, start: (
-            tighten(
-                cover.by_set, cover.weights, n_sets, cover.required, start, ascending
-            ).multipliers
-        )
-    )
-    _improve(ledger, budget.part(0.15 * budget.units), seed)
+class _CountSearch:
+    """Cover from above, bound from below and its proof; costs don't count."""
 
-    def exhaust(
-        n_sets: int, part: WorkBudget
-    ) -> tuple[NDArray[np.int64] | None, str | None]:
-        search, proof = _exact(n_sets)
-        found = search(
-            cover,
+    def __init__(
+        self, cover: ReducedCover, budget: WorkBudget, seed: int, max_sets: int | None
+    ) -> None:
+        self.cover, self.budget, self.seed = cover, budget, seed
+        self.selected = prune(cover, greedy(cover, NONE, budget))
+        self.cap = cover.n_sets if max_sets is None else max_sets
+        self.multipliers = cover.weights / cover.needs
+        self.lower, self.proof = 1, "a positive weight needs a set"
+        self.prove(count_bound(cover, self.multipliers), "sum of the largest sets")
+
+    @property
+    def settled(self) -> bool:
+        """Whether no smaller cover is left, or none that is allowed."""
+        return self.lower >= min(self.selected.size, self.cap + 1)
+
+    def prove(self, bound: int, proof: str) -> None:
+        """Raise the bound."""
+        if bound > self.lower:
+            self.lower, self.proof = bound, proof
+
+    def improve(self, budget: WorkBudget, seed: int) -> None:
+        """Take a set out and search from there, while that gives a cover."""
+        cover, simple = self.cover, self.cover.simple
+        while self.selected.size > self.lower:
+            without = [np.delete(self.selected, i) for i in range(self.selected.size)]
+            if simple:
+                start = max(without, key=cover.weight_of)
+                n, need = moves(start.size), cover.required
+                fewer = most_coverage(
+                    cover, start, budget, target=need, seed=seed, max_moves=n
+                )
+            else:
+                start = max(without, key=lambda sets: worth_of(cover, sets))
+                fewer = exchange(cover, start, budget, seed=seed, heaviest=False)
+            if not cover.meets(fewer):
+                break
+            self.selected = prune(cover, fewer)
+
+    def by_multipliers(self, budget: WorkBudget) -> None:
+        """Refute counts by multipliers while an ascent from the last ones does it."""
+        cover, start = self.cover, self.multipliers
+        while not self.settled:
+            count = self.lower
+            if cover.simple:
+                step = tighten(cover, count, cover.required, start, budget)
+            else:
+                step = ascend(cover, start, budget, target=0.0, n_sets=count)
+            self.multipliers = start = step.multipliers
+            self.prove(count_bound(cover, start), "Lagrangian bound")
+            if self.lower == count:
+                break
+
+    def by_tuples(self) -> None:
+        """Exhaust the tuples of as many sets as the bound, then of one more."""
+        while not self.settled and (self.cover.simple or self.lower <= _PAIR):
+            part = self.budget.part(0.7 * self.budget.remaining)
+            answer, proof = self._exhausted(self.lower, part)
+            if answer.selected is not None:
+                self.selected = answer.selected
+            elif answer.complete:
+                self.prove(self.lower + 1, proof)
+            else:
+                break
+
+    def _exhausted(self, n_sets: int, part: WorkBudget) -> tuple[ExactSearch, str]:
+        if not self.cover.simple:
+            return any_pair(self.cover, n_sets, part), pair_proof(n_sets)
+        search, proof = exact_search(n_sets)
+        answer = search(
+            self.cover,
             n_sets,
-            target=cover.required,
-            multipliers=multipliers,
+            target=self.cover.required,
+            multipliers=self.multipliers,
             budget=part,
             first=True,
         )
-        return found.selected, proof if found.complete else None
+        return answer, proof
 
-    ledger.by_exact_search(exhaust, budget)
-    again = seed
-    while not ledger.settled and not budget.exhausted:
-        again += 1
-        _improve(ledger, budget, again)
-    return ledger.closed(heavier, budget, heaviest=heaviest)
+    def by_integers(self) -> None:
+        """Leave a small program to HiGHS."""
+        answer = solve_integer(self.cover, self.selected, self.budget)
+        self.selected = better(self.cover, self.selected, answer.selected)
+        if answer.bound is not None:
+            proved = math.ceil(answer.bound - 1e-5)
+            # A bound above a cover that was counted here is none.
+            if proved <= self.selected.size:
+                self.prove(proved, INTEGER_PROOF)
 
-
-def most_weight(
-    cover: ReducedCover,
-    n_sets: int,
-    budget: WorkBudget,
-    *,
-    seed: int,
-    start: NDArray[np.int64] = NONE,
-) -> WeightAnswer:
-    """Find the most weight that K sets cover, with an upper bound."""
-    n_sets = min(n_sets, cover.n_sets)
-    if n_sets == 0:
-        return WeightAnswer(SolveStatus.OPTIMAL, NONE, 0.0, "no set is allowed")
-    best = NONE
-    for first in (start, NONE) if start.size else (NONE,):
-        filled = greedy(cover, first, budget, n_sets=n_sets)
-        best = max(best, filled, key=cover.weight_of)
-    kicks = budget.part(0.4 * budget.units)
-    best = most_coverage(
-        cover, best, kicks, target=cover.total, seed=seed, max_moves=_FIRST_MOVES
-    )
-    weight = cover.weight_of(best)
-    if weight >= cover.total:
-        proof = "all that any set covers is covered"
-        return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
-    least = max(cover.grain, np.floor(cover.total * 1e-11))
-    part = budget.part(0.2 * budget.units)
-    step = tighten(
-        cover.by_set, cover.weights, n_sets, weight + least, cover.weights, part
-    )
-    upper = float(coverage_bounds(cover, step.multipliers)[n_sets])
-    if upper >= weight + least:
-        # No more is to be had than the last whole grain below the bound.
-        best = most_coverage(
-            cover,
-            best,
-            kicks,
-            target=upper - upper % cover.grain,
-            seed=seed + 1,
-            max_moves=_FIRST_MOVES + _MOVES_A_SET * n_sets,
-        )
-        weight = cover.weight_of(best)
-    if upper < weight + least:
-        return WeightAnswer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
-    search, proof = _exact(n_sets)
-    found = search(
-        cover,
-        n_sets,
-        target=weight + least,
-        multipliers=step.multipliers,
-        budget=budget.part(budget.remaining),
-    )
-    if found.selected is not None:
-        best, weight = found.selected, found.weight
-    upper = max(weight, min(upper, found.upper_bound))
-    if found.complete:
-        return WeightAnswer(SolveStatus.OPTIMAL, best, weight, proof)
-    proof = cut_short("Lagrangian bound", budget)
-    return WeightAnswer(SolveStatus.FEASIBLE, best, upper, proof)
-
-
-def _improve(ledger: CountLedger, budget: WorkBudget, seed: int) -> None:
-    """Look for fewer sets by tabu search."""
-    cover = ledger.cover
-
-    def search(start: NDArray[np.int64]) -> NDArray[np.int64]:
-        return most_coverage(
-            cover,
-            start,
-            budget,
-            target=cover.required,
-            seed=seed,
-            max_moves=_FIRST_MOVES + _MOVES_A_SET * start.size,
-        )
-
-    ledger.improve(cover.weight_of, search)
-
-
-def _exact(n_sets: int) -> tuple[Callable[..., ExactSearch], str]:
-    """Return the search that exhausts K sets, and what it proves."""
-    if n_sets < _LEAST_GROUPED:
-        return best_pair, pair_proof(n_sets)
-    return best_by_groups, f"sets of {n_sets} by branching on groups of alike sets"
+    def closed(self, *, heaviest: bool) -> CountAnswer:
+        """Return the answer, of most weight where that is asked for."""
+        selected, settled = self.selected, self.lower >= self.selected.size
+        status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
+        # Its own allowance, so that a hard proof doesn't cost the larger area.
+        spare = self.budget.part(np.inf)
+        spare.units = _HEAVIEST * self.budget.units
+        if selected.size > self.cap:
+            settled = self.lower > self.cap
+            status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
+            heaviest_few = most_weight(self.cover, self.cap, spare, seed=self.seed)
+            selected = heaviest_few.selected
+        elif heaviest and selected.size:
+            selected = heavier(self.cover, selected, spare, self.seed)
+        proof = self.proof if settled else cut_short(self.proof, self.budget)
+        return CountAnswer(status, selected, float(self.lower), proof)

@@ -17,15 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from solvers.checked_numbers import set_names, whole_number
 from solvers.covers.bounds.reductions import ReducedCover, forgiven, reduce_problem
-from solvers.covers.multi.multicover import fewest_multicover, heaviest_of
 from solvers.covers.search.neighbourhood import greedy, prune
 from solvers.one_thread import on_one_thread
 from solvers.status import SolveStatus, WorkBudget
 
 from .answers import NONE, CountAnswer
 from .cheapest import cheapest_sets
-from .counts import fewest_sets, most_weight
+from .counts import fewest_sets
 from .cover_problem import CoverProblem
+from .heaviest import most_weight
 
 DEFAULT_BUDGET = 2e9
 
@@ -150,8 +150,7 @@ def solve_cover(
     elif not cover.reachable:
         answer = _unreachable(cover, work, seed, free)
     elif problem.unit_costs:
-        search = fewest_sets if cover.simple else fewest_multicover
-        answer = search(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
+        answer = fewest_sets(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
         unit = float(problem.costs[0])
         answer = replace(answer, lower_bound=answer.lower_bound * unit)
     else:
@@ -201,8 +200,7 @@ def solve_max_coverage(
     work.spend(cover.entries)
     known = cover.stand_in[np.setdiff1d(start, fixed)]
     known = np.unique(known[known >= 0])[:free]
-    search = most_weight if cover.simple else heaviest_of
-    answer = search(cover, free, work, seed=seed, start=known)
+    answer = most_weight(cover, free, work, seed=seed, start=known)
     selected = np.union1d(fixed, cover.kept[answer.selected])
     warm = np.union1d(fixed, start)
     better = problem.covered_weight(warm) > problem.covered_weight(selected)
@@ -253,7 +251,6 @@ def _unreachable(
     everything = replace(cover, quotas=cover.totals)
     few = prune(everything, greedy(everything, NONE, work))
     if max_sets is not None and few.size > max_sets:
-        search = most_weight if cover.simple else heaviest_of
-        few = search(cover, max_sets, work, seed=seed).selected
+        few = most_weight(cover, max_sets, work, seed=seed).selected
     proof = "all sets together cover less than is required"
     return CountAnswer(SolveStatus.INFEASIBLE, few, float("inf"), proof)

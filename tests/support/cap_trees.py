@@ -8,7 +8,8 @@ its centre. Cells are made when asked for; `flatten` makes arrays of a whole tre
 import numpy as np
 
 from solvers.bit_rows import pack_rows
-from solvers.cells.cell_tree import ArrayTree, CellBatch
+from solvers.cells.cell_tree import CellBatch
+from tests.support.array_trees import ArrayTree
 
 # Added to angles, so that rounding can only make a cell's row larger.
 SLACK = 1e-9

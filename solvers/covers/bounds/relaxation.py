@@ -17,18 +17,10 @@ The best lambda gives the bound of the linear program (Lagrangian duality). The 
 bound is evaluated here in numpy; the linear program only proposes lambda.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-
-from solvers.status import WorkBudget
 
 from .reductions import ReducedCover
-
-# Steps after which a descent that hardly moves is given up.
-_LOOK_BACK = 30
 
 
 def rounding(n_rows: int) -> float:
@@ -135,93 +127,3 @@ def _usable(multipliers: NDArray[np.float64]) -> tuple[NDArray[np.float64], floa
     usable = np.clip(np.nan_to_num(multipliers), 0.0, 1e200)
     _, exponent = np.frexp(usable.max(initial=0.0))
     return np.ldexp(usable, -exponent), float(np.ldexp(1.0, exponent))
-
-
-@dataclass(frozen=True, eq=False)
-class Tightening:
-    """Multipliers after a descent.
-
-    Attributes:
-        multipliers: The best found, in [0, w], shape (n_e,).
-        bound: Weight that no K sets exceed, by these multipliers.
-    """
-
-    multipliers: NDArray[np.float64]
-    bound: float
-
-
-def tighten(
-    by_set: sparse.csr_array,
-    weights: NDArray[np.float64],
-    n_sets: int,
-    target: float,
-    start: NDArray[np.float64],
-    budget: WorkBudget,
-    *,
-    max_steps: int = 200,
-) -> Tightening:
-    """Lower the coverage bound for K sets until it is below a target or stalls.
-
-    Volume algorithm: subgradient steps towards a running mean of the K dearest sets.
-
-    Args:
-        by_set: Ones where set s covers row e, shape (n_s, n_e).
-        weights: Weight of each row, at least 0, shape (n_e,).
-        n_sets: K.
-        target: Weight below which the bound need not go.
-        start: Multipliers to start from, shape (n_e,).
-        budget: Work; two matrix products a step.
-        max_steps: Steps at most.
-
-    References:
-        Barahona and Anbil, "The volume algorithm: producing primal solutions with a
-        subgradient method", Mathematical Programming 87, 2000.
-    """
-    by_row = by_set.T
-    total = float(weights.sum())
-    heavy = np.where(weights > 0, weights, 1.0)
-    best = np.clip(start / heavy, 0.0, 1.0)
-    bound, chosen = _dearest(by_set, weights, best, n_sets)
-    primal = chosen.copy()
-    aim = min(target, total) * 0.998
-    step, stale, mark = 1.0, 0, bound
-    for i in range(max_steps):
-        if bound < target or budget.exhausted:
-            break
-        excess = 1.0 - by_row @ primal
-        moving = np.where(excess > 0, best < 1.0, best > 0.0)
-        length = float(np.sum(weights * excess * excess * moving))
-        if not length > 0:
-            break
-        stride = step * max(bound - aim, 1e-4 * total) / length
-        share = np.clip(best + stride * excess, 0.0, 1.0)
-        value, chosen = _dearest(by_set, weights, share, n_sets)
-        budget.spend(3.0 * by_set.nnz + 20.0 * weights.size + 3e4)
-        primal = 0.9 * primal + 0.1 * chosen
-        if value < bound:
-            bound, best, stale, step = value, share, 0, min(step * 1.1, 4.0)
-        else:
-            stale += 1
-            if stale % 5 == 0:
-                step *= 0.6
-        if i % _LOOK_BACK == _LOOK_BACK - 1:
-            gain, mark = mark - bound, bound
-            if bound - target > 20.0 * gain:
-                break
-    return Tightening(best * weights, bound)
-
-
-def _dearest(
-    by_set: sparse.csr_array,
-    weights: NDArray[np.float64],
-    share: NDArray[np.float64],
-    n_sets: int,
-) -> tuple[float, NDArray[np.float64]]:
-    """Return the coverage bound for K sets and the indicator of the K dearest."""
-    multipliers = share * weights
-    prices = by_set @ multipliers
-    top = np.argsort(-prices, kind="stable")[:n_sets]
-    chosen = np.zeros(prices.size)
-    chosen[top] = 1.0
-    rest = float(np.sum(weights - multipliers))
-    return (rest + float(prices[top].sum())) * (1.0 + rounding(share.size)), chosen

@@ -19,12 +19,11 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.answers import NONE
+from solvers.covers.answers import NONE, ExactSearch, Incumbent
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import WorkBudget
 
 from .group_bounds import GroupPart, PartBounds
-from .incumbent import ExactSearch, Incumbent
 
 # Larger covers aren't searched: the dense copy takes four bytes an entry, the table
 # of what is alike four for each pair of sets.

@@ -16,11 +16,10 @@ Integer-valued weights make both exact, whatever the BLAS and its threads.
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.covers.answers import ExactSearch, Incumbent
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import rounding
 from solvers.status import WorkBudget
-
-from .incumbent import ExactSearch, Incumbent
 
 # Larger covers aren't searched: the dense copy takes a byte an entry.
 _MAX_DENSE = 200_000_000

@@ -12,6 +12,9 @@ from solvers.status import WorkBudget
 
 from .swaps import Swaps
 
+# Moves before a bound is asked whether more are worth it; after that, for each set.
+FIRST_MOVES = 60
+_MOVES_A_SET = 50
 # Moves for which a set that went may not come back: from the first to below the second.
 _AWAY = (6, 16)
 # What came may not go for a move, and one more for each of so many sets selected.
@@ -53,6 +56,11 @@ def greedy(
         chosen.append(best)
         counts[cover.members(best)] += 1
     return np.array(chosen, dtype=np.int64)
+
+
+def moves(n_sets: int) -> int:
+    """Return how many moves a selection of so many sets is worth."""
+    return FIRST_MOVES + _MOVES_A_SET * n_sets
 
 
 def most_coverage(

@@ -17,9 +17,9 @@ from solvers.cells.cell_multipliers import MultiplierSearch
 from solvers.cells.cell_problem import CellProblem, whole_rows
 from solvers.cells.cell_store import CellStore
 from solvers.cells.cell_subtrees import Subtrees
-from solvers.cells.cell_tree import ArrayTree
 from solvers.cells.cell_tuples import _split, refute_tuples
 from solvers.status import WorkBudget
+from tests.support.array_trees import ArrayTree
 from tests.support.leaf_trees import (
     leaves_of,
     multiplier_bound,

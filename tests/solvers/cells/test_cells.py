@@ -16,9 +16,10 @@ from solvers.cells.cell_bound import CellStatus, bound_count
 from solvers.cells.cell_multipliers import MultiplierSearch
 from solvers.cells.cell_problem import CellProblem, whole_rows
 from solvers.cells.cell_store import CellStore
-from solvers.cells.cell_tree import ArrayTree, CellBatch
+from solvers.cells.cell_tree import CellBatch
 from solvers.cells.cell_tuples import refute_tuples
 from solvers.status import WorkBudget
+from tests.support.array_trees import ArrayTree
 from tests.support.leaf_trees import leaves_of, tree_of_leaves
 
 PARENTS = np.array([-1, -1, 0, 0, 1, 1, 2, 2])

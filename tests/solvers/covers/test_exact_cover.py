@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from solvers.covers.bounds.lagrangian import tighten
 from solvers.covers.bounds.mixed_integer import linear_multipliers, solve_integer
 from solvers.covers.bounds.reductions import reduce_problem
-from solvers.covers.bounds.relaxation import cost_bound, coverage_bounds, tighten
+from solvers.covers.bounds.relaxation import cost_bound, coverage_bounds
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.exact.group_branching import best_by_groups
 from solvers.covers.exact.pairs import best_pair
@@ -57,9 +58,7 @@ def multipliers_of(cover, seed):
     return [
         cover.weights,
         cover.weights * rng.random(cover.weights.size),
-        tighten(
-            cover.by_set, cover.weights, 3, 0.0, cover.weights, plenty()
-        ).multipliers,
+        tighten(cover, 3, 0.0, cover.weights, plenty()).multipliers,
     ][seed % 3]
 
 
@@ -231,9 +230,9 @@ def test_descent_approaches_the_linear_program():
             bounds=(0, 1),
         )
         goal = -lp.fun * 0.999 * cover.total
-        step = tighten(cover.by_set, cover.weights, 4, goal, cover.weights, plenty())
+        step = tighten(cover, 4, goal, cover.weights, plenty())
         bound = coverage_bounds(cover, step.multipliers)[4]
-        assert bound == pytest.approx(step.bound, rel=1e-9)
+        assert bound == pytest.approx(-step.value, rel=1e-9)
         assert -lp.fun * (1 - 1e-9) <= bound / cover.total <= -lp.fun * 1.02
 
 

@@ -17,7 +17,7 @@ from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.bounds.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.covers.cover import solve_max_coverage
 from solvers.covers.exact.pairs import any_pair
-from solvers.covers.multi.multicover_swaps import exchange, worth_of
+from solvers.covers.search.exchanges import exchange, worth_of
 from solvers.covers.search.neighbourhood import greedy
 from solvers.status import WorkBudget
 

@@ -36,8 +36,8 @@ def exchange(
     budget: WorkBudget,
     *,
     seed: int,
-    max_kicks: int,
     heaviest: bool,
+    max_kicks: int | None = None,
 ) -> NDArray[np.int64]:
     """Return the selection of most worth found, with no more sets than at the start.
 
@@ -46,12 +46,13 @@ def exchange(
         start: Selection to start from, at least one set.
         budget: Counted work.
         seed: Seed of the restarts.
-        max_kicks: Restarts at most.
         heaviest: Whether to go on for weight once the requirements are met.
+        max_kicks: Restarts at most, default 20 and 10 for each set.
     """
     rng = np.random.default_rng(seed)
     best, worth = _descend(cover, [int(s) for s in start], budget, heaviest=heaviest)
-    for kick in range(max_kicks):
+    kicks = 20 + 10 * start.size if max_kicks is None else max_kicks
+    for kick in range(kicks):
         if budget.exhausted or (worth.reached >= cover.required and not heaviest):
             break
         width = min(len(best), 1 + kick % 4)

@@ -1,1 +1,0 @@
-"""Covers with several needs or row sets."""
