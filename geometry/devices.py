@@ -78,6 +78,13 @@ class PinholeModel:
             radius < distance and np.arcsin(radius / distance) <= half_angle.min()
         )
 
+    def holds_more_on_side(self, radius: float, distance: float) -> bool:
+        """Return whether a quarter turn may show more of a sphere about the aim.
+
+        The arguments are those of `holds_ball`.
+        """
+        return not self.holds_ball(radius, distance)
+
     def half_rectangle(self, distance: float) -> NDArray[np.float64]:
         """Return half the sides of a rectangle in the field, in [m], shape (2,).
 
@@ -231,6 +238,13 @@ class ParallelModel:
             distance: From the device to its centre [m].
         """
         return bool(radius <= min(float(self.half_panel.min()), self.beam_reach))
+
+    def holds_more_on_side(self, radius: float, distance: float) -> bool:
+        """Return whether a quarter turn of the panel may show more of a sphere.
+
+        The arguments are those of `holds_ball`.
+        """
+        return radius > float(self.half_panel.min())
 
     def half_rectangle(self, distance: float) -> NDArray[np.float64]:
         """Return half the sides of a rectangle in the field, in [m], shape (2,).

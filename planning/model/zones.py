@@ -1,7 +1,7 @@
 """Boxes that say where devices may stand: a room, keep-out volumes, mounting planes.
 
 Only values, as the plan file holds them (`requirements.workspace`); what follows from
-them the planner (`zone_limits`) and the audit (`audit.zones`) each work out alone.
+them the planner (`admissible`) and the audit (`audit.zones`) each work out alone.
 """
 
 from dataclasses import dataclass, replace

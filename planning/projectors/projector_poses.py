@@ -18,8 +18,7 @@ from planning.scene.limits import projector_limits
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.workspace.zone_limits import half_spaces
-from planning.scene.workspace.zone_positions import is_zoned
+from planning.scene.workspace.admissible import half_spaces, is_zoned
 from solvers.poses.pose_problem import PoseProgram, pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 

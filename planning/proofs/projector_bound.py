@@ -20,7 +20,7 @@ from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.workspace.zone_limits import may_hold
+from planning.scene.workspace.admissible import may_stand
 from solvers.bit_rows import BitSum
 from solvers.cells.cell_bound import CellBound, CellStatus
 
@@ -117,4 +117,4 @@ def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.boo
         lowest = workspace.floor_m / (far if workspace.floor_m > 0 else near)
         above = np.arccos(np.clip(cube.centres @ np.array(workspace.up), -1.0, 1.0))
         kept &= above <= np.arccos(np.clip(lowest, -1.0, 1.0)) + slack
-    return kept & may_hold(workspace, cube.centres, slack, near, far)
+    return kept & may_stand(workspace, cube.centres, slack, near, far)

@@ -10,7 +10,7 @@ from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Existing, Requirements, Workspace
 from planning.model.rounding import rounded_pose
-from planning.scene.workspace.candidates import aimed_poses
+from planning.scene.workspace.offered_poses import aimed_poses
 
 from .existing_tables import ExistingTable
 

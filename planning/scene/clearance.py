@@ -4,13 +4,11 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry.shapes.boxes import OrientedBox, boxes_overlap, triangles_touch
+from geometry.shapes.boxes import OrientedBox, triangles_touch
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Workspace
-from planning.model.zones import Box
+from planning.scene.workspace.admissible import broken_by_body
 
 from .existing import existing_cameras, existing_projectors
 from .placed_bodies import CLEARANCE_M, Device, collide, placed_box
@@ -36,7 +34,7 @@ def lacks_clearance(scene: Scene, device: Device) -> str:
         return "the object"
     if others := collide(device, scene.bodies):
         return f"the body of {others[0].name or 'another device'}"
-    return "" if device.existing else _zone_broken(scene.requirements.workspace, box)
+    return "" if device.existing else broken_by_body(scene.requirements.workspace, box)
 
 
 def with_clearance(scene: Scene, devices: Sequence[_D]) -> tuple[_D, ...]:
@@ -131,25 +129,3 @@ def _touches_object(scene: Scene, box: OrientedBox) -> bool:
     if np.linalg.norm(box.centre - mesh.centre) > box.radius + mesh.reach:
         return False
     return bool(triangles_touch(box, mesh.corners).any())
-
-
-def _zone_broken(workspace: Workspace, box: OrientedBox) -> str:
-    centre = np.array(workspace.centre)
-    corners = box.corners - centre
-    if workspace.floor_m is not None:
-        if not np.all(corners @ np.array(workspace.up) >= workspace.floor_m):
-            return "the floor"
-    if workspace.box is not None:
-        inside = np.abs(_of_zone(workspace.box, centre).local(box.corners))
-        if not np.all(inside <= np.array(workspace.box.half_m)):
-            return "the walls of the room"
-    for zone in workspace.keep_out:
-        if boxes_overlap(_of_zone(zone, centre), box):
-            return f"the keep-out volume {zone.name!r}"
-    return ""
-
-
-def _of_zone(zone: Box, centre: NDArray[np.float64]) -> OrientedBox:
-    return OrientedBox(
-        centre + np.array(zone.centre_m), np.array(zone.axes), np.array(zone.half_m)
-    )

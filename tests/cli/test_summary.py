@@ -11,7 +11,7 @@ from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.report.entries.cost import cost_lines, cost_record
 from planning.report.summary.summary import aim_angles
-from planning.scene.workspace.candidates import aimed_poses
+from planning.scene.workspace.offered_poses import aimed_poses
 
 Z = np.array([0.0, 0.0, 1.0])
 CAMERA = PinholeModel(

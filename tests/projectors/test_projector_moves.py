@@ -20,7 +20,7 @@ from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
-from planning.scene.workspace.candidates import aimed_poses
+from planning.scene.workspace.offered_poses import aimed_poses
 
 
 @pytest.fixture(scope="module")

@@ -10,13 +10,12 @@ from planning.model.requirements import TriangulationLimits, Workspace
 from planning.model.ring_frame import ring_frame
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
 from planning.scene.workspace.candidates import (
-    aimed_poses,
     camera_candidates,
     projector_candidates,
     projectors_around,
-    rolls_for,
-    shell_positions,
 )
+from planning.scene.workspace.offered_poses import aimed_poses, rolls_for
+from planning.scene.workspace.shell_positions import shell_positions
 
 CENTRE = (0.1, -0.2, 0.3)
 SHIFTED = PinholeModel(

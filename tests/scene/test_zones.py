@@ -14,13 +14,15 @@ from planning.model.plan import RigPlan
 from planning.model.plan_errors import RequirementError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.rig.wishes import Wishes
-from planning.scene.workspace.candidates import (
-    camera_candidates,
-    projectors_around,
-    shell_positions,
+from planning.scene.workspace.admissible import (
+    admissible,
+    depth,
+    half_spaces,
+    may_stand,
+    stands,
 )
-from planning.scene.workspace.zone_limits import depth, half_spaces, may_hold, stands
-from planning.scene.workspace.zone_positions import admissible, along_rays
+from planning.scene.workspace.candidates import camera_candidates, projectors_around
+from planning.scene.workspace.shell_positions import along_rays, shell_positions
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.devices.zone_claims import zone_excess
 from tests.support.written import requirements_of
@@ -170,8 +172,8 @@ def test_no_admissible_position_is_in_a_cell_that_was_dropped(workspace_of, name
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         turn = angle * rng.uniform(0.9, 1.0, (len(x), 1))
         near = np.cos(turn) * towards + np.sin(turn) * across
-        assert np.all(may_hold(space, near, angle, 1.05, 1.15))
-        dropped += int((~may_hold(space, middles, angle, 1.05, 1.15)).sum())
+        assert np.all(may_stand(space, near, angle, 1.05, 1.15))
+        dropped += int((~may_stand(space, middles, angle, 1.05, 1.15)).sum())
     assert dropped > 30
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
-from planning.scene.workspace.zone_limits import half_spaces
-from planning.scene.workspace.zone_positions import is_zoned
+from planning.scene.workspace.admissible import half_spaces, is_zoned
 from solvers.poses.baseline_problem import (
     BaselineProblem,
     HalfSpaces,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
-from planning.scene.workspace.zone_positions import admissible
+from planning.scene.workspace.admissible import admissible
 
 from .baseline_rows import check_seam
 from .baseline_terms import BaselineLimits

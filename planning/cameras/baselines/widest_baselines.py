@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
-from planning.scene.workspace.zone_limits import stands
+from planning.scene.workspace.admissible import admissible
 from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
 
 from .baseline_terms import BaselineLimits, RingsOnSurface, state_baselines
@@ -34,6 +34,8 @@ _REPEATS = 4
 _DEMANDS = 24
 # Gains below this share of a baseline aren't worth an evaluation.
 _GAIN = 1e-2
+# Programs end on a limit to their own rounding.
+_SLACK = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,20 +277,9 @@ class _Search:
 
     def _admissible(self, centres: _Array) -> bool:
         space = self.limits.workspace
-        centres = centres[self._free]
-        offset = centres - np.array(space.centre)
-        distance = np.linalg.norm(offset, axis=1)
-        low, high = space.camera_radius_m
-        inside = (distance >= low * (1 - 1e-7)) & (distance <= high * (1 + 1e-7))
-        # Every direction is within pi, whatever the rounding of its cosine.
-        if space.half_angle < np.pi:
-            inside &= offset @ np.array(space.axis) >= distance * (
-                np.cos(space.half_angle) - 1e-9
-            )
-        if space.floor_m is not None:
-            inside &= offset @ np.array(space.up) >= space.floor_m - 1e-9
-        inside &= stands(space, offset)
-        return bool(np.all(inside))
+        offsets = centres[self._free] - np.array(space.centre)
+        radius = space.camera_radius_m
+        return bool(np.all(admissible(space, radius, offsets, slack=_SLACK)))
 
     def _by_baseline(self) -> list[int]:
         """Cameras, those of the shortest baselines first."""

@@ -32,7 +32,8 @@ from planning.scene.draws import DRAWS
 from planning.scene.existing import movable
 from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import cameras_towards, middle_radius_m
+from planning.scene.workspace.candidates import cameras_towards
+from planning.scene.workspace.offered_poses import middle_radius_m
 from solvers import solve_cover
 
 from .paper_route import PaperRoute, paper_route

@@ -14,17 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.directions.cube_map import FACES, CubeMap, angle_between, middles
+from geometry.directions.cube_map import FACES, CubeMap, middles
 from geometry.directions.widened_maps import WidenedMaps
 from planning.model.requirements import Workspace
-from planning.scene.workspace.zone_limits import may_hold
+from planning.scene.workspace.admissible import may_be_admissible
 from solvers.bit_rows import parts
 
 from .grown_tree import GrownTree
 from .measurable_cells import MeasurableCells
 from .shell_cells import Seen, ShellCells, directions_of, seen_from
 
-_ROUNDING = 1e-9
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
 PAIRS = 1 << 13
 
@@ -144,14 +143,6 @@ class PositionTree(GrownTree):
 
     def _admissible(self, cells: ShellCells) -> NDArray[np.bool_]:
         """Return which cells may hold a position that all limits allow, shape (n,)."""
-        space = self._workspace
         outwards, angle = directions_of(self._cubes, cells.level, cells.cell)
-        axis, up = np.array(space.axis), np.array(space.up)
-        least = np.maximum(0.0, angle_between(outwards, axis) - angle)
-        allowed = least <= space.half_angle + _ROUNDING
-        allowed &= may_hold(space, outwards, angle, cells.low_m, cells.high_m)
-        if space.floor_m is not None:
-            rise = np.cos(np.maximum(0.0, angle_between(outwards, up) - angle))
-            highest = rise * np.where(rise > 0, cells.high_m, cells.low_m)
-            allowed &= highest >= space.floor_m - _ROUNDING
-        return allowed
+        low_m, high_m = cells.low_m, cells.high_m
+        return may_be_admissible(self._workspace, outwards, angle, low_m, high_m)

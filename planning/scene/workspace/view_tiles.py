@@ -19,7 +19,7 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import fibonacci_cap, look_at
 from planning.model.requirements import Workspace
 
-from .zone_positions import admissible, is_zoned
+from .admissible import admissible, is_zoned
 
 _Array = NDArray[np.float64]
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.poses import fibonacci_cap
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
 
-from .zone_positions import filled, is_zoned
+from .admissible import is_zoned
+from .shell_positions import shell_positions
 
 # Positions looked for before a workspace counts as empty.
 _LOOKED_FOR = 2000
@@ -51,7 +51,11 @@ def no_position(workspace: Workspace, radius_m: tuple[float, float]) -> str:
             "other; lower the floor or widen the cone"
         )
     limits = _limits(workspace)
-    guilty = [text for text, less in limits if _holds_any(less, radius_m)]
+    guilty = [
+        text
+        for text, less in limits
+        if len(shell_positions(less, radius_m, _LOOKED_FOR))
+    ]
     named = guilty or [text for text, _ in limits]
     only = "without it there would be" if guilty else "each excludes the rest"
     low, high = (f"{1e3 * radius:.0f}" for radius in radius_m)
@@ -89,13 +93,6 @@ def _limits(workspace: Workspace) -> list[tuple[str, Workspace]]:
         text = f"workspace.half_angle_deg = {degrees:g} (widen it)"
         found.append((text, replace(workspace, half_angle=float(np.pi))))
     return found
-
-
-def _holds_any(workspace: Workspace, radius_m: tuple[float, float]) -> bool:
-    def lattice(n: int) -> NDArray[np.float64]:
-        return fibonacci_cap(n, np.array(workspace.axis), workspace.half_angle)
-
-    return len(filled(workspace, radius_m, _LOOKED_FOR, lattice)) > 0
 
 
 def _out_of_reach(box: Box, workspace: Workspace) -> str | None:

@@ -1,4 +1,4 @@
-"""Where zones let devices stand: depths, cells that lie outside, half-spaces.
+"""Which positions the workspace admits: points, cells of positions, bodies, parts.
 
 Positions are offsets x = Q - centre from the workspace's centre. The depth of x in a
 box is its distance from the nearest face, negative outside::
@@ -12,11 +12,18 @@ radius to spare holds of the whole ball.
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.directions.cube_map import angle_between
+from geometry.shapes.boxes import OrientedBox, boxes_overlap
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
 
 _Array = NDArray[np.float64]
 _ROUNDING = 1e-9
+
+
+def is_zoned(workspace: Workspace) -> bool:
+    """Return whether a box, keep-out volumes or mounting planes cut the shell."""
+    return bool(workspace.box or workspace.keep_out or workspace.mounting)
 
 
 def depth(box: Box, offsets: _Array) -> _Array:
@@ -40,7 +47,76 @@ def stands(workspace: Workspace, offsets: _Array) -> NDArray[np.bool_]:
     return allowed
 
 
-def may_hold(
+def admissible(
+    workspace: Workspace,
+    radius_m: tuple[float, float],
+    offsets: _Array,
+    *,
+    slack: float = 0.0,
+) -> NDArray[np.bool_]:
+    """Return whether positions keep shell, cone, floor and zones, shape (n,).
+
+    Args:
+        workspace: Where devices may stand.
+        radius_m: Least and largest distance of this kind of device.
+        offsets: Positions, shape (n, 3).
+        slack: Of radii, as a share; of cosines; of heights in [m].
+    """
+    distance = np.linalg.norm(offsets, axis=1)
+    low, high = radius_m[0] * (1.0 - slack), radius_m[1] * (1.0 + slack)
+    inside = (distance >= low - _ROUNDING) & (distance <= high + _ROUNDING)
+    # Every direction is within pi, whatever the rounding of its cosine.
+    if workspace.half_angle < np.pi:
+        along = offsets @ np.array(workspace.axis)
+        inside &= along >= distance * (np.cos(workspace.half_angle) - slack)
+    if workspace.floor_m is not None:
+        inside &= offsets @ np.array(workspace.up) >= workspace.floor_m - slack
+    inside[inside] = stands(workspace, offsets[inside])
+    return inside
+
+
+def may_be_admissible(
+    workspace: Workspace, outwards: _Array, angle: _Array, low_m: _Array, high_m: _Array
+) -> NDArray[np.bool_]:
+    """Return which cells of the shell may hold a position that all limits allow.
+
+    The arguments are those of `may_stand`; any radius is of the shell.
+    """
+    axis, up = np.array(workspace.axis), np.array(workspace.up)
+    least = np.maximum(0.0, angle_between(outwards, axis) - angle)
+    possible = least <= workspace.half_angle + _ROUNDING
+    possible &= may_stand(workspace, outwards, angle, low_m, high_m)
+    if workspace.floor_m is not None:
+        rise = np.cos(np.maximum(0.0, angle_between(outwards, up) - angle))
+        highest = rise * np.where(rise > 0, high_m, low_m)
+        possible &= highest >= workspace.floor_m - _ROUNDING
+    return possible
+
+
+def broken_by_body(workspace: Workspace, box: OrientedBox) -> str:
+    """Return what a body in the world reaches into or through; empty if nothing."""
+    centre = np.array(workspace.centre)
+    if workspace.floor_m is not None:
+        heights = (box.corners - centre) @ np.array(workspace.up)
+        if not np.all(heights >= workspace.floor_m):
+            return "the floor"
+    if workspace.box is not None:
+        inside = np.abs(_in_world(workspace.box, centre).local(box.corners))
+        if not np.all(inside <= np.array(workspace.box.half_m)):
+            return "the walls of the room"
+    for zone in workspace.keep_out:
+        if boxes_overlap(_in_world(zone, centre), box):
+            return f"the keep-out volume {zone.name!r}"
+    return ""
+
+
+def _in_world(zone: Box, centre: _Array) -> OrientedBox:
+    return OrientedBox(
+        centre + np.array(zone.centre_m), np.array(zone.axes), np.array(zone.half_m)
+    )
+
+
+def may_stand(
     workspace: Workspace,
     outwards: _Array,
     angle: _Array | float,

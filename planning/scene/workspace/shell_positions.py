@@ -1,21 +1,21 @@
-"""Positions in a shell that zones cut: along rays from the centre, or on planes.
+"""Positions spread over the workspace: along rays from its centre, or on planes.
 
 Along a ray x = r u every limit holds on intervals of r, so the admissible radius
 nearest to the middle of the shell is the middle itself or an end of an interval. Only
 those are tried.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.poses import fibonacci_cap
 from planning.model.requirements import Workspace
 from planning.model.zones import Box
 
-from .zone_limits import stands
+from .admissible import admissible, is_zoned
 
 _Array = NDArray[np.float64]
+Range = tuple[float, float]
 
 # Radii are tried this far on either side of an end.
 _NUDGE_M = 1e-4
@@ -28,30 +28,47 @@ _LEVEL = 1e-12
 _STEPS: _Array = np.array([1.2207440846057596**-k for k in (1, 2, 3)])
 
 
-def is_zoned(workspace: Workspace) -> bool:
-    """Return whether a box, keep-out volumes or mounting planes cut the shell."""
-    return bool(workspace.box or workspace.keep_out or workspace.mounting)
+def shell_positions(workspace: Workspace, radius_m: Range, n: int) -> _Array:
+    """Return at least n admissible positions if there are as many, shape (m, 3).
+
+    In the middle of the shell; where zones cut it, as near to the middle as they allow,
+    or on the mounting planes. The lattice is refined until n positions are left, so
+    that a small workspace is searched as densely as a large one is.
+
+    Args:
+        workspace: Where devices may stand.
+        radius_m: Least and largest distance of this kind of device.
+        n: Positions wanted.
+    """
+    offered = n
+    while True:
+        if workspace.mounting:
+            laid = np.concatenate(_laid(workspace.mounting, offered))
+            offsets = laid[admissible(workspace, radius_m, laid)]
+        else:
+            offsets = towards(workspace, radius_m, _lattice(workspace, offered))
+        if len(offsets) >= n or offered >= _MOST_OFFERED * n:
+            return np.array(workspace.centre) + offsets
+        wanted = np.ceil(1.1 * offered * n / max(len(offsets), 1))
+        offered = int(min(wanted, _MOST_OFFERED * n))
 
 
-def admissible(
-    workspace: Workspace, radius_m: tuple[float, float], offsets: _Array
-) -> NDArray[np.bool_]:
-    """Return whether positions keep shell, cone, floor and zones, shape (n,)."""
-    distance = np.linalg.norm(offsets, axis=1)
-    low, high = radius_m
-    inside = (distance >= low - 1e-9) & (distance <= high + 1e-9)
-    if workspace.half_angle < np.pi:
-        along = offsets @ np.array(workspace.axis)
-        inside &= along >= distance * np.cos(workspace.half_angle)
-    if workspace.floor_m is not None:
-        inside &= offsets @ np.array(workspace.up) >= workspace.floor_m
-    inside[inside] = stands(workspace, offsets[inside])
-    return inside
+def towards(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
+    """Return admissible offsets from the centre in directions (n, 3), shape (m, 3)."""
+    if is_zoned(workspace):
+        return along_rays(workspace, radius_m, directions)
+    radius = 0.5 * (radius_m[0] + radius_m[1])
+    offsets = radius * directions
+    return offsets[admissible(workspace, (radius, radius), offsets)]
 
 
-def along_rays(
-    workspace: Workspace, radius_m: tuple[float, float], directions: _Array
-) -> _Array:
+def _lattice(workspace: Workspace, n: int) -> _Array:
+    """Unit vectors spread evenly over the cone, shape (n, 3)."""
+    start = None if workspace.bearing is None else np.array(workspace.bearing)
+    return fibonacci_cap(n, np.array(workspace.axis), workspace.half_angle, start=start)
+
+
+def along_rays(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
     """Return a position on each ray that has one, nearest to the middle of the shell.
 
     Args:
@@ -69,36 +86,6 @@ def along_rays(
     return np.concatenate([np.empty((0, 3)), *parts])
 
 
-def filled(
-    workspace: Workspace,
-    radius_m: tuple[float, float],
-    n: int,
-    lattice: Callable[[int], _Array],
-) -> _Array:
-    """Return at least n positions if there are as many, shape (m, 3).
-
-    They lie on the mounting planes, if there are any, else along the rays of a lattice
-    of directions. Either is refined until n positions are left of it.
-
-    Args:
-        workspace: Where devices may stand.
-        radius_m: Least and largest distance of this kind of device.
-        n: Positions wanted.
-        lattice: Gives a number of unit vectors over the workspace's cone, (k, 3).
-    """
-    offered = n
-    while True:
-        if workspace.mounting:
-            laid = np.concatenate(_laid(workspace.mounting, offered))
-            kept = laid[admissible(workspace, radius_m, laid)]
-        else:
-            kept = along_rays(workspace, radius_m, lattice(offered))
-        if len(kept) >= n or offered >= _MOST_OFFERED * n:
-            return kept
-        wanted = np.ceil(1.1 * offered * n / max(len(kept), 1))
-        offered = int(min(wanted, _MOST_OFFERED * n))
-
-
 def _laid(planes: tuple[Box, ...], n: int) -> list[_Array]:
     """About n places on all planes together, by area."""
     areas = np.array([4.0 * plane.half_m[0] * plane.half_m[1] for plane in planes])
@@ -111,9 +98,7 @@ def _laid(planes: tuple[Box, ...], n: int) -> list[_Array]:
     return places
 
 
-def _on_rays(
-    workspace: Workspace, radius_m: tuple[float, float], directions: _Array
-) -> _Array:
+def _on_rays(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
     radii = _trials(workspace, radius_m, directions)
     trials = radii[..., None] * directions[:, None]
     good = admissible(workspace, radius_m, trials.reshape(-1, 3)).reshape(radii.shape)
@@ -122,9 +107,7 @@ def _on_rays(
     return trials[np.arange(len(best)), best][good.any(axis=1)]
 
 
-def _trials(
-    workspace: Workspace, radius_m: tuple[float, float], directions: _Array
-) -> _Array:
+def _trials(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
     """Radii at which a limit begins or ends to hold on each ray, shape (n, k)."""
     low, high = radius_m
     n = len(directions)
