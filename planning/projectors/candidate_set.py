@@ -172,15 +172,6 @@ class CandidateSet:
             stages=np.concatenate([self.stages, fresh.stages]),
         )
 
-    def refuse_dark(self) -> None:
-        """Refuse candidates that light nothing.
-
-        Raises:
-            NothingLitError: It names the limits that stop most pairs.
-        """
-        if not self.lit.any():
-            raise NothingLitError(self)
-
 
 class NothingLitError(InfeasibleLimitsError):
     """No candidate lights any sample.

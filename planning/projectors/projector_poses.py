@@ -1,6 +1,7 @@
 """The pose program of section III: each projector moves to the largest margins."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +23,8 @@ from planning.scene.workspace.admissible import half_spaces, is_zoned
 from solvers.poses.pose_problem import PoseProgram, pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 
-from .margin_search import widest_between
 from .projector_stage import ProjectorStage
-from .share_margin import enough_lit, margin_at_share
+from .share_margin import enough_lit, margin_at_share, widest_between
 
 _SWEEPS = 6
 # Gains below this aren't worth a move [rad].
@@ -43,14 +43,12 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     """Return the projectors at the poses where what counts is lit with most margin.
 
     What counts are the samples that have the margin at the required share
-    (`share_margin`). First poses between the candidates are offered
-    (`margin_search`). Then each projector in turn solves the pose program over those
-    of them that are assigned to it. Occlusion isn't part of that program, so rays
-    decide after every move: the whole way is tried, then half, then a quarter, and a
-    move that lowers the margin at the share isn't taken, nor one that leaves too few
-    samples lit,
-    nor one that reaches what no candidate does: what is required, and was proved, is a
-    share of what they reach.
+    (`share_margin`). First poses between the candidates are offered. Then each
+    projector in turn solves the pose program over those of them that are assigned to
+    it. Occlusion isn't part of that program, so rays decide after every move: the whole
+    way is tried, then half, then a quarter, and a move that lowers the margin at the
+    share isn't taken, nor one that leaves too few samples lit, nor one that lights what
+    no candidate does: what is required, and was proved, is a share of what they cover.
 
     Args:
         scene: Surface and requirements.
@@ -96,19 +94,18 @@ def _between(state: "_Lit", required: int, lit: int, n_lattice: int) -> "_Lit":
     return moved if wider and enough_lit(moved.margin, required, lit) else state
 
 
+@dataclass(eq=False)
 class _Lit:
     """Projectors as they stand, and the margin of what each lights."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        samples: Target,
-        projectors: list[PlannedProjector],
-        reached: NDArray[np.bool_],
-    ) -> None:
-        self.scene, self.samples, self.projectors = scene, samples, projectors
-        self.reached = reached
-        self.margin = self._margins(projectors)
+    scene: Scene
+    samples: Target
+    projectors: list[PlannedProjector]
+    reached: NDArray[np.bool_]
+    margin: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.margin = self._margins(self.projectors)
 
     @property
     def n_lit(self) -> int:
@@ -118,11 +115,11 @@ class _Lit:
     def on(self, chosen: NDArray[np.int64]) -> "_Lit":
         """The same projectors, on some of the samples."""
         samples, reached = self.samples.take(chosen), self.reached[chosen]
-        return _Lit(self.scene, samples, self.projectors, reached)
+        return replace(self, samples=samples, reached=reached)
 
     def with_all(self, projectors: list[PlannedProjector]) -> "_Lit":
         """Other projectors, on the same samples."""
-        return _Lit(self.scene, self.samples, projectors, self.reached)
+        return replace(self, projectors=projectors)
 
     def margins(self, projectors: Sequence[PlannedProjector]) -> NDArray[np.float64]:
         """Margin of each sample and projector in [rad], -inf where unlit.
@@ -142,7 +139,7 @@ class _Lit:
     def with_moved(
         self, p: int, offered: PlannedProjector
     ) -> NDArray[np.float64] | None:
-        """Margins with one projector elsewhere; None if its body has no room there."""
+        """Margins with one projector elsewhere; None if its body collides there."""
         if offered.body is None:
             margin = self.margin.copy()
             margin[:, p] = self.margins([offered])[:, 0]
@@ -180,8 +177,8 @@ def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
         margin = state.with_moved(p, offered)
         if margin is None:
             continue
-        kept = margin_at_share(margin, required) >= level
-        if kept and enough_lit(margin, required, lit_before):
+        wide = margin_at_share(margin, required) >= level
+        if wide and enough_lit(margin, required, lit_before):
             state.projectors[p], state.margin = offered, margin
             return True
     return False
@@ -194,8 +191,7 @@ def pose_program(
     required, device = scene.requirements, projector.device
     workspace = scene.safe_workspace
     pinhole = isinstance(device, PinholeModel)
-    up = np.array(workspace.up)
-    centre = np.array(workspace.centre)
+    up, centre = np.array(workspace.up), np.array(workspace.centre)
     return PoseProgram(
         points=assigned.samples.points,
         normals=assigned.samples.normals,

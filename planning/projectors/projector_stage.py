@@ -15,14 +15,14 @@ from planning.proofs.conflicts import (
     resolve_conflicts,
     resolve_others,
 )
-from planning.proofs.selection import Selection, fewest_count, marginals, select_fewest
+from planning.proofs.selection import Selection, marginals, select_fewest
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins
 from planning.scene.limits import projector_limits
 from planning.scene.scene import Scene
 from solvers import solve_cover
 
-from .candidate_set import CandidateSet, CandidateSource
+from .candidate_set import CandidateSet, CandidateSource, NothingLitError
 from .one_fewer import one_fewer
 from .share_margin import widest_selection
 
@@ -58,6 +58,47 @@ class ProjectorStage:
         """The candidates' poses."""
         return self.candidates.projectors
 
+    @classmethod
+    def over(
+        cls,
+        candidates: CandidateSet,
+        selection: Selection,
+        most_area: NDArray[np.int64] | None = None,
+    ) -> "ProjectorStage":
+        """Return the stage of a selection, with compatible bodies and the certificate.
+
+        Args:
+            candidates: The poses.
+            selection: Those that are taken.
+            most_area: As many that light most; None: those that are taken.
+        """
+        cover, samples = candidates.cover, candidates.samples
+        crowd = ProjectorInterference(candidates.projectors, samples, cover.covers)
+        as_before, selection = selection, resolve_conflicts(crowd, cover, selection)
+        if most_area is None or selection is not as_before:
+            most_area = selection.chosen
+        others = marginals(cover, selection)
+        others = resolve_others(crowd, cover, others, len(selection.chosen))
+        proof = certificate(cover, selection, others, samples.samples.weight)
+        if crowd.bodied:
+            proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
+        proof = proof.changed(
+            excluded_pairs={
+                cause: int((candidates.stages == index).sum())
+                for index, cause in enumerate(projector_limits.CAUSES)
+                if index != projector_limits.BLOCKED or candidates.scene.bodies
+            },
+            n_regions=int(candidates.scene.region.max()) + 1,
+        )
+        by_count = {n: candidates.of(chosen) for n, chosen in others.by_count.items()}
+        return cls(
+            candidates.of(selection.chosen),
+            candidates,
+            by_count,
+            proof,
+            candidates.of(most_area),
+        )
+
 
 def plan_projectors(
     scene: Scene,
@@ -87,11 +128,13 @@ def plan_projectors(
     source = CandidateSource(scene, template, ring_offset)
     samples = scene.target_samples(DRAWS.projectors)
     candidates = CandidateSet.over(scene, samples, source.lattice(n_candidates))
-    candidates.refuse_dark()
+    if not candidates.lit.any():
+        raise NothingLitError(candidates)
     n_lattice = len(candidates.projectors)
     # The best of a lattice lies beside the best there is.
-    good = candidates.of(_good_cover(candidates))
-    candidates = candidates.extended(source.around(good, n_lattice))
+    good = solve_cover(candidates.cover.problem, seed=scene.seed, budget=_SEEDS_BUDGET)
+    around = source.around(candidates.of(good.selected), n_lattice)
+    candidates = candidates.extended(around)
 
     def finer() -> CandidateSet:
         poses = source.lattice(_FINER * n_candidates)
@@ -114,31 +157,7 @@ def plan_projectors(
     if confirmed and selection.status != "infeasible":
         wider = _with_widest_margin(candidates, selection)
         selection = wider if fresh.cover.confirms(wider.chosen) else selection
-    return _stage(candidates, selection, most_area)
-
-
-def with_more(
-    stage: ProjectorStage, more: tuple[PlannedProjector, ...]
-) -> ProjectorStage:
-    """Return the stage with more candidates where they need fewer projectors.
-
-    Else it is returned as it was: more candidates alone are no better plan.
-    """
-    candidates = stage.candidates.extended(more)
-    before = stage.certificate.needed.count
-    # Mostly they save none, and nothing is spent on which cover most.
-    if fewest_count(candidates.cover) >= before:
-        return stage
-    selection = select_fewest(candidates.cover)
-    better = _stage(candidates, selection, selection.chosen)
-    # Bodies in each other's way may cost what fewer would have saved.
-    return better if better.certificate.needed.count < before else stage
-
-
-def _good_cover(candidates: CandidateSet) -> NDArray[np.int64]:
-    """Return candidates that light what is required, no proof asked."""
-    problem, seed = candidates.cover.problem, candidates.scene.seed
-    return solve_cover(problem, seed=seed, budget=_SEEDS_BUDGET).selected
+    return ProjectorStage.over(candidates, selection, most_area)
 
 
 def _fewest(
@@ -196,35 +215,3 @@ def _with_widest_margin(candidates: CandidateSet, selection: Selection) -> Selec
         n_existing=candidates.n_existing,
     )
     return replace(selection, chosen=chosen)
-
-
-def _stage(
-    candidates: CandidateSet, selection: Selection, most_area: NDArray[np.int64]
-) -> ProjectorStage:
-    """Return the stage, with compatible bodies and the certificate."""
-    cover, samples = candidates.cover, candidates.samples
-    crowd = ProjectorInterference(candidates.projectors, samples, cover.covers)
-    as_before, selection = selection, resolve_conflicts(crowd, cover, selection)
-    if selection is not as_before:
-        most_area = selection.chosen
-    others = marginals(cover, selection)
-    others = resolve_others(crowd, cover, others, len(selection.chosen))
-    proof = certificate(cover, selection, others, samples.samples.weight)
-    if crowd.bodied:
-        proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
-    proof = proof.changed(
-        excluded_pairs={
-            cause: int((candidates.stages == index).sum())
-            for index, cause in enumerate(projector_limits.CAUSES)
-            if index != projector_limits.BLOCKED or candidates.scene.bodies
-        },
-        n_regions=int(candidates.scene.region.max()) + 1,
-    )
-    by_count = {n: candidates.of(chosen) for n, chosen in others.by_count.items()}
-    return ProjectorStage(
-        candidates.of(selection.chosen),
-        candidates,
-        by_count,
-        proof,
-        candidates.of(most_area),
-    )

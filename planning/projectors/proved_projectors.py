@@ -14,6 +14,7 @@ from planning.proofs.all_poses import (
     with_existing_alone,
 )
 from planning.proofs.projector_bound import bound_projectors
+from planning.proofs.selection import fewest_count, select_fewest
 from planning.scene.existing import existing_projectors
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
@@ -21,7 +22,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .candidate_set import CandidateSource
-from .projector_stage import ProjectorStage, with_more
+from .projector_stage import ProjectorStage
 
 
 def prove_fewest(
@@ -48,12 +49,30 @@ def prove_fewest(
     while stage.certificate.needed.count > stage.certificate.given:
         bound = _bound_of(scene, stage, template, effort)
         found = source.towards(bound.directions)
-        better = with_more(stage, found) if found else stage
+        better = _with_more(stage, found) if found else stage
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.proof()))
         stage = better
     n_reached = int(stage.candidates.reached.sum())
     return replace(stage, certificate=with_existing_alone(stage.certificate, n_reached))
+
+
+def _with_more(
+    stage: ProjectorStage, more: tuple[PlannedProjector, ...]
+) -> ProjectorStage:
+    """Return the stage with more candidates where they need fewer projectors.
+
+    Else it is returned as it was: more candidates alone are no better plan.
+    """
+    candidates = stage.candidates.extended(more)
+    before = stage.certificate.needed.count
+    # Mostly they save none, and nothing is spent on which cover most.
+    if fewest_count(candidates.cover) >= before:
+        return stage
+    selection = select_fewest(candidates.cover)
+    better = ProjectorStage.over(candidates, selection)
+    # Bodies in each other's way may cost what fewer would have saved.
+    return better if better.certificate.needed.count < before else stage
 
 
 def _bound_of(

@@ -8,20 +8,34 @@ where none does, `lighting.margins`), the margin at the share is the largest t w
 
 Among covers of equally many projectors the one of largest t is taken: a cover of most
 area often stands at the limit, where a little less area is lit a good deal better.
+
+The pose program moves one projector at a time and stays near where it starts. A cover
+of the most margin stands between the poses of a lattice, several of them moved at once;
+so poses around the chosen ones are offered, from less and less far.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.planned import PlannedProjector
+from planning.model.ring_frame import moved_to
 from planning.proofs.selection import cover_problem
+from planning.scene.existing import movable
+from planning.scene.scene import Scene
 from solvers import solve_max_coverage
+
+from .candidate_set import CandidateSource
 
 # Of an angle: closer than this no cover is looked for.
 _STEP_RAD = float(np.radians(0.25))
 # Lit beyond what is required, so that fresh samples don't fall short.
-SPARE = 0.01
+_SPARE = 0.01
 # Counted work of each cover, of which no proof is asked.
 _BUDGET = 1e8
+# How far out poses between are offered, in spacings of the lattice.
+_SCALES = (1.0, 0.5, 0.25)
 
 
 def margin_at_share(margin: NDArray[np.float64], required: int) -> float:
@@ -49,7 +63,7 @@ def enough_lit(margin: NDArray[np.float64], required: int, before: int) -> bool:
         before: Samples that were lit before the change that is judged.
     """
     lit = int(np.isfinite(margin).any(axis=1).sum())
-    return lit >= min(before, int(np.ceil((1.0 + SPARE) * required)))
+    return lit >= min(before, int(np.ceil((1.0 + _SPARE) * required)))
 
 
 def widest_selection(
@@ -88,3 +102,41 @@ def widest_selection(
         else:
             high = level
     return best
+
+
+def widest_between(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    margins: Callable[[tuple[PlannedProjector, ...]], NDArray[np.float64]],
+    required: int,
+    n_lattice: int,
+) -> tuple[PlannedProjector, ...]:
+    """Return as many projectors at poses of larger margin, where there are any.
+
+    Args:
+        scene: Surface and requirements.
+        projectors: As chosen, without bodies; existing ones come first.
+        margins: Margin of each sample and projector, -inf where unlit, (n, k).
+        required: Samples that count.
+        n_lattice: Poses of the lattice from which they were chosen.
+    """
+    n_existing = len(projectors) - len(movable(projectors))
+    margin, last = margins(projectors), projectors[-1]
+    source = CandidateSource(scene, last)
+    for scale in _SCALES:
+        between = source.around(projectors, n_lattice, scale)
+        if not between:
+            break
+        moved = tuple(moved_to(last, p.world_from_device) for p in between)
+        margin = np.concatenate([margin, margins(moved)], axis=1)
+        chosen = widest_selection(
+            margin,
+            np.arange(len(projectors)),
+            required,
+            seed=scene.seed,
+            n_existing=n_existing,
+        )
+        candidates = (*projectors, *moved)
+        projectors = tuple(candidates[i] for i in chosen)
+        margin = margin[:, chosen]
+    return projectors

@@ -13,9 +13,8 @@ from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
-from planning.projectors.margin_search import widest_between
 from planning.projectors.one_fewer import one_fewer
-from planning.projectors.share_margin import margin_at_share
+from planning.projectors.share_margin import margin_at_share, widest_between
 from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii

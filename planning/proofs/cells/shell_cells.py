@@ -8,7 +8,7 @@ angle about e, h half the interval, so::
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,8 @@ class ShellCells(NamedTuple):
 
     def take(self, chosen: NDArray[np.int64]) -> "ShellCells":
         """Return the chosen cells."""
-        return ShellCells(*(column[chosen] for column in self))
+        columns: list[Any] = [column[chosen] for column in self]
+        return ShellCells(*columns)
 
     def quartered(self) -> "ShellCells":
         """Return the four parts of each cell's directions."""
