@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from geometry.files.readers import load_mesh as load_mesh
     from planning.model.errors import InputError as InputError
     from planning.model.errors import PlanningError as PlanningError
+    from planning.model.plan import RequirementError as RequirementError
     from planning.model.plan import RigPlan as RigPlan
-    from planning.model.plan_errors import RequirementError as RequirementError
     from planning.rig.rig import Rig as Rig
     from planning.rig.rig import load_rig as load_rig
     from planning.scene.interest import read_selection as read_selection
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _EXPORTS = {
     "InputError": "planning.model.errors",
     "PlanningError": "planning.model.errors",
-    "RequirementError": "planning.model.plan_errors",
+    "RequirementError": "planning.model.plan",
     "RangedBody": "planning.scene.ranges.ranged_body",
     "Rig": "planning.rig.rig",
     "RigPlan": "planning.model.plan",

@@ -8,8 +8,7 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.routes import CamerasBy
 from planning.model.errors import TimeLimitError
-from planning.model.plan import RigPlan
-from planning.model.plan_errors import InterruptedPlanError, RequirementError
+from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
 from planning.report.assemble import write_plan
 from planning.report.entries.cost import cost_record

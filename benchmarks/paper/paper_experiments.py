@@ -30,7 +30,7 @@ from planning.experiments.setups import (
     single,
 )
 from planning.experiments.table import setup_lines
-from planning.model.plan_errors import RequirementError
+from planning.model.plan import RequirementError
 from planning.pipeline import plan_rig
 from planning.rig.rig import load_rig
 from planning.verify.reconstruction.check.accuracy import measure_accuracy

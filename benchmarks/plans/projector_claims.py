@@ -24,9 +24,8 @@ import numpy as np
 from benchmarks.bounds.continuous_bounds import jobs, ready_for
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
+from planning.model.device_poses import moved_to, rounded_pose
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.ring_frame import moved_to
-from planning.model.rounding import rounded_pose
 from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors

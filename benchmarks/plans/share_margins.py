@@ -34,9 +34,9 @@ from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.camera_stage import move_axes
+from planning.model.device_poses import ring_frame
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.ring_frame import ring_frame
 from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors

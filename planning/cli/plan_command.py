@@ -10,8 +10,7 @@ import click
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.plan import RigPlan
-from planning.model.plan_errors import InterruptedPlanError, RequirementError
+from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
 from planning.pipeline import plan_requested
 from planning.prepare import request_of

@@ -1,15 +1,16 @@
-"""The housing of a device, as rig files and plans hold it: a box that moves with it.
+"""Boxes: housings that move with a device, and zones that say where devices may stand.
 
-Only values; what follows from them the planner (`placed_bodies`) and the checkers each
-work out alone.
+Only values, as rig files and plans hold them; what follows from them the planner
+(`placed_bodies`, `admissible`) and the checkers each work out alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from .table_types import Axis, Sides, Table
 
 Triple = tuple[float, float, float]
+Axes = tuple[Triple, Triple, Triple]
 
 
 class BodyTable(Table):
@@ -62,3 +63,28 @@ def body_entry(body: Body | None) -> dict[str, Any]:
     if body is None:
         return {}
     return {"body": {"centre_m": list(body.centre_m), "half_m": list(body.half_m)}}
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box, of any turn. A mounting plane is a thin one.
+
+    A position Q is in it iff ``|a_i . (Q - centre of the workspace - centre_m)| <=
+    half_m_i`` for its three directions a_i.
+
+    Attributes:
+        name: What messages call it.
+        centre_m: Its middle, from the object's centre [m].
+        half_m: Half of each side [m].
+        axes: Unit directions of the sides in the world, right-handed.
+    """
+
+    name: str
+    centre_m: Triple
+    half_m: Triple
+    axes: Axes
+
+    def grown(self, by_m: float) -> "Box":
+        """Return the box with every face moved outwards, or inwards if negative."""
+        x, y, z = (max(half + by_m, 0.0) for half in self.half_m)
+        return replace(self, half_m=(x, y, z))

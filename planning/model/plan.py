@@ -1,4 +1,4 @@
-"""The plan: its document, and the surface that its claims speak about."""
+"""The plan: its document and surface, and the errors that carry one."""
 
 import json
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from .document.coverage_records import Coverage
 from .document.plan_document import FORMAT, VERSION, PlanDocument
-from .errors import PlanFileError
+from .errors import PlanFileError, PlanningError
 from .files import sha256_of, write_together
 from .planned import PlannedCamera, PlannedProjector
 from .requirements import Requirements
@@ -165,3 +165,33 @@ def _faults(error: ValidationError) -> str:
         faults.append(f"{where} is missing" if missing else f"{where} = {value} {rule}")
     more = len(entries) - len(faults)
     return ", ".join(faults) + (f", and {more} more faults" if more else "")
+
+
+class RequirementError(PlanningError):
+    """A plan was made, but it misses a requirement.
+
+    Attributes:
+        plan: The best plan found.
+        shortfalls: One sentence for each missed requirement, with its cause.
+    """
+
+    exit_code = 1
+
+    def __init__(self, plan: RigPlan, shortfalls: tuple[str, ...]) -> None:
+        super().__init__("; ".join(shortfalls))
+        self.plan = plan
+        self.shortfalls = shortfalls
+
+
+class InterruptedPlanError(PlanningError):
+    """The run was interrupted after a first plan stood.
+
+    Attributes:
+        plan: The best plan so far, marked `truncated`.
+    """
+
+    exit_code = 130
+
+    def __init__(self, plan: RigPlan) -> None:
+        super().__init__("interrupted; the best plan so far is kept")
+        self.plan = plan

@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal
 
-from .bodies import Body
-from .zones import Box
+from .bodies import Body, Box
 
 _LEFT_OUT = (
     "box",

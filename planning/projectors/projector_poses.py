@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
+from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
-from planning.model.ring_frame import moved_to
 from planning.proofs.selection import required_samples
 from planning.scene.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages

@@ -19,8 +19,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
-from planning.model.ring_frame import moved_to
 from planning.proofs.selection import cover_problem
 from planning.scene.existing import movable
 from planning.scene.scene import Scene

@@ -7,12 +7,12 @@ import numpy as np
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
-from planning.model.document.baseline_records import BaselineRow
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import (
     CameraMarginal,
     ProjectorMarginal,
 )
+from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import RigRecord, SurfaceRecord, Units
 from planning.model.document.plan_document import (
     FORMAT,

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
+from planning.model.device_poses import rounded_pose
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Existing, Requirements, Workspace
-from planning.model.rounding import rounded_pose
 from planning.scene.workspace.offered_poses import aimed_poses
 
 from .existing_tables import ExistingTable

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from planning.model.zones import Axes, Box, Triple
+from planning.model.bodies import Axes, Box, Triple
 
 from .workspace_tables import KeepOutTable, MountingTable, WorkspaceTable
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
-from planning.model.ring_frame import ring_frame
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.limits import camera_limits

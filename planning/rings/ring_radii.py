@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
+from planning.model.device_poses import frame_along, ring_frame, shifted_frame
 from planning.model.requirements import TriangulationLimits
-from planning.model.ring_frame import frame_along, ring_frame, shifted_frame
 from solvers.poses.axis_program import axis_direction
 
 _MIN_GAP_PROJECTOR_PX = 3.0

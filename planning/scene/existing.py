@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.bodies import Body
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
-from planning.model.ring_frame import ring_frame
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 

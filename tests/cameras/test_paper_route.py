@@ -19,9 +19,9 @@ from planning.cameras.paper.camera_rings import camera_rings
 from planning.cameras.paper.paper_route import paper_route
 from planning.cameras.paper.route_problem import CameraSet, RouteProblem
 from planning.cameras.paper.route_starts import grown
+from planning.model.bodies import Box
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
-from planning.model.zones import Box
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

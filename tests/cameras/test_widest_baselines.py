@@ -17,9 +17,9 @@ from planning.cameras.baselines.baseline_terms import (
 from planning.cameras.baselines.coverage_triangle import round_body_limit
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import maximise_baselines
+from planning.model.bodies import Box
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import TriangulationLimits, Workspace
-from planning.model.zones import Box
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED
 from planning.scene.measurability import first_pair_failure, pair_quality

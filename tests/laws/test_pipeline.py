@@ -14,7 +14,7 @@ from support.plain_shapes import box
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import RigPlan, load_rig, plan_rig, verify_plan
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
-from planning.model.plan_errors import InterruptedPlanError, RequirementError
+from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.report.summary.summary import summary
 from planning.verify.audit.audit import audit_plan
 

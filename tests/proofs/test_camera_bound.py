@@ -18,6 +18,7 @@ from planning.cameras.camera_cover import (
     plan_cameras,
 )
 from planning.cameras.proved_cameras import bound_stage
+from planning.model.device_poses import ring_frame
 from planning.model.document.certificates import (
     BestArea,
     CandidateBound,
@@ -29,7 +30,6 @@ from planning.model.document.certificates import (
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing
-from planning.model.ring_frame import ring_frame
 from planning.proofs import all_poses
 from planning.proofs.camera_bound import (
     DEFAULT,

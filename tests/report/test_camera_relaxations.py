@@ -14,9 +14,9 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import CameraCover, CameraStage
+from planning.model.device_poses import ring_frame
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.ring_frame import ring_frame
 from planning.report.advice import camera_relaxations
 from planning.report.advice.camera_relaxations import (
     _SPARE,

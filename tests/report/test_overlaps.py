@@ -10,9 +10,9 @@ from support.plain_shapes import box, grid, joined
 from geometry.devices import ParallelModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
+from planning.model.device_poses import ring_frame
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
-from planning.model.ring_frame import ring_frame
 from planning.report.entries.exposure import schedule_line
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.rig.rig import load_rig

@@ -12,8 +12,7 @@ from support.plain_shapes import box
 from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
 from planning.model.errors import InfeasibleLimitsError, RigError
-from planning.model.plan import RigPlan
-from planning.model.plan_errors import RequirementError
+from planning.model.plan import RequirementError, RigPlan
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Existing
 from planning.projectors.projector_poses import widen_margins

@@ -19,7 +19,7 @@ from planning.cameras.camera_stage import (
     proves_as_much,
     with_cameras,
 )
-from planning.model.ring_frame import ring_frame
+from planning.model.device_poses import ring_frame
 from planning.rig.rig import load_rig
 from planning.rings.axis_moves import (
     AxisJudge,

@@ -11,8 +11,8 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.ring_frame import ring_frame
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.rings import ring_pitch

@@ -5,9 +5,9 @@ import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits, Workspace
-from planning.model.ring_frame import ring_frame
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
 from planning.scene.workspace.candidates import (
     camera_candidates,

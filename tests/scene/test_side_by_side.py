@@ -11,10 +11,10 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views
+from planning.model.bodies import Box
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.model.ring_frame import ring_frame
-from planning.model.zones import Box
 from planning.prepare import prepared
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.one_fewer import one_fewer

@@ -1,4 +1,4 @@
-"""`projectors` and `cameras` of a plan file."""
+"""`projectors`, `cameras` and `baselines` of a plan file."""
 
 from typing import Annotated, Any, Literal
 
@@ -9,7 +9,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
 
-from .part import Interval, Matrix3, Part, Pose, Resolution
+from .part import Interval, Matrix3, Part, Pose, Resolution, Vector3
 
 
 class CreasesRecord(Part):
@@ -190,3 +190,42 @@ def _where_known(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:
     body = {} if device.body is None else {"body": device.body}
     name = {"existing": True, "name": device.existing} if device.existing else {}
     return body | name
+
+
+class BaselineRow(Part):
+    """The tightest seam point of a pair; lengths in [m], angles in [rad].
+
+    `docs/method/baselines.md` defines every key; the last three are known only where
+    ranges were estimated (`docs/use/ranges.md`).
+    """
+
+    cameras: tuple[str, str]
+    E: Vector3
+    standoff1: float
+    standoff2: float
+    C1: float
+    C2: float
+    D1: float
+    D2: float
+    phi: float
+    phi_max: float
+    d: float
+    d_lateral: float
+    d_axial: float
+    d_max: float | None
+    slack: float
+    covered: bool
+    limit: str
+    beta: tuple[float, float]
+    iota: tuple[float, float]
+    half_field: tuple[float, float]
+    max_incidence: float
+    delta_axes: float
+    delta_surface: float
+    normals: tuple[Vector3, Vector3]
+    onward: Vector3
+    shares_border: bool
+    n_seam: int
+    d_max_stated: float | None = None
+    d_max_sigma: float | None = None
+    covered_at_2_sigma: bool | None = None

@@ -1,4 +1,4 @@
-"""What a plan was made from: `meshes`, `surface` and `rig`."""
+"""What a plan was made from: `meshes`, `surface`, `rig` and `ranges`."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from pydantic import Field
 
 from planning.model.bodies import Body
 
-from .part import Interval, Matrix3, Part, Resolution
+from .part import Interval, Matrix3, Part, Resolution, Vector3
 
 
 class Units(Part):
@@ -134,3 +134,49 @@ class RigRecord(Part):
     check: dict[str, float] = Field(default={})
     notes: tuple[str, ...] = ()
     existing: tuple[dict[str, Any], ...] = ()
+
+
+class RangePoint(Part):
+    """A point of the object, as estimated from its lines of the file."""
+
+    point: str
+    lines: tuple[int, ...]
+    position_m: Vector3
+    covariance_m2: tuple[Vector3, Vector3, Vector3]
+    chi_square: float
+    n_free: int
+    residual_m: float
+
+
+class RefusedPoint(Part):
+    """A point that wasn't used, and why."""
+
+    point: str
+    lines: tuple[int, ...]
+    reason: str
+
+
+class EstimatedSphere(Part):
+    """The least-squares sphere; covariance of centre and radius."""
+
+    centre_m: Vector3
+    radius_m: float
+    covariance_m2: tuple[tuple[float, ...], ...]
+    shape_sigma_m: float
+    chi_square: float
+
+
+class RangesRecord(Part):
+    """What is known of a body by its ranges alone, and what was kept free for it."""
+
+    path: str
+    sha256: str
+    significance: float
+    observations: tuple[dict[str, Any], ...]
+    points: tuple[RangePoint, ...]
+    refused: tuple[RefusedPoint, ...]
+    sphere: EstimatedSphere
+    position_sigma_m: float
+    guard_m: float
+    guard_rad: float
+    stated: dict[str, Any]

@@ -7,7 +7,6 @@ from pydantic import field_serializer
 
 from planning.model.requirements import Requirements
 
-from .baseline_records import BaselineRow
 from .certificates import Certificates
 from .check_records import ReconstructionRecord
 from .coverage_records import (
@@ -18,10 +17,9 @@ from .coverage_records import (
     ProjectorMarginal,
     RegionRecord,
 )
-from .device_records import CameraRecord, ProjectorRecord
-from .input_records import MeshRecord, RigRecord, SurfaceRecord, Units
+from .device_records import BaselineRow, CameraRecord, ProjectorRecord
+from .input_records import MeshRecord, RangesRecord, RigRecord, SurfaceRecord, Units
 from .part import Part
-from .range_records import RangesRecord
 
 FORMAT = "ringrig-plan"
 VERSION = 1

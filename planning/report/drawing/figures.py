@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import transform
+from planning.model.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.zones import Box
 
 from .picture_view import Colour, facing
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
 from geometry.repair.hollow import MeshShell
+from planning.model.device_poses import DECIMALS, rounded_pose
 from planning.model.document.coverage_records import Coverage, RegionRecord
 from planning.model.document.device_records import (
     CameraRecord,
@@ -23,7 +24,6 @@ from planning.model.document.input_records import (
     ShellRecord,
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.rounding import DECIMALS, rounded_pose
 from planning.report.claims import Claims, Devices
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from geometry.directions.cube_map import angle_between
 from geometry.shapes.boxes import OrientedBox, boxes_overlap
+from planning.model.bodies import Box
 from planning.model.requirements import Workspace
-from planning.model.zones import Box
 
 _Array = NDArray[np.float64]
 _ROUNDING = 1e-9

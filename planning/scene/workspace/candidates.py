@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
-from planning.model.ring_frame import ring_frame
 
 from .offered_poses import OfferedPoses
 from .view_tiles import Site

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import fibonacci_cap
+from planning.model.bodies import Box
 from planning.model.requirements import Workspace
-from planning.model.zones import Box
 
 from .admissible import admissible, is_zoned
 

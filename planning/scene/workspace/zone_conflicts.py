@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.bodies import Box
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Workspace
-from planning.model.zones import Box
 
 from .admissible import is_zoned
 from .shell_positions import shell_positions

@@ -220,17 +220,15 @@ def test_draws_are_uniform_and_split_between_target_and_rest(handmade):
 
 def test_the_audit_imports_nothing_of_the_planner():
     allowed = {
-        "planning.model.document.baseline_records",
+        "planning.model.document.device_records",
         "planning.model.document.certificates",
         "planning.model.document.coverage_records",
-        "planning.model.document.device_records",
-        "planning.model.document.range_records",
+        "planning.model.document.input_records",
         "planning.model.planned",
         "planning.model.plan",
         "planning.model.requirements",
         "planning.model.surface",
         "planning.model.bodies",
-        "planning.model.zones",
         "planning.model.errors",
         "planning.model.files",
         "geometry.mesh.mesh",

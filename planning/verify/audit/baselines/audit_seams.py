@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.document.baseline_records import BaselineRow
+from planning.model.document.device_records import BaselineRow
 from planning.model.planned import PlannedCamera
 from planning.verify.audit.predicates.audit_optics import in_image, pixels_of
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planning.model.document.baseline_records import BaselineRow
+from planning.model.document.device_records import BaselineRow
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 

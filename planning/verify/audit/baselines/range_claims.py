@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincc
 
-from planning.model.document.range_records import RangePoint, RangesRecord
+from planning.model.document.input_records import RangePoint, RangesRecord
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.document.baseline_records import BaselineRow
-from planning.model.document.range_records import RangesRecord
+from planning.model.document.device_records import BaselineRow
+from planning.model.document.input_records import RangesRecord
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_findings import AuditFindings
 

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from planning.model.bodies import Body
+from planning.model.bodies import Body, Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
-from planning.model.zones import Box
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_optics import in_frame

@@ -1,4 +1,4 @@
-"""The ring frame of a projector: in it its rings are circles about z."""
+"""Poses of devices: ring frames, projectors moved with theirs, and poses as written."""
 
 from dataclasses import replace
 
@@ -9,6 +9,16 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
 
 from .planned import PlannedProjector
+
+_POSITION_DECIMALS = 5
+DECIMALS = 12
+
+
+def rounded_pose(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a pose as it will be written: positions to 0.01 mm."""
+    result = np.round(pose, DECIMALS)
+    result[:3, 3] = np.round(pose[:3, 3], _POSITION_DECIMALS)
+    return result + 0.0
 
 
 def ring_frame(
