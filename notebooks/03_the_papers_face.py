@@ -38,8 +38,8 @@ from planning.experiments.point_panels import PanelStage
 from planning.experiments.run import run_experiment
 from planning.experiments.setups import face_experiment
 from planning.experiments.table import cloud_lines, label_line, ring_lines, setup_lines
+from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.rig_picture import draw_rig
-from planning.report.face_status import face_status
 
 printed = run_experiment(face_experiment())
 print("\n".join(setup_lines(printed.experiment)))

@@ -11,7 +11,7 @@ from planning.model.errors import TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
 from planning.report.assemble import write_plan
-from planning.report.entries.cost import cost_record
+from planning.report.entries.device_entries import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.rig import Rig

@@ -14,9 +14,9 @@ from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
 from planning.pipeline import plan_requested
 from planning.prepare import request_of
+from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.rig_picture import save_rig_picture
 from planning.report.entries.range_entries import ranges_lines
-from planning.report.face_status import face_status
 from planning.report.summary.summary import summary
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes

@@ -1,5 +1,7 @@
 """Quantities as a person reads them."""
 
+from collections.abc import Sequence
+
 from .requirements import CheckLimits
 
 # Areas below this are told in mm² [m²].
@@ -27,6 +29,11 @@ def error_words(rms_m: float, p95_m: float, bias_m: float, limits: CheckLimits) 
     )
 
 
-def percent(share: float) -> str:
-    """Return a share in percent, with one decimal."""
-    return f"{100.0 * share:.1f} %"
+def percent(share: float, *, decimals: int = 1) -> str:
+    """Return a share in percent."""
+    return f"{100.0 * share:.{decimals}f} %"
+
+
+def labelled(label: str, lines: Sequence[str]) -> list[str]:
+    """Return lines of a block of the summary: its label stands before the first."""
+    return [f"{'' if k else label:<9}{line}" for k, line in enumerate(lines)]

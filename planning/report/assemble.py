@@ -8,10 +8,6 @@ import numpy as np
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
 from planning.model.document.certificates import Certificates
-from planning.model.document.coverage_records import (
-    CameraMarginal,
-    ProjectorMarginal,
-)
 from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import RigRecord, SurfaceRecord, Units
 from planning.model.document.plan_document import (
@@ -25,15 +21,13 @@ from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
-from planning.report.entries.cost import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
-from planning.report.entries.ring_entries import evenly_ringed
 from planning.rings.ring_pitch import widest_gap
 
 from .claims import Claims, Devices, make_claims
 from .entries import device_entries as entries
-from .marginal import camera_table, projector_table
+from .marginal import marginal_records
 from .partial_plan import PartialPlan
 
 
@@ -43,7 +37,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     scene = partial.scene
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
-        marginal = _marginal(partial, devices, claims)
+        marginal = marginal_records(partial, devices, claims)
     standing = replace(
         partial, scene=scene.among((*devices.projectors, *devices.cameras))
     )
@@ -80,7 +74,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         certificates=certificates,
         baselines=_baselines(partial, devices, claims, requirements),
         camera_groups=_camera_groups(devices, claims),
-        cost=cost_record(
+        cost=entries.cost_record(
             devices.cameras, certificates.cameras.greedy_count, clock.processor
         ),
         members=(
@@ -109,17 +103,6 @@ def _rounded_devices(partial: PartialPlan) -> Devices:
         tuple(entries.rounded_camera(c, f"C{i}") for i, c in enumerate(cameras, 1)),
         tuple(entries.rounded_projector(p, "") for p in partial.stage.reference),
         tuple(entries.rounded_camera(c, "") for c in partial.camera_stage.reference),
-    )
-
-
-def _marginal(
-    partial: PartialPlan, devices: Devices, claims: Claims
-) -> tuple[ProjectorMarginal | CameraMarginal, ...]:
-    # Rings are fine for the planned cameras; others would get their own.
-    even, scene = evenly_ringed(devices, partial.rings), partial.scene
-    return (
-        *projector_table(scene, devices, partial.stage.by_count, claims),
-        *camera_table(scene, even, partial.camera_stage.by_count, claims),
     )
 
 

@@ -1,6 +1,7 @@
 """What one device more or fewer would change."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 from planning.model.document.coverage_records import (
@@ -8,14 +9,28 @@ from planning.model.document.coverage_records import (
     ProjectorMarginal,
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.rings.ring_stage import RingStage
 from planning.scene.scene import Scene
 
 from .claims import Claims, Devices, lit_area, measured_area
+from .partial_plan import PartialPlan
 
 _D = TypeVar("_D")
 
 
-def projector_table(
+def marginal_records(
+    partial: PartialPlan, devices: Devices, claims: Claims
+) -> tuple[ProjectorMarginal | CameraMarginal, ...]:
+    """Return the plan's `marginal`: areas with 1, 2, ... devices of either kind."""
+    # Rings are fine for the planned cameras; others would get their own.
+    even, scene = _evenly_ringed(devices, partial.rings), partial.scene
+    return (
+        *_projector_table(scene, devices, partial.stage.by_count, claims),
+        *_camera_table(scene, even, partial.camera_stage.by_count, claims),
+    )
+
+
+def _projector_table(
     scene: Scene,
     devices: Devices,
     by_count: Mapping[int, Sequence[PlannedProjector]],
@@ -34,7 +49,7 @@ def projector_table(
     )
 
 
-def camera_table(
+def _camera_table(
     scene: Scene,
     devices: Devices,
     by_count: Mapping[int, Sequence[PlannedCamera]],
@@ -70,3 +85,14 @@ def _areas(
             surface = max(surface, areas[n - 1][1])
         areas[n] = (target, surface)
     return areas
+
+
+def _evenly_ringed(devices: Devices, stage: RingStage | None) -> Devices:
+    """Return the devices with evenly spaced rings, as for cameras not yet known."""
+    if stage is None:
+        return devices
+    projectors = tuple(
+        replace(projector, ring_radii=radii)
+        for projector, radii in zip(devices.projectors, stage.even_radii, strict=True)
+    )
+    return replace(devices, projectors=projectors)

@@ -9,8 +9,9 @@ from geometry.devices import PinholeModel
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.report.entries.cost import cost_lines, cost_record
-from planning.report.summary.summary import aim_angles
+from planning.report.entries.device_entries import cost_record
+from planning.report.summary.check_lines import cost_lines
+from planning.report.summary.device_lines import aim_angles
 from planning.scene.workspace.offered_poses import aimed_poses
 
 Z = np.array([0.0, 0.0, 1.0])

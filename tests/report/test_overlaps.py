@@ -13,7 +13,6 @@ from geometry.shapes.primitives import sphere
 from planning.model.device_poses import ring_frame
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
-from planning.report.entries.exposure import schedule_line
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
@@ -269,7 +268,7 @@ def test_exhaustion_is_tried_again_by_the_audit(plan, failures):
 
 
 def test_the_line_says_who_fires_when_and_why_not_in_fewer(plan):
-    line = schedule_line(plan.document)
+    (line,) = schedule_lines(plan.document)
     assert line.startswith("FIRING   P1, then P2: 2 groups, fewer won't do: any two of")
     share = plan.to_document()["overlaps"][0]["target_m2"]
     share /= plan.to_document()["coverage"]["target"]["area_m2"]
@@ -277,5 +276,5 @@ def test_the_line_says_who_fires_when_and_why_not_in_fewer(plan):
     document = plan.to_document()
     document["firing_schedule"] |= {"groups": [["P1", "P2"]], "n_groups": 1}
     alone = RigPlan.from_document(document, plan.surface).document
-    assert "all projectors together" in schedule_line(alone)
-    assert schedule_line(alone.changed(overlaps=())) == ""
+    assert "all projectors together" in schedule_lines(alone)[0]
+    assert schedule_lines(alone.changed(overlaps=())) == []

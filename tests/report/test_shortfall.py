@@ -5,8 +5,8 @@ import pytest
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.plan import RigPlan
 from planning.model.words import area_words
+from planning.report.summary.coverage_lines import area_cell
 from planning.report.summary.shortfall import shortfalls
-from planning.report.summary.summary import _cell
 
 
 @pytest.fixture
@@ -129,5 +129,5 @@ def test_areas_of_tiny_parts_are_told_in_square_millimetres():
         "99 mm²",
         "1.2 cm²",
     ]
-    assert _cell(3e-6, 4e-6).split() == ["3.0", "mm²", "75.0", "%"]
-    assert _cell(0.3, 0.4).split()[:2] == ["3000.0", "cm²"]
+    assert area_cell(3e-6, 4e-6).split() == ["3.0", "mm²", "75.0", "%"]
+    assert area_cell(0.3, 0.4).split()[:2] == ["3000.0", "cm²"]

@@ -13,7 +13,7 @@ from planning.cameras.camera_routes import widest_route
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.plan import RigPlan
 from planning.pipeline import plan_rig
-from planning.report.entries.range_entries import limits_at, summary_lines, with_spread
+from planning.report.entries.range_entries import limits_at, with_spread
 from planning.rig.range_guard import guarded
 from planning.rig.rig import load_rig
 from planning.scene.ranges.range_file import read_range_file
@@ -415,7 +415,7 @@ def test_the_plan_carries_points_sphere_and_guard(plan, body):
     least, most = plan.requirements.workspace.camera_radius_m
     width = 0.1 - 4.0 * body.position_sigma_m
     assert most - least == pytest.approx(width, abs=1e-9)
-    text = "\n".join(summary_lines(plan.document))
+    text = "\n".join(range_lines(plan.document))
     assert "14 points" in text
     rows = plan.to_document()["baselines"]
     assert f"{len(rows)} of {len(rows)} rows" in text
@@ -539,7 +539,7 @@ def test_the_audit_finds_a_surface_that_is_not_the_sphere(plan):
 def test_a_plan_of_a_mesh_has_no_such_claims(plan):
     document = {k: v for k, v in plan.to_document().items() if k != "ranges"}
     assert audited(plan, document) == ()
-    assert summary_lines(RigPlan.from_document(document, plan.surface).document) == []
+    assert range_lines(RigPlan.from_document(document, plan.surface).document) == []
 
 
 def test_documented_columns_are_those_that_are_read():

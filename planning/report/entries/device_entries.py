@@ -1,6 +1,6 @@
-"""Devices as they will be written, and what is said of mesh, target and coverage."""
+"""Devices as they will be written; records of mesh, target, coverage and cost."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -23,12 +23,18 @@ from planning.model.document.input_records import (
     SelectionRecord,
     ShellRecord,
 )
+from planning.model.document.plan_document import CostRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.claims import Claims, Devices
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
 from planning.scene.scene import Scene
+
+# Stages of planning that place light, with what they need to know of the surface, and
+# those that place cameras.
+_PROJECTOR_STAGES = ("regions", "projectors", "bounds", "projector_poses", "rings")
+_CAMERA_STAGES = ("cameras", "baselines")
 
 
 def rounded_projector(projector: PlannedProjector, name: str) -> PlannedProjector:
@@ -155,3 +161,46 @@ def coverage_record(claims: Claims) -> Coverage:
     if not claims.blocked_by_body_m2:
         return coverage
     return coverage.changed(blocked_by_body_m2=claims.blocked_by_body_m2)
+
+
+def cost_record(
+    cameras: Sequence[PlannedCamera],
+    n_before: int,
+    seconds: Mapping[str, float],
+) -> CostRecord:
+    """Return the plan's `cost`; `docs/method/cost.md` defines every key.
+
+    With M_j N_j pixels of camera j::
+
+        C = (sum_j M_j N_j)(t1 + t2) + t3 + t4 + t5
+
+    t1 (acquisition, here rendering) and t2 (pixels to points) are seconds a pixel, t3
+    (fusion), t4 (projector planning) and t5 (camera planning) seconds. C_before is the
+    same with the cameras of the greedy cover, which is what D was before it was
+    minimised. Without a check t1 to t3 are unknown, and C with them.
+
+    Args:
+        cameras: As planned.
+        n_before: Cameras of the greedy cover.
+        seconds: Measured processor times in [s]: of the stages of planning, and where a
+            check was made of `render`, `decode` and `merge`.
+    """
+    sizes = [c.device.resolution[0] * c.device.resolution[1] for c in cameras]
+    pixels = sum(sizes)
+    t4, t5 = (
+        sum(seconds.get(name, 0.0) for name in names)
+        for names in (_PROJECTOR_STAGES, _CAMERA_STAGES)
+    )
+    times = dict.fromkeys(("t1", "t2", "t3", "C", "C_before"))
+    if "render" in seconds:
+        t1, t2 = seconds["render"] / pixels, seconds["decode"] / pixels
+        t3 = seconds["merge"]
+        before = pixels * n_before / len(cameras)
+        times = {
+            "t1": t1,
+            "t2": t2,
+            "t3": t3,
+            "C": pixels * (t1 + t2) + t3 + t4 + t5,
+            "C_before": before * (t1 + t2) + t3 + t4 + t5,
+        }
+    return CostRecord(pixels=pixels, n_cameras_before=n_before, t4=t4, t5=t5, **times)

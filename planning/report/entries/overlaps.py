@@ -29,8 +29,7 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns.pattern import pattern_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-
-from .exposure import exposure_schedule
+from solvers.colouring import fewest_colours
 
 # Rays and rounding can't tell on which side light passes that runs along a face.
 _ANY_LIGHT = ProjectorLimits(float(np.radians(89.0)), 0.0)
@@ -56,6 +55,25 @@ def overlap_records(
     conflicts = (on_target > 0.0) | (on_surface > 0.0)
     np.fill_diagonal(conflicts, val=False)
     return overlaps, exposure_schedule(names, conflicts)
+
+
+def exposure_schedule(
+    names: Sequence[str], conflicts: NDArray[np.bool_]
+) -> ExposureSchedule:
+    """Return the plan's `firing_schedule`: the fewest groups without an overlap.
+
+    Args:
+        names: Ids of the projectors.
+        conflicts: Whether two overlap, shape (k, k).
+    """
+    colouring = fewest_colours(conflicts)
+    return ExposureSchedule(
+        groups=tuple(tuple(names[i] for i in group) for group in colouring.groups),
+        n_groups=colouring.n_colours,
+        lower_bound=colouring.lower_bound,
+        proof=colouring.proof,
+        clique=tuple(names[i] for i in colouring.clique),
+    )
 
 
 def shared_areas(

@@ -81,32 +81,6 @@ def ranges_lines(body: RangedBody) -> list[str]:
     return lines + [f"  {refusal_line(one)}" for one in body.refused]
 
 
-def summary_lines(document: PlanDocument) -> list[str]:
-    """Return what a plan says of estimated ranges, for a person; nothing of a mesh."""
-    ranges = document.ranges
-    if ranges is None:
-        return []
-    ball = ranges.sphere
-    x, y, z = (1e3 * part for part in ball.centre_m)
-    radius_sigma = 1e3 * ball.covariance_m2[3][3] ** 0.5
-    covered = [row.covered_at_2_sigma for row in document.baselines]
-    lines = [
-        f"RANGES   {len(ranges.points)} points: sphere of radius "
-        f"{1e3 * ball.radius_m:.1f} +- {radius_sigma:.1f} mm about ({x:.1f}, "
-        f"{y:.1f}, {z:.1f}) mm; they stray from it by "
-        f"{1e3 * ball.shape_sigma_m:.1f} mm",
-        f"         kept free of every limit: two sigma of where the surface is, "
-        f"{1e3 * ranges.guard_m:.1f} mm or {np.degrees(ranges.guard_rad):.2f} deg",
-        f"         {covered.count(True)} of {len(covered)} rows of neighbouring "
-        f"cameras lie within d_max - 2 sigma",
-    ]
-    return lines + [
-        f"         point {one.point} (line {', '.join(map(str, one.lines))}) "
-        f"refused: {one.reason}"
-        for one in ranges.refused
-    ]
-
-
 def with_spread(
     rows: Sequence[BaselineRow],
     cameras: Sequence[PlannedCamera],

@@ -1,7 +1,9 @@
 """What was proved of a plan, for a person."""
 
 from planning.model.document.certificates import Certificate
+from planning.model.document.input_records import SelectionRecord
 from planning.model.plan import RigPlan
+from planning.model.words import count_words, percent
 
 _EXCLUDED = {
     "projector_beam": "lie outside the beam",
@@ -13,25 +15,20 @@ _EXCLUDED = {
 }
 
 
-def proof_lines(plan: RigPlan, regions: str) -> str:
-    """Return what was proved of both counts, and over what.
-
-    Args:
-        plan: The plan.
-        regions: How many regions there are, and what chose their faces.
-    """
+def proof_lines(plan: RigPlan) -> list[str]:
+    """Return what was proved of both counts, and over what."""
     asked, proofs = plan.requirements, plan.document.certificates
-    lines = [
+    return [
+        "",
         _proof("projector", proofs.projectors, asked.dominant_coverage, "light"),
         _continuous(proofs.projectors, _freedom(plan)),
         _proof("camera", proofs.cameras, asked.coverage, "measure")
         + " (given these projectors)",
         _continuous(proofs.cameras, "position, aim and roll"),
         *route_lines(proofs.cameras),
-        f"         {regions}",
+        f"         {_regions(plan)}",
         *_excluded(proofs.projectors),
     ]
-    return "\n" + "\n".join(lines)
 
 
 def route_lines(proof: Certificate) -> list[str]:
@@ -51,6 +48,25 @@ def route_lines(proof: Certificate) -> list[str]:
     return [f"{told}; taken {names[routes.taken]}: {routes.why}"]
 
 
+def user_selection(plan: RigPlan) -> SelectionRecord | None:
+    """Return `surface.selection` if the user made it; older plans have none."""
+    selection = plan.document.surface.selection
+    return None if selection is None or selection.kind == "curvature" else selection
+
+
+def _regions(plan: RigPlan) -> str:
+    """Return how many regions there are, and what chose their faces."""
+    n, chosen = len(plan.document.regions), user_selection(plan)
+    if chosen is None:
+        return count_words(n, "dominant region")
+    by = "highest weight" if chosen.kind == "vertex_weight" else "selection"
+    source = f" by {chosen.source}" if chosen.source else ""
+    removed = chosen.n_removed_by_repair
+    gone = f" ({removed} chosen ones removed by repair)" if removed else ""
+    regions = f"{count_words(n, 'region')} of your {by}{source}"
+    return f"{regions}: {chosen.n_faces} faces{gone}"
+
+
 def _excluded(proof: Certificate) -> list[str]:
     """Return which limit of eq. (2) took how many pairs of pose and sample, in a line.
 
@@ -60,15 +76,15 @@ def _excluded(proof: Certificate) -> list[str]:
     excluded = proof.excluded_pairs
     if not excluded or not pairs:
         return []
-    told = [
-        f"{100.0 * excluded[cause] / pairs:.1f} % {words}"
+    shares = [
+        f"{percent(excluded[cause] / pairs)} {words}"
         for cause, words in _EXCLUDED.items()
         if cause in excluded
     ]
-    lit = 100.0 * (1.0 - sum(excluded.values()) / pairs)
+    lit = percent(1.0 - sum(excluded.values()) / pairs)
     return [
-        f"         of {pairs:,} pairs of pose and sample {', '.join(told)}; "
-        f"{lit:.1f} % are lit"
+        f"         of {pairs:,} pairs of pose and sample {', '.join(shares)}; "
+        f"{lit} are lit"
     ]
 
 

@@ -1,6 +1,4 @@
-"""What a plan's document and its summary say of rings."""
-
-from dataclasses import replace
+"""What a plan says of its rings, and of estimated ranges, for a person."""
 
 import numpy as np
 
@@ -9,27 +7,17 @@ from planning.model.document.device_records import (
     RingSharesRecord,
     RingsRecord,
 )
+from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.report.claims import Devices
-from planning.rings.ring_stage import RingStage, tolerance_m
+from planning.model.words import labelled, percent
+from planning.rings.ring_stage import tolerance_m
 
 # As many of the chords between rings may err by more than was asked.
 _STRAY = 0.01
 _MM = 1e3
 
 
-def evenly_ringed(devices: Devices, stage: RingStage | None) -> Devices:
-    """Return the devices with evenly spaced rings, as for cameras not yet known."""
-    if stage is None:
-        return devices
-    projectors = tuple(
-        replace(projector, ring_radii=radii)
-        for projector, radii in zip(devices.projectors, stage.even_radii, strict=True)
-    )
-    return replace(devices, projectors=projectors)
-
-
-def rings_lines(plan: RigPlan) -> list[str]:
+def ring_lines(plan: RigPlan) -> list[str]:
     """Return the summary's lines on rings; none for plans that don't speak of them."""
     records = plan.document.projectors
     lines: list[str] = []
@@ -39,7 +27,7 @@ def rings_lines(plan: RigPlan) -> list[str]:
         lines.append(_line(record, record.ring_shares))
     tolerance = tolerance_m(plan.requirements)
     lines += [note for record in records for note in _notes(record, tolerance)]
-    return [f"{'RINGS' if k == 0 else '':<9}{line}" for k, line in enumerate(lines)]
+    return ["", *labelled("RINGS", lines)] if lines else []
 
 
 def _line(record: ProjectorRecord, shares: RingSharesRecord) -> str:
@@ -48,7 +36,7 @@ def _line(record: ProjectorRecord, shares: RingSharesRecord) -> str:
         low, high = (_MM * value for value in rings.gap_m)
         gap = f", {low:.1f} to {high:.1f} mm apart on the object"
     words = ", ".join(
-        f"{100 * np.mean(values):.0f} % ({100 * min(values):.0f} %) {name}"
+        f"{_whole(float(np.mean(values)))} ({_whole(min(values))}) {name}"
         for name, values in (
             ("on the object", shares.on_object),
             ("on the target", shares.on_target),
@@ -71,7 +59,7 @@ def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:
         notes.append(f"{name}: rings stay even, others would lose measured samples")
     if rings.over_tolerance > _STRAY:
         notes.append(
-            f"{name}: between rings {100 * rings.over_tolerance:.1f} % of the "
+            f"{name}: between rings {percent(rings.over_tolerance)} of the "
             f"target strays more than {_MM * tolerance_m:g} mm from a straight line: "
             f"{_remedy(rings)}"
         )
@@ -91,3 +79,34 @@ def _remedy(rings: RingsRecord) -> str:
         "finer rings can't be told apart; a longer focal length, more views, or a "
         "second sequence with shifted radii would help"
     )
+
+
+def _whole(share: float) -> str:
+    return percent(share, decimals=0)
+
+
+def range_lines(document: PlanDocument) -> list[str]:
+    """Return what a plan says of estimated ranges, for a person; nothing of a mesh."""
+    ranges = document.ranges
+    if ranges is None:
+        return []
+    ball = ranges.sphere
+    x, y, z = (1e3 * part for part in ball.centre_m)
+    radius_sigma = 1e3 * ball.covariance_m2[3][3] ** 0.5
+    covered = [row.covered_at_2_sigma for row in document.baselines]
+    lines = [
+        f"{len(ranges.points)} points: sphere of radius "
+        f"{1e3 * ball.radius_m:.1f} +- {radius_sigma:.1f} mm about ({x:.1f}, "
+        f"{y:.1f}, {z:.1f}) mm; they stray from it by "
+        f"{1e3 * ball.shape_sigma_m:.1f} mm",
+        f"kept free of every limit: two sigma of where the surface is, "
+        f"{1e3 * ranges.guard_m:.1f} mm or {np.degrees(ranges.guard_rad):.2f} deg",
+        f"{covered.count(True)} of {len(covered)} rows of neighbouring "
+        f"cameras lie within d_max - 2 sigma",
+    ]
+    lines += [
+        f"point {one.point} (line {', '.join(map(str, one.lines))}) "
+        f"refused: {one.reason}"
+        for one in ranges.refused
+    ]
+    return ["", *labelled("RANGES", lines)]

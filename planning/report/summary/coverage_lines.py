@@ -1,0 +1,142 @@
+"""What a plan lights and measures, and what one device more would, for a person."""
+
+from collections.abc import Mapping
+
+from planning.model.document.coverage_records import (
+    Areas,
+    CameraMarginal,
+    ProjectorMarginal,
+)
+from planning.model.document.plan_document import PlanDocument
+from planning.model.plan import RigPlan
+from planning.model.words import percent
+
+from .proof_lines import user_selection
+from .shortfall import causes_line
+
+# Surfaces below this are told in mm² [m²].
+_SMALL_M2 = 1e-3
+_ROWS = {
+    "area": "area_m2",
+    "reachable by projectors": "reachable_by_projectors_m2",
+    "lit": "lit_m2",
+    "reachable by cameras": "reachable_by_cameras_m2",
+    "measured": "measured_m2",
+}
+
+
+def coverage_lines(plan: RigPlan) -> list[str]:
+    """Return the table of areas, both shares, and what is left uncovered."""
+    coverage, document = plan.coverage, plan.document
+    target, surface = coverage.target, coverage.surface
+    chosen = "your selection" if user_selection(plan) else plan.requirements.target
+    lit = _ratio(target.lit_m2, target.reachable_by_projectors_m2)
+    measured = _ratio(target.measured_m2, target.reachable_by_cameras_m2)
+    lines = [
+        "",
+        f"{'':<34}{'target (' + chosen + ')':>24}{'whole surface':>24}",
+        *(
+            f"{'':<9}{label:<25}{_cell(target, key):>24}{_cell(surface, key):>24}"
+            for label, key in _ROWS.items()
+        ),
+        f"COVERAGE lit / reachable by projectors {lit}, measured / reachable by "
+        f"cameras {measured}, on the target, {coverage.samples} fresh samples",
+    ]
+    if causes := coverage.uncovered_by_cause:
+        lines.append(f"         not measured: {causes_line(causes, target.area_m2)}")
+    return [*lines, *_apart(document), *_idle(document), *schedule_lines(document)]
+
+
+def _apart(document: PlanDocument) -> list[str]:
+    """Say if what groups of cameras measure doesn't overlap."""
+    idle = {c.id for c in document.cameras if c.seen_area_m2 == 0.0}
+    groups = [g for g in document.camera_groups if not idle.issuperset(g)]
+    if len(groups) < 2:
+        return []
+    names = ", ".join("{" + " ".join(group) + "}" for group in groups)
+    return [
+        f"         the parts of {names} don't overlap: register them by the "
+        f"calibrated poses, not by the surface"
+    ]
+
+
+def _idle(document: PlanDocument) -> list[str]:
+    areas = (
+        *((p.id, "lights", p.lit_area_m2) for p in document.projectors),
+        *((c.id, "measures", c.seen_area_m2) for c in document.cameras),
+    )
+    return [
+        f"         {name} {does} none of the target"
+        for name, does, area in areas
+        if area == 0.0
+    ]
+
+
+def schedule_lines(document: PlanDocument) -> list[str]:
+    """Return what may fire together, in a line; none for one projector."""
+    schedule, overlaps = document.firing_schedule, document.overlaps
+    if schedule is None or not overlaps:
+        return []
+    n = schedule.n_groups
+    if n == 1:
+        return ["FIRING   all projectors together: no two light a surface in common"]
+    goes = ", then ".join(" + ".join(group) for group in schedule.groups)
+    fewest = {
+        "clique": f"fewer won't do: any two of {', '.join(schedule.clique)} light "
+        "surface in common",
+        "exhaustion": "fewer won't do: every way was tried",
+        "none": f"at least {schedule.lower_bound} are needed",
+    }[schedule.proof]
+    most = max(overlaps, key=lambda overlap: overlap.target_m2)
+    share = percent(most.target_m2 / document.coverage.target.area_m2)
+    return [
+        f"FIRING   {goes}: {n} groups, {fewest}; most shared: "
+        f"{' and '.join(most.projectors)}, {share} of the target"
+    ]
+
+
+def _cell(areas: Areas, key: str) -> str:
+    return area_cell(getattr(areas, key), areas.area_m2)
+
+
+def area_cell(area_m2: float, whole_m2: float) -> str:
+    """Return an area and its share of a whole, in the unit that suits the whole."""
+    small = whole_m2 < _SMALL_M2
+    area, unit = (1e6 * area_m2, "mm²") if small else (1e4 * area_m2, "cm²")
+    return f"{area:9.1f} {unit} {percent(area_m2 / whole_m2):>8}"
+
+
+def _ratio(part: float, whole: float) -> str:
+    return percent(part / whole) if whole > 0 else "undefined"
+
+
+def marginal_lines(plan: RigPlan) -> list[str]:
+    """Return the covered share of the target by the number of devices."""
+    rows = plan.document.marginal
+    lit = {
+        row.n_projectors: row.lit_target_m2
+        for row in rows
+        if isinstance(row, ProjectorMarginal)
+    }
+    measured = {
+        row.n_cameras: row.measured_target_m2
+        for row in rows
+        if isinstance(row, CameraMarginal)
+    }
+    return [
+        "",
+        "MARGINAL what one more or fewer would change (* as planned)",
+        _counted("projectors", "lit", lit, len(plan.projectors), plan),
+        _counted("cameras", "measured", measured, len(plan.cameras), plan),
+    ]
+
+
+def _counted(
+    kind: str, verb: str, areas: Mapping[int, float], planned: int, plan: RigPlan
+) -> str:
+    whole = plan.coverage.target.area_m2
+    cells = [
+        f"{n}{'*' if n == planned else ''}: {percent(area / whole)}"
+        for n, area in areas.items()
+    ]
+    return f"         {kind:<10} {verb} of the target   {'   '.join(cells)}"
