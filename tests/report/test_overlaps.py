@@ -14,6 +14,7 @@ from planning.model.device_poses import ring_frame
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
 from planning.report.entries.overlaps import overlap_records, shared_areas
+from planning.report.summary.coverage_lines import schedule_lines
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
 from planning.scene.workspace.offered_poses import aimed_poses

@@ -14,6 +14,7 @@ from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.plan import RigPlan
 from planning.pipeline import plan_rig
 from planning.report.entries.range_entries import limits_at, with_spread
+from planning.report.summary.ring_lines import range_lines
 from planning.rig.range_guard import guarded
 from planning.rig.rig import load_rig
 from planning.scene.ranges.range_file import read_range_file

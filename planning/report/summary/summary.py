@@ -75,7 +75,7 @@ def shell_line(mesh: MeshRecord) -> str:
 
 
 def _where(workspace: Workspace) -> str:
-    zones = zone_phrases(workspace)
+    zones = _zone_phrases(workspace)
     if workspace.half_angle >= np.pi and workspace.floor_m is None and not zones:
         return "the whole shell about it (no floor)"
     phrases: list[str] = []
@@ -90,7 +90,7 @@ def _where(workspace: Workspace) -> str:
     return f"the shell about it, {', '.join(phrases + zones)}"
 
 
-def zone_phrases(workspace: Workspace) -> list[str]:
+def _zone_phrases(workspace: Workspace) -> list[str]:
     """Return what a box, keep-out volumes and mounting planes leave, a phrase each."""
     phrases: list[str] = []
     if workspace.box is not None:
