@@ -16,7 +16,6 @@ from planning.model.document.input_records import (
     RangesRecord,
     RefusedPoint,
 )
-from planning.model.document.plan_document import PlanDocument
 from planning.model.planned import PlannedCamera
 from planning.rig.range_guard import Guard
 from planning.scene.ranges.ranged_body import SIGNIFICANCE, RangedBody, refusal_line
