@@ -22,8 +22,11 @@ from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples
-from planning.verify.audit.counts.overlap_claims import audit_overlaps, light_falls
-from planning.verify.audit.counts.schedule_claims import audit_schedule
+from planning.verify.audit.counts.overlap_claims import (
+    audit_overlaps,
+    audit_schedule,
+    light_falls,
+)
 from planning.verify.audit.predicates.audit_devices import AuditProjector
 from planning.verify.audit.predicates.occlusion import Shadow
 

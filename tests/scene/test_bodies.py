@@ -49,8 +49,7 @@ from planning.scene.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import bodies_of
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
-from planning.verify.audit.predicates.blocks import Block, block_of
-from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.occlusion import Block, Shadow, block_of
 from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
     PROJECTOR_BODY,

@@ -11,19 +11,15 @@ from planning.model.surface import Surface
 from planning.verify.audit.baselines.baseline_claims import audit_baselines
 from planning.verify.audit.baselines.range_claims import audit_ranges
 from planning.verify.audit.counts.certificate_claims import audit_certificates
-from planning.verify.audit.counts.derived_claims import audit_derived
-from planning.verify.audit.counts.overlap_claims import audit_overlaps
+from planning.verify.audit.counts.overlap_claims import audit_overlaps, audit_schedule
 from planning.verify.audit.counts.route_claims import audit_routes
-from planning.verify.audit.counts.schedule_claims import audit_schedule
-from planning.verify.audit.counts.table_claims import audit_tables
+from planning.verify.audit.counts.table_claims import audit_derived, audit_tables
 from planning.verify.audit.coverage.area_claims import audit_areas, recomputed_areas
 from planning.verify.audit.coverage.group_claims import audit_groups
 from planning.verify.audit.coverage.inside_claims import audit_inside
-from planning.verify.audit.coverage.margin_claims import audit_margins
-from planning.verify.audit.coverage.region_claims import audit_regions
+from planning.verify.audit.coverage.region_claims import audit_margins, audit_regions
 from planning.verify.audit.devices.body_claims import audit_bodies
-from planning.verify.audit.devices.device_claims import audit_devices
-from planning.verify.audit.devices.existing_claims import audit_existing
+from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
 from planning.verify.audit.rings.ring_claims import audit_rings
@@ -31,7 +27,6 @@ from planning.verify.audit.rings.ring_claims import audit_rings
 from .audit_case import examine
 from .audit_findings import AuditFindings
 from .audit_samples import AuditSamples
-from .unmet import unmet_requirements
 
 _CLAIMS = (
     audit_devices,
@@ -157,3 +152,30 @@ def _require_shapes(surface: Surface) -> None:
         raise PlanFileError(
             f"surface.npz: steep must be ({n}, 3) finite numbers, plan again"
         )
+
+
+def unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
+    """Return one sentence for each requirement on the target that isn't met.
+
+    lit >= dominant_coverage x reachable by projectors, measured >= coverage x reachable
+    by cameras, reachable by projectors >= min_reachable x target, reachable by cameras
+    >= min_reachable x lit. Read from the claims, which the audit holds against its own
+    figures apart.
+    """
+    limits, areas = plan.requirements, plan.coverage.target
+    by_projectors = ("reachable_by_projectors_m2", areas.reachable_by_projectors_m2)
+    by_cameras = ("reachable_by_cameras_m2", areas.reachable_by_cameras_m2)
+    lit, measured = ("lit_m2", areas.lit_m2), ("measured_m2", areas.measured_m2)
+    whole = ("area_m2", areas.area_m2)
+    rules = (
+        ("min_reachable", by_projectors, limits.min_reachable, whole),
+        ("dominant_coverage", lit, limits.dominant_coverage, by_projectors),
+        ("coverage", measured, limits.coverage, by_cameras),
+        ("min_reachable", by_cameras, limits.min_reachable, lit),
+    )
+    return tuple(
+        f"requirements.{name}: {part} {area:.6g} m² is less than {share:g} x {of} = "
+        f"{share * total:.6g} m²"
+        for name, (part, area), share, (of, total) in rules
+        if not (total > 0.0 and area >= share * total * (1.0 - 1e-9))
+    )

@@ -1,5 +1,6 @@
 """Claims of the tables: marginal gains, shares and members."""
 
+import math
 from itertools import pairwise
 
 from planning.model.plan import RigPlan
@@ -92,3 +93,88 @@ def _audit_shares(case: AuditCase, findings: AuditFindings) -> None:
                 f"members.0.{name}",
                 f"differs from {name}, of which it is the only member",
             )
+
+
+_ROUNDING = 1e-9
+_RELATIVE = 1e-6
+# Metres of one file unit; a mesh that was scaled to a size names no such unit.
+_METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+_DEGREE = math.pi / 180.0
+# Largest s_N isn't among them: the command line may ask for another accuracy.
+_LIMITS = (
+    ("projector_max_incidence_deg", "projector", "max_incidence", _DEGREE),
+    ("min_tangent_angle_deg", "projector", "min_tangent_angle", _DEGREE),
+    ("camera_max_incidence_deg", "camera", "max_incidence", _DEGREE),
+    ("min_conditioning", "triangulation", "min_conditioning", 1.0),
+    ("noise_px", "triangulation", "noise_px", 1.0),
+    ("min_ring_pitch_px", "triangulation", "min_ring_pitch_px", 1.0),
+)
+
+
+def audit_derived(case: AuditCase, findings: AuditFindings) -> None:
+    """Check what needs no recomputation: values that others of the plan determine."""
+    _audit_limits(case, findings)
+    _audit_scales(case, findings)
+    _audit_cost(case, findings)
+
+
+def _audit_limits(case: AuditCase, findings: AuditFindings) -> None:
+    """The rig's limits are those of the requirements."""
+    limits = case.plan.document.rig.limits
+    for name, part, wish, unit in _LIMITS:
+        stated = limits.get(name)
+        required = getattr(getattr(case.plan.requirements, part), wish)
+        key = f"requirements.{part}.{wish}"
+        if stated is None:
+            findings.holds(
+                required is None,
+                key,
+                f"claimed {required!r}, but rig.limits.{name} is {stated!r}",
+            )
+            continue
+        whose = f"(rig.limits.{name})"
+        findings.number(key, required, unit * stated, _ROUNDING, whose)
+
+
+def _audit_scales(case: AuditCase, findings: AuditFindings) -> None:
+    for place, mesh in enumerate(case.plan.document.meshes):
+        key, truth = f"meshes.{place}.scale_to_m", _METRES.get(mesh.unit)
+        findings.holds(
+            mesh.scale_to_m > 0.0, key, f"{mesh.scale_to_m!r} must be positive"
+        )
+        findings.holds(
+            truth is not None or mesh.unit == "size_mm",
+            f"meshes.{place}.unit",
+            f"{mesh.unit!r} isn't one of {', '.join(_METRES)}, size_mm",
+        )
+        if truth is not None:
+            unit = f"m ({mesh.unit})"
+            findings.number(key, mesh.scale_to_m, truth, _RELATIVE * truth, unit)
+
+
+def _audit_cost(case: AuditCase, findings: AuditFindings) -> None:
+    """Eq. (8): C = pixels (t1 + t2) + t3 + t4 + t5, from the entry's own times."""
+    cost, document = case.plan.document.cost, case.plan.document
+    pixels = sum(math.prod(camera.resolution) for camera in document.cameras)
+    findings.number("cost.pixels", cost.pixels, pixels, 0.0, "px")
+    greedy, before = document.certificates.cameras.greedy_count, cost.n_cameras_before
+    findings.holds(
+        before == greedy,
+        "cost.n_cameras_before",
+        f"{before!r} is claimed, but certificates.cameras.greedy_count is {greedy!r}",
+    )
+    earlier = pixels * before / max(len(document.cameras), 1)
+    for name, claimed, each in (
+        ("C", cost.C, pixels),
+        ("C_before", cost.C_before, earlier),
+    ):
+        times = (cost.t1, cost.t2, cost.t3, cost.t4, cost.t5)
+        if claimed is None:
+            continue
+        if any(time is None or time < 0.0 for time in times):
+            findings.fail(f"cost.{name}", f"is claimed with the times {times}")
+            continue
+        t1, t2, t3, t4, t5 = (time or 0.0 for time in times)
+        total = each * (t1 + t2) + t3 + t4 + t5
+        slack = _RELATIVE * (1.0 + total)
+        findings.number(f"cost.{name}", claimed, total, slack, "s")

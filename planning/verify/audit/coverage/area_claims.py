@@ -10,7 +10,7 @@ from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import ROUNDING
 from planning.verify.audit.predicates.audit_devices import light_starts
-from planning.verify.audit.predicates.blocks import block_of
+from planning.verify.audit.predicates.occlusion import block_of
 from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
     LIGHT_CAUSES,

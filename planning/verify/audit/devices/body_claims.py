@@ -12,7 +12,7 @@ from planning.model.planned import PlannedCamera
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_optics import in_frame
-from planning.verify.audit.predicates.blocks import Block, block_of, touches
+from planning.verify.audit.predicates.occlusion import Block, block_of, touches
 
 _ROUNDING = 1e-9
 

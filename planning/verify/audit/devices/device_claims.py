@@ -1,12 +1,26 @@
 """Claims about devices: poses, ring frames, models, and how many there are."""
 
-import numpy as np
+from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import PinholeModel
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.predicates.audit_optics import pixels_of
 
-from .workspace_claims import POSITION_M, audit_poses, audit_ring_frames, outside_by
+from .workspace_claims import (
+    POSITION_M,
+    SAME_POSE,
+    audit_poses,
+    audit_ring_frames,
+    outside_by,
+)
 
 _MODEL = ("resolution", "range_m", "K", "distortion", "pixel_pitch_m", "beam_radius")
 
@@ -80,3 +94,132 @@ def _audit_model(
             continue
         slack = 1e-9 * float(np.abs(np.array(claimed)).max(initial=0.0))
         findings.array(key, claimed, truth, slack, whose)
+
+
+# Positions are written to 0.01 mm, typed rotations to four digits or more.
+_POSITION_M = 1e-5
+_TYPED = 1e-3
+_PIXEL = 1e-3
+_ROLL_RAD = 1e-6
+
+_Device = PlannedProjector | PlannedCamera
+
+
+def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
+    """Check existing devices against requirements, certificates and the rig."""
+    plan, proofs = case.plan, case.plan.document.certificates
+    for kind, devices, proof in (
+        ("projector", plan.projectors, proofs.projectors),
+        ("camera", plan.cameras, proofs.cameras),
+    ):
+        stated = plan.requirements.existing_of(kind)
+        marked: dict[str, _Device] = {d.existing: d for d in devices if d.existing}
+        names = sorted(device.name for device in stated)
+        findings.holds(
+            sorted(marked) == names,
+            f"{kind}s",
+            f"{sorted(marked)} are marked existing, but requirements.existing has "
+            f"{names}",
+        )
+        for device in stated:
+            if device.name in marked:
+                planned = marked[device.name]
+                findings.array(
+                    f"{planned.id}.world_from_device",
+                    planned.world_from_device.tolist(),
+                    device.world_from_device,
+                    SAME_POSE,
+                    f"that of the existing {device.name!r}",
+                )
+        findings.holds(
+            proof.given == len(stated),
+            f"certificates.{kind}s.given",
+            f"{proof.given} is claimed, but {len(stated)} {kind}s are existing devices",
+        )
+    _audit_rig(case, findings)
+
+
+def _audit_rig(case: AuditCase, findings: AuditFindings) -> None:
+    plan = case.plan
+    stated = {str(table.get("name")): table for table in plan.document.rig.existing}
+    names = sorted(device.name for device in plan.requirements.existing)
+    findings.holds(
+        sorted(stated) == names,
+        "requirements.existing",
+        f"holds {names}, but rig.existing has {sorted(stated)}",
+    )
+    for device in (*plan.projectors, *plan.cameras):
+        table = stated.get(device.existing)
+        if table is None:
+            continue
+        kind = "camera" if isinstance(device, PlannedCamera) else "projector"
+        findings.holds(
+            table["kind"] == kind,
+            f"{device.id}.existing",
+            f"is a {kind}, but rig.existing {device.existing!r} is a {table['kind']}",
+        )
+        _audit_pose(device, table, plan.requirements.workspace, findings)
+
+
+def _audit_pose(
+    device: _Device, table: Mapping[str, Any], space: Workspace, findings: AuditFindings
+) -> None:
+    """Compare a pose with the one that was typed, or with position, aim and roll."""
+    key, pose = f"{device.id}.world_from_device", device.world_from_device
+    typed = None if table.get("pose_mm") is None else np.array(table["pose_mm"])
+    place = np.array(table["position_mm"]) if typed is None else typed[:3, 3]
+    off = float(np.linalg.norm(pose[:3, 3] - (np.array(space.centre) + 1e-3 * place)))
+    findings.holds(
+        off <= _POSITION_M,
+        key,
+        f"stands {1e3 * off:.3g} mm from where rig.existing has {device.existing!r}",
+    )
+    if typed is None:
+        towards = np.array(table["aim_mm"]) - place
+        _audit_aim(device, towards, table["roll_deg"], space, findings)
+        return
+    turned = float(np.abs(pose[:3, :3] - typed[:3, :3]).max())
+    findings.holds(
+        turned <= _TYPED,
+        key,
+        f"its rotation differs from rig.existing's by {turned:.2g}",
+    )
+
+
+def _audit_aim(
+    device: _Device,
+    towards: NDArray[np.float64],
+    roll_deg: float,
+    space: Workspace,
+    findings: AuditFindings,
+) -> None:
+    """The aim is the middle of the image, and the image is turned by the roll."""
+    key, turn = f"{device.id}.world_from_device", device.world_from_device[:3, :3]
+    towards = towards / np.linalg.norm(towards)
+    middle = turn.T @ towards
+    model = device.device
+    if isinstance(model, PinholeModel):
+        centre = 0.5 * (np.array(model.resolution) - 1.0)
+        off = float(np.linalg.norm(pixels_of(model, middle[None])[0] - centre))
+        aimed = off <= _PIXEL and middle[2] > 0.0
+    else:
+        off, middle = float(np.linalg.norm(middle - [0.0, 0.0, 1.0])), np.eye(3)[2]
+        aimed = off <= _ROLL_RAD
+    if not findings.holds(
+        aimed, key, f"the aim of {device.existing!r} misses the image centre, {off:.3g}"
+    ):
+        return
+    level = np.cross(towards, space.up)
+    if np.linalg.norm(level) < 1e-6:
+        return
+    level /= np.linalg.norm(level)
+    # The image's x axis, had the middle ray been the optical axis.
+    both = middle + [0.0, 0.0, 1.0]
+    side = turn @ (np.array([1.0, 0.0, 0.0]) - middle[0] / (1.0 + middle[2]) * both)
+    roll = np.arctan2(side @ np.cross(towards, level), side @ level)
+    wrong = (roll - np.radians(roll_deg) + np.pi) % (2.0 * np.pi) - np.pi
+    findings.holds(
+        abs(wrong) <= _ROLL_RAD,
+        key,
+        f"is rolled by {np.degrees(roll):.4g} degrees, rig.existing says {roll_deg:g}",
+    )

@@ -15,7 +15,11 @@ from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .audit_optics import in_frame, in_image, in_world, pixels_of, towards
-from .blocks import Block, bodies_but, bodies_of_reference
+from .occlusion import (
+    Block,
+    bodies_but,
+    bodies_of_reference,
+)
 
 _Array = NDArray[np.float64]
 

@@ -1,10 +1,153 @@
 """Whether the segment from a device to a sample is free, by the first face it meets."""
 
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
+from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
+
+from .audit_optics import in_frame
+
+_Array = NDArray[np.float64]
+_Device = PlannedProjector | PlannedCamera
+# Positions are written to 0.01 mm, so bodies in contact may overlap by as much.
+_SLACK_M = 2e-5
+_POSE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A solid box.
+
+    Attributes:
+        name: What messages call it.
+        world_from_box: Its frame, the origin in its middle, shape (4, 4).
+        half: Half of its sides [m], shape (3,).
+    """
+
+    name: str
+    world_from_box: _Array
+    half: _Array
+
+    @property
+    def corners(self) -> _Array:
+        """Shape (8, 3) [m]; those whose numbers differ in one bit share an edge."""
+        bits = (np.arange(8)[:, None] >> np.arange(3)) & 1
+        local = (2.0 * bits - 1.0) * self.half
+        return local @ self.world_from_box[:3, :3].T + self.world_from_box[:3, 3]
+
+    @property
+    def edges(self) -> tuple[_Array, _Array]:
+        """Both ends of the twelve edges, (12, 3) each."""
+        ends = [(i, i | 1 << k) for k in range(3) for i in range(8) if not i >> k & 1]
+        first, last = np.array(ends).T
+        return self.corners[first], self.corners[last]
+
+    def meets(self, starts: _Array, ends: _Array) -> NDArray[np.bool_]:
+        """Return which straight lines share a point with the box, shape (n,)."""
+        a, b = (in_frame(self.world_from_box, p) for p in (starts, ends))
+        middle, way = 0.5 * (a + b), 0.5 * (b - a)
+        reach = np.abs(way)
+        met = np.all(np.abs(middle) <= self.half + reach, axis=1)
+        turned = np.abs(np.cross(middle, way))
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            met &= (
+                turned[:, i]
+                <= self.half[j] * reach[:, k] + self.half[k] * (reach[:, j])
+            )
+        return met
+
+    def overlaps(self, other: "Block") -> bool:
+        """Return whether two boxes share a point."""
+        return bool(self.meets(*other.edges).any() or other.meets(*self.edges).any())
+
+    def shrunk(self) -> "Block":
+        """Return the box less what rounding a position may have added."""
+        return replace(self, half=np.maximum(self.half - _SLACK_M, 0.0))
+
+
+def block_of(device: _Device) -> Block | None:
+    """Return a device's body in the world; None where it has none."""
+    if device.body is None:
+        return None
+    pose = device.world_from_device
+    frame = pose.copy()
+    frame[:3, 3] += pose[:3, :3] @ np.array(device.body.centre_m)
+    return Block(device.id, frame, np.array(device.body.half_m))
+
+
+def bodies_but(plan: RigPlan, device: _Device) -> tuple[Block, ...]:
+    """Return the bodies of all devices of a plan but one."""
+    every = (*plan.projectors, *plan.cameras)
+    return _bodies(other for other in every if other.id != device.id)
+
+
+def bodies_of_reference(
+    plan: RigPlan, kind: str, poses: _Array
+) -> list[tuple[Block, ...]]:
+    """Return the bodies among which each reference pose covers what it does.
+
+    Those of existing devices, and for a camera those of the projectors.
+
+    Args:
+        plan: The plan.
+        kind: `projector` or `camera`.
+        poses: Of the reference devices, (n, 4, 4); a device of their kind that stands
+            at one of them is itself.
+    """
+    cameras = [camera for camera in plan.cameras if camera.existing]
+    projectors = [p for p in plan.projectors if kind == "camera" or p.existing]
+    others, alike = cameras, projectors
+    if kind == "camera":
+        others, alike = projectors, cameras
+    return [
+        _bodies(
+            [
+                *(d for d in alike if np.abs(d.world_from_device - pose).max() > _POSE),
+                *others,
+            ]
+        )
+        for pose in poses
+    ]
+
+
+def free_of(
+    blocks: Sequence[Block], points: _Array, along: _Array, lengths: _Array
+) -> NDArray[np.bool_]:
+    """Return which segments that end at points (n, 3) meet no body, shape (n,)."""
+    free = np.ones(len(points), dtype=bool)
+    if len(points):
+        for block in blocks:
+            free &= ~block.meets(points - lengths[:, None] * along, points)
+    return free
+
+
+def touches(block: Block, caster: RayCaster) -> bool:
+    """Return whether a body meets a mesh: an edge of either a face of the other."""
+    corners = caster.mesh.corners
+    for k in range(3):
+        if block.meets(corners[:, k], corners[:, (k + 1) % 3]).any():
+            return True
+    starts, ends = block.edges
+    way = ends - starts
+    length = np.linalg.norm(way, axis=1)
+    # Of a body that rounding alone makes no edge is left.
+    long = length > 0.0
+    along = way[long] / length[long, None]
+    _, distance = caster.first_hits(starts[long], along)
+    return bool(np.any(distance <= length[long]))
+
+
+def _bodies(devices: Iterable[_Device]) -> tuple[Block, ...]:
+    blocks = (block_of(device) for device in devices)
+    return tuple(block for block in blocks if block is not None)
+
 
 # In units of the object's radius: 80 roundings of the float32 that rays are cast in.
 _SLACK = 1e-5

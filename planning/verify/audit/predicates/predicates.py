@@ -16,8 +16,7 @@ from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_devices import AuditCamera, AuditProjector
 from .audit_optics import dot, in_frame, in_image, pixel_gradient, pixels_of, towards
-from .blocks import free_of
-from .occlusion import Shadow
+from .occlusion import Shadow, free_of
 
 LIGHT_CAUSES = (
     "projector_beam",
