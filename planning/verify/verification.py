@@ -1,24 +1,25 @@
 """`plan verify`: the audit of every claim, then the simulated reconstruction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import SurfaceSamples
+from geometry.rays.proximity import closest_points
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
 from planning.verify.audit.audit import Audit, audit_plan
+from planning.verify.audit.audit_samples import AuditSamples
+from planning.verify.audit.coverage.prediction import possible_at_floors
 from planning.verify.audit.figure_claims import compare_figures, contradictions
-
-if TYPE_CHECKING:
-    from geometry.mesh.sampling import SurfaceSamples
-    from planning.verify.audit.audit_samples import AuditSamples
-    from planning.verify.reconstruction.check.comparison import PredictedSamples
-    from planning.verify.reconstruction.reconstruct import Reconstruction
+from planning.verify.reconstruction.check.accuracy import Expected
+from planning.verify.reconstruction.check.comparison import PredictedSamples, compare
+from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.reconstruct import reconstruct
+from planning.verify.reconstruction.scanner import Scanner
 
 _MM = 1e3
 _MESH_SAMPLES = 2000
@@ -50,7 +51,7 @@ class Verification:
 
     @property
     def unmet(self) -> tuple[str, ...]:
-        """Requirements and limits that the plan misses and says so: nothing false."""
+        """Requirements and limits that the plan misses and reports: nothing false."""
         return self.audit.unmet + self.missed
 
     @property
@@ -60,14 +61,14 @@ class Verification:
 
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
-        found = self.reconstruction
+        pixels = self.reconstruction
         return {
             "passed": self.passed,
             "failures": list(self.failures),
             "unmet": list(self.unmet),
             "coverage": self.coverage,
             "samples": len(self.audit.samples),
-            "reconstruction": None if found is None else found.to_document(),
+            "reconstruction": None if pixels is None else pixels.to_document(),
         }
 
     def summary(self) -> str:
@@ -78,9 +79,9 @@ class Verification:
         lines.append(_pixels_line(self.reconstruction))
         lines += [f"not met: {sentence}" for sentence in self.unmet]
         lines += [f"FALSE: {sentence}" for sentence in self.failures]
-        pixels = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
+        checked = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
         lines.append(
-            f"verified: every claim holds ({pixels})"
+            f"verified: every claim holds ({checked})"
             if self.passed
             else f"NOT verified: {count_words(len(self.failures), 'failure')}"
         )
@@ -114,7 +115,7 @@ def verify_plan(
     Raises:
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
-    say = progress or _silent
+    say = progress or (lambda line: None)
     seed = plan.document.seed if seed is None else seed
     say("audit: recomputing every claim on fresh samples")
     audit = audit_plan(plan, seed=seed, threads=threads)
@@ -124,20 +125,18 @@ def verify_plan(
         failures += differs
         if differs and _comparable(mesh, plan.surface.mesh):
             other = mesh
-    record = plan.document.reconstruction
-    recorded = None if record is None else record.to_document()
+    recorded = plan.document.reconstruction
     failures += contradictions(recorded)
     if not check_pixels:
         return Verification(tuple(failures), audit, None)
-    found = _reconstruct(plan, audit, truth, other, seed, threads, say)
+    pixels = _reconstruct(plan, audit, truth, other, seed, threads, say)
     if truth is not None or other is not None:
         # What is recorded is of the rig as planned.
-        return Verification((*failures, *found.failures), audit, found)
-    false = compare_figures(recorded, found.to_document())
-    reported = record is not None and not record.passed
-    if reported and not false:
-        return Verification(tuple(failures), audit, found, found.failures)
-    return Verification((*failures, *found.failures, *false), audit, found)
+        return Verification((*failures, *pixels.failures), audit, pixels)
+    false = compare_figures(recorded, pixels.record())
+    if recorded is not None and not recorded.passed and not false:
+        return Verification(tuple(failures), audit, pixels, pixels.failures)
+    return Verification((*failures, *pixels.failures, *false), audit, pixels)
 
 
 def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh) -> list[str]:
@@ -181,10 +180,6 @@ def _comparable(mesh: TriangleMesh, surface: TriangleMesh) -> bool:
     return low <= mesh.radius / surface.radius <= high and apart <= surface.radius
 
 
-def _silent(line: str) -> None:
-    """Report to nobody."""
-
-
 def _reconstruct(
     plan: RigPlan,
     audit: Audit,
@@ -195,16 +190,11 @@ def _reconstruct(
     say: Callable[[str], None],
 ) -> Reconstruction:
     """Run the simulated reconstruction on the audit's own samples."""
-    from planning.verify.reconstruction.check.accuracy import Expected
-    from planning.verify.reconstruction.check.comparison import compare
-    from planning.verify.reconstruction.reconstruct import reconstruct
-    from planning.verify.reconstruction.scanner import Scanner
-
     standing = None if truth is None and mesh is None else Scanner.of(truth or plan)
     if standing is not None and mesh is not None:
         standing = replace(standing, mesh=mesh)
     inside, predicted = audit.in_target()
-    found = reconstruct(
+    pixels = reconstruct(
         Scanner.of(plan),
         seed=seed,
         threads=threads,
@@ -212,23 +202,8 @@ def _reconstruct(
         expected=Expected(_bare(inside), predicted),
         progress=lambda done, total: say(f"pixels: pair {done} of {total}"),
     )
-    comparison = compare(
-        _prediction(plan, audit, threads),
-        found.everything,
-        found.accuracy,
-        plan.surface.region,
-        plan.requirements.check.tau_m,
-    )
-    return replace(found, comparison=comparison)
-
-
-def _prediction(plan: RigPlan, audit: Audit, threads: int) -> PredictedSamples:
-    """What the audit recomputed, by the plan's limits and at the physical floors."""
-    from planning.verify.audit.coverage.prediction import possible_at_floors
-    from planning.verify.reconstruction.check.comparison import PredictedSamples
-
     samples = audit.samples
-    return PredictedSamples(
+    prediction = PredictedSamples(
         _bare(samples),
         samples.weights,
         samples.in_target,
@@ -237,19 +212,21 @@ def _prediction(plan: RigPlan, audit: Audit, threads: int) -> PredictedSamples:
         audit.predicted_by,
         possible_at_floors(plan, samples, threads=threads),
     )
+    tau_m, regions = plan.requirements.check.tau_m, plan.surface.region
+    cloud, accuracy = pixels.everything, pixels.accuracy
+    return replace(
+        pixels, comparison=compare(prediction, cloud, accuracy, regions, tau_m)
+    )
 
 
 def _bare(samples: AuditSamples) -> SurfaceSamples:
-    from geometry.mesh.sampling import SurfaceSamples
-
+    """Return the samples as the reconstruction takes them, of one weight."""
     weight = float(samples.weights[0]) if len(samples) else 0.0
     return SurfaceSamples(samples.points, samples.normals, samples.faces, weight)
 
 
 def _apart(mesh: TriangleMesh, other: TriangleMesh) -> float:
     """Largest distance of random points of one mesh from the other in [m]."""
-    from geometry.rays.proximity import closest_points
-
     rng = np.random.default_rng(0)
     areas = mesh.face_areas
     faces = rng.choice(len(areas), size=_MESH_SAMPLES, p=areas / areas.sum())
@@ -259,6 +236,7 @@ def _apart(mesh: TriangleMesh, other: TriangleMesh) -> float:
 
 
 def _areas_line(name: str, areas: Mapping[str, float]) -> str:
+    """Return the recomputed areas of a part, in a line."""
     return (
         f"{name} {1e4 * areas['area_m2']:.2f} cm², recomputed: "
         f"{1e4 * areas['reachable_by_projectors_m2']:.2f} reachable by projectors, "
@@ -268,16 +246,15 @@ def _areas_line(name: str, areas: Mapping[str, float]) -> str:
     )
 
 
-def _pixels_line(found: Reconstruction | None) -> str:
-    if found is None:
+def _pixels_line(pixels: Reconstruction | None) -> str:
+    """Return what the simulated reconstruction says, in a line."""
+    if pixels is None:
         return "pixels: NOT CHECKED"
-    figures = found.to_document()
-    if figures["accuracy_rms_m"] is None:
+    if pixels.accuracy is None:
         return "pixels: no point was measured"
+    errors, missing = pixels.accuracy, pixels.completeness.predicted_missing
     return (
-        f"pixels: {figures['n_merged']} points, rms "
-        f"{_MM * figures['accuracy_rms_m']:.3f} mm, p95 "
-        f"{_MM * figures['accuracy_p95_m']:.3f} mm, bias "
-        f"{_MM * figures['accuracy_bias_m']:.3f} mm, predicted but missing "
-        f"{100 * figures['predicted_missing']:.2f} %"
+        f"pixels: {pixels.n_merged} points, rms {_MM * errors.rms_m:.3f} mm, p95 "
+        f"{_MM * errors.p95_m:.3f} mm, bias {_MM * errors.bias_m:.3f} mm, "
+        f"predicted but missing {100 * (missing or 0.0):.2f} %"
     )

@@ -1,7 +1,7 @@
 """Figures of the check that a plan records, against those of a run again."""
 
-from collections.abc import Mapping
-from typing import Any
+from planning.model.document.check_records import ConfusionRecord, ReconstructionRecord
+from planning.model.document.part import Part
 
 _MM = 1e3
 # Room between two runs with different pixel noise: a share of the figure, and a floor.
@@ -15,24 +15,12 @@ _REPEATABLE = {
     "predicted_missing": (0.25, 0.01),
 }
 _FRACTION_SLACK = 0.025
-# Of confusion tables and of parts of the surface; errors there are those of few points.
-_SHARES = frozenset(
-    (
-        "both",
-        "missing",
-        "unexpected",
-        "neither",
-        "beside",
-        "agreement",
-        "trivial_agreement",
-        "predicted",
-        "measured",
-    )
-)
+# Errors of parts of the surface are those of few points, and not compared.
+_SHARES = {*ConfusionRecord.model_fields, "predicted", "measured"}
 
 
 def compare_figures(
-    recorded: Mapping[str, Any] | None, found: Mapping[str, Any]
+    recorded: ReconstructionRecord | None, fresh: ReconstructionRecord
 ) -> list[str]:
     """Return where a plan's recorded reconstruction differs from one run again.
 
@@ -44,79 +32,57 @@ def compare_figures(
         return []
     failures: list[str] = []
     for name, (share, floor) in _REPEATABLE.items():
-        claimed, value = recorded.get(name), found.get(name)
-        if value is None:
-            continue
-        slack = max(share * abs(value), floor)
-        if not _near(claimed, value, slack):
-            failures.append(
-                f"reconstruction.{name}: claimed {claimed}, run again {value:.6g}, "
-                f"tolerance {slack:.2g}"
-            )
-    failures += _compare_tables(recorded, found)
-    rows = recorded.get("completeness") or []
-    if len(rows) != len(found["completeness"]):
-        failures.append(f"reconstruction.completeness: {len(rows)} rows are claimed")
-        return failures
-    for claimed, row in zip(rows, found["completeness"], strict=True):
-        at = row["threshold_m"]
-        if not _near(claimed.get("threshold_m"), at, 1e-9) or not _near(
-            claimed.get("fraction"), row["fraction"], _FRACTION_SLACK
-        ):
-            failures.append(
-                f"reconstruction.completeness: claimed {claimed}, run again "
-                f"{row['fraction']:.4f} at {_MM * at:.3g} mm, tolerance "
-                f"{_FRACTION_SLACK}"
-            )
-    if recorded.get("passed") is True and not found["passed"]:
+        claimed, value = getattr(recorded, name), getattr(fresh, name)
+        slack = max(share * abs(value or 0.0), floor)
+        failures += _apart(name, claimed, value, slack)
+    # Plans from before have none; rows of single regions rest on few samples.
+    for name in ("confusion", "dominant", "whole_surface"):
+        failures += _differing(name, getattr(recorded, name), getattr(fresh, name))
+    rows, key = recorded.completeness, "completeness"
+    if len(rows) != len(fresh.completeness):
+        return [*failures, f"reconstruction.{key}: {len(rows)} rows are claimed"]
+    for row, again in zip(rows, fresh.completeness, strict=True):
+        at = f"{key} at {_MM * again.threshold_m:.3g} mm"
+        failures += _apart(at, row.threshold_m, again.threshold_m, 1e-9)
+        failures += _apart(at, row.fraction, again.fraction, _FRACTION_SLACK)
+    if recorded.passed and not fresh.passed:
         failures.append(
             "reconstruction.passed: claimed true, the check run again fails"
         )
     return failures
 
 
-def _compare_tables(recorded: Mapping[str, Any], found: Mapping[str, Any]) -> list[str]:
-    """Hold the confusion tables, and the whole surface's row, against a run again.
-
-    Plans from before have none; rows of single regions rest on few samples.
-    """
-    failures: list[str] = []
-    for name in ("confusion", "dominant", "whole_surface"):
-        claimed, value = recorded.get(name), found.get(name)
-        if claimed is not None and value is not None:
-            failures += _differing(f"reconstruction.{name}", claimed, value)
-    return failures
-
-
-def _differing(key: str, claimed: object, value: Mapping[str, Any]) -> list[str]:
-    if not isinstance(claimed, Mapping):
-        return [f"{key}: {claimed!r} is claimed, a table is expected"]
-    failures: list[str] = []
-    for name, own in value.items():
-        if isinstance(own, Mapping):
-            failures += _differing(f"{key}.{name}", claimed.get(name), own)
-        elif name in _SHARES and not _near(claimed.get(name), own, _FRACTION_SLACK):
-            failures.append(
-                f"{key}.{name}: claimed {claimed.get(name)}, run again {own:.4f}, "
-                f"tolerance {_FRACTION_SLACK}"
-            )
-    return failures
-
-
-def contradictions(recorded: Mapping[str, Any] | None) -> list[str]:
+def contradictions(recorded: ReconstructionRecord | None) -> list[str]:
     """Return where a recorded check contradicts itself: passed, but with failures."""
-    if recorded is None:
-        return []
-    passed, missed = recorded.get("passed"), recorded.get("failures")
-    if isinstance(missed, list) and passed is (not missed):
+    if recorded is None or recorded.passed is (not recorded.failures):
         return []
     return [
-        f"reconstruction.passed: claimed {passed!r}, but reconstruction.failures is "
-        f"{missed!r}"
+        f"reconstruction.passed: claimed {recorded.passed!r}, but "
+        f"reconstruction.failures is {list(recorded.failures)!r}"
     ]
 
 
-def _near(claimed: object, value: float, slack: float) -> bool:
-    if isinstance(claimed, bool) or not isinstance(claimed, (int, float)):
-        return False
-    return abs(claimed - value) <= slack
+def _differing(key: str, recorded: Part | None, fresh: Part | None) -> list[str]:
+    """Return which shares of a table differ; nothing where there is no table."""
+    if recorded is None or fresh is None:
+        return []
+    failures: list[str] = []
+    for name in type(fresh).model_fields:
+        claimed, value = getattr(recorded, name), getattr(fresh, name)
+        if isinstance(value, Part):
+            failures += _differing(f"{key}.{name}", claimed, value)
+        elif name in _SHARES:
+            failures += _apart(f"{key}.{name}", claimed, value, _FRACTION_SLACK)
+    return failures
+
+
+def _apart(
+    key: str, claimed: float | None, value: float | None, slack: float
+) -> list[str]:
+    """Return the sentence that a figure differs from a run again, if it does."""
+    if value is None or (claimed is not None and abs(claimed - value) <= slack):
+        return []
+    return [
+        f"reconstruction.{key}: claimed {claimed}, run again {value:.6g}, "
+        f"tolerance {slack:.2g}"
+    ]

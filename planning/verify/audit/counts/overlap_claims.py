@@ -1,4 +1,4 @@
-"""Claims about the area on which light of two projectors falls."""
+"""Claims about overlapping light, and which projectors may fire together."""
 
 from dataclasses import replace
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Claims of the tables: marginal gains, shares and members."""
+"""Claims that follow from others: marginal gains, shares, limits, scales and cost."""
 
 import math
 from itertools import pairwise

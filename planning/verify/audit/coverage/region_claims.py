@@ -1,4 +1,4 @@
-"""Claims about the dominant regions: their size, and who lights them how far."""
+"""Claims about margins, and dominant regions: their size, and who lights them."""
 
 import numpy as np
 from numpy.typing import NDArray

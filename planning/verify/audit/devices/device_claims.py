@@ -1,4 +1,4 @@
-"""Claims about devices: poses, ring frames, models, and how many there are."""
+"""Claims about devices: number, poses, ring frames, models; existing ones."""
 
 from collections.abc import Mapping
 from typing import Any

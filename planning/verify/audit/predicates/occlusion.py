@@ -1,4 +1,10 @@
-"""Whether the segment from a device to a sample is free, by the first face it meets."""
+"""What stands in the way of light and sight: the surface itself, and bodies.
+
+A line from a to b misses a box about the origin iff its middle m and half way d leave
+one of six directions free between them: for x, y and z ``|m_i| > h_i + |d_i|``, for the
+products of the line with these ``|(m x d)_i| > h_j |d_k| + h_k |d_j|``. Two boxes share
+a point iff an edge of one meets the other.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

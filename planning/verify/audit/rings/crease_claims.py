@@ -1,4 +1,4 @@
-"""Creases of the surface, and what a projector's rings cut off them."""
+"""Creases of the surface and chords between rings: what rings leave out."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""A projector's light on a polar grid about its ring axis, and what it meets first."""
+"""A projector's light on a polar grid about its ring axis, and extremes over it."""
 
 from dataclasses import dataclass
 
