@@ -1,14 +1,9 @@
 """Claims of the certificates: counts, bounds and what the plan itself refutes."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from planning.model.document.certificates import Certificate
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
 from planning.verify.audit.estimates import POINT, ROUNDING
 
@@ -18,87 +13,29 @@ from .table_claims import marginal_of
 _FEWEST_SAMPLES = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class _Proof:
-    """A certificate with what the audit knows of it; areas are of the target.
-
-    Attributes:
-        kind: `projectors` or `cameras`.
-        claims: The certificate.
-        devices: Of the plan.
-        covers: Whether each device covers each sample of the target, (n_d, n).
-        reachable_m2: Claimed reachable area.
-        share: Of it that must be covered.
-        n_poses: Reference poses.
-        slack_m2: Tolerance of the area that the plan covers.
-    """
-
-    kind: str
-    claims: Certificate
-    devices: Sequence[PlannedProjector] | Sequence[PlannedCamera]
-    covers: NDArray[np.bool_]
-    reachable_m2: float
-    share: float
-    n_poses: int
-    slack_m2: float
-
-    @property
-    def key(self) -> str:
-        """Where the certificate stands."""
-        return f"certificates.{self.kind}"
-
-    @property
-    def count(self) -> int:
-        """Number of devices of the plan."""
-        return len(self.devices)
-
-
 def audit_certificates(case: AuditCase, findings: AuditFindings) -> None:
     """Check counts, bounds and statuses, and that the plan doesn't refute them."""
-    proofs, limits = case.plan.document.certificates, case.plan.requirements
-    areas, surface = case.plan.coverage.target, case.plan.surface
     target, estimator = case.samples.in_target, case.estimator
-    for kind, claims, devices, covers, reachable, share, poses in (
-        (
-            "projectors",
-            proofs.projectors,
-            case.plan.projectors,
-            case.actual.lit_by,
-            areas.reachable_by_projectors_m2,
-            limits.dominant_coverage,
-            surface.reference_projectors,
-        ),
-        (
-            "cameras",
-            proofs.cameras,
-            case.plan.cameras,
-            case.actual.measured_by,
-            areas.reachable_by_cameras_m2,
-            limits.coverage,
-            surface.reference_cameras,
-        ),
-    ):
-        covers = covers & target
-        slack = estimator.tolerance(np.any(covers, axis=0), estimator.target_m2)
-        proof = _Proof(
-            kind, claims, devices, covers, reachable, share, len(poses), slack
-        )
-        _audit_counts(proof, findings)
-        _audit_continuous(proof, findings)
-        _audit_areas(proof, case, findings)
-        _audit_bodies(proof, findings)
-        _audit_refuted(proof, case, findings)
+    for kind in case.kinds:
+        key = f"certificates.{kind.name}s"
+        chosen = kind.covers.any(axis=0) & target
+        slack = estimator.tolerance(chosen, estimator.target_m2)
+        _audit_counts(key, kind, findings)
+        _audit_continuous(key, kind.proof, findings)
+        _audit_areas(key, kind, slack, case, findings)
+        _audit_bodies(key, kind, findings)
+        _audit_refuted(key, kind, slack, case, findings)
 
 
-def _audit_counts(proof: _Proof, findings: AuditFindings) -> None:
+def _audit_counts(key: str, kind: DeviceKind, findings: AuditFindings) -> None:
     """Check count, bounds, status and what is needed against each other."""
-    key, claims, count = proof.key, proof.claims, proof.count
+    claims, count = kind.proof, len(kind.devices)
     bound, needed = claims.candidates.lower_bound, claims.needed
     # A proof over fewer candidates than the reference poses proves less.
-    offered = claims.candidates.n_candidates
+    candidates = claims.candidates.n_candidates
     name = f"{key}.candidates.n_candidates"
     findings.number(f"{key}.count", claims.count, count, 0.0, "")
-    findings.number(name, offered, proof.n_poses, 0.0, "poses")
+    findings.number(name, candidates, len(kind.poses), 0.0, "poses")
     met = claims.status != "infeasible"
     most = f"exceeds the count of {count}"
     scopes = {"candidates": bound}
@@ -125,16 +62,16 @@ def _audit_counts(proof: _Proof, findings: AuditFindings) -> None:
     )
 
 
-def _audit_continuous(proof: _Proof, findings: AuditFindings) -> None:
+def _audit_continuous(key: str, claims: Certificate, findings: AuditFindings) -> None:
     """What holds for all poses holds for the candidates too, on equal samples."""
-    claims, table = proof.claims, proof.claims.continuous
+    table = claims.continuous
     if table is None:
         return
     same = table.n_samples == claims.n_samples
     here = claims.needed.lower_bound if same else claims.needed.count
     findings.holds(
         table.lower_bound <= here,
-        f"{proof.key}.continuous.lower_bound",
+        f"{key}.continuous.lower_bound",
         f"{table.lower_bound} is claimed over all poses, but only {here} over the "
         f"candidates, which are some of them",
     )
@@ -144,58 +81,61 @@ def _audit_continuous(proof: _Proof, findings: AuditFindings) -> None:
     for entry in claims.by_count:
         findings.holds(
             entry.count != fewer or entry.value_m2 <= upper * (1.0 + ROUNDING),
-            f"{proof.key}.continuous.one_fewer_upper_bound_m2",
+            f"{key}.continuous.one_fewer_upper_bound_m2",
             f"{square_centimetres(upper)} is claimed over all poses, but {fewer} of "
             f"the candidates cover {square_centimetres(entry.value_m2)}",
         )
 
 
-def _audit_areas(proof: _Proof, case: AuditCase, findings: AuditFindings) -> None:
+def _audit_areas(
+    key: str,
+    kind: DeviceKind,
+    slack: float,
+    case: AuditCase,
+    findings: AuditFindings,
+) -> None:
     """Check required_m2, best_area, one_fewer, by_count and the marginal table.
 
     What a number of candidates covers at most bounds what they were found to cover,
     and, but for sampling, what the marginal table says of as many: its entries for
     other counts than the plan's speak of candidates, too.
     """
-    key, claims, whole = proof.key, proof.claims, case.estimator.target_m2
-    required = proof.share * proof.reachable_m2
-    slack = proof.slack_m2
+    claims, whole = kind.proof, case.estimator.target_m2
+    required = kind.share * kind.reachable_m2
     findings.number(f"{key}.required_m2", claims.required_m2, required, slack)
     most = {entry.count: entry.upper_bound_m2 for entry in claims.by_count}
     best, fewer, count = claims.best_area, claims.one_fewer, claims.count
-    for name, value, upper in (
-        ("best_area", best.value_m2, best.upper_bound_m2),
-        *(
-            (f"by_count: for {e.count}", e.value_m2, e.upper_bound_m2)
-            for e in claims.by_count
-        ),
-    ):
+    listed = {"best_area": best} | {
+        f"by_count: for {e.count}": e for e in claims.by_count
+    }
+    for name, entry in ({"best_area": best} | entries).items():
         findings.holds(
-            0.0 <= value <= upper * (1.0 + ROUNDING),
+            0.0 <= entry.value_m2 <= entry.upper_bound_m2 * (1.0 + ROUNDING),
             f"{key}.{name}",
-            f"value_m2 {square_centimetres(value)} exceeds upper_bound_m2 "
-            f"{square_centimetres(upper)}",
+            f"value_m2 {square_centimetres(entry.value_m2)} exceeds upper_bound_m2 "
+            f"{square_centimetres(entry.upper_bound_m2)}",
         )
     name = f"{key}.best_area.upper_bound_m2"
-    room = _noise(proof, proof.reachable_m2, whole)
+    room = _noise(claims, kind.reachable_m2, whole)
     findings.holds(
-        best.upper_bound_m2 <= proof.reachable_m2 + room,
+        best.upper_bound_m2 <= kind.reachable_m2 + room,
         name,
         f"{square_centimetres(best.upper_bound_m2)} exceeds the "
-        f"{square_centimetres(proof.reachable_m2)} that can be reached (tolerance "
+        f"{square_centimetres(kind.reachable_m2)} that can be reached (tolerance "
         f"{square_centimetres(room)})",
     )
     if count in most:
         findings.number(name, best.upper_bound_m2, most[count], ROUNDING * whole)
     if fewer is not None:
-        _audit_one_fewer(
-            proof, fewer.upper_bound_m2, most.get(count - 1), whole, findings
-        )
-    for number, area in marginal_of(case.plan, proof.kind, "target"):
+        if count - 1 in most:
+            name, listed = f"{key}.one_fewer.upper_bound_m2", most[count - 1]
+            findings.number(name, fewer.upper_bound_m2, listed, ROUNDING * whole)
+        _audit_one_fewer(key, claims, fewer.upper_bound_m2, slack, findings)
+    for number, area in marginal_of(case.plan, kind.name, "target"):
         upper = most.get(number)
         if upper is None or number == count:
             continue
-        room = _noise(proof, upper, whole)
+        room = _noise(claims, upper, whole)
         findings.holds(
             area <= upper + room,
             f"{key}.by_count",
@@ -206,67 +146,68 @@ def _audit_areas(proof: _Proof, case: AuditCase, findings: AuditFindings) -> Non
 
 
 def _audit_one_fewer(
-    proof: _Proof,
-    upper: float,
-    listed: float | None,
-    whole: float,
-    findings: AuditFindings,
+    key: str, claims: Certificate, upper: float, slack: float, findings: AuditFindings
 ) -> None:
     """If no fewer devices suffice, the bound on one fewer must fall short too."""
-    name, claims = f"{proof.key}.one_fewer.upper_bound_m2", proof.claims
+    name = f"{key}.one_fewer.upper_bound_m2"
     findings.holds(upper >= 0.0, name, f"{upper!r} must be an area")
-    if listed is not None:
-        findings.number(name, upper, listed, ROUNDING * whole)
-    fewest = claims.candidates.lower_bound == proof.count
+    fewest = claims.candidates.lower_bound == claims.count
     findings.holds(
-        not fewest or upper <= claims.required_m2 + proof.slack_m2,
+        not fewest or upper <= claims.required_m2 + slack,
         name,
         f"{square_centimetres(upper)}, which is enough for the "
         f"{square_centimetres(claims.required_m2)} required (tolerance "
-        f"{square_centimetres(proof.slack_m2)}), but {proof.count} are claimed to be "
+        f"{square_centimetres(slack)}), but {claims.count} are claimed to be "
         f"the fewest",
     )
 
 
-def _noise(proof: _Proof, area_m2: float, whole: float) -> float:
+def _noise(claims: Certificate, area_m2: float, whole: float) -> float:
     """A point, and three standard errors of an area from the certificate's samples."""
-    n = max(proof.claims.n_samples, _FEWEST_SAMPLES)
+    n = max(claims.n_samples, _FEWEST_SAMPLES)
     p = min(max(area_m2 / whole, 1.0 / n), 1.0 - 1.0 / n)
     return whole * (POINT + 3.0 * float(np.sqrt(p * (1.0 - p) / n)))
 
 
-def _audit_bodies(proof: _Proof, findings: AuditFindings) -> None:
+def _audit_bodies(key: str, kind: DeviceKind, findings: AuditFindings) -> None:
     """Where planned devices have bodies the bounds must say that these are left out."""
-    claims = proof.claims
-    bodied = any(d.body is not None and not d.existing for d in proof.devices)
+    claims = kind.proof
+    bodied = any(d.body is not None and not d.existing for d in kind.devices)
     findings.holds(
         not bodied or claims.bounds_leave_out,
-        f"{proof.key}.bounds_leave_out",
+        f"{key}.bounds_leave_out",
         "is missing, but planned devices have bodies",
     )
     stated = "but_for_bodies" in claims.model_fields_set
     findings.holds(
         not stated or (bodied and claims.but_for_bodies >= 1),
-        f"{proof.key}.but_for_bodies",
+        f"{key}.but_for_bodies",
         f"{claims.but_for_bodies!r} must be a number of devices with bodies "
-        f"(the plan has {proof.count})",
+        f"(the plan has {len(kind.devices)})",
     )
 
 
-def _audit_refuted(proof: _Proof, case: AuditCase, findings: AuditFindings) -> None:
+def _audit_refuted(
+    key: str,
+    kind: DeviceKind,
+    slack: float,
+    case: AuditCase,
+    findings: AuditFindings,
+) -> None:
     """A bound is false if the plan meets the requirement with fewer devices than that.
 
     Devices are left out one after the other, always the one that is missed least;
     existing ones belong to every cover that the bound speaks of.
     """
-    bound = proof.claims.candidates.lower_bound
-    enough = proof.claims.required_m2 + proof.slack_m2
-    spare = [i for i, device in enumerate(proof.devices) if not device.existing]
-    staying = list(range(proof.count))
+    bound = kind.proof.candidates.lower_bound
+    enough = kind.proof.required_m2 + slack
+    covers = kind.covers & case.samples.in_target
+    spare = [i for i, device in enumerate(kind.devices) if not device.existing]
+    staying = list(range(len(kind.devices)))
     while len(staying) >= bound and spare:
         areas = [
             case.estimator.area(
-                np.any(proof.covers[[i for i in staying if i != out]], axis=0)
+                np.any(covers[[i for i in staying if i != out]], axis=0)
             )
             for out in spare
         ]
@@ -274,7 +215,7 @@ def _audit_refuted(proof: _Proof, case: AuditCase, findings: AuditFindings) -> N
         staying.remove(spare.pop(best))
         if len(staying) < bound and areas[best] > enough:
             findings.fail(
-                f"{proof.key}.candidates.lower_bound",
+                f"{key}.candidates.lower_bound",
                 f"{bound} is claimed, but {len(staying)} of the plan's devices cover "
                 f"{areas[best]:.6g} m², more than the {enough:.6g} m² required",
             )

@@ -10,34 +10,36 @@ from planning.verify.audit.estimates import POINT, ROUNDING
 
 
 def marginal_of(plan: RigPlan, kind: str, part: str) -> list[tuple[int, float]]:
-    """Return (count, area in [m²]) of `projectors` or `cameras`, by rising count.
+    """Return (count, area in [m²]) of projectors or cameras, by rising count.
 
     Args:
         plan: The plan.
-        kind: `projectors`: what is lit; `cameras`: what is measured.
+        kind: `projector`: what is lit; `camera`: what is measured.
         part: `target` or `surface`.
     """
-    verb = "lit" if kind == "projectors" else "measured"
+    count, area = f"n_{kind}s", f"{_verb(kind)}_{part}_m2"
     return sorted(
-        (getattr(row, f"n_{kind}"), getattr(row, f"{verb}_{part}_m2"))
+        (getattr(row, count), getattr(row, area))
         for row in plan.document.marginal
-        if f"n_{kind}" in type(row).model_fields
+        if count in type(row).model_fields
     )
+
+
+def _verb(kind: str) -> str:
+    """What devices of a kind do to a sample, as keys call it."""
+    return "lit" if kind == "projector" else "measured"
 
 
 def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
     """Check the marginal table, the dominant share, mesh areas and members."""
-    for kind, chosen, count in (
-        ("projectors", case.actual.lit, len(case.plan.projectors)),
-        ("cameras", case.actual.measured, len(case.plan.cameras)),
-    ):
-        verb = "lit" if kind == "projectors" else "measured"
+    for kind in case.kinds:
+        verb, chosen = _verb(kind.name), kind.covers.any(axis=0)
         for part, (_, whole) in case.estimator.wholes().items():
-            table = marginal_of(case.plan, kind, part)
-            findings.holds(table, f"marginal.{kind}", "is missing")
+            table = marginal_of(case.plan, kind.name, part)
+            findings.holds(table, f"marginal.{kind.name}s", "is missing")
             for number, area in table:
-                key = f"marginal.{kind}.{number}.{verb}_{part}_m2"
-                if number == count:
+                key = f"marginal.{kind.name}s.{number}.{verb}_{part}_m2"
+                if number == len(kind.devices):
                     case.estimator.audit(key, area, chosen, findings, part=part)
                     continue
                 findings.holds(
@@ -49,20 +51,20 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
         slack = case.estimator.tolerance(
             chosen & case.samples.in_target, case.estimator.target_m2
         )
-        _audit_rising(case.plan, kind, f"{verb}_target_m2", slack, findings)
+        _audit_rising(case.plan, kind.name, slack, findings)
     _audit_shares(case, findings)
 
 
 def _audit_rising(
-    plan: RigPlan, kind: str, name: str, slack: float, findings: AuditFindings
+    plan: RigPlan, kind: str, slack: float, findings: AuditFindings
 ) -> None:
     """On the target more devices do more; on the surface one more may well add less."""
     for (fewer, less), (number, more) in pairwise(marginal_of(plan, kind, "target")):
         findings.holds(
             more >= less - slack,
-            f"marginal.{kind}",
-            f"{name} falls from {square_centimetres(less)} with {fewer} "
-            f"{kind[: -1 if fewer == 1 else None]} to {square_centimetres(more)} with "
+            f"marginal.{kind}s",
+            f"{_verb(kind)}_target_m2 falls from {square_centimetres(less)} with "
+            f"{fewer} {kind}{'s' * (fewer != 1)} to {square_centimetres(more)} with "
             f"{number}, more than sampling explains ({square_centimetres(slack)})",
         )
 
@@ -77,16 +79,11 @@ def _audit_shares(case: AuditCase, findings: AuditFindings) -> None:
     areas = sum(mesh.area_m2 for mesh in document.meshes)
     findings.number("meshes.area_m2 (sum)", areas, total, POINT * 1e-2 * total)
     if len(document.meshes) == 1 and document.members:
-        member = document.members[0]
+        member, checked = document.members[0], document.reconstruction
+        sole = len(document.members) == 1
         for name, same in (
-            (
-                "coverage",
-                len(document.members) == 1 and member.coverage == document.coverage,
-            ),
-            (
-                "reconstruction",
-                member.reconstruction in (document.reconstruction, None),
-            ),
+            ("coverage", sole and member.coverage == document.coverage),
+            ("reconstruction", member.reconstruction in (checked, None)),
         ):
             findings.holds(
                 same,

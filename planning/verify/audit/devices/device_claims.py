@@ -10,7 +10,7 @@ from geometry.devices import PinholeModel
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
-from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_optics import pixels_of
 
@@ -27,30 +27,21 @@ _MODEL = ("resolution", "range_m", "K", "distortion", "pixel_pitch_m", "beam_rad
 
 def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
     """Check ids, poses, ring frames and models of the devices, and their number."""
-    document, limits = case.plan.document, case.plan.requirements
-    space = limits.workspace
-    for kind, records, most, shell in (
-        (
-            "projector",
-            document.projectors,
-            limits.max_projectors,
-            space.projector_radius_m,
-        ),
-        ("camera", document.cameras, limits.max_cameras, space.camera_radius_m),
-    ):
-        key, names = f"{kind}s", [record.id for record in records]
+    document, space = case.plan.document, case.plan.requirements.workspace
+    for kind in case.kinds:
+        key, names = f"{kind.name}s", [record.id for record in kind.records]
         findings.holds(len(set(names)) == len(names), key, f"ids repeat: {names}")
         findings.holds(
-            most is None or len(names) <= most,
+            kind.most is None or len(names) <= kind.most,
             key,
-            f"{len(names)} devices, requirements.max_{key} allows {most}",
+            f"{len(names)} devices, requirements.max_{key} allows {kind.most}",
         )
-        for record in records:
+        for record in kind.records:
             key, pose = f"{record.id}.world_from_device", record.world_from_device
             audit_poses(key, np.array([pose]), findings)
-            _audit_model(kind, record, case, findings)
+            _audit_model(kind, record, findings)
             position = np.array([pose])[:, :3, 3]
-            excess = float(outside_by(position, shell, space)[0])
+            excess = float(outside_by(position, kind.shell, space)[0])
             # An existing device stands where it stands: `audit_existing` checks that.
             findings.holds(
                 record.existing or excess <= POSITION_M,
@@ -74,19 +65,14 @@ def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
 
 
 def _audit_model(
-    kind: str,
-    record: ProjectorRecord | CameraRecord,
-    case: AuditCase,
-    findings: AuditFindings,
+    kind: DeviceKind, record: ProjectorRecord | CameraRecord, findings: AuditFindings
 ) -> None:
     """Check that a device's model is the rig's."""
-    rig = case.plan.document.rig
-    model = rig.projector if kind == "projector" else rig.camera
     for name in _MODEL:
         if name not in type(record).model_fields:
             continue
-        key, whose = f"{record.id}.{name}", f"rig.{kind}.{name}"
-        claimed, truth = getattr(record, name), getattr(model, name)
+        key, whose = f"{record.id}.{name}", f"rig.{kind.name}.{name}"
+        claimed, truth = getattr(record, name), getattr(kind.model, name)
         if claimed is None or truth is None:
             findings.holds(
                 claimed is truth, key, f"claimed {claimed!r}, but {whose} is {truth!r}"
@@ -107,17 +93,13 @@ _Device = PlannedProjector | PlannedCamera
 
 def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
     """Check existing devices against requirements, certificates and the rig."""
-    plan, proofs = case.plan, case.plan.document.certificates
-    for kind, devices, proof in (
-        ("projector", plan.projectors, proofs.projectors),
-        ("camera", plan.cameras, proofs.cameras),
-    ):
-        stated = plan.requirements.existing_of(kind)
-        marked: dict[str, _Device] = {d.existing: d for d in devices if d.existing}
+    for kind in case.kinds:
+        stated = case.plan.requirements.existing_of(kind.name)
+        marked = {d.existing: d for d in kind.devices if d.existing}
         names = sorted(device.name for device in stated)
         findings.holds(
             sorted(marked) == names,
-            f"{kind}s",
+            f"{kind.name}s",
             f"{sorted(marked)} are marked existing, but requirements.existing has "
             f"{names}",
         )
@@ -132,9 +114,10 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
                     f"that of the existing {device.name!r}",
                 )
         findings.holds(
-            proof.given == len(stated),
-            f"certificates.{kind}s.given",
-            f"{proof.given} is claimed, but {len(stated)} {kind}s are existing devices",
+            kind.proof.given == len(stated),
+            f"certificates.{kind.name}s.given",
+            f"{kind.proof.given} is claimed, but {len(stated)} {kind.name}s are "
+            f"existing devices",
         )
     _audit_rig(case, findings)
 

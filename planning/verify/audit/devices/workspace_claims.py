@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
-from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_devices import (
     DivergingRays,
@@ -41,31 +41,23 @@ def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
         f"{_KEY}.object_radius_m", space.object_radius_m, radius, slack, "m"
     )
     _audit_values(space, findings)
-    for kind, poses, stated, shell in (
-        (
-            "projector",
-            surface.reference_projectors,
-            space.n_reference_projectors,
-            space.projector_radius_m,
-        ),
-        (
-            "camera",
-            surface.reference_cameras,
-            space.n_reference_cameras,
-            space.camera_radius_m,
-        ),
-    ):
+    for kind in case.kinds:
+        low, high = kind.shell
         findings.holds(
-            len(poses) == stated,
-            f"{_KEY}.n_reference_{kind}s",
-            f"{stated} reference poses are claimed, surface.npz holds {len(poses)}",
+            0.0 < low <= high,
+            f"{_KEY}.{kind.name}_radius_m",
+            f"{list(kind.shell)} m must be positive and rise",
         )
-        key, movable = (
-            f"surface.npz reference_{kind}s",
-            _movable(poses, kind, case.plan),
+        findings.holds(
+            len(kind.poses) == kind.n_poses,
+            f"{_KEY}.n_reference_{kind.name}s",
+            f"{kind.n_poses} reference poses are claimed, surface.npz holds "
+            f"{len(kind.poses)}",
         )
+        key = f"surface.npz reference_{kind.name}s"
+        movable = _movable(kind, case.plan)
         audit_poses(key, movable, findings)
-        excess = outside_by(movable[:, :3, 3], shell, space)
+        excess = outside_by(movable[:, :3, 3], kind.shell, space)
         count = int((~(excess <= POSITION_M)).sum())
         findings.holds(
             count == 0,
@@ -133,6 +125,7 @@ def audit_ring_frames(
 
 
 def _audit_values(space: Workspace, findings: AuditFindings) -> None:
+    """Check that directions are unit vectors, and the cone is one."""
     for name, vector in (("up", space.up), ("axis", space.axis)):
         length = float(np.linalg.norm(vector))
         findings.holds(
@@ -145,23 +138,12 @@ def _audit_values(space: Workspace, findings: AuditFindings) -> None:
         f"{_KEY}.half_angle",
         f"{space.half_angle:.6g} rad must lie in (0, pi]",
     )
-    for name, shell in (
-        ("projector_radius_m", space.projector_radius_m),
-        ("camera_radius_m", space.camera_radius_m),
-    ):
-        findings.holds(
-            0.0 < shell[0] <= shell[1],
-            f"{_KEY}.{name}",
-            f"{list(shell)} m must be positive and rise",
-        )
 
 
-def _movable(
-    poses: NDArray[np.float64], kind: str, plan: RigPlan
-) -> NDArray[np.float64]:
-    """The poses (n, 4, 4) that aren't those of existing devices."""
-    movable = np.ones(len(poses), dtype=bool)
-    for device in plan.requirements.existing_of(kind):
-        off = np.abs(poses - np.array(device.world_from_device)).max(axis=(1, 2))
+def _movable(kind: DeviceKind, plan: RigPlan) -> NDArray[np.float64]:
+    """The reference poses (n, 4, 4) that aren't those of existing devices."""
+    movable = np.ones(len(kind.poses), dtype=bool)
+    for device in plan.requirements.existing_of(kind.name):
+        off = np.abs(kind.poses - np.array(device.world_from_device)).max(axis=(1, 2))
         movable &= off > SAME_POSE
-    return poses[movable]
+    return kind.poses[movable]

@@ -75,17 +75,14 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
     if standoff is None or play is None:
         return
     middle = standoff + space.object_radius_m
-    for kind, radius, tiled in (
-        ("projector", space.projector_radius_m, space.projector_standoff_m),
-        ("camera", space.camera_radius_m, space.camera_standoff_m),
-    ):
-        low = middle if tiled is None else standoff
-        truth = [low - play, middle + play]
-        key = f"{_KEY}.{kind}_radius_m"
-        findings.array(key, radius, truth, _ROUNDING, "by rig.standoff_m")
+    for kind in case.kinds:
+        tiled = kind.standoff_m
+        truth = [(middle if tiled is None else standoff) - play, middle + play]
+        key = f"{_KEY}.{kind.name}_radius_m"
+        findings.array(key, kind.shell, truth, _ROUNDING, "by rig.standoff_m")
         findings.holds(
             tiled is None or abs(tiled - standoff) <= _ROUNDING,
-            f"{_KEY}.{kind}_standoff_m",
+            f"{_KEY}.{kind.name}_standoff_m",
             f"{tiled!r} m, but rig.standoff_m is {standoff:g} m",
         )
 
