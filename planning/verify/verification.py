@@ -115,7 +115,11 @@ def verify_plan(
     Raises:
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
-    say = progress or (lambda line: None)
+
+    def say(line: str) -> None:
+        if progress is not None:
+            progress(line)
+
     seed = plan.document.seed if seed is None else seed
     say("audit: recomputing every claim on fresh samples")
     audit = audit_plan(plan, seed=seed, threads=threads)

@@ -18,7 +18,7 @@ def audit_certificates(case: AuditCase, findings: AuditFindings) -> None:
     target, estimator = case.samples.in_target, case.estimator
     for kind in case.kinds:
         key = f"certificates.{kind.name}s"
-        chosen = kind.covers.any(axis=0) & target
+        chosen = np.any(kind.covers, axis=0) & target
         slack = estimator.tolerance(chosen, estimator.target_m2)
         _audit_counts(key, kind, findings)
         _audit_continuous(key, kind.proof, findings)
@@ -105,9 +105,7 @@ def _audit_areas(
     findings.number(f"{key}.required_m2", claims.required_m2, required, slack)
     most = {entry.count: entry.upper_bound_m2 for entry in claims.by_count}
     best, fewer, count = claims.best_area, claims.one_fewer, claims.count
-    listed = {"best_area": best} | {
-        f"by_count: for {e.count}": e for e in claims.by_count
-    }
+    entries = {f"by_count: for {e.count}": e for e in claims.by_count}
     for name, entry in ({"best_area": best} | entries).items():
         findings.holds(
             0.0 <= entry.value_m2 <= entry.upper_bound_m2 * (1.0 + ROUNDING),

@@ -3,6 +3,8 @@
 import math
 from itertools import pairwise
 
+import numpy as np
+
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
@@ -33,7 +35,7 @@ def _verb(kind: str) -> str:
 def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
     """Check the marginal table, the dominant share, mesh areas and members."""
     for kind in case.kinds:
-        verb, chosen = _verb(kind.name), kind.covers.any(axis=0)
+        verb, chosen = _verb(kind.name), np.any(kind.covers, axis=0)
         for part, (_, whole) in case.estimator.wholes().items():
             table = marginal_of(case.plan, kind.name, part)
             findings.holds(table, f"marginal.{kind.name}s", "is missing")
