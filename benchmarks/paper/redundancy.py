@@ -39,7 +39,7 @@ from planning.verify.reconstruction.check.image_overlap import (
     overlap_by_frames,
     overlap_by_intensity,
 )
-from planning.verify.reconstruction.faults.overlapping_light import light_falls
+from planning.verify.reconstruction.faults.missing import light_falls
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view

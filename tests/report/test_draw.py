@@ -6,6 +6,8 @@ import time
 import numpy as np
 import pytest
 from PIL import Image
+from support.bare_plan import bare_plan
+from support.reconstruction_rigs import MESH_TABLE
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at, transform
@@ -34,8 +36,6 @@ from planning.report.drawing.rig_picture import (
     save_rig_picture,
 )
 from planning.report.drawing.shader import Shader, draw_mesh
-from tests.support.bare_plan import bare_plan
-from tests.support.reconstruction_rigs import MESH_TABLE
 
 K_PROJECTOR = [[2100.0, 0, 639.5], [0, 2100.0, 399.5], [0, 0, 1]]
 K_CAMERA = [[3500.0, 0, 1223.5], [0, 3500.0, 1023.5], [0, 0, 1]]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support.factories import make_projector, make_requirements, make_scene
 from support.plain_shapes import box
+from support.written import requirements_of
 
 from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
@@ -24,7 +25,6 @@ from planning.report.claims import Devices, make_claims
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
 from planning.verify.audit.audit import audit_plan
-from tests.support.written import requirements_of
 
 CENTRE = np.array([0.3, -0.2, 0.1])
 OLD = (

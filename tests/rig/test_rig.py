@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydantic import BaseModel
+from support.written import requirements_of
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.errors import InfeasibleLimitsError, InputError, RigError
@@ -14,7 +15,6 @@ from planning.rig.rig import list_presets, load_rig
 from planning.rig.rig_files import lay_over, preset_names, read_rig
 from planning.rig.rig_tables import RigTable
 from planning.rig.wishes import Wishes
-from tests.support.written import requirements_of
 
 MINIMAL = """
 name = "bench"

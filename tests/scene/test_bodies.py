@@ -9,6 +9,7 @@ from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 from support.factories import make_requirements, make_scene
 from support.plain_shapes import grid
+from support.written import requirements_of
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
@@ -57,7 +58,6 @@ from planning.verify.audit.predicates.predicates import (
     sight_steps,
 )
 from planning.verify.reconstruction.render.occluders import Both, obstacles_of
-from tests.support.written import requirements_of
 
 # ---- boxes
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.plain_shapes import box, grid
+from support.written import requirements_of
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
@@ -33,7 +34,6 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.candidates import projector_candidates, projectors_towards
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
 from planning.verify.audit.devices.workspace_claims import outside_by
-from tests.support.written import requirements_of
 
 EFFORT = Effort(finest=4, budget=1e7, shadows=0.0, most_samples=500)
 SHIFTED = PinholeModel(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.plain_shapes import box as plate_of
+from support.written import requirements_of
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
@@ -24,7 +25,6 @@ from planning.scene.workspace.candidates import camera_candidates, projectors_ar
 from planning.scene.workspace.shell_positions import along_rays, shell_positions
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.devices.zone_claims import zone_excess
-from tests.support.written import requirements_of
 
 # A ball of 100 mm: devices stand 1050 to 1150 mm from its centre, which is off the
 # origin, so that offsets and positions differ.

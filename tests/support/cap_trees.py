@@ -9,7 +9,7 @@ import numpy as np
 
 from solvers.bit_rows import pack_rows
 from solvers.cells.cell_tree import CellBatch
-from tests.support.array_trees import ArrayTree
+from support.array_trees import ArrayTree
 
 # Added to angles, so that rounding can only make a cell's row larger.
 SLACK = 1e-9

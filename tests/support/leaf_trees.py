@@ -4,7 +4,7 @@ import numpy as np
 
 from solvers.bit_rows import BitSum, words_for
 from solvers.cells.cell_problem import whole_rows
-from tests.support.array_trees import ArrayTree
+from support.array_trees import ArrayTree
 
 
 def tree_of_leaves(parents, leaf_rows, n_rows):

@@ -10,6 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import linprog
+from support.array_trees import ArrayTree
+from support.leaf_trees import (
+    leaves_of,
+    multiplier_bound,
+    rederived,
+    tree_of_leaves,
+)
 
 from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cells.cell_bound import CellStatus, bound_count
@@ -19,13 +26,6 @@ from solvers.cells.cell_store import CellStore
 from solvers.cells.cell_subtrees import Subtrees
 from solvers.cells.cell_tuples import _split, refute_tuples
 from solvers.status import WorkBudget
-from tests.support.array_trees import ArrayTree
-from tests.support.leaf_trees import (
-    leaves_of,
-    multiplier_bound,
-    rederived,
-    tree_of_leaves,
-)
 
 DEG = np.pi / 180.0
 PLENTY = 1e12

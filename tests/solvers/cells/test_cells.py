@@ -7,6 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from support.array_trees import ArrayTree
+from support.leaf_trees import leaves_of, tree_of_leaves
 
 from solvers import bit_rows
 from solvers.bit_rows import BitSum, pack_rows, unpack_rows
@@ -19,8 +21,6 @@ from solvers.cells.cell_store import CellStore
 from solvers.cells.cell_tree import CellBatch
 from solvers.cells.cell_tuples import refute_tuples
 from solvers.status import WorkBudget
-from tests.support.array_trees import ArrayTree
-from tests.support.leaf_trees import leaves_of, tree_of_leaves
 
 PARENTS = np.array([-1, -1, 0, 0, 1, 1, 2, 2])
 

@@ -5,17 +5,17 @@ import dataclasses
 import highspy
 import numpy as np
 import pytest
+from support.cover_statements import (
+    solve_statement,
+    state_cover_relaxation,
+    state_max_coverage,
+)
 
 from solvers import CoverProblem
 from solvers.covers.bounds.mixed_integer import linear_multipliers
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.bounds.relaxation import cost_bound, coverage_bounds
 from solvers.status import SolveStatus, WorkBudget
-from tests.support.cover_statements import (
-    solve_statement,
-    state_cover_relaxation,
-    state_max_coverage,
-)
 
 TIGHT = 1e-6
 

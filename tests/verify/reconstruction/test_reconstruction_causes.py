@@ -85,7 +85,7 @@ def test_only_a_point_whose_ray_meets_its_ring_on_the_mesh_has_a_wrong_root(plan
     pixels = calibrate_camera(camera).project(
         np.column_stack([away, np.full(n, -0.039), away])
     )
-    at = places(Evidence.at(scanner, pixels, 0, 0), Supposed.of(scanner)).points
+    at = places(Evidence.at(scanner, pixels, 0, 0), Supposed.of(scanner))[0]
     design = calibrate_projector(projector)
     rho = np.hypot(*design.ring_plane(design.panel(at)[0]).T)
     rays = calibrate_camera(camera).rays(pixels)

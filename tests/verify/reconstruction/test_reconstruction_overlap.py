@@ -17,10 +17,7 @@ from planning.verify.reconstruction.check.image_overlap import (
     overlap_by_intensity,
     three_classes,
 )
-from planning.verify.reconstruction.faults.overlapping_light import (
-    light_falls,
-    lit_twice,
-)
+from planning.verify.reconstruction.faults.missing import light_falls, lit_twice
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view

@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from geometry.mesh.mesh import TriangleMesh
@@ -101,7 +102,7 @@ def confirm(
     for key, pair in pairs:
         if key in off:
             nothing = np.zeros(len(pair.cloud), dtype=bool)
-            kept.append((key, _left(pair, nothing)))
+            kept.append((key, _with_points(pair, nothing)))
             continue
         if key in good and np.mean(errors[key] > _STRAY * limit_m) > _FEW_STRAYS:
             far = np.abs(_distances(mesh, pair.cloud)) > _STRAY * limit_m
@@ -110,7 +111,7 @@ def confirm(
             taken = pair.cloud.take(far)
             if not _seen_too(key, taken, others, camera, _APART * limit_m):
                 strays[key] = int(np.count_nonzero(far))
-                pair = _left(pair, ~far)
+                pair = _with_points(pair, ~far)
         kept.append((key, pair))
     return Confirmed(
         kept, {key: medians[key] for key in off}, strays, by_each_other=False
@@ -121,7 +122,7 @@ def _distances(mesh: TriangleMesh, cloud: Cloud) -> Array:
     return closest_points(mesh, cloud.points).distances
 
 
-def _left(pair: Decoded, kept: Mask) -> Decoded:
+def _with_points(pair: Decoded, kept: Mask) -> Decoded:
     """Return a pair with some of its points, the others counted as unconfirmed."""
     why = pair.rejected | {"unconfirmed": int(np.count_nonzero(~kept))}
     outcomes = pair.outcomes.copy()
@@ -220,9 +221,6 @@ def _agree(
         return False
     if not apart or max(apart.values()) > tolerance:
         return False
-    reached = {min(keys)}
-    while True:
-        linked = {key for both in apart if both & reached for key in both}
-        if linked <= reached:
-            return reached == keys
-        reached |= linked
+    order = sorted(keys)
+    links = np.array([[frozenset((a, b)) in apart for b in order] for a in order])
+    return connected_components(links, directed=False)[0] == 1

@@ -26,10 +26,10 @@ def in_words(cause: Cause, plan: Scanner) -> str:
         plan: Whose devices it names.
     """
     looks = [_looks(explanation, plan) for explanation in cause.explanations]
-    left = cause.explanations[0].left_m
+    remaining = cause.explanations[0].remaining_m
     return (
         f"{' or '.join(looks)} (that takes the edges' mean distance from their rings "
-        f"from {_MM * cause.before_m:.3f} to {_MM * left:.3f} mm)"
+        f"from {_MM * cause.before_m:.3f} to {_MM * remaining:.3f} mm)"
     )
 
 
@@ -108,12 +108,13 @@ def _grazing(
     each = [one.incidence_cosine(middles, normals) for one in plan.projectors]
     planned = before.incidence_cosine(middles, normals)
     limit = np.cos(plan.limits.max_lit)
-    own = (planned >= limit) & (planned >= np.max(each, axis=0))
-    if not own.any():
+    assigned = (planned >= limit) & (planned >= np.max(each, axis=0))
+    if not assigned.any():
         return ""
-    lit = after.incidence_cosine(middles[own], normals[own])
+    lit = after.incidence_cosine(middles[assigned], normals[assigned])
     order = np.argsort(lit)
-    half = np.searchsorted(np.cumsum(areas[own][order]), 0.5 * areas[own].sum())
+    share = np.cumsum(areas[assigned][order])
+    half = np.searchsorted(share, 0.5 * share[-1])
     angle = float(np.arccos(np.clip(lit[order[half]], -1.0, 1.0)))
     if angle < GRAZING:
         return ""

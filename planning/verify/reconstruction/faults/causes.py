@@ -12,8 +12,13 @@ from planning.verify.reconstruction.scanner import Scanner
 from .cause_words import in_words
 from .diagnosis import diagnose
 from .inaccurate import where_inaccurate, wrong_roots
-from .missing import hole_between, left_out_nearby, missing_where, no_edges
-from .overlapping_light import lit_twice
+from .missing import (
+    hole_between,
+    left_out_nearby,
+    lit_twice,
+    missing_where,
+    no_edges,
+)
 
 # A device whose edges are fewer than this share of what its role gives is all but dark.
 _DARK_SHARE = 0.01
@@ -87,9 +92,9 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
     blurred = [*_unordered(measured), *_double_light(measured)]
     causes = [*blurred, *_dark(measured)]
     if not blurred:
-        found = diagnose(measured.plan, measured.decoded)
-        causes += [in_words(cause, measured.plan) for cause in found]
-        causes += _wrong_roots(measured) if not found else []
+        diagnosed = diagnose(measured.plan, measured.decoded)
+        causes += [in_words(cause, measured.plan) for cause in diagnosed]
+        causes += _wrong_roots(measured) if not diagnosed else []
     lost = _lost(measured, displaced=bool(causes))
     inaccurate = causes or [where_inaccurate(measured.plan, measured.cloud)]
     return tuple(
@@ -145,7 +150,7 @@ def _silent(pairs: dict[str, list[PairCount]], dark: str) -> list[str]:
 def _double_light(measured: MeasuredClouds) -> list[str]:
     """Name projectors that saturate many pixels, and what else lights these."""
     plan = measured.plan
-    found: dict[tuple[str, ...], list[str]] = {}
+    lit_too: dict[tuple[str, ...], list[str]] = {}
     for (p, c), pair in measured.decoded:
         n = pair.n_saturated
         lit = pair.lit_pixels + n
@@ -153,7 +158,7 @@ def _double_light(measured: MeasuredClouds) -> list[str]:
             others = lit_twice(plan, pair.saturated, p, c)
             names = (plan.projectors[p].id, *others)
             seen = f"{100 * n / lit:.0f} % in {plan.cameras[c].id}"
-            found.setdefault(names, []).append(seen)
+            lit_too.setdefault(names, []).append(seen)
     return [
         f"{name} saturates lit pixels, {', '.join(seen)}: "
         + (
@@ -161,7 +166,7 @@ def _double_light(measured: MeasuredClouds) -> list[str]:
             if others
             else "exposed too long"
         )
-        for (name, *others), seen in found.items()
+        for (name, *others), seen in lit_too.items()
     ]
 
 

@@ -78,16 +78,13 @@ def of_device(role: Role, index: int, kind: Kind, reach_m: float) -> Correction:
     """
 
     def apply(supposed: Supposed, x: Array) -> Supposed:
-        devices = list(getattr(supposed, role))
-        device = devices[index]
+        device = getattr(supposed, role)[index]
         if kind == "focal":
             size = supposed.body.mesh.radius
-            devices[index] = _zoomed(device, 1.0 + float(x[0]) / size)
-        else:
-            turn = x[:3] / reach_m if kind != "place" else np.zeros(3)
-            shift = x[-3:] if kind != "aim" else np.zeros(3)
-            devices[index] = _moved(device, turn, shift)
-        return _with(supposed, role, devices)
+            return _with(supposed, role, {index: _zoomed(device, 1.0 + x[0] / size)})
+        turn = x[:3] / reach_m if kind != "place" else np.zeros(3)
+        shift = x[-3:] if kind != "aim" else np.zeros(3)
+        return _with(supposed, role, {index: _moved(device, turn, shift)})
 
     count = {"focal": 1, "aim": 3, "place": 3, "pose": 6}[kind]
     return Correction(kind, role, (index,), count, apply)
@@ -98,9 +95,8 @@ def standing_at(role: Role, index: int, pose: Array, reach_m: float) -> Correcti
     near = of_device(role, index, "pose", reach_m)
 
     def apply(supposed: Supposed, x: Array) -> Supposed:
-        devices = list(getattr(supposed, role))
-        devices[index] = _posed(devices[index], pose)
-        return near.apply(_with(supposed, role, devices), x)
+        there = replace(getattr(supposed, role)[index], world_from_device=pose)
+        return near.apply(_with(supposed, role, {index: there}), x)
 
     return replace(near, kind="far pose", apply=apply)
 
@@ -110,9 +106,8 @@ def swapped(role: Role, one: int, other: int) -> Correction:
 
     def apply(supposed: Supposed, x: Array) -> Supposed:
         del x
-        devices = list(getattr(supposed, role))
-        devices[one], devices[other] = devices[other], devices[one]
-        return _with(supposed, role, devices)
+        devices = getattr(supposed, role)
+        return _with(supposed, role, {one: devices[other], other: devices[one]})
 
     return Correction("swap", role, (one, other), 0, apply)
 
@@ -140,15 +135,16 @@ def of_object(kind: Kind) -> Correction:
     return Correction(kind, None, (), counts[kind], apply)
 
 
-def _with(supposed: Supposed, role: Role, devices: list[Device]) -> Supposed:
-    return replace(supposed, **{role: tuple(devices)})
+def _with(supposed: Supposed, role: Role, changed: dict[int, Device]) -> Supposed:
+    devices = enumerate(getattr(supposed, role))
+    return replace(supposed, **{role: tuple(changed.get(k, one) for k, one in devices)})
 
 
 def _moved(device: Device, turn: Array, shift: Array) -> Device:
     pose = device.world_from_device.copy()
     pose[:3, :3] = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
     pose[:3, 3] += shift
-    return _posed(device, pose)
+    return replace(device, world_from_device=pose)
 
 
 def _zoomed(device: Device, factor: float) -> Device:
@@ -156,10 +152,6 @@ def _zoomed(device: Device, factor: float) -> Device:
     matrix[0, 0] *= factor
     matrix[1, 1] *= factor
     return replace(device, matrix=matrix)
-
-
-def _posed(device: Device, pose: Array) -> Device:
-    return replace(device, world_from_device=pose)
 
 
 def turns_aside(pose: Array) -> list[Array]:
@@ -190,7 +182,7 @@ def far_poses(pose: Array, middle: Array) -> list[Array]:
     reach = float(np.linalg.norm(away))
     poses: list[Array] = []
     for towards in sphere:
-        about = _shortest_turn(away / reach, towards)
+        about = Rotation.align_vectors(towards, away / reach)[0].as_matrix()
         for roll in np.arange(_ROLLS) * (2.0 * np.pi / _ROLLS):
             turned = Rotation.from_rotvec(roll * towards).as_matrix() @ about
             new = np.eye(4)
@@ -198,16 +190,3 @@ def far_poses(pose: Array, middle: Array) -> list[Array]:
             new[:3, 3] = middle + turned @ away
             poses.append(new)
     return poses
-
-
-def _shortest_turn(one: Array, other: Array) -> Array:
-    """Return the least rotation that takes one unit vector to another, (3, 3)."""
-    axis = np.cross(one, other)
-    sine, cosine = float(np.linalg.norm(axis)), float(one @ other)
-    if sine < 1e-9:
-        axis = np.cross(one, np.eye(3)[np.argmin(np.abs(one))])
-        sine = float(np.linalg.norm(axis))
-        return Rotation.from_rotvec(
-            axis / sine * (0.0 if cosine > 0.0 else np.pi)
-        ).as_matrix()
-    return Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix()

@@ -60,14 +60,13 @@ def diagnose_edges(plan: Scanner, evidence: Evidence) -> tuple[Cause, ...]:
         _FINE_SHARE * plan.limits.check.max_rms_m,
         _FINE_NOISE * _noise(evidence, supposed, at),
     )
-    lies = mismatches(evidence, supposed, at)[0]
+    lies = mismatches(evidence, supposed, at)
     state = State(evidence, supposed, lies, fine)
     causes: list[Cause] = []
     while len(causes) < _MOST_CAUSES and state.misfit() > fine:
         good = _equally_good(state.explanations())
         if not good or not _helps(good[0], state):
             break
-        good = tuple(state.settled(one) for one in good)
         causes.append(Cause(good, state.misfit()))
         state = State(evidence, good[0].after, good[0].mismatch, fine)
     return tuple(causes)
@@ -83,14 +82,14 @@ def _equally_good(tried: list[Explanation]) -> tuple[Explanation, ...]:
     """Return the simplest of the best, and others as good that don't contain it."""
     if not tried:
         return ()
-    best = min(tried, key=lambda e: e.left_m)
+    best = min(tried, key=lambda e: e.remaining_m)
     good = [e for e in tried if not _clearly_worse(e, best)]
-    good.sort(key=lambda e: (e.correction.n_parameters, e.left_m))
-    kept: list[Explanation] = []
+    good.sort(key=lambda e: (e.correction.n_parameters, e.remaining_m))
+    simplest: list[Explanation] = []
     for one in good:
-        if not any(one.correction.repeats(e.correction) for e in kept):
-            kept.append(one)
-    return tuple(kept)
+        if not any(one.correction.repeats(e.correction) for e in simplest):
+            simplest.append(one)
+    return tuple(simplest)
 
 
 def _clearly_worse(one: Explanation, best: Explanation) -> bool:
@@ -100,19 +99,19 @@ def _clearly_worse(one: Explanation, best: Explanation) -> bool:
     # Outliers of either are no evidence.
     size = np.minimum(left, least)
     sound = size <= np.quantile(size, SOUND_SHARE)
-    more = (left - least)[sound]
-    share = float(np.mean(more)) / float(np.mean(least[sound]))
+    excess = (left - least)[sound]
+    share = float(np.mean(excess)) / float(np.mean(least[sound]))
     if not _AS_GOOD_SHARE < share <= _WORSE_SHARE:
         return share > _WORSE_SHARE
-    error = float(np.std(more)) / np.sqrt(len(more))
-    return float(np.mean(more)) > _AS_GOOD_ERRORS * error
+    error = float(np.std(excess)) / np.sqrt(len(excess))
+    return float(np.mean(excess)) > _AS_GOOD_ERRORS * error
 
 
 def _noise(evidence: Evidence, supposed: Supposed, at: Places) -> float:
     """Median standard deviation of the edges across themselves, at the object [m]."""
     centres = np.array([camera.centre for camera in supposed.cameras])
     focal = np.array([camera.focal_px for camera in supposed.cameras])
-    reach = np.linalg.norm(at.points - centres[evidence.camera], axis=1)
+    reach = np.linalg.norm(at[0] - centres[evidence.camera], axis=1)
     width = reach / focal[evidence.camera]
     known = np.isfinite(width)
     return float(np.median((evidence.noise_px * width)[known])) if known.any() else 0.0

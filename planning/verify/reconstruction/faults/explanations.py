@@ -21,7 +21,7 @@ from .corrections import (
     swapped,
     turns_aside,
 )
-from .fits import fit, least_change
+from .fits import fit
 from .supposed import Evidence, Role, Supposed, mismatches, places
 
 # A pair's mismatch is the mean of this share of its edges, the rest are outliers.
@@ -37,7 +37,7 @@ _ROLES: tuple[Role, Role] = ("cameras", "projectors")
 _THIN = 4
 _FITTED_FAR = 12
 
-Look = Callable[[Supposed], tuple[Array, Array]]
+Look = Callable[[Supposed], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,23 +46,19 @@ class Explanation:
 
     Attributes:
         correction: What is changed.
-        parameters: Fitted ones.
         before: How everything was supposed to stand without it.
         after: How everything is supposed to stand with it.
         mismatch: Of each edge after it [m], shape (n,).
-        left_m: Mismatch that is left, mean over the pairs of devices [m].
+        remaining_m: Mismatch that is left, mean over the pairs of devices [m].
         rows: Edges that it bears on, shape (n,).
-        cosine: Median cosine of the incidence of the light on them.
     """
 
     correction: Correction
-    parameters: Array
     before: Supposed
     after: Supposed
     mismatch: Array
-    left_m: float
+    remaining_m: float
     rows: Mask
-    cosine: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +90,7 @@ class State:
         if all(len(off[role]) == self._n_measured(role) for role in _ROLES):
             tried += [self._fitted(of_object(k)) for k in ("scale", "moved", "similar")]
         several = all(len(off[role]) > 1 for role in _ROLES)
-        if several and any(e.left_m <= self.fine_m for e in tried):
+        if several and any(e.remaining_m <= self.fine_m for e in tried):
             # No change of one device would do as well.
             return tried
         devices: list[tuple[Role, int]] = [
@@ -102,11 +98,11 @@ class State:
         ]
         for role, index in devices:
             tried += self._nearby(role, index)
-        best = min(tried, key=lambda e: e.left_m)
+        best = min(tried, key=lambda e: e.remaining_m)
         for role, index in devices:
-            own = self.evidence.index(role) == index
-            does = [best, *(e for e in tried if np.array_equal(e.rows, own))]
-            least = min(self.misfit(e.mismatch, own) for e in does)
+            concerned = self.evidence.index(role) == index
+            does = [best, *(e for e in tried if np.array_equal(e.rows, concerned))]
+            least = min(self.misfit(e.mismatch, concerned) for e in does)
             if least > _FAR_TIMES * self.fine_m:
                 tried.append(self._afar(role, index))
         return tried
@@ -161,7 +157,7 @@ class State:
         rows = np.flatnonzero(tried[0].concerns(self.evidence))[::_THIN]
         look = self._looking(tried[0], rows)
         starts = [
-            fit(lambda x, one=one: look(one.apply(self.supposed, x))[0], start)
+            fit(lambda x, one=one: look(one.apply(self.supposed, x)), start)
             for one in tried
         ]
         k = self._nearest(tried, starts)[0]
@@ -176,58 +172,32 @@ class State:
         rows = np.flatnonzero(changes[0].concerns(self.evidence))[::_THIN]
         look = self._looking(changes[0], rows)
         left = [
-            capped(look(c.apply(self.supposed, x))[0], _FAR_CAP_M).mean()
+            capped(look(c.apply(self.supposed, x)), _FAR_CAP_M).mean()
             for c, x in zip(changes, starts, strict=True)
         ]
         return np.argsort(left, kind="stable").tolist()
 
     def _looking(self, correction: Correction, rows: Indices) -> Look:
-        """Return what tells mismatch and cosine of some edges, however all stands."""
+        """Return what tells the mismatch of some edges, however all stands."""
         few = self.evidence.take(rows)
         if correction.role == "projectors":
             at = places(few, self.supposed)
             return lambda supposed: mismatches(few, supposed, at)
         return lambda supposed: mismatches(few, supposed, places(few, supposed))
 
-    def settled(self, found: Explanation) -> Explanation:
-        """Return an explanation without what leaves no trace in the edges."""
-        x = found.parameters
-        if len(x) < 2:
-            return found
-        off = self._off_rings(found.correction)
-        nearer = least_change(off, x, np.zeros(len(x)))
-        return self._explanation(found.correction, nearer)
-
     def _fitted(
         self, correction: Correction, start: Array | None = None
     ) -> Explanation:
+        rows = correction.concerns(self.evidence)
+        look = self._looking(correction, np.flatnonzero(rows))
         x = np.zeros(correction.n_parameters) if start is None else start
         if len(x):
-            x = fit(self._off_rings(correction), x)
-        return self._explanation(correction, x)
-
-    def _off_rings(self, correction: Correction) -> Callable[[Array], Array]:
-        """Return what tells the mismatch of the edges that a change bears on."""
-        rows = np.flatnonzero(correction.concerns(self.evidence))
-        look = self._looking(correction, rows)
-        return lambda x: look(correction.apply(self.supposed, x))[0]
-
-    def _explanation(self, correction: Correction, x: Array) -> Explanation:
-        rows = correction.concerns(self.evidence)
+            x = fit(lambda x: look(correction.apply(self.supposed, x)), x)
         after = correction.apply(self.supposed, x)
         mismatch = self.mismatch.copy()
-        mismatch[rows], cosine = self._looking(correction, np.flatnonzero(rows))(after)
-        known = cosine[np.isfinite(cosine)]
-        return Explanation(
-            correction,
-            x,
-            self.supposed,
-            after,
-            mismatch,
-            self.misfit(mismatch),
-            rows,
-            float(np.median(known)) if len(known) else np.nan,
-        )
+        mismatch[rows] = look(after)
+        error = self.misfit(mismatch)
+        return Explanation(correction, self.supposed, after, mismatch, error, rows)
 
 
 def capped(mismatch: Array, cap: float) -> Array:

@@ -3,114 +3,79 @@
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from planning.verify.reconstruction.arrays import Array
 
 # Step of finite differences at the object [m].
 _STEP_M = 2e-5
-_STEPS = 25
-_TRIALS = 5
+# A step along which a mismatch changes faster left one surface for another.
+_MOST_SLOPE = 50.0
 # Mismatches beyond so many medians, and at least this, pull no more [m].
 _FAR_MEDIANS, _FAR_M = 4.0, 1e-3
-# Directions whose singular value is this small against the largest leave no trace.
-_SILENT, _PULLS_BACK, _NO_WORSE = 1e-3, 2, 1.02
-# Below so many medians, and at least this, they count by their square [m].
-_SMALL_MEDIANS, _SMALL_M = 0.5, 5e-6
-_SETTLED_M = 2e-8
-
-
-def least_change(
-    mismatch: Callable[[Array], Array], found: Array, origin: Array
-) -> Array:
-    """Return parameters as good as those found, and nearer to where they began.
-
-    A turn of a projector about its rings' axis, for one, leaves no trace in any edge:
-    whatever of it a start held is taken out again.
-
-    Args:
-        mismatch: Mismatch of each edge in [m], NaN where it has none, shape (n,).
-        found: Fitted parameters [m], shape (k,).
-        origin: Parameters without any change, shape (k,).
-    """
-    error = mismatch(found)
-    cap = max(_FAR_MEDIANS * _typical(error), _FAR_M)
-    for _ in range(_PULLS_BACK):
-        slopes = _slopes(mismatch, found, error)
-        slopes = slopes[np.all(np.isfinite(slopes), axis=1)]
-        if len(slopes) < len(found):
-            return found
-        values, directions = np.linalg.svd(slopes, full_matrices=False)[1:]
-        silent = directions[values < _SILENT * values[0]]
-        nearer = found - silent.T @ (silent @ (found - origin))
-        tried = fit(mismatch, nearer)
-        left = mismatch(tried)
-        if _cost(left, cap) > _NO_WORSE * _cost(error, cap):
-            return found
-        found, error = tried, left
-    return found
+# Below this share of the median, and at least this, they count by their square [m].
+_SMALL_SHARE, _SMALL_M = 0.5, 5e-6
+# What leaves no trace in any edge, as a turn of a projector about its rings' axis, is
+# drawn back to no change by this share of itself.
+_DRAWN_BACK = 1e-3
+_ROUNDS, _STEPS_A_ROUND, _SETTLED_M = 8, 6, 2e-8
 
 
 def fit(mismatch: Callable[[Array], Array], start: Array) -> Array:
-    """Return parameters of a small sum of capped absolute mismatches.
+    """Return parameters of a small sum of absolute mismatches, none without effect.
 
-    Levenberg-Marquardt steps on reweighted squares, w = 1 / max(|e|, small), zero
-    beyond a cap; both follow the median of |e|. What edges can't tell stays as it was.
+    Reweighted least squares, w = 1 / max(|e|, small), zero beyond a cap; both follow
+    the median of |e| from round to round.
 
     Args:
         mismatch: Mismatch of each edge in [m], NaN where it has none, shape (n,).
-        start: Parameters [m], shape (k,).
+        start: Parameters [m], shape (k,); zeros are no change.
     """
-    x, error = start, mismatch(start)
-    damping = 1e-3
-    for _ in range(_STEPS):
-        typical = _typical(error)
-        if not np.isfinite(typical):
+    x = start
+    for _ in range(_ROUNDS):
+        error = mismatch(x)
+        size = np.abs(error)
+        if not np.isfinite(size).any():
             return x
+        typical = float(np.nanmedian(size))
         cap = max(_FAR_MEDIANS * typical, _FAR_M)
-        slopes = _slopes(mismatch, x, error)
-        step = None
-        for _ in range(_TRIALS):
-            tried = _step(
-                error, slopes, cap, max(_SMALL_MEDIANS * typical, _SMALL_M), damping
-            )
-            found = mismatch(x + tried)
-            if _cost(found, cap) < _cost(error, cap):
-                step = tried
-                x, error, damping = x + tried, found, 0.2 * damping
-                break
-            damping *= 10.0
-        if step is None or np.abs(step).max() < _SETTLED_M:
+        small = max(_SMALL_SHARE * typical, _SMALL_M)
+        pulls = np.where(size < cap, 1.0 / np.sqrt(np.fmax(size, small)), 0.0)
+        before, x = x, _weighed(mismatch, x, pulls, cap, small)
+        if np.abs(x - before).max() < _SETTLED_M:
             return x
     return x
 
 
-def _typical(error: Array) -> float:
-    known = np.isfinite(error)
-    return float(np.median(np.abs(error[known]))) if known.any() else np.inf
-
-
-def _cost(error: Array, cap: float) -> float:
-    return float(
-        np.mean(np.minimum(np.where(np.isfinite(error), np.abs(error), cap), cap))
-    )
-
-
-def _slopes(mismatch: Callable[[Array], Array], x: Array, error: Array) -> Array:
-    """Return the derivative of each mismatch by each parameter, shape (n, k)."""
-    steps = _STEP_M * np.eye(len(x))
-    return np.stack([(mismatch(x + step) - error) / _STEP_M for step in steps], axis=1)
-
-
-def _step(
-    error: Array, slopes: Array, cap: float, small: float, damping: float
+def _weighed(
+    mismatch: Callable[[Array], Array],
+    start: Array,
+    pulls: Array,
+    cap: float,
+    small: float,
 ) -> Array:
-    size = np.abs(error)
-    use = (size < cap) & np.all(np.isfinite(slopes), axis=1)
-    # Where a ray leaves one surface for another in the step, the slope is senseless.
-    use &= np.all(np.abs(slopes) < 50.0, axis=1)
-    weight = 1.0 / np.maximum(size[use], small)
-    normal = (slopes[use] * weight[:, None]).T @ slopes[use]
-    pull = (slopes[use] * weight[:, None]).T @ error[use]
-    floor = 1e-9 * float(np.trace(normal)) + 1e-30
-    damped = normal + np.diag(damping * np.diag(normal) + floor)
-    return -np.linalg.solve(damped, pull).astype(np.float64)
+    """Least squares of mismatches by fixed weights, from a start."""
+    back = _DRAWN_BACK / np.sqrt(small)
+
+    def residuals(x: Array) -> Array:
+        error = mismatch(x)
+        size = np.where(np.isfinite(error), np.clip(error, -cap, cap), cap)
+        return np.concatenate([pulls * size, back * x])
+
+    def slopes(x: Array) -> Array:
+        error, every = mismatch(x), np.eye(len(x))
+        changes = [mismatch(x + _STEP_M * one) - error for one in every]
+        rates = np.stack(changes, axis=1) / _STEP_M
+        sound = np.all(np.abs(rates) < _MOST_SLOPE, axis=1)
+        rates = np.where(sound[:, None], pulls[:, None] * rates, 0.0)
+        return np.concatenate([rates, back * every])
+
+    steps = least_squares(
+        residuals,
+        start,
+        slopes,  # pyright: ignore[reportArgumentType]
+        xtol=1e-12,
+        ftol=1e-12,
+        max_nfev=_STEPS_A_ROUND,
+    )
+    return np.asarray(steps.x)

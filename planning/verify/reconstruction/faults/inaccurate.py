@@ -71,9 +71,9 @@ def _grazing(plan: Scanner, projector: NDArray[np.int16], cosine: Array) -> list
     """
     names: list[str] = []
     for p, device in enumerate(plan.projectors):
-        own = projector == p
-        if len(own) and np.mean(own) > _MUCH:
-            lit = float(np.median(cosine[own]))
+        chosen = projector == p
+        if len(chosen) and np.mean(chosen) > _MUCH:
+            lit = float(np.median(cosine[chosen]))
             if lit < np.cos(GRAZING):
                 angle = np.rad2deg(np.arccos(np.clip(lit, -1.0, 1.0)))
                 names.append(f"{device.id} at {angle:.0f} degrees")
@@ -87,9 +87,9 @@ def _pair_medians(
     medians = np.full((n_projectors, n_cameras), np.nan)
     for p in range(n_projectors):
         for c in range(n_cameras):
-            own = (cloud.projector == p) & (cloud.camera == c)
-            if own.any():
-                medians[p, c] = np.median(error[own])
+            chosen = (cloud.projector == p) & (cloud.camera == c)
+            if chosen.any():
+                medians[p, c] = np.median(error[chosen])
     return medians
 
 
@@ -116,12 +116,12 @@ def _name_devices(
     )
     for names, blamed in explanations:
         if names and not np.any(off & ~blamed):
-            rest = known & ~blamed
+            others = known & ~blamed
             verb = "differs" if len(names) == 1 else "differ"
             return (
                 f"{' and '.join(names)} {verb} from the plan in pose or optics: median "
                 f"error {_MM * np.median(medians[off]):.3f} mm, of the other pairs "
-                f"{_MM * np.median(medians[rest]):.3f} mm"
+                f"{_MM * np.median(medians[others]):.3f} mm"
             )
     pairs = ", ".join(f"{projectors[p]} with {cameras[c]}" for p, c in np.argwhere(off))
     return f"some pairs of devices are off and others aren't: {pairs}"
@@ -142,7 +142,7 @@ def wrong_roots(plan: Scanner, decoded: Pairs) -> tuple[tuple[str, str, float], 
     """
     limit = plan.limits.check.max_rms_m
     supposed = Supposed.of(plan)
-    found: list[tuple[str, str, float]] = []
+    wrong_pairs: list[tuple[str, str, float]] = []
     for (p, c), pair in decoded:
         cloud = pair.cloud.thinned(_POINTS_A_PAIR)
         if len(cloud) == 0:
@@ -150,10 +150,10 @@ def wrong_roots(plan: Scanner, decoded: Pairs) -> tuple[tuple[str, str, float], 
         radii = plan.projectors[p].pattern.coordinate(cloud.ring)
         evidence = replace(Evidence.at(plan, cloud.pixels, p, c), radii=radii)
         at = places(evidence, supposed)
-        off = np.abs(mismatches(evidence, supposed, at)[0])
-        apart = np.linalg.norm(cloud.points - at.points, axis=1)
+        off = np.abs(mismatches(evidence, supposed, at))
+        apart = np.linalg.norm(cloud.points - at[0], axis=1)
         wrong = (off < _ON_RING_SHARE * limit) & (apart > _ELSEWHERE_SHARE * limit)
         share = float(np.mean(wrong))
         if share > _LEAST_SHARE:
-            found.append((plan.projectors[p].id, plan.cameras[c].id, share))
-    return tuple(found)
+            wrong_pairs.append((plan.projectors[p].id, plan.cameras[c].id, share))
+    return tuple(wrong_pairs)

@@ -1,4 +1,7 @@
-"""Samples that were promised and have no point: where they lie, and why."""
+"""Samples that were promised and have no point: where they lie, and why.
+
+Where light falls, by ray casting, also tells what two projectors light at once.
+"""
 
 from itertools import combinations
 from typing import Any
@@ -8,11 +11,13 @@ from scipy.spatial import KDTree
 
 from geometry.mesh.sampling import SurfaceSamples
 from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import CAUSES, Pairs
+from planning.verify.reconstruction.render.occluders import Occluder
+from planning.verify.reconstruction.render.rendered_light import SHADOW_SLACK
 from planning.verify.reconstruction.scanner import Scanner
 
-from .overlapping_light import light_falls
 from .supposed import GRAZING, Evidence, Supposed, places
 
 _MM = 1e3
@@ -24,6 +29,8 @@ _ONE_SIDED = 0.05
 _NEIGHBOURS = 60
 # An explanation must hold for this share of the missing samples.
 _MOST = 0.5
+# Light met more obliquely isn't told from none (docs/reference/semantics.md) [cosine].
+_GLANCING = np.cos(np.deg2rad(89.0))
 
 
 def missing_where(
@@ -126,7 +133,7 @@ def left_out_nearby(
         for cause in np.unique(pair.outcomes[pair.outcomes >= 0]).tolist():
             own = pair.outcomes == cause
             evidence = Evidence.at(plan, pair.edges.pixels[own], p, c)
-            lie = places(evidence, supposed).points
+            lie, _ = places(evidence, supposed)
             lie = lie[np.isfinite(lie[:, 0])]
             if len(lie):
                 reached[cause] |= KDTree(lie).query(points)[0] <= tau
@@ -162,3 +169,49 @@ def no_edges(plan: Scanner, points: Array, normals: Array) -> str:
         f"no edge was found there: {name} meets them at {np.rad2deg(angle):.0f} "
         f"degrees (median), at grazing incidence"
     )
+
+
+def light_falls(
+    projector: ProjectorCalibration, caster: Occluder, points: Array, normals: Array
+) -> Mask:
+    """Return whether a projector's rings light points of the surface, by ray casting.
+
+    Args:
+        projector: As it stands.
+        caster: What stands in the way.
+        points: On the surface in [m], shape (n, 3).
+        normals: Unit normals there, shape (n, 3).
+    """
+    pixels, depth = projector.panel(points)
+    starts, beams, reach = projector.aim(points)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        drawn = projector.ring_coordinate(points) <= projector.pattern.outer_radius
+        lit = projector.in_panel(pixels) & (depth > 0.0) & drawn
+    lit &= -np.einsum("ij,ij->i", beams, normals) > _GLANCING
+    rows = np.flatnonzero(lit)
+    starts = np.broadcast_to(starts, points.shape)[rows]
+    stop = reach[rows] * (1.0 - SHADOW_SLACK)
+    lit[rows] = ~caster.occluded(np.ascontiguousarray(starts), beams[rows], stop)
+    return lit
+
+
+def lit_twice(plan: Scanner, pixels: Array, p: int, c: int) -> tuple[str, ...]:
+    """Return which other projectors light most of some pixels, by the plan's geometry.
+
+    Args:
+        plan: Of the rig.
+        pixels: In the image of camera `c`, shape (n, 2).
+        p: Index of the projector that lights them anyway.
+        c: Index of the camera.
+    """
+    supposed = Supposed.of(plan)
+    points, normals = places(Evidence.at(plan, pixels, p, c), supposed)
+    known = np.isfinite(points[:, 0])
+    if not known.any():
+        return ()
+    spot = supposed.body.caster, points[known], normals[known]
+    lit: list[str] = []
+    for q, projector in enumerate(supposed.projectors):
+        if q != p and np.mean(light_falls(projector, *spot)) > 0.5:
+            lit.append(projector.id)
+    return tuple(lit)

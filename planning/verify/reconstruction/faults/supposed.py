@@ -132,23 +132,14 @@ class Evidence(Columns):
             rows = np.linspace(0, len(edges) - 1, min(EDGES_A_PAIR, len(edges)))
             rows = rows.astype(np.int64)
             radii = plan.projectors[p].pattern.coordinate(edges.rings[rows])
-            part = cls.at(plan, edges.pixels[rows], p, c)
+            some_edges = cls.at(plan, edges.pixels[rows], p, c)
             noise = edges.noise_px[rows]
-            parts.append(replace(part, radii=radii, noise_px=noise))
+            parts.append(replace(some_edges, radii=radii, noise_px=noise))
         return Evidence.join(parts)
 
 
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Where the rays of edges meet the object, shape (n, 3), NaN where they don't.
-
-    Attributes:
-        points: In the world [m].
-        normals: Unit normals there.
-    """
-
-    points: Array
-    normals: Array
+# Points in the world [m] and unit normals there, shape (n, 3), NaN where rays miss.
+Places = tuple[Array, Array]
 
 
 def places(evidence: Evidence, supposed: Supposed) -> Places:
@@ -156,20 +147,20 @@ def places(evidence: Evidence, supposed: Supposed) -> Places:
     n = len(evidence)
     points, normals = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
     for c in np.unique(evidence.camera):
-        own = np.flatnonzero(evidence.camera == c)
+        chosen = np.flatnonzero(evidence.camera == c)
         camera = supposed.cameras[c]
-        rays = camera.rays(evidence.pixels[own])
+        rays = camera.rays(evidence.pixels[chosen])
         whole = np.isfinite(rays[:, 0])
         hits, faces = supposed.body.hits(camera.centre, rays[whole])
-        points[own[whole]] = hits
-        normals[own[whole]] = supposed.body.normals(faces)
-    return Places(points, normals)
+        points[chosen[whole]] = hits
+        normals[chosen[whole]] = supposed.body.normals(faces)
+    return points, normals
 
 
-def mismatches(
-    evidence: Evidence, supposed: Supposed, at: Places
-) -> tuple[Array, Array]:
-    """Return how far edges are off their rings, and how squarely they are lit.
+def mismatches(evidence: Evidence, supposed: Supposed, at: Places) -> Array:
+    """Return how far edges are off their rings [m], shape (n,).
+
+    NaN where the object is missed or faces away from the light.
 
     With X where the edge lies, z its depth before the projector, and rho the ring
     coordinate of the projector's pixel that lights X (as the patterns were drawn), the
@@ -179,20 +170,18 @@ def mismatches(
         evidence: The edges.
         supposed: How everything is supposed to stand.
         at: Where the edges lie.
-
-    Returns:
-        Mismatch in [m], NaN where the object is missed or faces away from the light,
-        and the cosine of the incidence of the light, shape (n,).
     """
-    mismatch, cosine = np.full((2, len(evidence)), np.nan)
+    mismatch = np.full(len(evidence), np.nan)
     for p in np.unique(evidence.projector):
-        own = np.flatnonzero(evidence.projector == p)
+        chosen = np.flatnonzero(evidence.projector == p)
         projector, design = supposed.projectors[p], evidence.designs[p]
-        points, radii = at.points[own], evidence.radii[own]
+        points, normals = (one[chosen] for one in at)
+        radii = evidence.radii[chosen]
         with np.errstate(invalid="ignore", divide="ignore"):
             pixels, depth = projector.panel(points)
             plane = design.ring_plane(pixels)
             off = np.hypot(plane[:, 0], plane[:, 1]) - radii
-            mismatch[own] = design.light.across_m(off, radii, depth)
-            cosine[own] = projector.incidence_cosine(points, at.normals[own])
-    return np.where(cosine > 0.0, mismatch, np.nan), cosine
+            lit = projector.incidence_cosine(points, normals) > 0.0
+            off = np.where(lit, design.light.across_m(off, radii, depth), np.nan)
+        mismatch[chosen] = off
+    return mismatch
