@@ -6,7 +6,7 @@ A projector is an inverse camera and uses the same pinhole. Both models answer t
 questions about their field, so that callers needn't ask which one they have.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +103,14 @@ class PinholeModel:
     def pixel_m(self, distance: float) -> float:
         """Return the side of a pixel on a surface across the axis [m]."""
         return distance / self.focal_px
+
+    def widened(self, times: int) -> "PinholeModel":
+        """Return optics so many times as wide and high."""
+        width, height = self.resolution
+        matrix = self.camera_matrix.copy()
+        matrix[:2, 2] += 0.5 * (times - 1) * np.array([width, height])
+        size = (times * width, times * height)
+        return replace(self, camera_matrix=matrix, resolution=size)
 
     def ray_starts(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where the rays to points (..., 3) of the device frame start."""
@@ -264,6 +272,13 @@ class ParallelModel:
     def pixel_m(self, distance: float) -> float:
         """Return the side of a pixel on a surface across the axis [m]."""
         return self.pixel_pitch_m
+
+    def widened(self, times: int) -> "ParallelModel":
+        """Return optics so many times as wide and high, in no round beam."""
+        width, height = self.resolution
+        return replace(
+            self, resolution=(times * width, times * height), beam_radius=None
+        )
 
     def ray_starts(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where the rays to points (..., 3) of the device frame start."""

@@ -41,6 +41,7 @@ class DivergingLight:
     """Light from one point, through a lens."""
 
     device: PinholeModel
+    reach_words = "an image that reaches {:.0f} degrees off its middle on every side"
 
     def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
         """Return unit L = (P - Q) / |P - Q|, (n, 3), and |P - Q| in [m], (n,)."""
@@ -96,7 +97,8 @@ class DivergingLight:
 
     def off_axis(self, local: _Array) -> _Array:
         """Return the angle to the ray of the image's middle [deg]."""
-        along = local @ self.device.middle_ray / np.linalg.norm(local, axis=1)
+        far = np.maximum(np.linalg.norm(local, axis=1), 1e-12)
+        along = local @ self.device.middle_ray / far
         return np.degrees(np.arccos(np.clip(along, -1.0, 1.0)))
 
 
@@ -105,6 +107,7 @@ class ParallelLight:
     """The paper's ideal beam, along the device's +z."""
 
     device: ParallelModel
+    reach_words = "a beam of {:.0f} mm about its axis"
 
     def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
         """Return +z of the device, and depths z."""

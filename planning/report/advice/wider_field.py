@@ -16,7 +16,6 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.selection import required_samples
 from planning.scene.draws import DRAWS
-from planning.scene.limits.limit import widened
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 from planning.scene.workspace.view_tiles import Site
@@ -81,7 +80,7 @@ def _over_larger_tiles(
 ) -> Iterator[PlannedProjector]:
     """Yield projectors at poses that suit wider fields."""
     for times in _TIMES:
-        device = widened(template.device, times)
+        device = template.device.widened(times)
         offered = projector_candidates(
             replace(template, device=device),
             site.workspace,

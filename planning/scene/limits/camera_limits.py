@@ -1,5 +1,6 @@
 """When a camera sees a sample."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,19 +15,19 @@ from planning.model.requirements import CameraLimits
 from planning.scene.samples import Target
 
 from .limit import (
-    STEEPEST,
     Array,
     InBetween,
+    InRange,
     Limit,
     LimitRelaxation,
     Mask,
     RigFacts,
     causes,
-    degrees,
+    off_axis,
     range_ends,
     to_digits,
     to_step,
-    widened,
+    wider_angle,
 )
 
 # Products of a few cosines and lengths are exact to this.
@@ -138,37 +139,31 @@ class CameraField(CameraLimit):
         """Return which samples appear in the image."""
         return view.device.in_field(view.local)
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return an image that reaches farther, up to three times as wide."""
-        return (
-            LimitRelaxation(
-                self.name,
-                _off_axis,
-                to_step(1.0),
-                lambda value: (
-                    f"a camera image that reaches {value:.0f} degrees off its middle "
-                    f"on every side"
-                ),
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield an image that reaches farther, up to three times as wide."""
+        yield LimitRelaxation(
+            self.name,
+            lambda view: off_axis(view.device, view.local),
+            to_step(1.0),
+            lambda value: (
+                f"a camera image that reaches {value:.0f} degrees off its middle "
+                f"on every side"
             ),
         )
 
 
-class CameraRange(CameraLimit):
+class CameraRange(InRange):
     """Within the depth of field."""
 
     name = "camera_range"
     words = "out of the cameras' depth of field"
 
-    def holds(self, view: CameraRays, rules: CameraLimits) -> Mask:
-        """Return which samples are sharp."""
-        low, high = view.device.range_m
-        return (view.distances >= low) & (view.distances <= high)
-
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return the blur that is let pass where it sets the range; else its ends."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield the blur that is let pass where it sets the range; else its ends."""
         sharp, focus = facts.device.range_m, facts.focus
         if focus is None:
-            return range_ends(self.name, "camera", sharp, sharp)
+            yield from range_ends(self.name, "camera", sharp, sharp)
+            return
         allowed = focus.allowed_m
 
         def ask(view: CameraRays) -> Array:
@@ -184,9 +179,9 @@ class CameraRange(CameraLimit):
                 f"(now {focus.f_number:g})"
             )
 
-        blur = LimitRelaxation(self.name, ask, to_digits(3), say)
+        yield LimitRelaxation(self.name, ask, to_digits(3), say)
         # Ends that the focus sets move only with it.
-        return (blur, *range_ends(self.name, "camera", allowed, sharp))
+        yield from range_ends(self.name, "camera", allowed, sharp)
 
 
 class CameraIncidence(CameraLimit):
@@ -203,23 +198,10 @@ class CameraIncidence(CameraLimit):
         """Return which may face a camera in the cell."""
         return cell.facing >= np.cos(rules.max_incidence) - ROUNDING
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return a larger angle."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a larger angle."""
         limit = facts.required.camera.max_incidence
-        least = np.cos(max(limit, STEEPEST))
-        return (
-            LimitRelaxation(
-                self.name,
-                lambda view: np.where(
-                    view.facing >= least, degrees(view.facing), np.inf
-                ),
-                to_step(1.0),
-                lambda value: (
-                    f"limits.camera_max_incidence_deg = {value:.0f} "
-                    f"(now {np.degrees(limit):g})"
-                ),
-            ),
-        )
+        yield wider_angle(self.name, limit, lambda view: view.facing)
 
 
 class SampleDistance(CameraLimit):
@@ -241,54 +223,30 @@ class SampleDistance(CameraLimit):
         widest = limit * cell.focal_px * np.maximum(cell.facing, 1e-9)
         return cell.least_depth * (1.0 - ROUNDING) <= widest
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return a larger distance."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a larger distance."""
         limit = facts.required.camera.max_sample_distance_m
         if limit is None:
-            return ()
-        return (
-            LimitRelaxation(
-                self.name,
-                lambda view: 1e3 * view.sample_distance,
-                to_digits(3),
-                lambda value: (
-                    f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
-                ),
+            return
+        yield LimitRelaxation(
+            self.name,
+            lambda view: 1e3 * view.sample_distance,
+            to_digits(3),
+            lambda value: (
+                f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
             ),
         )
-
-
-class CameraOcclusion(InBetween):
-    """Not behind the surface."""
-
-    name = "camera_occlusion"
-    words = "hidden from every camera that faces it"
-
-
-class CameraBody(InBetween):
-    """No body of another device in between."""
-
-    name = "camera_body"
-    words = "hidden by a device's body"
 
 
 CAMERA_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
     CameraField(),
     CameraRange(),
     CameraIncidence(),
-    CameraOcclusion(),
-    CameraBody(),
+    InBetween("camera_occlusion", "hidden from every camera that faces it"),
+    InBetween("camera_body", "hidden by a device's body"),
     SampleDistance(),
 )
 SEEN_CAUSES = causes(CAMERA_LIMITS)
 SEEN = len(SEEN_CAUSES)
 OCCLUDED = SEEN_CAUSES.index("camera_occlusion")
 BLOCKED = SEEN_CAUSES.index("camera_body")
-
-
-def _off_axis(view: CameraRays) -> Array:
-    """How far samples are off the middle [deg], inf beyond the widest image, (n,)."""
-    middle = view.device.middle_ray
-    along = view.local @ middle / np.maximum(view.distances, 1e-12)
-    wide = widened(view.device).in_field(view.local)
-    return np.where(wide, degrees(along), np.inf)

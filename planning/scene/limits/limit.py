@@ -1,25 +1,27 @@
 """What all limits have in common, and the first that a sample violates."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import DeviceModel, ParallelModel, PinholeModel
+from geometry.devices import DeviceModel
 from planning.model.requirements import Requirements
+from planning.scene.lights import light_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_Device = TypeVar("_Device", PinholeModel, ParallelModel, DeviceModel)
 View = TypeVar("View")
 Cell = TypeVar("Cell")
 Rules = TypeVar("Rules")
 
 # Beyond this no limit of incidence is worth relaxing.
 STEEPEST = float(np.radians(85.0))
+# A field so many times as wide is as much as is worth asking for.
+WIDEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +60,6 @@ class RigFacts:
     ring_gap_chosen: bool = False
 
 
-class _HasDistances(Protocol):
-    @property
-    def distances(self) -> Array: ...
-
-
 @dataclass(frozen=True, eq=False)
 class LimitRelaxation:
     """How one limit may give way, all others as they are.
@@ -91,8 +88,8 @@ class Limit(Generic[View, Cell, Rules]):
         words: The same as a phrase, of samples that it forbids.
     """
 
-    name: ClassVar[str]
-    words: ClassVar[str]
+    name: str
+    words: str
 
     def holds(self, view: View, rules: Rules) -> Mask | None:
         """Return on which samples it holds, shape (n,); None: it doesn't bind."""
@@ -102,16 +99,57 @@ class Limit(Generic[View, Cell, Rules]):
         """Return a superset of where it holds from poses of a cell; None: of all."""
         return None
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return how it may give way; empty: nothing is advised."""
-        return ()
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield how it may give way; nothing: nothing is advised."""
+        yield from ()
 
 
+@dataclass(frozen=True)
 class InBetween(Limit[object, object, object]):
     """A limit that rays or bodies decide, on samples that pass the others."""
 
+    name: str
+    words: str
+
     def holds(self, view: object, rules: object) -> None:
         """Return None: what stands between isn't looked at."""
+
+
+class RangedView(Protocol):
+    """What a range asks of a view: optics, and how far off samples are [m]."""
+
+    @property
+    def device(self) -> DeviceModel: ...
+    @property
+    def distances(self) -> Array: ...
+
+
+class InRange(Limit[RangedView, Any, Any]):
+    """Within the depth of field."""
+
+    def holds(self, view: RangedView, rules: object) -> Mask:
+        """Return which samples are sharp."""
+        low, high = view.device.range_m
+        return (view.distances >= low) & (view.distances <= high)
+
+
+def wider_angle(
+    name: str, limit: float, cosines: Callable[[Any], Array]
+) -> LimitRelaxation:
+    """Return a larger angle of incidence.
+
+    Args:
+        name: Of the limit, to which `_max` and a unit make the rig file's key.
+        limit: As it is [rad].
+        cosines: Of the angles in a view.
+    """
+    least, key = np.cos(max(limit, STEEPEST)), name.replace("_", "_max_")
+    return LimitRelaxation(
+        name,
+        lambda view: np.where(cosines(view) >= least, degrees(cosines(view)), np.inf),
+        to_step(1.0),
+        lambda value: f"limits.{key}_deg = {value:.0f} (now {np.degrees(limit):g})",
+    )
 
 
 def causes(limits: Sequence[Limit[Any, Any, Any]]) -> tuple[str, ...]:
@@ -164,8 +202,8 @@ def may_hold(
 
 def range_ends(
     cause: str, device: str, ends: tuple[float, float], sharp: tuple[float, float]
-) -> tuple[LimitRelaxation, ...]:
-    """Return relaxations of a range's near end, its far end, and both at once.
+) -> Iterator[LimitRelaxation]:
+    """Yield relaxations of a range's near end, its far end, and both at once.
 
     Each is left out where that end isn't what binds. Views have `distances` in [m].
 
@@ -178,7 +216,7 @@ def range_ends(
     near, far = ends
     low, high = 1e3 * sharp[0], 1e3 * sharp[1]
 
-    def away(view: _HasDistances) -> Array:
+    def away(view: RangedView) -> Array:
         return 1e3 * view.distances
 
     nearer = LimitRelaxation(
@@ -206,7 +244,7 @@ def range_ends(
     )
     binds = (near > 0.0 and near >= sharp[0], far < np.inf and far <= sharp[1])
     offered = zip((*binds, all(binds)), (nearer, farther, both), strict=True)
-    return tuple(relaxation for offer, relaxation in offered if offer)
+    yield from (relaxation for offer, relaxation in offered if offer)
 
 
 def degrees(cosines: Array) -> Array:
@@ -229,15 +267,12 @@ def to_digits(digits: int) -> Callable[[Array], Array]:
     return rounded
 
 
-def widened(device: _Device, times: int = 3) -> _Device:
-    """Return optics so many times as wide and high, and in no round beam.
+def off_axis(device: DeviceModel, local: Array) -> Array:
+    """Return how far samples are off the middle, inf beyond the widest field, (n,).
 
-    Three times as wide is as much as is worth asking for.
+    Args:
+        device: Optics of a camera or a projector.
+        local: Samples in its frame, shape (n, 3) [m].
     """
-    width, height = device.resolution
-    size = (times * width, times * height)
-    if isinstance(device, ParallelModel):
-        return replace(device, resolution=size, beam_radius=None)
-    matrix = device.camera_matrix.copy()
-    matrix[:2, 2] += 0.5 * (times - 1) * np.array([width, height])
-    return replace(device, camera_matrix=matrix, resolution=size)
+    wide = device.widened(WIDEST)
+    return np.where(wide.in_field(local), light_of(wide).off_axis(local), np.inf)

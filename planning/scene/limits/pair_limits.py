@@ -4,6 +4,7 @@ With m the unit normal of the surface of equal code, h their spacing along it an
 viewing ray, |r.m|, s_N and the pitch are those of `measurability`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,18 +86,16 @@ class Conditioning(PairLimit):
         """Return which may be, from the largest |r.m|."""
         return cell.conditioning >= rules.min_conditioning - ROUNDING
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return a smaller |r.m|."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a smaller |r.m|."""
         limit = facts.required.triangulation.min_conditioning
-        return (
-            LimitRelaxation(
-                self.name,
-                lambda pair: np.where(
-                    pair.conditioning >= _LEAST_CONDITIONING, -pair.conditioning, np.inf
-                ),
-                to_step(0.01),
-                lambda value: f"limits.min_conditioning = {-value:.2f} (now {limit:g})",
+        yield LimitRelaxation(
+            self.name,
+            lambda pair: np.where(
+                pair.conditioning >= _LEAST_CONDITIONING, -pair.conditioning, np.inf
             ),
+            to_step(0.01),
+            lambda value: f"limits.min_conditioning = {-value:.2f} (now {limit:g})",
         )
 
 
@@ -119,18 +118,16 @@ class Sigma(PairLimit):
         edge = cell.noise * cell.shift * (1.0 - ROUNDING)
         return edge <= limit * np.maximum(cell.conditioning, 1e-12)
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return a larger deviation."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a larger deviation."""
         limit = facts.required.triangulation.max_sigma_m
         if limit is None:
-            return ()
-        return (
-            LimitRelaxation(
-                self.name,
-                lambda pair: 1e3 * pair.sigma,
-                to_digits(3),
-                lambda value: f"--accuracy {value:.3g} (now {1e3 * limit:g} mm)",
-            ),
+            return
+        yield LimitRelaxation(
+            self.name,
+            lambda pair: 1e3 * pair.sigma,
+            to_digits(3),
+            lambda value: f"--accuracy {value:.3g} (now {1e3 * limit:g} mm)",
         )
 
 
@@ -152,25 +149,26 @@ class Pitch(PairLimit):
             return None
         return cell.spacing * cell.facing * (1.0 + ROUNDING) >= least * cell.shift
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return a wider gap; a smaller limit too where the gap doesn't follow it."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a wider gap; a smaller limit too where the gap doesn't follow it."""
         least, gap = facts.required.triangulation.min_ring_pitch_px, facts.ring_gap_m
         if least is None:
-            return ()
+            return
         chosen = ", chosen" if facts.ring_gap_chosen else ""
-        wider = LimitRelaxation(
+        yield LimitRelaxation(
             self.name,
             lambda pair: 1e3 * gap * least / np.maximum(pair.pitch, 1e-12),
             to_digits(3),
             lambda value: f"rings.gap_mm = {value:.3g} (now {1e3 * gap:.3g}{chosen})",
         )
-        closer = LimitRelaxation(
+        if facts.ring_gap_chosen:
+            return
+        yield LimitRelaxation(
             self.name,
             lambda pair: np.where(pair.pitch >= _LEAST_PITCH_PX, -pair.pitch, np.inf),
             to_step(0.1),
             lambda value: f"limits.min_ring_pitch_px = {-value:.1f} (now {least:g})",
         )
-        return (wider,) if facts.ring_gap_chosen else (wider, closer)
 
 
 PAIR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (Conditioning(), Sigma(), Pitch())

@@ -1,11 +1,13 @@
 """Eq. (2) with margins: when a projector lights a sample."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from geometry.devices import ParallelModel
+from geometry.devices import DeviceModel
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene.lights import light_of
@@ -13,18 +15,19 @@ from planning.scene.patterns.pattern import pattern_of
 from planning.scene.samples import SampleColumns
 
 from .limit import (
-    STEEPEST,
     Array,
     InBetween,
+    InRange,
     Limit,
     LimitRelaxation,
     Mask,
     RigFacts,
     causes,
     degrees,
+    off_axis,
     range_ends,
     to_step,
-    widened,
+    wider_angle,
 )
 
 
@@ -47,6 +50,11 @@ class ProjectorView:
     distances: Array
     incidence_cos: Array
     tangent_cos: Array
+
+    @property
+    def device(self) -> DeviceModel:
+        """The projector's optics."""
+        return self.projector.device
 
     @classmethod
     def of(cls, projector: PlannedProjector, samples: SampleColumns) -> "ProjectorView":
@@ -75,41 +83,29 @@ class ProjectorBeam(ProjectorLimit):
     def holds(self, view: ProjectorView, rules: ProjectorLimits) -> Mask:
         """Return which samples the pattern reaches."""
         inside = pattern_of(view.projector).inside(view.points)
-        return inside & view.projector.device.in_field(view.local.T)
+        return inside & view.device.in_field(view.local.T)
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return an image or beam that reaches farther, up to three times as wide."""
-        parallel = isinstance(facts.device, ParallelModel)
-        return (
-            LimitRelaxation(
-                self.name,
-                _off_axis,
-                to_step(1.0),
-                lambda value: (
-                    f"a beam of {value:.0f} mm about its axis"
-                    if parallel
-                    else f"an image that reaches {value:.0f} degrees off its middle on "
-                    f"every side"
-                ),
-            ),
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield an image or beam that reaches farther, up to three times as wide."""
+        image = light_of(facts.device).reach_words
+        yield LimitRelaxation(
+            self.name,
+            lambda view: off_axis(view.device, view.local.T),
+            to_step(1.0),
+            lambda value: image.format(value),
         )
 
 
-class ProjectorRange(ProjectorLimit):
+class ProjectorRange(InRange):
     """Within the depth of field."""
 
     name = "projector_range"
     words = "out of the projectors' range"
 
-    def holds(self, view: ProjectorView, rules: ProjectorLimits) -> Mask:
-        """Return which samples are sharp."""
-        low, high = view.projector.device.range_m
-        return (view.distances >= low) & (view.distances <= high)
-
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return either end of the range."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield either end of the range."""
         sharp = facts.device.range_m
-        return range_ends(self.name, "projector", sharp, sharp)[:2]
+        yield from islice(range_ends(self.name, "projector", sharp, sharp), 2)
 
 
 class ProjectorIncidence(ProjectorLimit):
@@ -122,23 +118,10 @@ class ProjectorIncidence(ProjectorLimit):
         """Return which samples face the light."""
         return view.incidence_cos >= np.cos(rules.max_incidence)
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return a larger angle."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a larger angle."""
         limit = facts.required.projector.max_incidence
-        least = np.cos(max(limit, STEEPEST))
-        return (
-            LimitRelaxation(
-                self.name,
-                lambda view: np.where(
-                    view.incidence_cos >= least, degrees(view.incidence_cos), np.inf
-                ),
-                to_step(1.0),
-                lambda value: (
-                    f"limits.projector_max_incidence_deg = {value:.0f} "
-                    f"(now {np.degrees(limit):g})"
-                ),
-            ),
-        )
+        yield wider_angle(self.name, limit, lambda view: view.incidence_cos)
 
 
 class TangentAngle(ProjectorLimit):
@@ -151,34 +134,18 @@ class TangentAngle(ProjectorLimit):
         """Return which samples aren't lit along T1."""
         return view.tangent_cos <= np.cos(rules.min_tangent_angle)
 
-    def relaxations(self, facts: RigFacts) -> tuple[LimitRelaxation, ...]:
-        """Return a smaller angle."""
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a smaller angle."""
         limit = facts.required.projector.min_tangent_angle
-        return (
-            LimitRelaxation(
-                self.name,
-                lambda view: -degrees(view.tangent_cos),
-                to_step(1.0),
-                lambda value: (
-                    f"limits.min_tangent_angle_deg = {-value:.0f} "
-                    f"(now {np.degrees(limit):g})"
-                ),
+        yield LimitRelaxation(
+            self.name,
+            lambda view: -degrees(view.tangent_cos),
+            to_step(1.0),
+            lambda value: (
+                f"limits.min_tangent_angle_deg = {-value:.0f} "
+                f"(now {np.degrees(limit):g})"
             ),
         )
-
-
-class ProjectorOcclusion(InBetween):
-    """Not in the shadow of the surface."""
-
-    name = "projector_occlusion"
-    words = "shadowed from every projector that faces it"
-
-
-class ProjectorBody(InBetween):
-    """No body of another device in between."""
-
-    name = "projector_body"
-    words = "kept from the light by a device's body"
 
 
 PROJECTOR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
@@ -186,18 +153,11 @@ PROJECTOR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
     ProjectorRange(),
     ProjectorIncidence(),
     TangentAngle(),
-    ProjectorOcclusion(),
-    ProjectorBody(),
+    InBetween("projector_occlusion", "shadowed from every projector that faces it"),
+    InBetween("projector_body", "kept from the light by a device's body"),
 )
 CAUSES = causes(PROJECTOR_LIMITS)
 LIT = len(CAUSES)
 OCCLUDED = CAUSES.index("projector_occlusion")
 BLOCKED = CAUSES.index("projector_body")
 INCIDENCE = CAUSES.index("projector_incidence")
-
-
-def _off_axis(view: ProjectorView) -> Array:
-    """How far samples are off the middle, inf beyond the widest field, (n,)."""
-    wide = widened(view.projector.device)
-    local = view.local.T
-    return np.where(wide.in_field(local), light_of(wide).off_axis(local), np.inf)
