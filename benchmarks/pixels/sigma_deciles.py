@@ -27,7 +27,6 @@ from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
-from planning.scene.limits import camera_limits
 from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
 from planning.verify.reconstruction.cloud import Cloud
@@ -158,7 +157,7 @@ def _of_camera(
     asked = TriangulationLimits(0.1, 1.0)
     quality = measurability.pair_quality(normals, light, rings, seen, asked)
     cosine = seen.rays @ camera.world_from_device[:3, 2]
-    kept = (seen.stage == camera_limits.SEEN) & (light.incidence_cos > _LEAST_LIGHT)
+    kept = (seen.seen) & (light.incidence_cos > _LEAST_LIGHT)
     columns = (
         near.distances,
         quality.sigma * light.incidence_cos,

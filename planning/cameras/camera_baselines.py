@@ -55,8 +55,8 @@ class BaselineSamples:
         """The rings of every projector on the samples."""
         noise = self.scene.requirements.triangulation.noise_px
         return RingsOnSurface(
-            np.stack([rings.normals for rings in self.lit.rings]),
-            np.stack([rings.spacing for rings in self.lit.rings]),
+            np.stack([rings.normals for rings in self.lit.surfaces]),
+            np.stack([rings.spacing for rings in self.lit.surfaces]),
             np.stack(
                 [noise / np.maximum(x.incidence_cos, 1e-9) for x in self.lit.lights]
             ),

@@ -272,7 +272,7 @@ def _blocked_by_body(
         note(projector, np.flatnonzero(~measured & dark))
     left = np.flatnonzero(~measured & _any(stages == LIT))
     for camera in devices.cameras:
-        stage = view_of(scene, camera, target.take(left)).stage
+        stage = view_of(scene, camera, target.take(left)).first_violated
         note(camera, left[stage == camera_limits.BLOCKED])
     areas = target.samples.weight * stopped.sum(axis=0)
     every = (*devices.projectors, *devices.cameras)

@@ -16,7 +16,6 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
-from planning.scene.limits import camera_limits
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import PairQuality
 from planning.scene.measured import LitSamples, lit_samples, pairs_of, taken
@@ -229,7 +228,7 @@ def axis_program(
         points=transform(into, points[chosen]),
         rays=rays @ turn,
         slopes=slopes @ turn,
-        seen=np.stack([view.stage == camera_limits.SEEN for view in seen], axis=1),
+        seen=np.stack([view.seen for view in seen], axis=1),
         noise=noise[:, None] * distances,
         placement_m=(limits.ring_sigma_m or 0.0) * np.abs(facing),
         facing=np.abs(facing) / distances,

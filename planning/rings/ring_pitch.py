@@ -140,6 +140,6 @@ def widest_gap(
     return float(
         max(
             ring.spacing[samples.lit[:, p]].max(initial=0.0)
-            for p, ring in enumerate(samples.rings)
+            for p, ring in enumerate(samples.surfaces)
         )
     )

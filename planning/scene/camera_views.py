@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from geometry.rays.visibility_matrix import visibility_matrix
 from planning.model.planned import PlannedCamera
-from planning.scene.limits.camera_limits import SEEN, ViewedSamples
+from planning.scene.limits.camera_limits import ViewedSamples
 
 from . import measurability
 from .placed_bodies import PlacedBody, blocked_by
@@ -27,12 +27,24 @@ class CameraView:
     """What one camera sees.
 
     Attributes:
-        rows: Samples seen, within every limit and with nothing in between, shape (k,).
+        samples: Those seen, within every limit and with nothing in between, shape (k,).
         view: How it sees them.
     """
 
-    rows: NDArray[np.int64]
+    samples: NDArray[np.int64]
     view: ViewedSamples
+
+    @classmethod
+    def joined(cls, views: Sequence["CameraView"]) -> "CameraView":
+        """Return the views of several cameras, one after the other."""
+        return cls(
+            np.concatenate([view.samples for view in views]),
+            ViewedSamples.joined([view.view for view in views]),
+        )
+
+    def take(self, chosen: NDArray[np.int64]) -> "CameraView":
+        """Return the view of some of the samples seen."""
+        return CameraView(self.samples[chosen], self.view.take(chosen))
 
 
 def camera_views(
@@ -45,7 +57,7 @@ def camera_views(
     for row, camera in enumerate(cameras):
         scene.check_cancelled()
         sight = _in_the_open(scene, camera, target, np.flatnonzero(facing[row]))
-        wanted[row, sight.rows] = True
+        wanted[row, sight.samples] = True
         offered.append(sight)
     samples = target.samples
     free = visibility_matrix(
@@ -56,27 +68,12 @@ def camera_views(
         candidates=wanted,
     )
     clear = (
-        _taken(sight, np.flatnonzero(free[column, sight.rows]))
+        sight.take(np.flatnonzero(free[column, sight.samples]))
         for column, sight in enumerate(offered)
     )
     return tuple(
         unblocked(sight, camera, samples.points, scene.bodies)
         for sight, camera in zip(clear, cameras, strict=True)
-    )
-
-
-def joined_view(sights: Sequence[CameraView]) -> CameraView:
-    """Return the sights of several cameras, one after the other."""
-    views = [sight.view for sight in sights]
-    return CameraView(
-        np.concatenate([sight.rows for sight in sights]),
-        ViewedSamples(
-            np.concatenate([view.stage for view in views]),
-            np.concatenate([view.rays for view in views]),
-            np.concatenate([view.distances for view in views]),
-            np.concatenate([view.facing for view in views]),
-            np.concatenate([view.jacobian for view in views]),
-        ),
     )
 
 
@@ -89,8 +86,8 @@ def unblocked(
     """Return what is left of a sight of points (n, 3) with bodies in the way."""
     if not bodies:
         return sight
-    blocked = blocked_by(bodies, camera, points[sight.rows]).any(axis=1)
-    return _taken(sight, np.flatnonzero(~blocked))
+    blocked = blocked_by(bodies, camera, points[sight.samples]).any(axis=1)
+    return sight.take(np.flatnonzero(~blocked))
 
 
 def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> ViewedSamples:
@@ -137,11 +134,7 @@ def _in_the_open(
     """Return which of some samples a camera would see, were nothing in between."""
     limits = scene.requirements.camera
     seen = measurability.view(camera, target.take(some), limits, None)
-    return _taken(CameraView(some, seen), np.flatnonzero(seen.stage == SEEN))
-
-
-def _taken(sight: CameraView, chosen: NDArray[np.int64]) -> CameraView:
-    return CameraView(sight.rows[chosen], sight.view.take(chosen))
+    return CameraView(some, seen).take(np.flatnonzero(seen.seen))
 
 
 def _facing(

@@ -15,7 +15,7 @@ from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from geometry.mesh.tensors import lengths
 from planning.model.planned import PlannedProjector
 
-from .samples import Target
+from .samples import SampleArrays, Target
 
 _Array = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
@@ -165,7 +165,7 @@ def light_of(device: DeviceModel) -> Light:
 
 
 @dataclass(frozen=True, eq=False)
-class LightOnSamples:
+class LightOnSamples(SampleArrays):
     """One projector's light on n samples, before occlusion.
 
     Attributes:
@@ -179,15 +179,6 @@ class LightOnSamples:
     distances: _Array
     incidence_cos: _Array
     tangent_cos: _Array
-
-    def take(self, chosen: NDArray[np.int64]) -> "LightOnSamples":
-        """Return the light on some of the samples."""
-        return LightOnSamples(
-            self.directions[chosen],
-            self.distances[chosen],
-            self.incidence_cos[chosen],
-            self.tangent_cos[chosen],
-        )
 
 
 def light_on(projector: PlannedProjector, target: Target) -> LightOnSamples:

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
-from planning.scene.limits.camera_limits import SEEN, ViewedSamples
+from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED, PairQuality
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns.code_surfaces import CodeSurfaces
 from planning.scene.patterns.pattern import code_surfaces
 
-from .camera_views import CameraView, camera_views, joined_view, view_of
+from .camera_views import CameraView, camera_views, view_of
 from .lighting import lit_stages
 from .lights import LightOnSamples, light_on
 from .measurability import first_pair_failure, pair_quality
@@ -34,13 +34,13 @@ class LitSamples:
         target: The samples that at least one projector lights.
         lit: Which projector lights which, shape (n, n_projectors).
         lights: Light of each projector.
-        rings: Surfaces of equal code of each projector.
+        surfaces: Those of equal code of each projector.
     """
 
     target: Target
     lit: NDArray[np.bool_]
     lights: tuple[LightOnSamples, ...]
-    rings: tuple[CodeSurfaces, ...]
+    surfaces: tuple[CodeSurfaces, ...]
 
     @classmethod
     def of(
@@ -60,7 +60,8 @@ class LitSamples:
 
     def with_surfaces(self, p: int, surfaces: CodeSurfaces) -> "LitSamples":
         """Return the samples with other surfaces of equal code of one projector."""
-        return replace(self, rings=(*self.rings[:p], surfaces, *self.rings[p + 1 :]))
+        others = self.surfaces[:p], self.surfaces[p + 1 :]
+        return replace(self, surfaces=(*others[0], surfaces, *others[1]))
 
 
 def lit_samples(
@@ -73,14 +74,14 @@ def lit_samples(
 
 
 def taken(
-    rows: LitSamples, chosen: NDArray[np.int64], lit: NDArray[np.bool_]
+    samples: LitSamples, chosen: NDArray[np.int64], lit: NDArray[np.bool_]
 ) -> LitSamples:
     """Return some of the samples, lit as stated for all."""
     return LitSamples(
-        rows.target.take(chosen),
+        samples.target.take(chosen),
         lit[chosen],
-        tuple(light.take(chosen) for light in rows.lights),
-        tuple(surfaces.take(chosen) for surfaces in rows.rings),
+        tuple(light.take(chosen) for light in samples.lights),
+        tuple(surfaces.take(chosen) for surfaces in samples.surfaces),
     )
 
 
@@ -93,24 +94,25 @@ class Pair:
         places: Where the samples stand in the camera's view, shape (k,).
         samples: Which of the lit samples they are, shape (k,).
         quality: How well they are triangulated.
-        stage: Index in `CAUSES` of the first limit that fails, or `MEASURED`, (k,).
+        first_violated: Index in `CAUSES` of the first limit that fails, or `MEASURED`,
+            shape (k,).
     """
 
     projector: int
     places: NDArray[np.int64]
     samples: NDArray[np.int64]
     quality: PairQuality
-    stage: NDArray[np.int8]
+    first_violated: NDArray[np.int8]
 
     @property
     def measured(self) -> NDArray[np.bool_]:
         """Whether no limit fails, shape (k,)."""
-        return self.stage == MEASURED
+        return self.first_violated == MEASURED
 
 
 def pairs_of(
     limits: TriangulationLimits,
-    rows: LitSamples,
+    lit: LitSamples,
     view: ViewedSamples,
     *,
     samples: NDArray[np.int64] | None = None,
@@ -121,7 +123,7 @@ def pairs_of(
 
     Args:
         limits: Of pairs.
-        rows: Lit samples.
+        lit: Lit samples.
         view: How the camera sees them, or `samples` of them.
         samples: Which of the lit samples are in view; None: all.
         wanted: Which places of the view to look at; it is read anew for each projector
@@ -129,16 +131,16 @@ def pairs_of(
         projectors: Their indices; None: all.
     """
     if samples is None:
-        samples = np.arange(len(rows.target))
+        samples = np.arange(len(lit.target))
     if wanted is None:
-        wanted = view.stage == SEEN
-    for p in range(len(rows.lights)) if projectors is None else projectors:
-        places = np.flatnonzero(rows.lit[samples, p] & wanted)
+        wanted = view.seen
+    for p in range(len(lit.lights)) if projectors is None else projectors:
+        places = np.flatnonzero(lit.lit[samples, p] & wanted)
         chosen = samples[places]
         quality = pair_quality(
-            rows.target.samples.normals[chosen],
-            rows.lights[p].take(chosen),
-            rows.rings[p].take(chosen),
+            lit.target.samples.normals[chosen],
+            lit.lights[p].take(chosen),
+            lit.surfaces[p].take(chosen),
             view.take(places),
             limits,
         )
@@ -148,41 +150,41 @@ def pairs_of(
 def measured_by(
     scene: Scene,
     cameras: Sequence[PlannedCamera],
-    rows: LitSamples,
-    sights: Sequence[CameraView] | None = None,
+    lit: LitSamples,
+    views: Sequence[CameraView] | None = None,
 ) -> NDArray[np.bool_]:
     """Return which camera measures which sample with any projector, (n, n_cameras).
 
     Args:
         scene: Surface and requirements.
         cameras: As they stand.
-        rows: Lit samples.
-        sights: Of these cameras on these samples, where they are at hand.
+        lit: Lit samples.
+        views: Of these cameras on these samples, where they are at hand.
     """
-    if sights is None:
-        sights = camera_views(scene, cameras, rows.target)
+    if views is None:
+        views = camera_views(scene, cameras, lit.target)
     limits = scene.requirements.triangulation
-    measured = np.zeros((len(rows.target), len(cameras)), dtype=bool)
-    for first, last in _chunks(sights):
+    measured = np.zeros((len(lit.target), len(cameras)), dtype=bool)
+    for first, last in _chunks(views):
         scene.check_cancelled()
         column = np.repeat(
-            np.arange(first, last), [len(s.rows) for s in sights[first:last]]
+            np.arange(first, last), [len(s.samples) for s in views[first:last]]
         )
-        seen = joined_view(sights[first:last])
-        open_places = np.ones(len(seen.rows), dtype=bool)
+        seen = CameraView.joined(views[first:last])
+        open_places = np.ones(len(seen.samples), dtype=bool)
         for pair in pairs_of(
-            limits, rows, seen.view, samples=seen.rows, wanted=open_places
+            limits, lit, seen.view, samples=seen.samples, wanted=open_places
         ):
             open_places[pair.places[pair.measured]] = False
-        measured[seen.rows, column] = ~open_places
+        measured[seen.samples, column] = ~open_places
     return measured
 
 
-def _chunks(sights: Sequence[CameraView]) -> Iterator[tuple[int, int]]:
+def _chunks(views: Sequence[CameraView]) -> Iterator[tuple[int, int]]:
     """Ranges of cameras that together see about `_PAIRS` samples, or of one."""
-    ends = np.cumsum([len(sight.rows) for sight in sights])
+    ends = np.cumsum([len(view.samples) for view in views])
     first = 0
-    while first < len(sights):
+    while first < len(views):
         before = ends[first - 1] if first else 0
         last = int(np.searchsorted(ends, before + _PAIRS, side="right"))
         last = max(last, first + 1)
@@ -191,18 +193,18 @@ def _chunks(sights: Sequence[CameraView]) -> Iterator[tuple[int, int]]:
 
 
 def furthest_failure(
-    scene: Scene, cameras: Sequence[PlannedCamera], rows: LitSamples
+    scene: Scene, cameras: Sequence[PlannedCamera], lit: LitSamples
 ) -> NDArray[np.int8]:
     """Return how far each sample comes over all pairs: an index in `CAUSES`.
 
     It is `MEASURED` where some pair measures the sample.
     """
-    furthest = np.zeros(len(rows.target), dtype=np.int8)
+    furthest = np.zeros(len(lit.target), dtype=np.int8)
     for camera in cameras:
         scene.check_cancelled()
-        seen = view_of(scene, camera, rows.target)
-        furthest = np.maximum(furthest, seen.stage)
-        for pair in pairs_of(scene.requirements.triangulation, rows, seen):
+        seen = view_of(scene, camera, lit.target)
+        furthest = np.maximum(furthest, seen.first_violated)
+        for pair in pairs_of(scene.requirements.triangulation, lit, seen):
             chosen = pair.samples
-            furthest[chosen] = np.maximum(furthest[chosen], pair.stage)
+            furthest[chosen] = np.maximum(furthest[chosen], pair.first_violated)
     return furthest

@@ -1,6 +1,8 @@
 """Samples of the surface with what the limits ask of each."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,24 @@ class Target:
         return Target(
             self.samples.take(chosen), self.steep[chosen], self.member[chosen]
         )
+
+
+@dataclass(frozen=True, eq=False)
+class SampleArrays:
+    """Arrays with one row a sample; a base of values that hold nothing else."""
+
+    def take(self, chosen: NDArray[np.int64]) -> Self:
+        """Return what is known of some of the samples."""
+        return type(self)(*(array[chosen] for array in self._arrays()))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return what is known of several sets of samples, one after the other."""
+        arrays = zip(*(part._arrays() for part in parts), strict=True)
+        return cls(*(np.concatenate(same) for same in arrays))
+
+    def _arrays(self) -> list[NDArray[Any]]:
+        return [getattr(self, field.name) for field in fields(self)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,6 @@ from planning.cameras.baselines.coverage_triangle import (
 from planning.cameras.baselines.seams import SampledSurface
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
-from planning.scene.limits.camera_limits import SEEN
 from planning.scene.measurability import view
 from planning.scene.samples import Target
 from solvers import CoverProblem, solve_cover
@@ -57,8 +56,8 @@ class Shape:
         )
         target = Target(samples, np.zeros(self.points.shape))
         limits = CameraLimits(self.theta)
-        stages = [view(camera, target, limits, None).stage for camera in cameras]
-        return np.stack(stages, axis=1) == SEEN
+        views = [view(camera, target, limits, None) for camera in cameras]
+        return np.stack([view.seen for view in views], axis=1)
 
     def rows(self, cameras):
         """The plan's rows of `baselines` for these cameras."""

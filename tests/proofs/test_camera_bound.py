@@ -43,7 +43,7 @@ from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
 from planning.scene.lights import LightOnSamples
-from planning.scene.limits import camera_limits, pair_limits
+from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.patterns.code_surfaces import CodeSurfaces
 from planning.scene.workspace.offered_poses import aimed_poses
@@ -311,14 +311,14 @@ def _exact(rows, position, device, required):
 
     camera = PlannedCamera("", look_at(position, np.zeros(3), UP), device)
     seen = measurability.view(camera, rows.target, required.camera, None)
-    every = np.zeros(len(seen.stage), dtype=bool)
-    for p, (light, rings) in enumerate(zip(rows.lights, rows.rings, strict=True)):
+    every = np.zeros(len(seen.first_violated), dtype=bool)
+    for p, (light, rings) in enumerate(zip(rows.lights, rows.surfaces, strict=True)):
         quality = measurability.pair_quality(
             rows.target.samples.normals, light, rings, seen, required.triangulation
         )
         passed = measurability.first_pair_failure(quality, required.triangulation)
         every |= rows.lit[:, p] & (passed == pair_limits.MEASURED)
-    return every & (seen.stage == camera_limits.SEEN)
+    return every & (seen.seen)
 
 
 # ---- what holds for a whole image

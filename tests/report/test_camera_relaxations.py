@@ -107,7 +107,7 @@ def turned_to(name, value, scene, rows, camera):
         case "gap":
             wider = tuple(
                 replace(rings, spacing=rings.spacing * value / 2.0)
-                for rings in rows.rings
+                for rings in rows.surfaces
             )
             rows = replace(rows, rings=wider)
         case "blur":

@@ -31,7 +31,6 @@ from planning.rings.axis_moves import (
 from planning.rings.ring_radii import ring_axis, ring_frame_of_axis, uniform_radii
 from planning.scene import measurability
 from planning.scene.draws import Draw
-from planning.scene.limits import camera_limits
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.patterns.ring_pattern import ring_coordinate
@@ -221,7 +220,7 @@ def test_the_program_scores_pairs_as_the_exact_predicate_does(ball):
     scores = pair_scores(program, program.start)
     lit = np.flatnonzero(rows.lit[:, 1])
     chosen = lit[:: -(-len(lit) // len(program.points))]
-    seen = np.stack([v.stage[chosen] == camera_limits.SEEN for v in views], axis=1)
+    seen = np.stack([v.seen[chosen] for v in views], axis=1)
     assert np.array_equal(scores > 0.0, seen)
     assert 100 < seen.sum() < seen.size
     samples = rows.target.samples.take(chosen)
@@ -263,7 +262,7 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
         assert np.array_equal(new.world_from_ring, expected.world_from_ring)
     samples = followed.stage.cover.samples
     points = samples.target.samples.points
-    for p, rings in zip(followed.projectors, samples.rings, strict=True):
+    for p, rings in zip(followed.projectors, samples.surfaces, strict=True):
         own = code_surfaces(p, points)
         assert np.array_equal(own.normals, rings.normals)
     count = len(cover.cameras)

@@ -239,13 +239,13 @@ def test_a_body_before_a_camera_hides_the_same_rectangle_but_never_its_own(scene
     limits = scene.requirements.camera
     stage = measurability.view(
         blind, target, limits, scene.visibility, among.bodies
-    ).stage
+    ).first_violated
     assert np.array_equal(
         stage, np.where(dark, camera_limits.BLOCKED, camera_limits.SEEN)
     )
     over, own = camera_views(among, [blind, eye], target)
-    assert np.array_equal(over.rows, np.flatnonzero(~dark))
-    assert np.array_equal(own.rows, camera_views(scene, [eye], target)[0].rows)
+    assert np.array_equal(over.samples, np.flatnonzero(~dark))
+    assert np.array_equal(own.samples, camera_views(scene, [eye], target)[0].samples)
     samples = audit_samples(target)
     looks = AuditCamera(LENS, blind.world_from_device, (block_of(eye),))
     steps = sight_steps(looks, samples, limits, Shadow(scene.mesh, threads=1))

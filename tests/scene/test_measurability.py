@@ -211,7 +211,7 @@ def test_view_names_the_first_limit_that_fails():
     samples = SurfaceSamples(points, normals, np.zeros(5, dtype=np.int64), 1.0)
     target = Target(samples, np.zeros((5, 3)))
     limits = CameraLimits(np.radians(70), max_sample_distance_m=0.0005)
-    stage = measurability.view(camera, target, limits, None).stage
+    stage = measurability.view(camera, target, limits, None).first_violated
     names = [*camera_limits.SEEN_CAUSES, "seen"]
     assert [names[i] for i in stage] == [
         "camera_field",
@@ -221,7 +221,7 @@ def test_view_names_the_first_limit_that_fails():
         "seen",
     ]
     coarse = CameraLimits(np.radians(70), max_sample_distance_m=0.00048)
-    stage = measurability.view(camera, target, coarse, None).stage
+    stage = measurability.view(camera, target, coarse, None).first_violated
     assert names[stage[3]] == "sample_distance"
 
 

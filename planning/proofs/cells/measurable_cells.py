@@ -57,8 +57,8 @@ class MeasurableCells:
         self._image, self._focal = image_cone(device), device.focal_px
         normals = samples.target.samples.normals
         self._normals, self._lit = normals, samples.lit
-        self._across = np.stack([ring.normals for ring in samples.rings])
-        self._spacing = np.stack([ring.spacing for ring in samples.rings])
+        self._across = np.stack([ring.normals for ring in samples.surfaces])
+        self._spacing = np.stack([ring.spacing for ring in samples.surfaces])
         cosines = np.stack([light.incidence_cos for light in samples.lights])
         self._noise = self._pair.noise_px / np.maximum(cosines, 1e-9)
         along = np.cross(normals, self._across)

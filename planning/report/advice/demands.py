@@ -114,7 +114,7 @@ def demands(
     ):
         some, quality = pair.samples, pair.quality
         furthest[some] = np.where(
-            seen[some], np.maximum(furthest[some], pair.stage), furthest[some]
+            seen[some], np.maximum(furthest[some], pair.first_violated), furthest[some]
         )
         of_pair = violated(PAIR_LIMITS, quality, required.triangulation, len(some))
         table = np.concatenate([failed[:, some], of_pair])

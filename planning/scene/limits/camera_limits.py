@@ -12,7 +12,7 @@ from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
-from planning.scene.samples import Target
+from planning.scene.samples import SampleArrays, Target
 
 from .limit import (
     Array,
@@ -82,32 +82,28 @@ class CameraRays:
 
 
 @dataclass(frozen=True, eq=False)
-class ViewedSamples:
+class ViewedSamples(SampleArrays):
     """One camera's view of n samples.
 
     Attributes:
-        stage: Index in `SEEN_CAUSES` of the first limit that fails, `SEEN` if none.
+        first_violated: Index in `SEEN_CAUSES` of the first limit that fails, `SEEN` if
+            none, shape (n,).
         rays: Unit viewing rays r, shape (n, 3).
         distances: t in [m], shape (n,).
         facing: -N.r, shape (n,).
         jacobian: J_r in the world in [1/px], shape (n, 3, 2); 0 where a limit fails.
     """
 
-    stage: NDArray[np.int8]
+    first_violated: NDArray[np.int8]
     rays: Array
     distances: Array
     facing: Array
     jacobian: Array
 
-    def take(self, chosen: NDArray[np.int64]) -> "ViewedSamples":
-        """Return the view of some of the samples."""
-        return ViewedSamples(
-            self.stage[chosen],
-            self.rays[chosen],
-            self.distances[chosen],
-            self.facing[chosen],
-            self.jacobian[chosen],
-        )
+    @property
+    def seen(self) -> Mask:
+        """Whether no limit fails, shape (n,)."""
+        return self.first_violated == SEEN
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,9 +119,14 @@ class RangedView(Protocol):
     """What a range asks of a view: optics, and how far off samples are [m]."""
 
     @property
-    def device(self) -> DeviceModel: ...
+    def device(self) -> DeviceModel:
+        """Of a camera or a projector."""
+        ...
+
     @property
-    def distances(self) -> Array: ...
+    def distances(self) -> Array:
+        """Of samples, shape (n,) [m]."""
+        ...
 
 
 class InRange(Limit[RangedView, Any, Any]):

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.scene.samples import SampleArrays
 
 
 @dataclass(frozen=True, eq=False)
-class CodeSurfaces:
+class CodeSurfaces(SampleArrays):
     """One projector's surfaces of equal code at n samples.
 
     Attributes:
@@ -20,10 +21,6 @@ class CodeSurfaces:
 
     normals: NDArray[np.float64]
     spacing: NDArray[np.float64]
-
-    def take(self, chosen: NDArray[np.int64]) -> "CodeSurfaces":
-        """Return the surfaces at some of the points."""
-        return CodeSurfaces(self.normals[chosen], self.spacing[chosen])
 
 
 class Pattern(Protocol):
