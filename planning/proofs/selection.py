@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers import CoverProblem, solve_cover
+from solvers.bit_rows import sparse_rows
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
-from solvers.dense_rows import sparse_rows
 
 MORE = 2
 # Counted work for the marginal table's other counts, where no proof is claimed.

@@ -49,7 +49,7 @@ class CellBound:
         survivor: Cells, by the tree's names and with repetition, in which
             ``lower_bound`` poses may be enough: where a better cover may be. Else None.
         multipliers: Of the rows, integers, shape (n_rows,).
-        dearest: No pose serves rows of more than this price by the multipliers.
+        largest_cost: No pose serves rows of more than this cost by the multipliers.
         by_multipliers: The part of the bound that multipliers prove.
         most_weight: Weight that ``count`` - 1 poses can serve at most, by the
             multipliers, in the problem's unit.
@@ -65,7 +65,7 @@ class CellBound:
     proof: str
     survivor: NDArray[np.int64] | None
     multipliers: NDArray[np.int64]
-    dearest: int
+    largest_cost: int
     by_multipliers: float
     most_weight: float
     cells_used: int
@@ -163,7 +163,8 @@ class _Proof:
 
     def _answer(self, status: CellStatus, lower: float, proof: str) -> CellBound:
         search, total = self.search, float(self.problem.weights.sum())
-        most = self.whole.most(search.multipliers, (self.count - 1) * search.dearest)
+        paid = (self.count - 1) * search.largest_cost
+        most = self.whole.most(search.multipliers, paid)
         multipliers = search.multipliers.copy()
         multipliers.flags.writeable = False
         return CellBound(
@@ -175,7 +176,7 @@ class _Proof:
             proof=proof,
             survivor=self.survivor,
             multipliers=multipliers,
-            dearest=search.dearest,
+            largest_cost=search.largest_cost,
             by_multipliers=search.bound,
             most_weight=min(self.whole.in_unit(most), total),
             cells_used=self.store.size,

@@ -1,9 +1,9 @@
 """Multipliers that refute a number of poses, with cells split where they are used.
 
 The frontier is the set of cells that aren't split; it holds every pose. One round
-solves the program over the cells in hand, prices the frontier, and takes in hand what
-is dearer than the program knew. Where nothing is, cells that the fractional cover uses,
-and with them the dearest others, are split: a child's price is at most its parent's,
+solves the program over the cells in hand and takes in hand what of the frontier is
+costlier than the program knew. Where nothing is, cells that the fractional cover uses,
+and with them the costliest others, are split: a child's cost is at most its parent's,
 so the bound can only rise.
 """
 
@@ -22,7 +22,7 @@ from .cell_store import CellStore
 _TAKEN = 40
 _POLISH = 8
 _SPLIT = 100
-# Splitting goes on while it leaves at most this share of what was too dear: errors
+# Splitting goes on while it leaves at most this share of what was too costly: errors
 # halve with the size of cells, so that less would never close the gap.
 _WORTH = 0.6
 _TOLERANCE = 1e-6
@@ -36,7 +36,7 @@ class MultiplierSearch:
 
     Attributes:
         multipliers: The best, integers, shape (n_rows,).
-        dearest: Largest lambda(S) of the frontier then, hence of all poses.
+        largest_cost: Largest lambda(S) of the frontier then, hence of all poses.
         ratio: need(lambda) / M by these; at least so many poses, not rounded.
         bound: The same, rounded up; inf if no number of poses is enough.
     """
@@ -44,7 +44,7 @@ class MultiplierSearch:
     def __init__(self, whole: WholeRows, store: CellStore, budget: WorkBudget) -> None:
         self._whole, self._store, self._budget = whole, store, budget
         self._program = MultiplierProgram(whole, budget)
-        self.multipliers, self.dearest = np.zeros_like(whole.weights), 0
+        self.multipliers, self.largest_cost = np.zeros_like(whole.weights), 0
         self.ratio, self.bound, self._need = Fraction(0), 0.0, Fraction(0)
         self._drilled = self.multipliers
         start = whole.weights / np.maximum(whole.needs, 1)
@@ -65,19 +65,19 @@ class MultiplierSearch:
         return self.bound > n_poses
 
     def _drill(self, n_poses: int) -> None:
-        """Split the dearest cells by the best multipliers, while that pays."""
+        """Split the costliest cells by the best multipliers, while that pays."""
         if self.multipliers is self._drilled:
             return
         allowed = float(self._need) / n_poses
-        gap = self.dearest - allowed
+        gap = self.largest_cost - allowed
         while self.bound <= n_poses and not self._budget.exhausted:
             frontier = self._store.frontier
-            prices = self._store.prices(frontier, self.multipliers)
-            split = self._split(frontier[prices >= allowed + 0.5 * gap])
+            costs = self._store.costs(frontier, self.multipliers)
+            split = self._split(frontier[costs >= allowed + 0.5 * gap])
             frontier = self._store.frontier
-            prices = self._store.prices(frontier, self.multipliers)
-            self._measure(int(prices.max(initial=0)))
-            before, gap = gap, self.dearest - allowed
+            costs = self._store.costs(frontier, self.multipliers)
+            self._measure(int(costs.max(initial=0)))
+            before, gap = gap, self.largest_cost - allowed
             if not split or gap >= _WORTH * before:
                 self._drilled = self.multipliers
                 break
@@ -95,47 +95,47 @@ class MultiplierSearch:
             if proposal is None:
                 return False
             frontier = self._store.frontier
-            prices = self._record(proposal.multipliers, frontier)
+            costs = self._record(proposal.multipliers, frontier)
             if self.bound > n_poses:
                 return True
             reached = proposal.value > _TOLERANCE * self._whole.weights.size
             final = reached and not np.any(self._store.may_split(proposal.used))
             polish -= final
             if final or not reached:
-                if self._take(frontier, prices):
+                if self._take(frontier, costs):
                     continue
                 if final:
                     return False
-            costly = frontier[np.argsort(-prices, kind="stable")[:_SPLIT]]
+            costly = frontier[np.argsort(-costs, kind="stable")[:_SPLIT]]
             return self._split(np.union1d(proposal.used, costly))
         return False
 
     def _record(
         self, proposed: NDArray[np.float64], frontier: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Evaluate multipliers, keep them if they are the best; return the prices."""
+        """Evaluate multipliers, keep them if they are the best; return the costs."""
         multipliers = self._whole.multipliers(proposed)
-        prices = self._store.prices(frontier, multipliers)
+        costs = self._store.costs(frontier, multipliers)
         need = self._whole.least_cost(multipliers)
-        dearest = int(prices.max(initial=0))
+        largest_cost = int(costs.max(initial=0))
         self._budget.spend(2e3 * multipliers.size)
-        if need / max(1, dearest) > self.ratio:
+        if need / max(1, largest_cost) > self.ratio:
             self.multipliers, self._need = multipliers, need
-            self._measure(dearest)
-        return prices
+            self._measure(largest_cost)
+        return costs
 
-    def _measure(self, dearest: int) -> None:
-        """Say what the best multipliers prove with the frontier's dearest cell."""
-        self.dearest = dearest
-        self.ratio = self._need / max(1, dearest)
-        self.bound = self._whole.count_bound(self.multipliers, dearest)
+    def _measure(self, largest_cost: int) -> None:
+        """Say what the best multipliers prove, by the largest cost of the frontier."""
+        self.largest_cost = largest_cost
+        self.ratio = self._need / max(1, largest_cost)
+        self.bound = self._whole.count_bound(self.multipliers, largest_cost)
 
-    def _take(self, frontier: NDArray[np.int64], prices: NDArray[np.int64]) -> bool:
-        """Take in hand the dearest cells that break the program; say if any did."""
+    def _take(self, frontier: NDArray[np.int64], costs: NDArray[np.int64]) -> bool:
+        """Take in hand the costliest cells that break the program; say if any did."""
         in_hand = np.isin(frontier, self._program.cells)
-        known = int(prices[in_hand].max(initial=0))
-        order = np.argsort(-np.where(in_hand, -1, prices), kind="stable")[:_TAKEN]
-        cells = frontier[order[prices[order] > known * (1.0 + _TOLERANCE)]]
+        known = int(costs[in_hand].max(initial=0))
+        order = np.argsort(-np.where(in_hand, -1, costs), kind="stable")[:_TAKEN]
+        cells = frontier[order[costs[order] > known * (1.0 + _TOLERANCE)]]
         cells = cells[~np.isin(cells, self._program.cells)]
         if cells.size == 0:
             return False

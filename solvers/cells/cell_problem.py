@@ -127,7 +127,7 @@ class WholeRows:
             raise ValueError(
                 f"multipliers must be {self.weights.shape}, got {values.shape}"
             )
-        # Rows that cost nothing to serve or weigh nothing only make cells dearer.
+        # Rows that cost nothing to serve or weigh nothing only make cells costlier.
         values = np.where((self.needs > 0) & (self.weights > 0), values, 0.0)
         top = float(values.max(initial=0.0))
         if top == 0.0:
@@ -150,7 +150,7 @@ class WholeRows:
             least += _cheapest(self.weights[rows], costs[rows], needed)
         return least
 
-    def count_bound(self, multipliers: NDArray[np.int64], dearest: int) -> float:
+    def count_bound(self, multipliers: NDArray[np.int64], largest_cost: int) -> float:
         """Return the poses needed at least, where no cell's rows cost more than this.
 
         It is inf if no number of poses is enough.
@@ -158,7 +158,7 @@ class WholeRows:
         need = self.least_cost(multipliers)
         if need <= 0:
             return 0.0
-        return float(-(-need // dearest)) if dearest > 0 else float("inf")
+        return float(-(-need // largest_cost)) if largest_cost > 0 else float("inf")
 
     def most(self, multipliers: NDArray[np.int64], paid: int) -> int:
         """Return the integer weight that rows which cost ``paid`` can have at most."""

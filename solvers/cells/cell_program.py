@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.highs import quiet_highs, run_highs, seconds_left
+from solvers.one_thread import quiet_highs, run_highs, seconds_left
 from solvers.status import WorkBudget
 
 from .cell_problem import WholeRows

@@ -108,15 +108,15 @@ class CellStore:
         self._first.values[asked] = self.size + np.cumsum(number) - number
         self._append(batch, self.levels[asked[batch.parents]] + 1)
 
-    def prices(
+    def costs(
         self, cells: NDArray[np.int64], multipliers: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         """Return lambda(S) of each cell, exactly."""
-        price = BitSum(multipliers)
-        self._budget.spend(cells.size * self._words * price.units + 3e5)
+        cost = BitSum(multipliers)
+        self._budget.spend(cells.size * self._words * cost.units + 3e5)
         found = np.empty(cells.size, dtype=np.int64)
         for part in parts(cells.size):
-            found[part] = price(self.rows[cells[part]])
+            found[part] = cost(self.rows[cells[part]])
         return found
 
     def _room(self, n: int) -> bool:

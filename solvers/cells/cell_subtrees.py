@@ -1,6 +1,6 @@
 """The tree of cells as the tuple search walks it: halved, and trimmed by multipliers.
 
-With M the dearest cell of the frontier, K poses that serve enough satisfy
+With M the costliest cell of the frontier, K poses that serve enough satisfy
 lambda(S_k) + (K - 1) M >= need(lambda) each: cells below that hold none of them. A
 coarse cell then serves at most what its remaining parts serve together. Cells with many
 parts are split in halves, so that a cell used m times splits in m + 1 ways.
@@ -36,13 +36,13 @@ class Subtrees:
         multipliers: NDArray[np.int64],
     ) -> None:
         self._store = store
-        self._price = BitSum(multipliers)
+        self._cost_sum = BitSum(multipliers)
         self._multipliers = multipliers
-        prices = store.prices(np.arange(store.size), multipliers)
-        dearest = int(prices[store.frontier].max(initial=0))
+        costs = store.costs(np.arange(store.size), multipliers)
+        largest_cost = int(costs[store.frontier].max(initial=0))
         self.floor = math.ceil(whole.least_cost(multipliers))
-        self._least = self.floor - (n_poses - 1) * dearest
-        self._kept = GrowingArray(prices >= self._least)
+        self._least = self.floor - (n_poses - 1) * largest_cost
+        self._kept = GrowingArray(costs >= self._least)
         self._trim()
         self._groups: list[NDArray[np.int64]] = []
         none = np.empty(0, dtype=np.int64)
@@ -113,7 +113,7 @@ class Subtrees:
             # Deeper levels are finer, and among one level's groups the smaller ones.
             ranks = [(int(levels[g[0]]) << 32) - g.size for g in filled]
             self._bits.append(bits)
-            self._cost.append(self._price(bits))
+            self._cost.append(self._cost_sum(bits))
             self._coarseness.append(np.array(ranks))
             self._halves.append(np.full((len(filled), 2), _UNKNOWN))
         return [next(numbers) if g.size else VOID for g in groups]
@@ -122,8 +122,8 @@ class Subtrees:
         """Split cells that the tree hasn't been asked about."""
         new = self._store.split(cells)
         if new.size:
-            prices = self._store.prices(new, self._multipliers)
-            self._kept.append(prices >= self._least)
+            costs = self._store.costs(new, self._multipliers)
+            self._kept.append(costs >= self._least)
 
     def _union(self, group: NDArray[np.int64]) -> NDArray[np.uint64]:
         """Return what a group's cells serve, as far as they remain."""

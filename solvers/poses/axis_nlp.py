@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 from solvers.status import interruptible
 
 from .axis_problem import INSET, PITCH_POWER, AxisProgram
-from .ipopt import Nlp, strict_solver
-from .light import Light
-from .slots import slots_for
+from .compiled import Light, Nlp, slots_for, strict_solver
 
 _COLUMNS = 16
 _SLOTS = (64, 128, 256, 512, 1024)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import Light
+from .compiled import Light
 
 # The largest ring is kept by this share, well above IPOPT's tolerance.
 INSET = 1e-6

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from solvers.status import SolveStatus
 
-from .slots import slots_for
+from .compiled import slots_for
 
 _UNIT = 1e-6
 # What the value may lack of the bound that its multipliers prove.
@@ -71,21 +71,21 @@ def max_margin_direction(normals: NDArray[np.float64]) -> DirectionSolution:
         ValueError: If the normals aren't such an array.
     """
     _check(normals)
-    light, prices = _solved(normals)
-    total = float(prices.sum())
+    light, multipliers = _solved(normals)
+    total = float(multipliers.sum())
     if not (np.all(np.isfinite(light)) and total > 0.0):
         none = np.zeros(len(normals))
         return DirectionSolution(SolveStatus.UNKNOWN, None, 0.0, 1.0, none)
-    prices = prices / total
-    bound = float(np.linalg.norm(prices @ normals))
+    multipliers = multipliers / total
+    bound = float(np.linalg.norm(multipliers @ normals))
     if bound <= _UNIT:
         # L = 0 holds the limits always, so "optimal" alone says nothing.
-        return DirectionSolution(SolveStatus.INFEASIBLE, None, 0.0, bound, prices)
+        return DirectionSolution(SolveStatus.INFEASIBLE, None, 0.0, bound, multipliers)
     light = light / np.linalg.norm(light)
     value = float(np.min(-normals @ light))
     if not value >= bound - _GAP:
-        return DirectionSolution(SolveStatus.UNKNOWN, None, 0.0, bound, prices)
-    return DirectionSolution(SolveStatus.OPTIMAL, light, value, bound, prices)
+        return DirectionSolution(SolveStatus.UNKNOWN, None, 0.0, bound, multipliers)
+    return DirectionSolution(SolveStatus.OPTIMAL, light, value, bound, multipliers)
 
 
 def _solved(
@@ -105,9 +105,9 @@ def _solved(
         return np.full(3, np.nan), np.zeros(len(normals))
     if light.value is None or facing.dual_value is None:
         return np.full(3, np.nan), np.zeros(len(normals))
-    prices = np.zeros(len(normals))
-    np.add.at(prices, index, np.maximum(facing.dual_value, 0.0))
-    return light.value, prices
+    multipliers = np.zeros(len(normals))
+    np.add.at(multipliers, index, np.maximum(facing.dual_value, 0.0))
+    return light.value, multipliers
 
 
 @lru_cache(maxsize=len(_SLOTS))

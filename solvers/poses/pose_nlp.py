@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 
 from solvers.status import interruptible
 
-from .ipopt import Nlp, strict_solver
-from .light import Light
+from .compiled import Light, Nlp, slots_for, strict_solver
 from .pose_problem import INSET, PoseProgram, pose_margins
-from .slots import slots_for
 
 RIDGE = 1e-6
 _N_SCALARS = 44

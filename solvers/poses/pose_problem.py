@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import Light
+from .compiled import Light
 
 # Hard limits are kept by this share of the size, well above IPOPT's tolerance.
 INSET = 1e-6

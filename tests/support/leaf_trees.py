@@ -23,25 +23,25 @@ def leaves_of(parents):
     return np.setdiff1d(np.arange(len(parents)), parents)
 
 
-def multiplier_bound(problem, tree, multipliers, *, n_poses, dearest=0):
+def multiplier_bound(problem, tree, multipliers, *, n_poses, largest_cost=0):
     """Return what multipliers prove, whatever made them, from the roots down.
 
-    Cells are split while they cost more than `dearest`; 0 goes down to the leaves.
+    Cells are split while they cost more than `largest_cost`; 0 goes down to the leaves.
     Returns the poses that are needed at least, and the weight that `n_poses` serve at
     most.
     """
     whole = whole_rows(problem)
     usable = whole.multipliers(multipliers)
-    price = BitSum(usable)
+    cost = BitSum(usable)
     top, batch = 0, tree.roots()
     while batch.cells.size:
-        prices = price(batch.rows)
-        dear = prices > dearest
-        top = max(top, int(prices[~dear].max(initial=0)))
-        cells, prices = batch.cells[dear], prices[dear]
+        costs = cost(batch.rows)
+        dear = costs > largest_cost
+        top = max(top, int(costs[~dear].max(initial=0)))
+        cells, costs = batch.cells[dear], costs[dear]
         batch = tree.children(cells)
         leaf = np.bincount(batch.parents, minlength=cells.size) == 0
-        top = max(top, int(prices[leaf].max(initial=0)))
+        top = max(top, int(costs[leaf].max(initial=0)))
     most = whole.in_unit(whole.most(usable, n_poses * top))
     return whole.count_bound(usable, top), min(most, float(problem.weights.sum()))
 
@@ -53,5 +53,5 @@ def rederived(answer):
         answer.tree,
         answer.multipliers,
         n_poses=answer.count - 1,
-        dearest=answer.dearest,
+        largest_cost=answer.largest_cost,
     )

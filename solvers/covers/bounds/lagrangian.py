@@ -2,9 +2,9 @@
 
 Maximises over lambda, in the terms of ``relaxation``::
 
-    need(lambda) - (the K dearest lambda(a_j)),              lambda >= 0: refutes K
-    need(lambda) + sum_j min(0, c_j - lambda(a_j)),          lambda >= 0: bounds a cost
-    -sum_i (w_i - lambda_i) - (the K dearest),               lambda in [0, w]: a weight
+    need(lambda) - (the K costliest lambda(a_j)),      lambda >= 0: refutes K
+    need(lambda) + sum_j min(0, c_j - lambda(a_j)),    lambda >= 0: bounds a cost
+    -sum_i (w_i - lambda_i) - (the K costliest),       lambda in [0, w]: a weight
 
 by subgradient steps towards a running mean of where the bound is attained. What comes
 back is a proposal; ``relaxation`` evaluates it again.
@@ -159,7 +159,7 @@ class _WeightDual(_Dual):
 
     def evaluate(self, point: _Array) -> tuple[float, _Array]:
         multipliers = point * self._weights
-        paid, sets = _dearest(self._by_set @ multipliers, self._n_sets)
+        paid, sets = _costliest(self._by_set @ multipliers, self._n_sets)
         others = float(np.sum(self._weights - multipliers))
         return -(others + paid) * (1.0 + rounding(point.size)), sets
 
@@ -192,7 +192,7 @@ class _ServiceDual(_Dual):
             sets = (payments > self._cover.costs).astype(np.float64)
             paid = -float(np.minimum(self._cover.costs - payments, 0.0).sum())
         else:
-            paid, sets = _dearest(payments, self._n_sets)
+            paid, sets = _costliest(payments, self._n_sets)
         return need - paid, np.concatenate([rows, sets])
 
     def moved(
@@ -215,8 +215,8 @@ class _ServiceDual(_Dual):
         return trial * (self._size / size) if size > 1e-100 * self._size else point
 
 
-def _dearest(payments: _Array, n_sets: int) -> tuple[float, _Array]:
-    """Return what the K dearest sets pay, and their indicator."""
+def _costliest(payments: _Array, n_sets: int) -> tuple[float, _Array]:
+    """Return what the K costliest sets pay, and their indicator."""
     top = np.argsort(-payments, kind="stable")[:n_sets]
     sets = np.zeros(payments.size)
     sets[top] = 1.0

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.highs import quiet_highs, row_program, run_highs
+from solvers.one_thread import quiet_highs, row_program, run_highs
 from solvers.status import WorkBudget
 
 from .reductions import ReducedCover

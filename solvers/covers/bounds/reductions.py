@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.bit_rows import pack_shuffled
+from solvers.bit_rows import pack_shuffled, sparse_rows
 from solvers.covers.cover_problem import CoverProblem
-from solvers.dense_rows import sparse_rows
 
 WEIGHT_SLACK = 1e-12
 _SKETCH_WORDS = 4

@@ -8,9 +8,9 @@ Covered y_i costs r_i service, so the rows ask together at least for::
 a fractional knapsack for each row set, and a set pays at most lambda(a_j). So for any
 lambda >= 0, with reduced costs d_j = c_j - lambda(a_j):
 
-* fewest sets: the first K whose K dearest sets pay need(lambda);
+* fewest sets: the first K whose K costliest sets pay need(lambda);
 * cheapest (of at most K) sets: cost >= need(lambda) + the (K) least min(0, d_j);
-* most weight of K sets, with lambda <= w: sum_i (w_i - lambda_i) and the K dearest
+* most weight of K sets, with lambda <= w: sum_i (w_i - lambda_i) and the K costliest
   sum_i a_ij lambda_i / r_i.
 
 The best lambda gives the bound of the linear program (Lagrangian duality). The printed
@@ -38,9 +38,9 @@ def coverage_bounds(
         multipliers: Any numbers, shape (n_e,); clipped into [0, w].
     """
     clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
-    prices = np.sort(cover.by_set @ (clipped / cover.needs))[::-1]
+    payments = np.sort(cover.by_set @ (clipped / cover.needs))[::-1]
     rest = float(np.sum(cover.weights - clipped))
-    bounds = rest + np.concatenate([[0.0], np.cumsum(prices)])
+    bounds = rest + np.concatenate([[0.0], np.cumsum(payments)])
     return np.minimum(bounds * (1.0 + rounding(clipped.size)), cover.total)
 
 
@@ -74,16 +74,15 @@ def cost_bound(
         max_sets: Sets allowed.
     """
     usable, unit = _usable(multipliers)
-    prices = cover.by_set @ usable
+    payments = cover.by_set @ usable
     asked = least_service(cover, usable)
-    fit = float(
-        np.min((cover.costs / np.maximum(prices, 1e-200))[prices > 0], initial=np.inf)
-    )
+    ratios = cover.costs / np.maximum(payments, 1e-200)
+    fit = float(np.min(ratios[payments > 0], initial=np.inf))
     best = 0.0
     for scale in (unit, fit if np.isfinite(fit) else 0.0):
-        gains = np.sort(np.minimum(cover.costs - scale * prices, 0.0))[:max_sets]
+        gains = np.sort(np.minimum(cover.costs - scale * payments, 0.0))[:max_sets]
         # Both sums may be off by a share of their own size.
-        error = rounding(usable.size + prices.size) * (scale * asked - gains.sum())
+        error = rounding(usable.size + payments.size) * (scale * asked - gains.sum())
         best = max(best, float(scale * asked + gains.sum() - error))
     return best * (1.0 - 1e-9)
 
@@ -107,8 +106,8 @@ def cheapest_rows(
         cover: The cover.
         multipliers: Numbers of at least 0, shape (n_e,).
     """
-    prices = multipliers * cover.needs
-    order = np.lexsort((prices / cover.weights, cover.row_sets))
+    payments = multipliers * cover.needs
+    order = np.lexsort((payments / cover.weights, cover.row_sets))
     weights, groups = cover.weights[order], cover.row_sets[order]
     before = np.cumsum(weights) - weights
     starts = np.searchsorted(groups, np.arange(cover.quotas.size))
@@ -116,7 +115,7 @@ def cheapest_rows(
     missing = cover.quotas[groups] - (before - ahead[groups])
     rows = np.zeros(weights.size)
     rows[order] = np.clip(missing / weights, 0.0, 1.0)
-    return rows, float(prices @ rows)
+    return rows, float(payments @ rows)
 
 
 def _usable(multipliers: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:

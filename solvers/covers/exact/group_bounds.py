@@ -4,9 +4,9 @@ A part holds the selections of K sets that take no closed set, and at least one 
 each of some groups that have none in common. For any lambda in [0, w] they cover at
 most::
 
-    sum_e (w_e - lambda_e) + the dearest such selection, a set's price being lambda(a_j)
+    sum_e (w_e - lambda_e) + the costliest such selection, a set paying lambda(a_j)
 
-which is the dearest of each group and the dearest others. Multipliers are kept as whole
+which is the costliest of each group and the costliest others. Multipliers are whole
 steps of a grid so coarse that sums of all of them are exact in single precision: bounds
 are exact, and the same whatever the BLAS and its threads. The volume algorithm
 (``relaxation``) lowers the bounds of many parts by one matrix product a step.
@@ -26,7 +26,7 @@ _EXACT = float(1 << 23)
 _STEP = 2.0**-12
 # A dense multiply-add in single precision costs this share of a unit of work.
 _DENSE_UNIT = 1.0 / 16.0
-# Work of choosing the dearest, for each part and set.
+# Work of choosing the costliest, for each part and set.
 _CHOOSE = 6.0
 _MEMORY = 0.9
 # After so many steps, parts that were refuted take no further part.
@@ -41,8 +41,8 @@ class GroupPart:
         closed: Sets that aren't taken, shape (n_s,).
         groups: Indices of sets of which at least one is taken, each; none is closed.
         shares: lambda / w, shape (n_e,).
-        primal: Running mean of the dearest selections, shape (n_s,).
-        dearest: The last dearest selection, at most K sets.
+        primal: Running mean of the costliest selections, shape (n_s,).
+        costliest: The last costliest selection, at most K sets.
         pace: Of the volume algorithm: the length of its steps, and how many in a row
             lowered nothing.
         bound: Integer-valued weight that no selection of the part exceeds.
@@ -52,7 +52,7 @@ class GroupPart:
     groups: tuple[NDArray[np.int64], ...]
     shares: NDArray[np.float32]
     primal: NDArray[np.float32]
-    dearest: NDArray[np.int64]
+    costliest: NDArray[np.int64]
     bound: float
     pace: tuple[float, int] = (1.0, 0)
 
@@ -118,7 +118,7 @@ class PartBounds:
         best, (bounds, chosen) = shares, self._bounds(parts, shares)
         taken = self._indicator(chosen)
         primal = np.stack([part.primal for part in parts]).astype(np.float64)
-        fresh = np.array([not part.dearest.size for part in parts])
+        fresh = np.array([not part.costliest.size for part in parts])
         primal = np.where(fresh[:, None], taken, primal)
         step = np.array([part.pace[0] for part in parts])
         stale = np.array([part.pace[1] for part in parts])
@@ -145,7 +145,7 @@ class PartBounds:
                 part,
                 shares=best[i].astype(np.float32),
                 primal=primal[i].astype(np.float32),
-                dearest=chosen[i],
+                costliest=chosen[i],
                 bound=min(part.bound, float(bounds[i])),
                 pace=(float(step[i]), int(stale[i])),
             )
@@ -155,34 +155,29 @@ class PartBounds:
     def _bounds(
         self, parts: list[GroupPart], shares: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
-        """Return the bound of each part by its multipliers, and what is dearest."""
+        """Return the bound of each part by its multipliers, and what is costliest."""
         steps = np.floor(shares * (self._weights / self._grid))
-        prices = steps.astype(np.float32) @ self.covers.T
+        payments = steps.astype(np.float32) @ self.covers.T
         self._budget.spend(
             2.0 * len(parts) * self.covers.size * _DENSE_UNIT
-            + _CHOOSE * prices.size
+            + _CHOOSE * payments.size
             + 1e5
         )
-        chosen = [
-            self._dearest(part, own) for part, own in zip(parts, prices, strict=True)
-        ]
-        paid = np.array(
-            [
-                own[sets].sum(dtype=np.float64)
-                for own, sets in zip(prices, chosen, strict=True)
-            ]
-        )
+        pairs = zip(parts, payments, strict=True)
+        chosen = [self._costliest(part, row) for part, row in pairs]
+        sums = zip(payments, chosen, strict=True)
+        paid = np.array([row[sets].sum(dtype=np.float64) for row, sets in sums])
         return self._total + self._grid * (paid - steps.sum(axis=1)), chosen
 
-    def _dearest(
-        self, part: GroupPart, prices: NDArray[np.float32]
+    def _costliest(
+        self, part: GroupPart, payments: NDArray[np.float32]
     ) -> NDArray[np.int64]:
-        """Return the dearest selection of a part."""
-        picks = [int(group[np.argmax(prices[group])]) for group in part.groups]
+        """Return the costliest selection of a part."""
+        picks = [int(group[np.argmax(payments[group])]) for group in part.groups]
         left = self.n_sets - len(picks)
         if left == 0:
             return np.array(picks, dtype=np.int64)
-        others = np.where(part.closed, np.float32(-1.0), prices)
+        others = np.where(part.closed, np.float32(-1.0), payments)
         others[picks] = -1.0
         top = np.argpartition(-others, min(left, others.size) - 1)[:left]
         top = top[others[top] > 0.0]

@@ -118,9 +118,9 @@ class _Tree(Incumbent):
             if only is not None:
                 self.offer(np.sort(only), self.bounds.weight_of(only))
                 continue
-            if part.dearest.size:
-                dearest = np.sort(part.dearest)
-                self.offer(dearest, self.bounds.weight_of(dearest))
+            if part.costliest.size:
+                costliest = np.sort(part.costliest)
+                self.offer(costliest, self.bounds.weight_of(costliest))
             still.append(part)
         for part in still:
             if part.bound >= self.target:
@@ -146,7 +146,7 @@ class _Tree(Incumbent):
         without = kept
         if home >= 0:
             without += (np.setdiff1d(part.groups[home], group),)
-        part = replace(part, pace=(1.0, 0), dearest=NONE)
+        part = replace(part, pace=(1.0, 0), costliest=NONE)
         fewer = replace(part, closed=closed, groups=without)
         return [replace(part, groups=(*kept, group)), fewer]
 

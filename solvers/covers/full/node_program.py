@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.highs import run_highs
+from solvers.one_thread import run_highs
 from solvers.status import WorkBudget
 
 from .row_generation import needed_sets, program

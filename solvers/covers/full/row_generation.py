@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.highs import quiet_highs, row_program, run_highs, seconds_left
+from solvers.one_thread import quiet_highs, row_program, run_highs, seconds_left
 from solvers.status import WorkBudget
 
 _FIRST_ROWS = 200

@@ -109,7 +109,7 @@ def most_coverage(
 
 
 def prune(cover: ReducedCover, selected: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Drop sets, dearest first, while what is required is still reached."""
+    """Drop sets, costliest first, while what is required is still reached."""
     chosen = [int(s) for s in selected]
     counts = cover.served(selected)
     covered = cover.by_row_set(np.where(counts >= cover.needs, cover.weights, 0.0))

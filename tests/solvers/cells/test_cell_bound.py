@@ -246,9 +246,9 @@ def test_the_bound_holds_for_any_multipliers(case, numbers, data):
     tree, leaves, problem = CASES[case]
     multipliers = numbers[: tree.n_rows]
     k = data.draw(st.integers(0, 2))
-    dearest = data.draw(st.sampled_from([0, 2**40, 2**48, 2**50]))
+    largest_cost = data.draw(st.sampled_from([0, 2**40, 2**48, 2**50]))
     bound, most = multiplier_bound(
-        problem, tree, multipliers, n_poses=k, dearest=dearest
+        problem, tree, multipliers, n_poses=k, largest_cost=largest_cost
     )
     if TRUTHS[case] < math.inf:
         assert bound <= TRUTHS[case]
@@ -313,12 +313,12 @@ def test_a_spoiled_answer_is_caught():
         rows[int(np.argmax(rows))] = 0
         for spoiled in (
             dataclasses.replace(good, multipliers=rows),
-            dataclasses.replace(good, dearest=good.dearest // 2),
+            dataclasses.replace(good, largest_cost=good.largest_cost // 2),
             dataclasses.replace(good, by_multipliers=good.by_multipliers + 1),
         ):
             bound, most = rederived(spoiled)
             assert bound <= good.by_multipliers
-            assert most >= good.most_weight or spoiled.dearest == good.dearest
+            assert most >= good.most_weight or spoiled.largest_cost == good.largest_cost
             caught += (bound, most) != (spoiled.by_multipliers, spoiled.most_weight)
     assert caught > 30
 

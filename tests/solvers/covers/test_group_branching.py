@@ -78,7 +78,7 @@ def test_no_selection_of_a_part_exceeds_its_bound(seed):
     bounds = PartBounds(cover, 3, 0.0, budget)
     whole = bounds.whole(rng.random(cover.weights.size))
     part = type(whole)(
-        closed, groups, whole.shares, whole.primal, whole.dearest, np.inf
+        closed, groups, whole.shares, whole.primal, whole.costliest, np.inf
     )
     own = [
         weight_of(cover, chosen)
@@ -92,8 +92,8 @@ def test_no_selection_of_a_part_exceeds_its_bound(seed):
         assert max(own) <= part.bound <= before
         before = part.bound
     assert part.bound < 1.1 * max(own)
-    assert not closed[part.dearest].any()
-    assert all(np.isin(part.dearest, group).any() for group in groups)
+    assert not closed[part.costliest].any()
+    assert all(np.isin(part.costliest, group).any() for group in groups)
 
 
 @pytest.mark.parametrize("seed", range(4))

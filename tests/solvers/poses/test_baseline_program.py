@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from planning.cameras.baselines.coverage_triangle import round_body_limit, seam_angles
+from solvers.poses.baseline_nlp import build_baseline_program
 from solvers.poses.baseline_problem import (
     BaselineProblem,
     HalfSpaces,
@@ -15,7 +16,7 @@ from solvers.poses.baseline_problem import (
     PositionShell,
     SeamPoints,
 )
-from solvers.poses.baseline_program import build_baseline_program, solve_baseline
+from solvers.poses.baseline_program import solve_baseline
 from solvers.status import SolveStatus
 
 THETA = np.radians(60.0)

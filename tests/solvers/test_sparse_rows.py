@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from solvers.dense_rows import sparse_rows
+from solvers.bit_rows import sparse_rows
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (3, 0), (1, 1), (40, 7), (7, 40)])
