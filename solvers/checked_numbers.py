@@ -5,6 +5,9 @@ import operator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+# A required weight is lowered by this share, against rounding.
+WEIGHT_SLACK = 1e-12
+
 
 def real_numbers(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
     """Return a copy in float64.
@@ -62,3 +65,19 @@ def set_names(name: str, numbers: ArrayLike, n: int) -> NDArray[np.int64]:
     if not np.all((names >= 0) & (names < n)):
         raise ValueError(f"{name} must name sets from 0 to {n - 1}")
     return names
+
+
+def whole_weights(
+    weights: NDArray[np.float64], *, bits: int
+) -> tuple[int, NDArray[np.float64], NDArray[np.bool_]]:
+    """Return weights as whole numbers of a power of two, of a sum below 2^bits or so.
+
+    Returns:
+        The exponent by which they were scaled, the whole numbers, and which of them
+        were rounded.
+    """
+    total = float(weights.sum())
+    exponent = bits - 1 - int(np.floor(np.log2(total))) if total > 0 else 0
+    scaled = np.ldexp(weights, exponent)
+    whole = np.rint(scaled)
+    return exponent, whole, whole != scaled

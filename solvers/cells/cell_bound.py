@@ -141,16 +141,16 @@ class _Proof:
             self.lower = int(min(self.search.bound, self.count))
             self.proof = "multipliers of the rows"
             return True
-        found = refute_tuples(
+        answer = refute_tuples(
             self.whole, self.store, n_poses, self.search.multipliers, self.budget
         )
-        self.met += found.met
-        if found.refuted:
+        self.met += answer.met
+        if answer.refuted:
             self.lower = n_poses + 1
             self.proof = f"multisets of {n_poses} cells by exhaustion"
-        elif found.survivor is not None:
-            self.survivor = self.store.names[found.survivor]
-        return found.refuted
+        elif answer.survivor is not None:
+            self.survivor = self.store.names[answer.survivor]
+        return answer.refuted
 
     def _refute_none(self) -> bool:
         none = np.zeros((1, 0, self.store.rows.shape[1]), dtype=np.uint64)

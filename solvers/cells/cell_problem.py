@@ -25,12 +25,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solvers.checked_numbers import real_numbers
+from solvers.checked_numbers import WEIGHT_SLACK, real_numbers, whole_weights
 
 # Of rows; the tables of row weights take 256 bytes a row.
 MAX_ROWS = 1_000_000
-# The required weight is lowered by this share, as in covers over candidates.
-WEIGHT_SLACK = 1e-12
 _BITS = 51
 # Sums within this and its inverse neither vanish nor overflow.
 _LEAST_TOTAL = 1e-250
@@ -182,15 +180,12 @@ class WholeRows:
 def whole_rows(problem: CellProblem) -> WholeRows:
     """Return the problem in integers."""
     total = float(np.sum(problem.weights))
-    exponent = _BITS - 1 - int(np.floor(np.log2(total))) if total > 0 else 0
-    scaled = np.ldexp(problem.weights, exponent)
-    whole = np.rint(scaled)
-    inexact = whole != scaled
+    exponent, whole, inexact = whole_weights(problem.weights, bits=_BITS)
     sets = np.arange(problem.required_weight.size)
     lost = [0.5 * np.count_nonzero(inexact & (problem.row_sets == g)) for g in sets]
     # More than there is can't be had, however much more; of nothing, nothing.
-    asked = np.minimum(problem.required_weight, 4.0 * total)
-    needed = np.ldexp(asked, exponent) * (1.0 - WEIGHT_SLACK) - lost
+    required = np.minimum(problem.required_weight, 4.0 * total)
+    needed = np.ldexp(required, exponent) * (1.0 - WEIGHT_SLACK) - lost
     if not total > 0:
         needed = (problem.required_weight > 0).astype(np.float64)
     return WholeRows(

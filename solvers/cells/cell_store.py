@@ -90,23 +90,23 @@ class CellStore:
             ValueError: If a child serves a row that its parent misses.
         """
         before = self.size
-        asked = cells[self.may_split(cells)]
-        for part in parts(asked.size, _ASKED):
-            self._ask(asked[part])
+        parents = cells[self.may_split(cells)]
+        for part in parts(parents.size, _ASKED):
+            self._ask(parents[part])
         return np.arange(before, self.size)
 
-    def _ask(self, asked: NDArray[np.int64]) -> None:
+    def _ask(self, parents: NDArray[np.int64]) -> None:
         if self.full:
             return
-        batch = self.tree.children(self.names[asked])
+        batch = self.tree.children(self.names[parents])
         if not self._room(batch.cells.size):
             self.full = True
             return
-        self._check(asked, batch)
-        number = np.bincount(batch.parents, minlength=asked.size)
-        self._number.values[asked] = number
-        self._first.values[asked] = self.size + np.cumsum(number) - number
-        self._append(batch, self.levels[asked[batch.parents]] + 1)
+        self._check(parents, batch)
+        number = np.bincount(batch.parents, minlength=parents.size)
+        self._number.values[parents] = number
+        self._first.values[parents] = self.size + np.cumsum(number) - number
+        self._append(batch, self.levels[parents[batch.parents]] + 1)
 
     def costs(
         self, cells: NDArray[np.int64], multipliers: NDArray[np.int64]
@@ -114,20 +114,20 @@ class CellStore:
         """Return lambda(S) of each cell, exactly."""
         cost = BitSum(multipliers)
         self._budget.spend(cells.size * self._words * cost.units + 3e5)
-        found = np.empty(cells.size, dtype=np.int64)
+        sums = np.empty(cells.size, dtype=np.int64)
         for part in parts(cells.size):
-            found[part] = cost(self.rows[cells[part]])
-        return found
+            sums[part] = cost(self.rows[cells[part]])
+        return sums
 
     def _room(self, n: int) -> bool:
         return (self.size + n) * self._words * 8 <= MAX_BYTES
 
-    def _check(self, asked: NDArray[np.int64], batch: CellBatch) -> None:
+    def _check(self, parents: NDArray[np.int64], batch: CellBatch) -> None:
         if not np.all(np.diff(batch.parents) >= 0):
             raise ValueError("children must come in the order of the cells asked for")
-        bad = exceeds(batch.rows, self.rows, asked[batch.parents])
+        bad = exceeds(batch.rows, self.rows, parents[batch.parents])
         if bad >= 0:
-            parent = self.names[asked[batch.parents[bad]]]
+            parent = self.names[parents[batch.parents[bad]]]
             raise ValueError(
                 f"cell {batch.cells[bad]} serves rows that its parent {parent} misses: "
                 f"a parent must hold the union of its children"

@@ -113,17 +113,17 @@ class Enough:
                 planes[j] |= planes[j - 1] & rows[:, k]
             if self._planes:
                 planes[0] |= rows[:, k]
-        found = np.broadcast_to(self._exactly[0], (n, words)).copy()
+        covered = np.broadcast_to(self._exactly[0], (n, words)).copy()
         for plane, mask in zip(planes, self._exactly[1:], strict=True):
-            found |= plane & mask
-        return found
+            covered |= plane & mask
+        return covered
 
     def __call__(
         self, rows: NDArray[np.uint64]
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Return whether each K rows meet every set, and what they serve in all."""
-        found = self.served(rows)
-        each = np.stack([weigh(found) for weigh in self._sums])
+        covered = self.served(rows)
+        each = np.stack([weigh(covered) for weigh in self._sums])
         meets = [w >= needed for w, needed in zip(each, self._needed, strict=True)]
         return np.all(meets, axis=0), each.sum(axis=0)
 
@@ -166,7 +166,7 @@ def _uses(
     nodes: NDArray[np.int64], chosen: NDArray[np.int64], halves: NDArray[np.int64]
 ) -> list[NDArray[np.int64]]:
     """Replace m uses of a subtree by (m, 0), (m - 1, 1), ... uses of its halves."""
-    found: list[NDArray[np.int64]] = []
+    multisets: list[NDArray[np.int64]] = []
     at = nodes == chosen[:, None]
     uses = at.sum(axis=1)
     for m in np.unique(uses):
@@ -175,5 +175,5 @@ def _uses(
             parts_of = np.repeat(two, [m - second, second], axis=1)
             new = rows.copy()
             new[places] = parts_of.ravel()
-            found.append(np.sort(new, axis=1))
-    return found
+            multisets.append(np.sort(new, axis=1))
+    return multisets

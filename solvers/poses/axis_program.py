@@ -100,8 +100,8 @@ def pair_scores(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.f
 
 def axis_scores(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return each sample's best 1/(1 + e), over cameras and projectors, (n,)."""
-    own = pair_scores(program, axis).max(axis=1, initial=0.0)
-    return np.maximum(own, program.others)
+    scores = pair_scores(program, axis).max(axis=1, initial=0.0)
+    return np.maximum(scores, program.others)
 
 
 def axis_slack(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -193,10 +193,14 @@ def _figures(program: AxisProgram, axis: NDArray[np.float64]) -> tuple[float, fl
 
 def _assigned(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.int64]:
     """Rows (sample, camera): the best camera of each sample that this projector has."""
-    own = pair_scores(program, axis)
-    camera = np.argmax(own, axis=1) if own.shape[1] else np.zeros(len(own), dtype=int)
+    scores = pair_scores(program, axis)
+    camera = (
+        np.argmax(scores, axis=1)
+        if scores.shape[1]
+        else np.zeros(len(scores), dtype=int)
+    )
     seen = program.seen.any(axis=1)
-    best = own.max(axis=1, initial=0.0)
+    best = scores.max(axis=1, initial=0.0)
     rows = np.flatnonzero(seen & (best >= program.others))
     return np.column_stack([rows, camera[rows]]).astype(np.int64)
 

@@ -184,12 +184,12 @@ def _half_spaces(
     program: PoseProgram, size: float
 ) -> tuple[NDArray[np.float64], list[bool]]:
     """Return rows (n, d) for q instead of Q, and which of them apply."""
-    given = program.planes
+    limits = program.planes
     planes = np.zeros((n_planes_of(program), 4))
-    planes[: len(given), :3] = given[:, :3]
+    planes[: len(limits), :3] = limits[:, :3]
     start = program.world_from_device[:3, 3]
-    planes[: len(given), 3] = (given[:, 3] - given[:, :3] @ start) / size
-    return planes, [k < len(given) for k in range(len(planes))]
+    planes[: len(limits), 3] = (limits[:, 3] - limits[:, :3] @ start) / size
+    return planes, [k < len(limits) for k in range(len(planes))]
 
 
 def n_planes_of(program: PoseProgram) -> int:

@@ -101,8 +101,8 @@ class PoseProgram:
     @property
     def planes(self) -> NDArray[np.float64]:
         """Rows (n, d) of the half-spaces, shape (k, 4); k = 0 without any."""
-        given = np.empty((0, 4)) if self.half_spaces is None else self.half_spaces
-        return np.asarray(given, dtype=np.float64)
+        rows = np.empty((0, 4)) if self.half_spaces is None else self.half_spaces
+        return np.asarray(rows, dtype=np.float64)
 
 
 def light_directions(

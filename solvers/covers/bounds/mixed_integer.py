@@ -141,8 +141,8 @@ def _answer(
         return IntegerAnswer(None, None)
     values = np.asarray(solver.getSolution().col_value, dtype=np.float64)
     n = cover.n_sets
-    found = bool(solver.getSolution().value_valid) and values.size >= n
-    selected = np.flatnonzero(values[:n] > 0.5) if found else None
+    usable = bool(solver.getSolution().value_valid) and values.size >= n
+    selected = np.flatnonzero(values[:n] > 0.5) if usable else None
     bound = float(info.mip_dual_bound)
     if not np.isfinite(bound):
         return IntegerAnswer(selected, None)
@@ -182,11 +182,11 @@ def _model(
     lower = cover.needs.astype(np.float64)
     cost = cover.costs / _cost_unit(cover)
     if with_rows:
-        own = sparse.dia_array((-lower[None], [0]), shape=(n_e, n_e))
+        service = sparse.dia_array((-lower[None], [0]), shape=(n_e, n_e))
         groups = sparse.csr_array(
             (weights, (cover.row_sets, np.arange(n_e))), shape=(needed.size, n_e)
         )
-        link = _stack([[link, own], [None, groups]])
+        link = _stack([[link, service], [None, groups]])
         lower = np.concatenate([np.zeros(n_e), needed])
         cost = np.concatenate(
             [np.zeros(n_s), -weights] if heaviest else [cost, np.zeros(n_e)]

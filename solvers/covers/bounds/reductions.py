@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from solvers.bit_rows import pack_shuffled, sparse_rows
+from solvers.checked_numbers import WEIGHT_SLACK, whole_weights
 from solvers.covers.cover_problem import CoverProblem
 
-WEIGHT_SLACK = 1e-12
 _SKETCH_WORDS = 4
 # Words of columns that are compared, some seconds; so many are reached beyond about
 # ten thousand columns.
@@ -184,8 +184,8 @@ def _quotas(
         # Nothing can be had, so anything is too much.
         return (problem.required_weight > 0).astype(np.float64)
     # More than there is can't be had, however much more.
-    asked = np.ldexp(np.minimum(problem.required_weight, 4.0 * total), exponent)
-    return np.floor(asked * (1.0 - WEIGHT_SLACK) - 0.5 * inexact)
+    required = np.ldexp(np.minimum(problem.required_weight, 4.0 * total), exponent)
+    return np.floor(required * (1.0 - WEIGHT_SLACK) - 0.5 * inexact)
 
 
 def forgiven(problem: CoverProblem) -> NDArray[np.float64]:
@@ -196,8 +196,8 @@ def forgiven(problem: CoverProblem) -> NDArray[np.float64]:
     """
     total = problem.total_weight
     exponent, _, inexact = _whole_weights(problem)
-    asked = np.minimum(problem.required_weight, 4.0 * total)
-    return WEIGHT_SLACK * (asked + total) + np.ldexp(inexact + 1.0, -exponent)
+    required = np.minimum(problem.required_weight, 4.0 * total)
+    return WEIGHT_SLACK * (required + total) + np.ldexp(inexact + 1.0, -exponent)
 
 
 def _whole_weights(
@@ -207,11 +207,8 @@ def _whole_weights(
 
     The last in each row set, shape (n_g,).
     """
-    total = problem.total_weight
-    exponent = 51 - int(np.floor(np.log2(total))) if total > 0 else 0
-    scaled = np.ldexp(problem.weights, exponent)
-    whole = np.rint(scaled)
-    return exponent, whole, problem.by_row_set((whole != scaled).astype(np.float64))
+    exponent, whole, inexact = whole_weights(problem.weights, bits=52)
+    return exponent, whole, problem.by_row_set(inexact.astype(np.float64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,8 +39,8 @@ def coverage_bounds(
     """
     clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
     payments = np.sort(cover.by_set @ (clipped / cover.needs))[::-1]
-    rest = float(np.sum(cover.weights - clipped))
-    bounds = rest + np.concatenate([[0.0], np.cumsum(payments)])
+    others = float(np.sum(cover.weights - clipped))
+    bounds = others + np.concatenate([[0.0], np.cumsum(payments)])
     return np.minimum(bounds * (1.0 + rounding(clipped.size)), cover.total)
 
 
@@ -75,15 +75,15 @@ def cost_bound(
     """
     usable, unit = _usable(multipliers)
     payments = cover.by_set @ usable
-    asked = least_service(cover, usable)
+    need = least_service(cover, usable)
     ratios = cover.costs / np.maximum(payments, 1e-200)
     fit = float(np.min(ratios[payments > 0], initial=np.inf))
     best = 0.0
     for scale in (unit, fit if np.isfinite(fit) else 0.0):
         gains = np.sort(np.minimum(cover.costs - scale * payments, 0.0))[:max_sets]
         # Both sums may be off by a share of their own size.
-        error = rounding(usable.size + payments.size) * (scale * asked - gains.sum())
-        best = max(best, float(scale * asked + gains.sum() - error))
+        error = rounding(usable.size + payments.size) * (scale * need - gains.sum())
+        best = max(best, float(scale * need + gains.sum() - error))
     return best * (1.0 - 1e-9)
 
 

@@ -130,11 +130,11 @@ class PartBounds:
             length = np.maximum((excess * excess * moving) @ weights, 1e-9)
             far = np.maximum(bounds - aim, 1e-4 * self._total)
             shares = np.clip(best + (step * far / length)[:, None] * excess, 0.0, 1.0)
-            found, chosen = self._bounds(parts, shares)
+            values, chosen = self._bounds(parts, shares)
             primal = _MEMORY * primal + (1.0 - _MEMORY) * self._indicator(chosen)
-            lower = found < bounds
+            lower = values < bounds
             best = np.where(lower[:, None], shares, best)
-            bounds = np.minimum(bounds, found)
+            bounds = np.minimum(bounds, values)
             stale = np.where(lower, 0, stale + 1)
             step = np.where(lower, np.minimum(1.1 * step, 4.0), step)
             step = np.where(~lower & (stale % 5 == 0), 0.6 * step, step)
@@ -174,17 +174,17 @@ class PartBounds:
     ) -> NDArray[np.int64]:
         """Return the costliest selection of a part."""
         picks = [int(group[np.argmax(payments[group])]) for group in part.groups]
-        left = self.n_sets - len(picks)
-        if left == 0:
+        spare = self.n_sets - len(picks)
+        if spare == 0:
             return np.array(picks, dtype=np.int64)
         others = np.where(part.closed, np.float32(-1.0), payments)
         others[picks] = -1.0
-        top = np.argpartition(-others, min(left, others.size) - 1)[:left]
+        top = np.argpartition(-others, min(spare, others.size) - 1)[:spare]
         top = top[others[top] > 0.0]
         return np.concatenate([np.array(picks, dtype=np.int64), top])
 
     def _indicator(self, chosen: list[NDArray[np.int64]]) -> NDArray[np.float64]:
-        found = np.zeros((len(chosen), len(self.covers)))
-        for row, sets in zip(found, chosen, strict=True):
+        taken = np.zeros((len(chosen), len(self.covers)))
+        for row, sets in zip(taken, chosen, strict=True):
             row[sets] = 1.0
-        return found
+        return taken

@@ -96,8 +96,8 @@ class _Tree(Incumbent):
         while self._promising:
             if self.done or self.budget.exhausted or len(self._open) > most:
                 # What the clock cut before it was bounded may cover everything.
-                left = min(-self._open[0][0], self.cover.total)
-                upper = max(self.weight, left // self.cover.grain * self.cover.grain)
+                bound = min(-self._open[0][0], self.cover.total)
+                upper = max(self.weight, bound // self.cover.grain * self.cover.grain)
                 return ExactSearch(self.selected, self.weight, upper, complete=False)
             split: list[GroupPart] = []
             while self._promising and len(split) < _BATCH:
@@ -134,21 +134,21 @@ class _Tree(Incumbent):
         if taken.size == self.n_sets:
             return taken
         others = np.setdiff1d(np.flatnonzero(~part.closed), taken)
-        left = self.n_sets - taken.size
-        return np.concatenate([taken, others]) if others.size <= left else None
+        spare = self.n_sets - taken.size
+        return np.concatenate([taken, others]) if others.size <= spare else None
 
     def _children(self, part: GroupPart) -> list[GroupPart]:
         """Return the part without a group, and with at least one of it."""
         home, group = self._group(part)
         closed = part.closed.copy()
         closed[group] = True
-        kept = tuple(own for i, own in enumerate(part.groups) if i != home)
-        without = kept
+        others = tuple(other for i, other in enumerate(part.groups) if i != home)
+        without = others
         if home >= 0:
             without += (np.setdiff1d(part.groups[home], group),)
         part = replace(part, pace=(1.0, 0), costliest=NONE)
         fewer = replace(part, closed=closed, groups=without)
-        return [replace(part, groups=(*kept, group)), fewer]
+        return [replace(part, groups=(*others, group)), fewer]
 
     def _group(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
         """Return sets to branch on, and the group of the part that holds them, or -1.
@@ -196,6 +196,6 @@ def _likeness(
     scale = max(1.0, float(weights.sum()) / float(1 << 23))
     whole = np.maximum(np.floor(weights / scale), 1.0).astype(np.float32)
     both = (covers * whole) @ covers.T
-    own = both.diagonal()
-    either = own[:, None] + own[None, :] - both
+    alone = both.diagonal()
+    either = alone[:, None] + alone[None, :] - both
     return np.asarray(both / either, dtype=np.float32)

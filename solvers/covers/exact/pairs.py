@@ -3,7 +3,7 @@
 What a pair leaves open of a cover in which each row is needed once is a product of
 matrices over the open rows::
 
-    left(i, j) = sum_e w_e (1 - a_ei) (1 - a_ej)
+    missing(i, j) = sum_e w_e (1 - a_ei) (1 - a_ej)
 
 With several needs and row sets, i and j complete the rows that need one set and have
 either, and those that need two and have both, in each row set G::
@@ -111,15 +111,15 @@ class _Pairs:
             if self.budget.exhausted:
                 return False
             block = slice(start, start + _PAIR_BLOCK)
-            i, j, left = self._best_of(missed[block], missed[start:stop])
-            if left is not None:
+            i, j, missing = self._best_of(missed[block], missed[start:stop])
+            if missing is not None:
                 ends = np.unique([start + i, start + j])
-                best.offer(np.sort(sets[ends]), cover.total - left)
+                best.offer(np.sort(sets[ends]), cover.total - missing)
         return True
 
-    def _may_help(self, values: NDArray[np.float64], rest: float) -> NDArray[np.bool_]:
+    def _may_help(self, values: NDArray[np.float64], base: float) -> NDArray[np.bool_]:
         """Return the sets that reach the target together with the best other."""
-        return (rest + values.max() + values) * self._slack >= self.best.target
+        return (base + values.max() + values) * self._slack >= self.best.target
 
     def _best_of(
         self, ones: NDArray[np.bool_], others: NDArray[np.bool_]
@@ -130,30 +130,30 @@ class _Pairs:
         refuted by the rows that fewest sets cover, which come first.
         """
         weights, allowed = self._weights, self.cover.total - self.best.target
-        left = np.zeros((len(ones), len(others)))
+        missing = np.zeros((len(ones), len(others)))
         start, length = 0, _FIRST_ROWS
         while start < weights.size:
             part = slice(start, start + length)
-            left += (ones[:, part] * weights[part]) @ others[:, part].T.astype(float)
+            missing += (ones[:, part] * weights[part]) @ others[:, part].T.astype(float)
             width = min(length, weights.size - start)
-            self.budget.spend(left.size * (4.0 + width * _DENSE_UNIT))
+            self.budget.spend(missing.size * (4.0 + width * _DENSE_UNIT))
             start, length = start + length, 4 * length
-            alive = left <= allowed
+            alive = missing <= allowed
             n_alive = int(np.count_nonzero(alive))
             if n_alive == 0:
                 return 0, 0, None
-            if n_alive * _FEW_PAIRS < left.size and start < weights.size:
+            if n_alive * _FEW_PAIRS < missing.size and start < weights.size:
                 i, j = np.nonzero(alive)
-                rest = slice(start, None)
+                tail = slice(start, None)
                 for k in range(0, i.size, _PAIR_BLOCK):
                     few = slice(k, k + _PAIR_BLOCK)
-                    both = ones[i[few], rest] & others[j[few], rest]
-                    left[i[few], j[few]] += both @ weights[rest]
+                    both = ones[i[few], tail] & others[j[few], tail]
+                    missing[i[few], j[few]] += both @ weights[tail]
                     self.budget.spend(2.0 * both.size)
-                left[~alive] = np.inf
+                missing[~alive] = np.inf
                 break
-        i, j = np.unravel_index(int(np.argmin(left)), left.shape)
-        value = float(left[i, j])
+        i, j = np.unravel_index(int(np.argmin(missing)), missing.shape)
+        value = float(missing[i, j])
         return int(i), int(j), value if value <= allowed else None
 
 

@@ -76,12 +76,12 @@ def fewest_full(
         raise ValueError(f"start of {start.size} sets must cover every row")
     budget.spend(float(served.size))
     rows, columns = essential(served, budget.part(0.12 * budget.units))
-    left = served[np.ix_(rows, columns)]
-    parts = separate(left)
+    smaller = served[np.ix_(rows, columns)]
+    parts = separate(smaller)
     if len(parts) > 1:
-        best, bound, proof = _of_parts(left, parts, budget, seed)
+        best, bound, proof = _of_parts(smaller, parts, budget, seed)
     else:
-        search = _Search(left, budget, seed, start.size)
+        search = _Search(smaller, budget, seed, start.size)
         search.lower = lower
         search.run()
         best, bound, proof = search.best, search.lower, search.proof
@@ -221,15 +221,15 @@ class _Search:
         for _ in range(_ROUNDS):
             linear = linear_cover(part, budget)
             kept = linear.needed + linear.reduced < self.lower + _ROUNDING
-            left = part[:, kept]
-            if linear.lower_bound >= size or not left.any(axis=1).all():
+            smaller = part[:, kept]
+            if linear.lower_bound >= size or not smaller.any(axis=1).all():
                 self._raise(size, _BRANCHING_PROOF)
                 return True
             if np.count_nonzero(kept) > _FEWER * kept.size:
                 break
             # Without sets of large reduced cost more rows include others.
-            rows, fewer = essential(left, budget.part(0.2 * budget.remaining))
-            part, columns = left[np.ix_(rows, fewer)], columns[kept][fewer]
+            rows, fewer = essential(smaller, budget.part(0.2 * budget.remaining))
+            part, columns = smaller[np.ix_(rows, fewer)], columns[kept][fewer]
         linear = linear_cover(part, budget)
         answer = RowTree(part, linear.rows, size, budget).run()
         self._raise(answer.lower_bound, _BRANCHING_PROOF)
@@ -255,20 +255,20 @@ def _spread_rows(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
         return np.arange(len(covers))
     order = np.argsort(covers.sum(axis=1), kind="stable")
     half = _FEW_ROWS // 2
-    more = np.linspace(half, len(covers) - 1, half).astype(np.int64)
-    return np.sort(np.concatenate([order[:half], order[more]]))
+    spread = np.linspace(half, len(covers) - 1, half).astype(np.int64)
+    return np.sort(np.concatenate([order[:half], order[spread]]))
 
 
 def _greedy(covers: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
     """Return sets that cover every row, the one of most open rows first, increasing."""
-    left = np.ones(len(covers), dtype=bool)
+    open_rows = np.ones(len(covers), dtype=bool)
     counts = covers.sum(axis=0)
     budget.spend(2.0 * covers.size)
     chosen: list[int] = []
-    while left.any():
+    while open_rows.any():
         best = int(np.argmax(counts))
         chosen.append(best)
-        served = left & covers[:, best]
+        served = open_rows & covers[:, best]
         counts -= covers[served].sum(axis=0)
-        left &= ~served
+        open_rows &= ~served
     return np.sort(np.array(chosen, dtype=np.int64))

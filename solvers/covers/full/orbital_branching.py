@@ -39,44 +39,46 @@ class OrbitalTree(Tree):
         allowed = part.allowed & ~(free & (node.bound + node.reduced > self.cut))
         taken = part.taken | (free & (node.bound - node.reduced > self.cut))
         open_rows = np.flatnonzero(~self.covers[:, taken].any(axis=1))
-        left = np.flatnonzero(allowed & ~taken)
-        self.budget.spend(float(self.covers.size + 2 * open_rows.size * left.size))
-        rest = self.covers[np.ix_(open_rows, left)]
-        if not rest.any(axis=1).all():
+        candidates = np.flatnonzero(allowed & ~taken)
+        self.budget.spend(
+            float(self.covers.size + 2 * open_rows.size * candidates.size)
+        )
+        remaining = self.covers[np.ix_(open_rows, candidates)]
+        if not remaining.any(axis=1).all():
             return []
         rows, columns = essential(
-            rest, self.budget.part(_DOMINANCE * self.budget.remaining)
+            remaining, self.budget.part(_DOMINANCE * self.budget.remaining)
         )
-        rest = rest[np.ix_(rows, columns)]
+        remaining = remaining[np.ix_(rows, columns)]
         allowed = taken.copy()
-        allowed[left[columns]] = True
-        only = rest[rest.sum(axis=1) == 1].any(axis=0)
-        if only.any() or columns.size < left.size or np.any(taken & ~part.taken):
-            taken[left[columns[only]]] = True
+        allowed[candidates[columns]] = True
+        only = remaining[remaining.sum(axis=1) == 1].any(axis=0)
+        if only.any() or columns.size < candidates.size or np.any(taken & ~part.taken):
+            taken[candidates[columns[only]]] = True
             return self._solved(
                 node, NodePart(allowed, taken, symmetric=part.symmetric)
             )
-        return self._split(node, rest, left, allowed)
+        return self._split(node, remaining, candidates, allowed)
 
     def _split(
         self,
         node: Node,
-        rest: NDArray[np.bool_],
-        left: NDArray[np.int64],
+        remaining: NDArray[np.bool_],
+        candidates: NDArray[np.int64],
         allowed: NDArray[np.bool_],
     ) -> list[Node] | None:
         """Return both sides of the orbit that most rows of few sets wait for."""
         part = node.part
-        orbits = np.arange(left.size)
+        orbits = np.arange(candidates.size)
         if part.symmetric:
-            orbits = column_orbits(rest, self.budget)
-        symmetric = np.unique(orbits).size < left.size
-        urgent = np.exp2(-rest.sum(axis=1).astype(np.float64)) @ rest
+            orbits = column_orbits(remaining, self.budget)
+        symmetric = np.unique(orbits).size < candidates.size
+        urgent = np.exp2(-remaining.sum(axis=1).astype(np.float64)) @ remaining
         score = np.round(np.bincount(orbits, urgent), 12)
         best = int(np.argmax(score))
-        orbit = left[orbits == best]
+        orbit = candidates[orbits == best]
         taken, fewer = part.taken.copy(), allowed.copy()
-        taken[left[best]] = True
+        taken[candidates[best]] = True
         fewer[orbit] = False
         return self._solved(
             node,

@@ -45,13 +45,15 @@ class RowTree(Tree):
             )
             without = dataclasses.replace(part, allowed=allowed & ~pair)
             taken = self.linear.solve(with_one, node.basis)
-            left = self.linear.solve(without, node.basis)
-            if taken is None or left is None:
+            excluded = self.linear.solve(without, node.basis)
+            if taken is None or excluded is None:
                 return None
-            gains = [min(max(c.bound - node.bound, 0.0), room) for c in (taken, left)]
+            gains = [
+                min(max(c.bound - node.bound, 0.0), room) for c in (taken, excluded)
+            ]
             gain = (gains[0] + 1e-3) * (gains[1] + 1e-3)
             if gain > best_gain:
-                best, best_gain = [left, taken], gain
+                best, best_gain = [excluded, taken], gain
             if min(gains) >= room:
                 break
         return best

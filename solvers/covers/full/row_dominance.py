@@ -34,13 +34,13 @@ def essential(
         budget: Work; where it ends, what wasn't compared is kept.
     """
     rows, columns = (np.arange(n, dtype=np.int64) for n in covers.shape)
-    left = covers
+    smaller = covers
     for _ in range(_MAX_ROUNDS):
-        kept_rows = minimal(left, budget)
-        left = left[kept_rows]
-        kept_columns = minimal(~left.T, budget)
+        kept_rows = minimal(smaller, budget)
+        smaller = smaller[kept_rows]
+        kept_columns = minimal(~smaller.T, budget)
         unchanged = kept_rows.size == rows.size and kept_columns.size == columns.size
-        left = left[:, kept_columns]
+        smaller = smaller[:, kept_columns]
         rows, columns = rows[kept_rows], columns[kept_columns]
         if unchanged or budget.exhausted:
             break
@@ -78,10 +78,10 @@ def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
     words = np.ascontiguousarray(pack_shuffled(sets).T)[:, order]
     alive = np.ones(order.size, dtype=bool)
     # A superset is larger, so only later sets of this order can include the pivot.
-    rest = np.arange(order.size)
-    while rest.size > 1 and not budget.exhausted:
-        pivot, rest = rest[0], rest[1:]
-        larger = rest
+    later = np.arange(order.size)
+    while later.size > 1 and not budget.exhausted:
+        pivot, later = later[0], later[1:]
+        larger = later
         spent = 0
         for word in words:
             spent += larger.size
@@ -91,7 +91,7 @@ def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
         budget.spend(_UNITS_PER_WORD * spent + _CALL_UNITS)
         if larger.size:
             alive[larger] = False
-            rest = rest[alive[rest]]
+            later = later[alive[later]]
     return np.sort(order[alive]).astype(np.int64)
 
 

@@ -6,7 +6,7 @@ sum_i w_i min(n_i, r_i) / r_i, and after that the weight. The best exchange of a
 made until none is worth more; then some sets are dropped and refilled half at random.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +17,16 @@ from solvers.status import WorkBudget
 _TOP = 8
 
 
-@dataclass(frozen=True, order=True)
-class Worth:
+class Worth(NamedTuple):
     """How good a selection is; compared in this order.
 
     Attributes:
         reached: Integer-valued weight that counts towards the requirements.
-        rest: Service of rows while short of them, else total weight.
+        beyond: Service of rows while short of them, else total weight.
     """
 
     reached: float
-    rest: float
+    beyond: float
 
 
 def exchange(
@@ -115,14 +114,14 @@ def _best_without(
     budget.spend(cover.entries * (2.0 + n_groups) + 8.0 * columns.size)
     reached = np.minimum(held + gains[:, :-1], cover.quotas).sum(axis=1)
     service = cover.weights @ (np.minimum(counts, cover.needs) / cover.needs)
-    rest = np.where(
+    beyond = np.where(
         reached >= cover.required,
         held.sum() + gains[:, :-1].sum(axis=1),
         service + gains[:, -1] - cover.total,
     )
     reached[others] = -1.0
-    best = int(np.lexsort((-np.arange(rest.size), rest, reached))[-1])
-    return Worth(float(reached[best]), float(rest[best])), best
+    best = int(np.lexsort((-np.arange(beyond.size), beyond, reached))[-1])
+    return Worth(float(reached[best]), float(beyond[best])), best
 
 
 def _refill(
