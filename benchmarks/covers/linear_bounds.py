@@ -11,6 +11,7 @@ Usage: python -m benchmarks.covers.linear_bounds
 """
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def by_cvxpy(cover: ReducedCover) -> tuple[float, float, float]:
     imported = time.perf_counter()
     x, y = cp.Variable(cover.n_sets), cp.Variable(cover.weights.size)
     weights = cover.weights / cover.weights.mean()
-    limits = [
+    limits: Any = [
         cover.by_row @ x >= y,
         weights @ y >= float(cover.quotas[0] / cover.weights.mean()),
         x >= 0,
