@@ -9,7 +9,8 @@ questions about their field, so that callers needn't ask which one they have.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Mask
 
 _UNDISTORT_STEPS = 12
 
@@ -25,7 +26,7 @@ class PinholeModel:
         distortion: Brown-Conrady k1, k2, p1, p2, k3, as in OpenCV.
     """
 
-    camera_matrix: NDArray[np.float64]
+    camera_matrix: Array
     resolution: tuple[int, int]
     range_m: tuple[float, float]
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -35,7 +36,7 @@ class PinholeModel:
         """Geometric mean of the two focal lengths in [px]."""
         return float(np.sqrt(self.camera_matrix[0, 0] * self.camera_matrix[1, 1]))
 
-    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def project(self, points: Array) -> Array:
         """Return pixels (u, v) of points in the device frame; (..., 3) to (..., 2).
 
         Points at or behind the optical centre give NaN.
@@ -46,7 +47,7 @@ class PinholeModel:
         normalised = self._distort(points[..., :2] * scale[..., None])
         return normalised * self._focal + self._principal
 
-    def contains(self, pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def contains(self, pixels: Array) -> Mask:
         """Return whether pixels (..., 2) lie inside the image; NaN doesn't."""
         u, v = pixels[..., 0], pixels[..., 1]
         width, height = self.resolution
@@ -54,12 +55,12 @@ class PinholeModel:
         across = (u >= -0.5) & (u <= width - 0.5)
         return across & (v >= -0.5) & (v <= height - 0.5)
 
-    def in_field(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def in_field(self, points: Array) -> Mask:
         """Return whether points (..., 3) of the device frame lie in its image."""
         return self.contains(self.project(points))
 
     @property
-    def middle_ray(self) -> NDArray[np.float64]:
+    def middle_ray(self) -> Array:
         """Unit direction in which the middle of the image looks, shape (3,)."""
         return self.rays(0.5 * (np.array(self.resolution) - 1.0))
 
@@ -85,7 +86,7 @@ class PinholeModel:
         """
         return not self.holds_ball(radius, distance)
 
-    def half_rectangle(self, distance: float) -> NDArray[np.float64]:
+    def half_rectangle(self, distance: float) -> Array:
         """Return half the sides of a rectangle in the field, in [m], shape (2,).
 
         It is across the line of sight, sides along the image's, its middle on the aim.
@@ -112,11 +113,11 @@ class PinholeModel:
         size = (times * width, times * height)
         return replace(self, camera_matrix=matrix, resolution=size)
 
-    def ray_starts(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ray_starts(self, points: Array) -> Array:
         """Return where the rays to points (..., 3) of the device frame start."""
         return np.zeros_like(points)
 
-    def rays(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rays(self, pixels: Array) -> Array:
         """Return unit viewing directions in the device frame; (..., 2) to (..., 3)."""
         target = (np.asarray(pixels, dtype=np.float64) - self._principal) / self._focal
         normalised = target
@@ -132,7 +133,7 @@ class PinholeModel:
         )
         return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
-    def ray_jacobian(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ray_jacobian(self, points: Array) -> Array:
         """Return J_r = dr/d(u, v) in [1/px] at points of the device frame.
 
         With p = (x/z, y/z), q(p) the distorted p and r = (p, 1)/|(p, 1)|::
@@ -158,14 +159,14 @@ class PinholeModel:
         return dr_dp / self._focal
 
     @property
-    def _focal(self) -> NDArray[np.float64]:
+    def _focal(self) -> Array:
         return np.array([self.camera_matrix[0, 0], self.camera_matrix[1, 1]])
 
     @property
-    def _principal(self) -> NDArray[np.float64]:
+    def _principal(self) -> Array:
         return self.camera_matrix[:2, 2]
 
-    def _distort(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _distort(self, p: Array) -> Array:
         if not any(self.distortion):
             return p
         k1, k2, p1, p2, k3 = self.distortion
@@ -180,7 +181,7 @@ class PinholeModel:
             axis=-1,
         )
 
-    def _distort_slope(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _distort_slope(self, p: Array) -> Array:
         """Derivative dq/dp of the distortion, shape (..., 2, 2)."""
         k1, k2, p1, p2, k3 = self.distortion
         x, y = p[..., 0], p[..., 1]
@@ -215,7 +216,7 @@ class ParallelModel:
     beam_radius: float | None = None
 
     @property
-    def half_panel(self) -> NDArray[np.float64]:
+    def half_panel(self) -> Array:
         """Half width and half height of the panel in [m], shape (2,)."""
         return 0.5 * self.pixel_pitch_m * np.array(self.resolution, dtype=np.float64)
 
@@ -224,7 +225,7 @@ class ParallelModel:
         """Radius that the beam fills in [m], inf where only the panel bounds it."""
         return np.inf if self.beam_radius is None else self.beam_radius
 
-    def in_field(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def in_field(self, points: Array) -> Mask:
         """Return whether points (..., 3) of the device frame lie in its beam."""
         x, y = points[..., 0], points[..., 1]
         across, down = self.half_panel
@@ -234,7 +235,7 @@ class ParallelModel:
         return inside
 
     @property
-    def middle_ray(self) -> NDArray[np.float64]:
+    def middle_ray(self) -> Array:
         """Unit direction of the light, shape (3,)."""
         return np.array([0.0, 0.0, 1.0])
 
@@ -254,7 +255,7 @@ class ParallelModel:
         """
         return radius > float(self.half_panel.min())
 
-    def half_rectangle(self, distance: float) -> NDArray[np.float64]:
+    def half_rectangle(self, distance: float) -> Array:
         """Return half the sides of a rectangle in the field, in [m], shape (2,).
 
         Sides along the panel's, its middle on the axis. In a round beam, of the
@@ -280,7 +281,7 @@ class ParallelModel:
             self, resolution=(times * width, times * height), beam_radius=None
         )
 
-    def ray_starts(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ray_starts(self, points: Array) -> Array:
         """Return where the rays to points (..., 3) of the device frame start."""
         return points * [1.0, 1.0, 0.0]
 
@@ -288,7 +289,7 @@ class ParallelModel:
 DeviceModel = PinholeModel | ParallelModel
 
 
-def turned_to(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+def turned_to(direction: Array) -> Array:
     """Return the smallest rotation that takes a unit direction to +z (Rodrigues)."""
     axis = np.cross(direction, [0.0, 0.0, 1.0])
     skew = np.array(

@@ -9,16 +9,11 @@ Device frames are right-handed with +x right, +y down and +z along the optical a
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array
 
 
-def look_at(
-    positions: NDArray[np.float64],
-    targets: NDArray[np.float64],
-    up: NDArray[np.float64],
-    *,
-    roll: float = 0.0,
-) -> NDArray[np.float64]:
+def look_at(positions: Array, targets: Array, up: Array, *, roll: float = 0.0) -> Array:
     """Return ``world_from_device`` for devices that look at targets.
 
     Where a device looks straight along ``up``, the world axis least along it takes
@@ -60,7 +55,7 @@ def look_at(
     return poses
 
 
-def inverse(b_from_a: NDArray[np.float64]) -> NDArray[np.float64]:
+def inverse(b_from_a: Array) -> Array:
     """Return ``a_from_b`` of rigid matrices, shape (..., 4, 4)."""
     turned = np.swapaxes(b_from_a[..., :3, :3], -1, -2)
     result = np.zeros_like(b_from_a)
@@ -70,20 +65,14 @@ def inverse(b_from_a: NDArray[np.float64]) -> NDArray[np.float64]:
     return result
 
 
-def transform(
-    b_from_a: NDArray[np.float64], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def transform(b_from_a: Array, points: Array) -> Array:
     """Return points (n, 3) of frame a in frame b."""
     return points @ b_from_a[:3, :3].T + b_from_a[:3, 3]
 
 
 def fibonacci_cap(
-    n: int,
-    axis: NDArray[np.float64],
-    half_angle: float,
-    *,
-    start: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
+    n: int, axis: Array, half_angle: float, *, start: Array | None = None
+) -> Array:
     """Return n unit vectors spread evenly over a spherical cap.
 
     Args:

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.diffusion import diffused
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import cross, principal, tangent_planes, unpacked
@@ -46,25 +46,25 @@ class CurvatureField:
 
     radius: float
     scale: float
-    k_max: NDArray[np.float64]
-    k_min: NDArray[np.float64]
-    direction_max: NDArray[np.float64]
-    direction_min: NDArray[np.float64]
-    valid: NDArray[np.bool_]
+    k_max: Array
+    k_min: Array
+    direction_max: Array
+    direction_min: Array
+    valid: Mask
 
     @cached_property
-    def steep(self) -> NDArray[np.float64]:
+    def steep(self) -> Array:
         """Unit direction T1 of the curvature of larger magnitude, shape (n_v, 3)."""
         larger = np.abs(self.k_max) >= np.abs(self.k_min)
         return np.where(larger[:, None], self.direction_max, self.direction_min)
 
     @cached_property
-    def curvedness(self) -> NDArray[np.float64]:
+    def curvedness(self) -> Array:
         """sqrt((k_max^2 + k_min^2) / 2) in [1/m], shape (n_v,)."""
         return np.sqrt(0.5 * (self.k_max**2 + self.k_min**2))
 
     @cached_property
-    def tensors(self) -> NDArray[np.float64]:
+    def tensors(self) -> Array:
         """k_max d_max d_max^T + k_min d_min d_min^T in [1/m], shape (n_v, 3, 3)."""
         a, b = self.direction_max, self.direction_min
         return (
@@ -160,13 +160,13 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
 
 
 def _averaged_fit(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    mass: NDArray[np.float64],
+    vertices: Array,
+    faces: Ints,
+    mass: Array,
     laplacian: csr_array,
-    whole: NDArray[np.bool_],
+    whole: Mask,
     scale: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+) -> tuple[Array, Array, Mask]:
     """Fit, averaged over a scale in mean edges; and where there was one.
 
     Only vertices with a whole neighbourhood take part.
@@ -188,7 +188,7 @@ def _averaged_fit(
     return *principal(unpacked(tensors), tangent_planes(normals)), fitted
 
 
-def _joined_to(chosen: NDArray[np.bool_], laplacian: csr_array) -> NDArray[np.bool_]:
+def _joined_to(chosen: Mask, laplacian: csr_array) -> Mask:
     """Which nodes are connected to a chosen one, shape (n,)."""
     count, label = connected_components(laplacian, directed=False)
     held = np.zeros(count, dtype=bool)
@@ -196,9 +196,7 @@ def _joined_to(chosen: NDArray[np.bool_], laplacian: csr_array) -> NDArray[np.bo
     return held[label]
 
 
-def _near_border(
-    vertices: NDArray[np.float64], edges: MeshEdges, reach: float, rings: int
-) -> NDArray[np.bool_]:
+def _near_border(vertices: Array, edges: MeshEdges, reach: float, rings: int) -> Mask:
     """Vertices on a border or branching edge, or in reach or rings of a long border.
 
     A neighbourhood that a border cuts in two is fitted on one side only, and the

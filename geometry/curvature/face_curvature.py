@@ -1,8 +1,8 @@
 """Curvature of faces: smoothed tensors in each face's plane."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Mask
 from geometry.mesh.diffusion import diffused
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import packed, principal, tangent_planes, unpacked
@@ -17,7 +17,7 @@ _ISOTROPIC = 0.3
 FLAT = 0.05
 
 
-def steep_directions(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.float64]:
+def steep_directions(mesh: TriangleMesh, field: CurvatureField) -> Array:
     """Return T1 of every face, for a target that is the whole surface.
 
     Shape (n_f, 3): unit and in the face's plane; zero where |k1 - k2| <= 0.3
@@ -28,7 +28,7 @@ def steep_directions(mesh: TriangleMesh, field: CurvatureField) -> NDArray[np.fl
 
 def face_curvature(
     mesh: TriangleMesh, field: CurvatureField
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+) -> tuple[Array, Array, Mask]:
     """Return curvedness [1/m], steep direction and trust of each face.
 
     The smoothed tensors of a face's corners are averaged and projected into its plane;
@@ -53,11 +53,8 @@ def face_curvature(
 
 
 def averaged_on_faces(
-    mesh: TriangleMesh,
-    field: CurvatureField,
-    values: NDArray[np.float64],
-    share: float,
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    mesh: TriangleMesh, field: CurvatureField, values: Array, share: float
+) -> tuple[Array, Mask]:
     """Return values averaged on the faces, and which faces have valid corners only.
 
     Vertices that aren't valid give nothing.

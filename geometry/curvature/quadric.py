@@ -2,8 +2,8 @@
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.tensors import cross, packed
 from geometry.mesh.topology import numbered
 
@@ -17,11 +17,7 @@ _MOST_TURN = np.pi
 _CANCELLED = 1e-6
 
 
-def fit_quadrics(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[
-    NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]
-]:
+def fit_quadrics(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask, Mask]:
     """Fit a quadric to two rings about each vertex, over the plane of its normals.
 
     The tensor is k1 d1 d1^T + k2 d2 d2^T; an outward-oriented sphere is positive.
@@ -54,9 +50,7 @@ def fit_quadrics(
     return packed((k[0], k[1]), (ways[0], ways[1])), normals, fitted, sensible
 
 
-def _fit(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def _fit(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask]:
     """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,).
 
     Where there is no success, all are zero.
@@ -79,9 +73,7 @@ def _fit(
     return k, ways, fitted
 
 
-def _shortest_edges(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _shortest_edges(vertices: Array, faces: Ints) -> Array:
     """Shortest edge at each vertex, infinite without a face, shape (n,)."""
     shortest = np.full(len(vertices), np.inf)
     for a, b in ((0, 1), (1, 2), (2, 0)):
@@ -92,9 +84,7 @@ def _shortest_edges(
     return shortest
 
 
-def _vertex_normals(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _vertex_normals(vertices: Array, faces: Ints) -> Array:
     """Unit normals averaged over the area of each vertex's faces, (n, 3)."""
     corners = vertices[faces]
     weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -107,9 +97,7 @@ def _vertex_normals(
     return np.where(length > 0, normals / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
 
 
-def _with_normals(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _with_normals(vertices: Array, faces: Ints) -> Ints:
     """Leave out faces at vertices whose normals cancel: libigl crashes there.
 
     Two faces on the same three corners, turned against each other, do that.

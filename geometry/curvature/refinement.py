@@ -1,8 +1,8 @@
 """Cut long edges in half, so that every place has vertices near it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import MeshEdges, mesh_edges
 
@@ -35,7 +35,7 @@ _GROWTH = np.array([0, 1, 1, 2, 1, 2, 2, 3])
 
 def cut_for_curvature(
     mesh: TriangleMesh, radius: float | None = None
-) -> tuple[TriangleMesh, NDArray[np.int64]]:
+) -> tuple[TriangleMesh, Ints]:
     """Cut the long edges of a mesh on which curvature knows no places, as of CAD parts.
 
     Curvature lives at vertices: on triangles far larger than its scale (the radius, or
@@ -71,9 +71,7 @@ def cut_for_curvature(
     return cut_long_edges(mesh, longest)
 
 
-def cut_long_edges(
-    mesh: TriangleMesh, longest: float
-) -> tuple[TriangleMesh, NDArray[np.int64]]:
+def cut_long_edges(mesh: TriangleMesh, longest: float) -> tuple[TriangleMesh, Ints]:
     """Halve edges longer than a length until there are none; the surface stays.
 
     Where that would make more than 100,000 faces and more than twice those there are,
@@ -106,12 +104,8 @@ def cut_long_edges(
 
 
 def refined(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    longest: float,
-    *,
-    max_faces: int,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    vertices: Array, faces: Ints, longest: float, *, max_faces: int
+) -> tuple[Array, Ints, Ints]:
     """Halve edges longer than a length until there are none; the surface stays.
 
     Args:
@@ -147,9 +141,7 @@ def refined(
     return vertices, faces, parent
 
 
-def _to_cut(
-    edges: MeshEdges, lengths: NDArray[np.float64], longest: float
-) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+def _to_cut(edges: MeshEdges, lengths: Array, longest: float) -> tuple[Mask, Ints]:
     """Which edges are long, and for each face the key of its pattern."""
     long = lengths > longest
     return long, np.where(long[edges.of_face], [1, 2, 4], 0).sum(axis=1)

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from geometry.arrays import Array, Ints
+
 # Rows: the world axes that a face's x, y and z run along.
 _AXES = np.array([[1, 2, 0], [1, 2, 0], [2, 0, 1], [2, 0, 1], [0, 1, 2], [0, 1, 2]])
 _SIGNS = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
@@ -39,23 +41,23 @@ class CubeMap:
         return FACES * self.n * self.n
 
     @cached_property
-    def lines(self) -> NDArray[np.float64]:
+    def lines(self) -> Array:
         """Gnomonic coordinates of the lines between cells, shape (n + 1,)."""
         return np.tan(np.linspace(-0.25 * np.pi, 0.25 * np.pi, self.n + 1))
 
     @cached_property
-    def corners(self) -> NDArray[np.float64]:
+    def corners(self) -> Array:
         """Unit directions of the corners of cells, shape (6, n + 1, n + 1, 3)."""
         return self._directions(self.lines)
 
     @cached_property
-    def centres(self) -> NDArray[np.float64]:
+    def centres(self) -> Array:
         """Unit directions of the middles of cells, shape (size, 3)."""
         angles = np.linspace(-0.25 * np.pi, 0.25 * np.pi, 2 * self.n + 1)[1::2]
         return self._directions(np.tan(angles)).reshape(-1, 3)
 
     @cached_property
-    def radii(self) -> NDArray[np.float64]:
+    def radii(self) -> Array:
         """Largest angle from the middle of each cell to its corners, shape (size,)."""
         n = self.n
         middle = self.centres.reshape(FACES, n, n, 3)
@@ -78,7 +80,7 @@ class CubeMap:
         return float(np.arcsin(np.sin(0.5 * np.pi / self.n) * np.sqrt(0.5))) - _ROUNDING
 
     @cached_property
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Ints:
         """Cells around each cell, itself among them, shape (size, k); may repeat.
 
         On a face these are the eight around it. At the border of a face, all whose
@@ -107,7 +109,7 @@ class CubeMap:
             around[inner, column] += b * n + a
         return around
 
-    def locate(self, directions: NDArray[np.float64]) -> NDArray[np.int64]:
+    def locate(self, directions: Array) -> Ints:
         """Return the cell that each direction lies in, shape (m,).
 
         Args:
@@ -125,7 +127,7 @@ class CubeMap:
         across = np.bitwise_or.reduce(rows.reshape(FACES, n, 2, n, 2, -1), axis=4)
         return np.bitwise_or.reduce(across, axis=2).reshape(FACES * n * n, -1)
 
-    def _directions(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _directions(self, steps: Array) -> Array:
         n = steps.size
         found = np.empty((FACES, n, n, 3))
         x, y = steps[None, :], steps[:, None]
@@ -136,9 +138,7 @@ class CubeMap:
         return found
 
 
-def located(
-    directions: NDArray[np.float64], n: NDArray[np.int64] | int
-) -> NDArray[np.int64]:
+def located(directions: Array, n: Ints | int) -> Ints:
     """Return the cell that each direction lies in, on a map of its own, shape (m,).
 
     Args:
@@ -161,16 +161,14 @@ def located(
     return (face * n + j) * n + i
 
 
-def _steps(
-    gnomonic: NDArray[np.float64], n: NDArray[np.int64] | int
-) -> NDArray[np.int64]:
+def _steps(gnomonic: Array, n: Ints | int) -> Ints:
     """Column or row of cells that a gnomonic coordinate falls into, shape (m,)."""
     steps = (np.arctan(gnomonic) * (4.0 / np.pi) + 1.0) / 2.0
     # No coordinate lies below -1, so none is less than the first cell's.
     return np.minimum((steps * n).astype(np.int64), n - 1)
 
 
-def quarters(level: NDArray[np.int64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
+def quarters(level: Ints, cells: Ints) -> Ints:
     """Return the four parts of cells on the map of the next level, shape (m, 4).
 
     Args:
@@ -184,7 +182,7 @@ def quarters(level: NDArray[np.int64], cells: NDArray[np.int64]) -> NDArray[np.i
     return low[:, None] + np.stack([0 * n, 0 * n + 1, 2 * n, 2 * n + 1], axis=1)
 
 
-def middles(level: NDArray[np.int64], cells: NDArray[np.int64]) -> NDArray[np.float64]:
+def middles(level: Ints, cells: Ints) -> Array:
     """Return the unit direction of the middle of cells, shape (m, 3)."""
     found = np.empty((cells.size, 3))
     for own in np.unique(level):
@@ -193,18 +191,14 @@ def middles(level: NDArray[np.int64], cells: NDArray[np.int64]) -> NDArray[np.fl
     return found
 
 
-def face_coordinates(
-    vectors: NDArray[np.float64], face: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def face_coordinates(vectors: Array, face: int) -> tuple[Array, Array, Array]:
     """Return x, y, z of vectors in the frame of a face: direction (x/z, y/z, 1)."""
     own = _AXES[face]
     z = _SIGNS[face] * vectors[..., own[2]]
     return vectors[..., own[0]], vectors[..., own[1]], z
 
 
-def angle_between(
-    a: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def angle_between(a: Array, b: Array) -> Array:
     """Return the angle between unit vectors, accurate for small ones too."""
     chord = np.linalg.norm(a - b, axis=-1)
     return 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))

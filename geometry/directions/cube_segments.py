@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints, Mask
 
 from .cube_map import FACES, CubeMap, face_coordinates
 
@@ -14,11 +15,7 @@ _MOST_CELLS = 1 << 21
 
 
 def mark_segments(
-    cube: CubeMap,
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    owners: NDArray[np.int64],
-    marks: NDArray[np.bool_],
+    cube: CubeMap, starts: Array, ends: Array, owners: Ints, marks: Mask
 ) -> None:
     """Mark every cell that a segment, seen from the origin, passes through.
 
@@ -44,9 +41,7 @@ def mark_segments(
             _mark(cube, flat, begin[part] + column, low, high)
 
 
-def _clipped(
-    starts: NDArray[np.float64], ends: NDArray[np.float64], face: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def _clipped(starts: Array, ends: Array, face: int) -> tuple[Array, Array, Ints]:
     """Return gnomonic ends, (m', 2), of the parts of segments on a face, and whose.
 
     A part lies on the face where |x| <= z and |y| <= z: four half spaces.
@@ -85,9 +80,7 @@ def _clipped(
     return first, np.clip(second[seen], -1.0, 1.0), met[seen]
 
 
-def _may_meet(
-    starts: NDArray[np.float64], ends: NDArray[np.float64], face: int
-) -> NDArray[np.int64]:
+def _may_meet(starts: Array, ends: Array, face: int) -> Ints:
     """Return the segments that don't lie in one of a face's four outer half spaces."""
     outside = np.zeros(len(starts), dtype=bool)
     a, b = face_coordinates(starts, face), face_coordinates(ends, face)
@@ -99,8 +92,8 @@ def _may_meet(
 
 
 def _by_column(
-    cube: CubeMap, first: NDArray[np.float64], second: NDArray[np.float64]
-) -> Iterator[tuple[NDArray[np.int64], ...]]:
+    cube: CubeMap, first: Array, second: Array
+) -> Iterator[tuple[Ints, ...]]:
     """Yield segment, column, and the first and last row met there, some at a time."""
     low, high = np.minimum(first, second), np.maximum(first, second)
     begin, end = _index(cube, low[:, 0] - _MARGIN), _index(cube, high[:, 0] + _MARGIN)
@@ -129,13 +122,7 @@ def _by_column(
         )
 
 
-def _mark(
-    cube: CubeMap,
-    flat: NDArray[np.bool_],
-    begin: NDArray[np.int64],
-    low: NDArray[np.int64],
-    high: NDArray[np.int64],
-) -> None:
+def _mark(cube: CubeMap, flat: Mask, begin: Ints, low: Ints, high: Ints) -> None:
     """Mark rows low to high of columns that begin at a place."""
     counts = high - low + 1
     for some in _parts(counts):
@@ -144,19 +131,19 @@ def _mark(
         flat[begin[which] + (low[which] + nth) * cube.n] = True
 
 
-def _index(cube: CubeMap, steps: NDArray[np.float64]) -> NDArray[np.int64]:
+def _index(cube: CubeMap, steps: Array) -> Ints:
     found = np.searchsorted(cube.lines, steps, side="right") - 1
     return np.clip(found, 0, cube.n - 1)
 
 
-def _spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _spread(counts: Ints) -> tuple[Ints, Ints]:
     """Return which thing each of its parts belongs to, and its number among them."""
     which = np.repeat(np.arange(counts.size), counts)
     nth = np.arange(which.size) - np.repeat(np.cumsum(counts) - counts, counts)
     return which, nth
 
 
-def _parts(counts: NDArray[np.int64]) -> Iterator[slice]:
+def _parts(counts: Ints) -> Iterator[slice]:
     """Return slices of things that have at most so many parts, or are one thing."""
     ends = np.cumsum(counts)
     begin = 0

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from geometry.arrays import Ints, Mask
+
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
@@ -26,12 +28,12 @@ class Pieces:
     """
 
     shape: tuple[int, ...]
-    start: NDArray[np.int64]
-    stop: NDArray[np.int64]
+    start: Ints
+    stop: Ints
     piece: NDArray[np.int32]
-    first: NDArray[np.int64]
+    first: Ints
 
-    def cells(self, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def cells(self, wanted: Mask) -> Mask:
         """Return the cells of the pieces that are wanted, in the shape of the marks."""
         some = wanted[self.piece]
         start, stop = self.start[some], self.stop[some]
@@ -46,7 +48,7 @@ class Pieces:
         return np.repeat(turn, length).reshape(self.shape)
 
 
-def pieces(marks: NDArray[np.bool_], n: int) -> Pieces:
+def pieces(marks: Mask, n: int) -> Pieces:
     """Return the pieces of cells that are marked.
 
     Args:

@@ -18,8 +18,8 @@ The mesh must be nearer than the device in every direction asked about.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.rays.rays import CHUNK, equal_parts
 from geometry.rays.visibility import Visibility
 
@@ -85,13 +85,7 @@ class OpenDirections:
         width = 2.0 * mesh.face_areas / np.where(longest > 0, longest, 1.0)
         self._narrow = width <= _SLACKS * visibility.slack
 
-    def maps(
-        self,
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        steep: NDArray[np.float64],
-        faces: NDArray[np.int64],
-    ) -> NDArray[np.bool_]:
+    def maps(self, points: Array, normals: Array, steep: Array, faces: Ints) -> Mask:
         """Return which cells are open to each sample, shape (n, cube.size).
 
         Args:
@@ -118,7 +112,7 @@ class OpenDirections:
             cells &= ~blocked | doubtful[:, None]
         return cells
 
-    def _within_incidence(self, normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _within_incidence(self, normals: Array) -> Mask:
         """Return the cells that the cap about each normal meets."""
         cube, limit = self._cube, self._limits.max_incidence
         within = np.empty((len(normals), cube.size), dtype=bool)
@@ -135,7 +129,7 @@ class OpenDirections:
         within[np.arange(len(normals)), cube.locate(normals)] = True
         return within
 
-    def _along_steep(self, steep: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _along_steep(self, steep: Array) -> Mask:
         """Return the cells that lie in a cap about +T1 or -T1 as a whole."""
         cube, n = self._cube, self._cube.n
         least = np.cos(self._limits.min_tangent_angle) + _ROUNDING
@@ -150,12 +144,12 @@ class OpenDirections:
 
     def _blocked(
         self,
-        silhouettes: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]],
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        cells: NDArray[np.bool_],
+        silhouettes: tuple[Ints, Array, Array],
+        points: Array,
+        normals: Array,
+        cells: Mask,
         reach: float,
-    ) -> NDArray[np.bool_]:
+    ) -> Mask:
         """Return the cells that are blocked as a whole; only those given are asked."""
         cube = self._cube
         touched = np.zeros(cells.shape, dtype=bool)
@@ -171,12 +165,8 @@ class OpenDirections:
         return found.cells(answer)
 
     def _meets(
-        self,
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        reach: float,
-    ) -> NDArray[np.bool_]:
+        self, points: Array, normals: Array, directions: Array, reach: float
+    ) -> Mask:
         """Return whether rays from samples outwards meet the mesh within reach [m]."""
         caster, slack = self._visibility.caster, self._visibility.slack
         rise = np.einsum("ij,ij->i", normals, directions)
@@ -195,12 +185,7 @@ class OpenDirections:
         return up & met
 
 
-def _arcs_come_within(
-    cube: CubeMap,
-    axes: NDArray[np.float64],
-    cells: NDArray[np.int64],
-    cosine: float,
-) -> NDArray[np.bool_]:
+def _arcs_come_within(cube: CubeMap, axes: Array, cells: Ints, cosine: float) -> Mask:
     """Return whether the border of each cell comes within an angle of its axis."""
     face, rest = np.divmod(cells, cube.n * cube.n)
     j, i = np.divmod(rest, cube.n)

@@ -9,7 +9,8 @@ no sign depends on it. With rows scaled to at most 1, columns to at most R and k
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints, Mask, Words
 
 # Columns at most: bits of a word.
 WORD = 64
@@ -24,15 +25,13 @@ class ProductSigns:
         rows: Finite numbers, shape (m, k).
     """
 
-    def __init__(self, rows: NDArray[np.float64]) -> None:
+    def __init__(self, rows: Array) -> None:
         self._rows = rows
         largest = np.abs(rows).max(axis=0, initial=0.0)
         self._scale = np.where(largest > 0.0, largest, 1.0)
         self._single = (rows / self._scale).astype(np.float32)
 
-    def over(
-        self, columns: NDArray[np.float64], near: float = 0.0
-    ) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.float64]]:
+    def over(self, columns: Array, near: float = 0.0) -> tuple[Words, Ints, Array]:
         """Return which products are above zero, and those that come near to it.
 
         Args:
@@ -66,7 +65,7 @@ class ProductSigns:
         return words, rows, self._rows[rows] @ columns.T
 
 
-def packed(bits: NDArray[np.bool_]) -> NDArray[np.uint64]:
+def packed(bits: Mask) -> Words:
     """Return a word for each row of at most 64 bits: column i in bit i."""
     if bits.shape[1] < WORD:
         whole = np.zeros((len(bits), WORD), dtype=bool)

@@ -19,8 +19,8 @@ A bit for each of 64 points, so that edges are compared for all of them at once.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask, Words
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import lengths
 from geometry.mesh.topology import face_pairs
@@ -49,12 +49,12 @@ class Sides:
         alone: The same of each edge of one face or of more than two.
     """
 
-    local: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    close: NDArray[np.uint64]
-    changes: NDArray[np.uint64]
-    above: NDArray[np.uint64]
-    alone: NDArray[np.uint64]
+    local: Array
+    normals: Array
+    close: Words
+    changes: Words
+    above: Words
+    alone: Words
 
 
 class Silhouettes:
@@ -102,12 +102,7 @@ class Silhouettes:
         self._unsure = _UNSURE * size
         self._balls: dict[float, ProductSigns] = {}
 
-    def sides(
-        self,
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        close: float = 0.0,
-    ) -> Sides:
+    def sides(self, points: Array, normals: Array, close: float = 0.0) -> Sides:
         """Return from which side points see each face.
 
         Args:
@@ -137,7 +132,7 @@ class Silhouettes:
             above[self._single_ends[:, 0]] | above[self._single_ends[:, 1]],
         )
 
-    def faces_within(self, sides: Sides, reach: float) -> NDArray[np.uint64]:
+    def faces_within(self, sides: Sides, reach: float) -> Words:
         """Return for each face the points to which it comes within reach, as bits.
 
         A few faces that don't quite are told too, none that does is left out.
@@ -162,8 +157,8 @@ class Silhouettes:
         return self._balls[reach]
 
     def seen_from(
-        self, sides: Sides, half_angle: float, among: NDArray[np.uint64] | None = None
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        self, sides: Sides, half_angle: float, among: Words | None = None
+    ) -> tuple[Ints, Array, Array]:
         """Return the silhouettes that may cross a cone above each point.
 
         Args:
@@ -203,11 +198,11 @@ class Silhouettes:
     def touched(
         self,
         sides: Sides,
-        faces: NDArray[np.int64],
+        faces: Ints,
         reach: float,
         half_angle: float,
-        among: NDArray[np.uint64] | None = None,
-    ) -> NDArray[np.bool_]:
+        among: Words | None = None,
+    ) -> Mask:
         """Return to which points something comes near that may rise into a cone, (n,).
 
         Every face but their own may, except one that goes on from it across an edge and
@@ -243,9 +238,7 @@ class Silhouettes:
         return found
 
 
-def _distances(
-    points: NDArray[np.float64], corners: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _distances(points: Array, corners: Array) -> Array:
     """Return the distance of each point from its triangle, shape (n,)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
@@ -264,12 +257,7 @@ def _distances(
     return np.where(over, np.minimum(best, np.abs(height)), best)
 
 
-def _may_cross(
-    begin: NDArray[np.float64],
-    end: NDArray[np.float64],
-    axes: NDArray[np.float64],
-    half_angle: float,
-) -> NDArray[np.bool_]:
+def _may_cross(begin: Array, end: Array, axes: Array, half_angle: float) -> Mask:
     """Return which segments the ball about their middle lets into a cone; (3, m)."""
     middle = begin + end
     distance, size = lengths(middle.T), lengths((end - begin).T)
@@ -282,9 +270,7 @@ def _may_cross(
     return around | (off - spread <= half_angle + _ANGLE)
 
 
-def _unpacked(
-    words: NDArray[np.uint64], n: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _unpacked(words: Words, n: int) -> tuple[Ints, Ints]:
     """Return the rows and columns of the bits that are set."""
     some = np.flatnonzero(words)
     bits = np.unpackbits(
@@ -295,7 +281,7 @@ def _unpacked(
     return row, some[column]
 
 
-def _runs_along(faces: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _runs_along(faces: Ints, ends: Ints) -> Mask:
     """Return whether each face runs along its edge from the first end to the second."""
     after = faces[:, [1, 2, 0]]
     return np.any((faces == ends[:, :1]) & (after == ends[:, 1:]), axis=1)

@@ -6,7 +6,8 @@ likewise, answer for larger angles.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints, Mask, Words
 
 from .cube_map import CubeMap, located
 
@@ -24,8 +25,8 @@ class WidenedMaps:
         cube: The map, of a power of two cells an edge.
     """
 
-    def __init__(self, rows: NDArray[np.uint64], cube: CubeMap) -> None:
-        made: list[NDArray[np.uint64]] = []
+    def __init__(self, rows: Words, cube: CubeMap) -> None:
+        made: list[Words] = []
         angles: list[float] = []
         cells: list[int] = []
         rounds = _FINEST
@@ -45,12 +46,7 @@ class WidenedMaps:
         self._rows = np.concatenate(made).view(np.uint8)
         self._first = np.cumsum([0, *(len(own) for own in made[:-1])])
 
-    def open(
-        self,
-        directions: NDArray[np.float64],
-        angles: NDArray[np.float64],
-        samples: NDArray[np.int64],
-    ) -> NDArray[np.bool_]:
+    def open(self, directions: Array, angles: Array, samples: Ints) -> Mask:
         """Return whether a sample has an open direction within an angle of one given.
 
         More may be called open than is, never less.
@@ -72,7 +68,7 @@ class WidenedMaps:
         return found
 
 
-def _widened(rows: NDArray[np.uint64], cube: CubeMap) -> NDArray[np.uint64]:
+def _widened(rows: Words, cube: CubeMap) -> Words:
     wide = rows.copy()
     for column in cube.neighbours.T:
         np.bitwise_or(wide, rows[column], out=wide)

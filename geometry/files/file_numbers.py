@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints
 
 # Up to here every whole number has a float64 of its own.
 _LARGEST = 2.0**53
@@ -20,7 +21,7 @@ def decode(data: bytes) -> str:
     return data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
 
 
-def numbers(words: Sequence[str]) -> NDArray[np.float64]:
+def numbers(words: Sequence[str]) -> Array:
     """Return words as numbers, shape (n,).
 
     Python also takes digit groups (1_000) and digits of other scripts; no mesh format
@@ -39,7 +40,7 @@ def numbers(words: Sequence[str]) -> NDArray[np.float64]:
     return values
 
 
-def whole(values: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int64]:
+def whole(values: Array | Ints) -> Ints:
     """Return vertex numbers as integers.
 
     Raises:

@@ -12,8 +12,8 @@ from pathlib import PurePosixPath, PureWindowsPath
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints
 from geometry.mesh.file_origin import FileOrigin, Properties
 
 from .file_numbers import FormatError
@@ -49,8 +49,8 @@ class RawMesh:
     ``origin`` is None where each triangle is a polygon of the file, in its order.
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    vertices: Array
+    faces: Ints
     unit: str | None
     origin: FileOrigin | None = None
 
@@ -123,9 +123,9 @@ def _ply(data: bytes) -> RawMesh:
 
 
 def _of_polygons(
-    points: NDArray[np.float64],
-    sizes: NDArray[np.int64],
-    corners: NDArray[np.int64],
+    points: Array,
+    sizes: Ints,
+    corners: Ints,
     of_vertices: Properties = MappingProxyType({}),
     of_faces: Properties = MappingProxyType({}),
 ) -> RawMesh:
@@ -134,7 +134,7 @@ def _of_polygons(
     return RawMesh(points, faces, None, origin)
 
 
-def _check_range(corners: NDArray[np.int64], n_vertices: int) -> None:
+def _check_range(corners: Ints, n_vertices: int) -> None:
     if corners.size and not (corners.min() >= 0 and corners.max() < n_vertices):
         raise FormatError(
             f"faces name vertices {corners.min()}..{corners.max()}, "

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from geometry.arrays import Array, Ints
+
 from .file_numbers import FormatError
 from .scene_parts import ScenePart, joined
 
@@ -34,7 +36,7 @@ _PACKED = (
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
-def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
+def read_glb(data: bytes) -> tuple[Array, Ints, str]:
     """Return vertices (n, 3), triangles (m, 3) and the unit of a GLB file.
 
     Raises:
@@ -64,7 +66,7 @@ def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
 
 def read_gltf(
     text: bytes, fetch: Fetch | None, stored: bytes | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
+) -> tuple[Array, Ints, str]:
     """Return vertices (n, 3), triangles (m, 3) and the unit of the default scene.
 
     The unit is the metre, unless all meshes state the same other one under
@@ -87,7 +89,7 @@ def read_gltf(
         raise FormatError("its JSON isn't an object")
     _check_extensions(tree)
     buffers = _Buffers(tree, fetch, stored)
-    meshes: dict[int, list[tuple[NDArray[np.float64], NDArray[np.int64]]]] = {}
+    meshes: dict[int, list[tuple[Array, Ints]]] = {}
     parts: list[ScenePart] = []
     units: set[str] = set()
     for node, world_from_node in _placed(tree):
@@ -132,7 +134,7 @@ def _item(tree: _Tree, kind: str, index: object) -> Any:  # noqa: ANN401
     return held[index]
 
 
-def _placed(tree: _Tree) -> list[tuple[_Tree, NDArray[np.float64]]]:
+def _placed(tree: _Tree) -> list[tuple[_Tree, Array]]:
     """Return every node of the default scene with its transform to the world."""
     nodes = tree.get("nodes", ())
     if tree.get("scenes"):
@@ -140,7 +142,7 @@ def _placed(tree: _Tree) -> list[tuple[_Tree, NDArray[np.float64]]]:
     else:
         children = {c for node in nodes for c in node.get("children", ())}
         roots = [i for i in range(len(nodes)) if i not in children]
-    placed: list[tuple[_Tree, NDArray[np.float64]]] = []
+    placed: list[tuple[_Tree, Array]] = []
     seen: set[int] = set()
     waiting = [(root, np.eye(4)) for root in reversed(roots)]
     while waiting:
@@ -156,7 +158,7 @@ def _placed(tree: _Tree) -> list[tuple[_Tree, NDArray[np.float64]]]:
     return placed
 
 
-def _transform(index: int, node: _Tree) -> NDArray[np.float64]:
+def _transform(index: int, node: _Tree) -> Array:
     matrix = np.array(node.get("matrix", np.eye(4).ravel()), dtype=np.float64)
     if matrix.shape != (16,):
         raise FormatError(f"its node {index} has a matrix of {matrix.size} numbers")
@@ -187,7 +189,7 @@ def _check_rigid(node: _Tree, mesh: _Tree) -> None:
 
 def _primitive(
     tree: _Tree, buffers: "_Buffers", primitive: _Tree
-) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+) -> tuple[Array, Ints] | None:
     mode = primitive.get("mode", _TRIANGLES)
     if mode in (0, 1, 2, 3):
         return None

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints
+
 from .file_numbers import FormatError, numbers, whole
 
 _TYPES = {
@@ -43,8 +45,8 @@ class PlyProperty:
 class PlyLists:
     """Lists of one property: their values end to end, and the length of each."""
 
-    values: NDArray[np.float64] | NDArray[np.int64]
-    lengths: NDArray[np.int64]
+    values: Array | Ints
+    lengths: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +63,7 @@ class PlyElement:
     name: str
     count: int
     properties: list[PlyProperty] = field(default_factory=list[PlyProperty])
-    scalars: dict[str, NDArray[np.float64]] = field(
-        default_factory=dict[str, NDArray[np.float64]]
-    )
+    scalars: dict[str, Array] = field(default_factory=dict[str, Array])
     lists: dict[str, PlyLists] = field(default_factory=dict[str, PlyLists])
 
 
@@ -82,9 +82,7 @@ def read_ply(data: bytes) -> dict[str, PlyElement]:
     return {element.name: element for element in elements}
 
 
-def ply_surface(
-    elements: dict[str, PlyElement],
-) -> tuple[NDArray[np.float64], PlyLists]:
+def ply_surface(elements: dict[str, PlyElement]) -> tuple[Array, PlyLists]:
     """Return positions (n, 3) in file units and the corners of every face.
 
     Raises:
@@ -290,10 +288,7 @@ class _Cursor:
 
 
 def _store(
-    element: PlyElement,
-    p: PlyProperty,
-    values: NDArray[np.generic],
-    lengths: NDArray[np.int64],
+    element: PlyElement, p: PlyProperty, values: NDArray[np.generic], lengths: Ints
 ) -> None:
     """Keep a column, in the widest type of its kind."""
     if p.count_dtype is None:

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints, Mask
 
 from .file_numbers import FormatError
 
@@ -14,18 +15,14 @@ _SAME = 1e-12
 _MOST_CORNERS = 3000
 
 
-def end_to_end(
-    polygons: Sequence[Sequence[int]],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def end_to_end(polygons: Sequence[Sequence[int]]) -> tuple[Ints, Ints]:
     """Return the number of corners of each polygon, and all corners in one array."""
     sizes = np.fromiter(map(len, polygons), np.int64, len(polygons))
     corners = chain.from_iterable(polygons)
     return sizes, np.fromiter(corners, np.int64, int(sizes.sum()))
 
 
-def cut_polygons(
-    points: NDArray[np.float64], sizes: NDArray[np.int64], corners: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def cut_polygons(points: Array, sizes: Ints, corners: Ints) -> tuple[Ints, Ints]:
     """Return the triangles of polygons, in their order and with their winding.
 
     A fan about the first corner of a concave polygon would leave its outline, so
@@ -44,8 +41,8 @@ def cut_polygons(
         FormatError: If a concave one has more than 3,000 corners.
     """
     starts = np.cumsum(sizes) - sizes
-    cut: list[NDArray[np.int64]] = []
-    owner: list[NDArray[np.int64]] = []
+    cut: list[Ints] = []
+    owner: list[Ints] = []
     for size in np.unique(sizes[sizes >= 3]).tolist():
         which = np.flatnonzero(sizes == size)
         outline = corners[starts[which, None] + np.arange(size)]
@@ -76,9 +73,7 @@ def cut_polygons(
     return np.concatenate(cut)[order], owners[order]
 
 
-def _twins_alike(
-    points: NDArray[np.float64], outline: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _twins_alike(points: Array, outline: Ints) -> Ints:
     """Let polygons (n, k) with the same corners begin at the same one.
 
     Else a polygon that is stored twice is cut along other diagonals the second time,
@@ -97,7 +92,7 @@ def _twins_alike(
     return np.take_along_axis(outline, turned, axis=1)
 
 
-def _concave(points: NDArray[np.float64], fans: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _concave(points: Array, fans: Ints) -> Mask:
     """Whether some triangle of each fan (n, k, 3) is turned against the whole."""
     a, b, c = (points[fans[..., k]] for k in range(3))
     areas = np.cross(b - a, c - a)
@@ -106,7 +101,7 @@ def _concave(points: NDArray[np.float64], fans: NDArray[np.int64]) -> NDArray[np
     return np.any(along < 0, axis=1)
 
 
-def _ears(points: NDArray[np.float64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ears(points: Array, corners: Ints) -> Ints:
     flat = _in_plane(points[corners])
     left = list(range(len(corners)))
     triangles: list[tuple[int, int, int]] = []
@@ -122,7 +117,7 @@ def _ears(points: NDArray[np.float64], corners: NDArray[np.int64]) -> NDArray[np
     return corners[np.array(triangles)]
 
 
-def _in_plane(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+def _in_plane(polygon: Array) -> Array:
     """Coordinates (n, 2), counter-clockwise, in the plane of the vector area."""
     local = polygon - polygon.mean(axis=0)
     normal = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
@@ -131,7 +126,7 @@ def _in_plane(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     return local @ (frame / np.maximum(np.linalg.norm(frame, axis=0), 1e-300))
 
 
-def _is_ear(flat: NDArray[np.float64], left: list[int], at: int) -> bool:
+def _is_ear(flat: Array, left: list[int], at: int) -> bool:
     n = len(left)
     a, b, c = left[at - 1], left[at], left[(at + 1) % n]
     if not _turn(flat[a], flat[b], flat[c]) > 0:
@@ -145,8 +140,6 @@ def _is_ear(flat: NDArray[np.float64], left: list[int], at: int) -> bool:
     return not inside.any()
 
 
-def _turn(
-    p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _turn(p: Array, q: Array, r: Array) -> Array:
     along, to = q - p, r - p
     return along[0] * to[..., 1] - along[1] * to[..., 0]

@@ -13,8 +13,8 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Ints
 from geometry.mesh.file_origin import FileOrigin
 from geometry.mesh.mesh import MeshError, MeshSource, Repair, TriangleMesh
 from geometry.mesh.topology import numbered
@@ -118,9 +118,7 @@ def usable_mesh(
     return mesh.tagged(source, _origin(raw).of_faces(kept))
 
 
-def _without_far(
-    mesh: TriangleMesh,
-) -> tuple[TriangleMesh, NDArray[np.int64], tuple[Repair, ...]]:
+def _without_far(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints, tuple[Repair, ...]]:
     """Drop fragments so far away that rays at the object would lose their precision.
 
     Returns:

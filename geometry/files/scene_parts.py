@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints
 
 from .file_numbers import FormatError
 
@@ -22,12 +23,12 @@ class ScenePart:
         world_from_part: Affine map, shape (4, 4).
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    world_from_part: NDArray[np.float64]
+    vertices: Array
+    faces: Ints
+    world_from_part: Array
 
 
-def joined(parts: Sequence[ScenePart]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def joined(parts: Sequence[ScenePart]) -> tuple[Array, Ints]:
     """Return all parts in the world; mirrored ones keep their outside outside.
 
     Raises:
@@ -39,8 +40,8 @@ def joined(parts: Sequence[ScenePart]) -> tuple[NDArray[np.float64], NDArray[np.
         raise FormatError(
             f"its instances add up to {total} faces, at most {_MAX_FACES} are read"
         )
-    vertices: list[NDArray[np.float64]] = [np.empty((0, 3))]
-    faces: list[NDArray[np.int64]] = [np.empty((0, 3), np.int64)]
+    vertices: list[Array] = [np.empty((0, 3))]
+    faces: list[Ints] = [np.empty((0, 3), np.int64)]
     n = 0
     for part in parts:
         corners, count = part.faces, len(part.vertices)

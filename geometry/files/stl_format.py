@@ -4,7 +4,8 @@ import re
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints
 
 from .file_numbers import FormatError, decode, numbers
 
@@ -22,7 +23,7 @@ _SOLID = re.compile(
 _GEOMETRY = re.compile(r"\bfacet\s+normal\b|\bendloop\b|\bendfacet\b", re.I)
 
 
-def read_stl(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def read_stl(data: bytes) -> tuple[Array, Ints]:
     """Return vertices (3m, 3) in file units and triangles (m, 3), every corner apart.
 
     A file whose length is the one that its counter states is binary, even if it begins
@@ -46,9 +47,9 @@ def read_stl(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3)
 
 
-def _ascii(text: str) -> NDArray[np.float64]:
+def _ascii(text: str) -> Array:
     at = 0
-    parts: list[NDArray[np.float64]] = []
+    parts: list[Array] = []
     while text[at:].strip():
         found = _SOLID.match(text, at)
         if found is None:
@@ -68,7 +69,7 @@ def _ascii(text: str) -> NDArray[np.float64]:
     return np.concatenate(parts)
 
 
-def _facets(words: list[str]) -> NDArray[np.float64]:
+def _facets(words: list[str]) -> Array:
     """Return the corners (m, 3, 3) of the facets of one solid."""
     if len(words) % len(_FACET):
         raise FormatError(_fault(words))

@@ -8,8 +8,7 @@ keeps no face at all.
 import re
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from geometry.arrays import Array, Ints
 
 from .file_numbers import FormatError, decode, numbers
 from .polygons import end_to_end
@@ -42,7 +41,7 @@ def _lines(text: str) -> list[str]:
     return re.split(r"\r\n|\r|\n", text)
 
 
-_PointsAndPolygons = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]
+_PointsAndPolygons = tuple[Array, Ints, Ints]
 
 
 def read_obj(data: bytes) -> _PointsAndPolygons:
@@ -195,7 +194,7 @@ def _off_stream(
     return (points, polygons) if at == len(words) else None
 
 
-def _points(rows: list[list[str]]) -> NDArray[np.float64]:
+def _points(rows: list[list[str]]) -> Array:
     return numbers([word for row in rows for word in row]).reshape(-1, 3)
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints
 
 from .file_numbers import FormatError, numbers, whole
 from .scene_parts import ScenePart, joined
@@ -20,7 +21,7 @@ _CORE = f"{{{_NAMESPACE}core/2015/02}}"
 _UNDERSTOOD = ("production/", "material/", "core/")
 _MAX_BYTES = 1 << 31
 _MAX_PARTS = 100_000
-_Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
+_Mesh = tuple[Array, Ints]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +32,7 @@ class _Object:
     )
 
 
-def read_three_mf(
-    data: bytes,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
+def read_three_mf(data: bytes) -> tuple[Array, Ints, str]:
     """Return vertices (n, 3), triangles (m, 3) and the unit of what a 3MF file builds.
 
     Raises:
@@ -134,7 +133,7 @@ def _collect(
     package: _Package,
     model: str,
     reference: ElementTree.Element,
-    world_from_parent: NDArray[np.float64],
+    world_from_parent: Array,
     above: Sequence[tuple[str, str]],
     parts: list[ScenePart],
 ) -> None:
@@ -154,7 +153,7 @@ def _collect(
         _collect(package, model, component, world_from_object, (*above, key), parts)
 
 
-def _transform(text: str | None) -> NDArray[np.float64]:
+def _transform(text: str | None) -> Array:
     if text is None:
         return np.eye(4)
     values = numbers(text.split())
@@ -187,7 +186,7 @@ def _mesh(mesh: ElementTree.Element) -> _Mesh:
 
 def _table(
     mesh: ElementTree.Element, group: str, row: str, keys: Sequence[str]
-) -> NDArray[np.float64]:
+) -> Array:
     groups = mesh.findall(f"{_CORE}{group}")
     if len(groups) != 1:
         raise FormatError(f"a mesh has {len(groups)} lists of {group}, must have one")

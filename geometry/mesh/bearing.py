@@ -1,7 +1,8 @@
 """A direction across an axis that belongs to an object, not to its coordinates."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array
 
 from .mesh import TriangleMesh
 
@@ -10,7 +11,7 @@ _CLEAR = 0.01
 _HARMONICS = 6
 
 
-def bearing(mesh: TriangleMesh, axis: NDArray[np.float64]) -> NDArray[np.float64]:
+def bearing(mesh: TriangleMesh, axis: Array) -> Array:
     """Return a unit direction across an axis that turns with the mesh about it.
 
     With rho, theta the polar coordinates of the surface about the axis through the
@@ -30,7 +31,7 @@ def bearing(mesh: TriangleMesh, axis: NDArray[np.float64]) -> NDArray[np.float64
     Returns:
         Shape (3,).
     """
-    spare: NDArray[np.float64] = np.eye(3)[np.argmin(np.abs(axis))]
+    spare: Array = np.eye(3)[np.argmin(np.abs(axis))]
     e1 = np.asarray(np.cross(axis, spare), dtype=np.float64)
     e1 = e1 / np.linalg.norm(e1)
     e2 = np.cross(axis, e1)

@@ -1,9 +1,9 @@
 """Averages over a physical length, whatever the size and shape of the triangles."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from geometry.arrays import Array, Ints
 from geometry.parallel import mapped
 
 from .tensors import cross
@@ -21,9 +21,7 @@ _LARGEST_WEIGHT = 3.0
 
 
 def surface_laplacian(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edges: MeshEdges | None = None,
+    vertices: Array, faces: Ints, edges: MeshEdges | None = None
 ) -> csr_array:
     """Return the stiffness L of linear elements, (n, n), positive semi-definite.
 
@@ -56,9 +54,7 @@ def surface_laplacian(
     )
 
 
-def graph_laplacian(
-    ends: NDArray[np.int64], weights: NDArray[np.float64], n: int
-) -> csr_array:
+def graph_laplacian(ends: Ints, weights: Array, n: int) -> csr_array:
     """Return L of n nodes with links (m, 2) and their weights (m,), shape (n, n).
 
     L_ij = -w_ij, and rows sum to zero.
@@ -71,9 +67,7 @@ def graph_laplacian(
     return coo_array((values, (rows, columns)), (n, n)).tocsr()
 
 
-def vertex_areas(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def vertex_areas(vertices: Array, faces: Ints) -> Array:
     """Return a third of the area of each vertex's faces, shape (n,)."""
     corners = vertices[faces]
     normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -82,12 +76,7 @@ def vertex_areas(
     return np.bincount(faces.ravel(), corner, len(vertices)).astype(np.float64)
 
 
-def diffused(
-    values: NDArray[np.float64],
-    mass: NDArray[np.float64],
-    laplacian: csr_array,
-    length: float,
-) -> NDArray[np.float64]:
+def diffused(values: Array, mass: Array, laplacian: csr_array, length: float) -> Array:
     """Return x of (M + length^2/2 L) x = M values: one implicit step of diffusion.
 
     The weights of the average fall off over about `length`; where the mass is zero the
@@ -119,9 +108,7 @@ def diffused(
     return values + root[:, None] * change
 
 
-def _conjugate_gradients(
-    system: csr_array, rest: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _conjugate_gradients(system: csr_array, rest: Array) -> Array:
     """Return x of A x = b, shape (n, m), up to the tolerance; b is used up.
 
     Goes through the rows in blocks that stay in the cache, on all cores: the time goes
@@ -163,5 +150,5 @@ def _conjugate_gradients(
     return x
 
 
-def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def _product(a: Array, b: Array) -> float:
     return float(np.einsum("ij,ij->", a, b))

@@ -3,7 +3,8 @@
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints, Mask
 
 from .topology import components
 
@@ -14,9 +15,7 @@ _SMALL = 0.01
 _ON = 1e-12
 
 
-def main_bodies(
-    faces: NDArray[np.int64], areas: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def main_bodies(faces: Ints, areas: Array) -> Mask:
     """Return whether each face belongs to a body that counts for the object's extent.
 
     A body is connected by shared vertices. The smallest ones are left out, as long as
@@ -43,9 +42,7 @@ def main_bodies(
     return kept[body]
 
 
-def enclosing_ball(
-    points: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], float]:
+def enclosing_ball(points: Array) -> tuple[Array, float]:
     """Return centre and radius of the smallest ball that holds all points, exactly.
 
     The ball is spanned by at most four of them. From the ball of those found so far,
@@ -78,11 +75,9 @@ def enclosing_ball(
         radius = grown
 
 
-def _ball_of_few(
-    points: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _ball_of_few(points: Array) -> tuple[Array, Array, float]:
     """Smallest ball of up to five points: those that span it, centre and radius."""
-    best: tuple[NDArray[np.float64], NDArray[np.float64], float] | None = None
+    best: tuple[Array, Array, float] | None = None
     for size in range(2, min(4, len(points)) + 1):
         for chosen in combinations(range(len(points)), size):
             span = points[list(chosen)]
@@ -97,7 +92,7 @@ def _ball_of_few(
     return best
 
 
-def _circumcentre(span: NDArray[np.float64]) -> NDArray[np.float64]:
+def _circumcentre(span: Array) -> Array:
     """Return the point of the span's affine hull that is equally far from each."""
     edges = span[1:] - span[0]
     gram = edges @ edges.T

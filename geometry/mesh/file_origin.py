@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import Ints
+
 Properties = Mapping[str, NDArray[Any]]
 
 
@@ -32,7 +34,7 @@ class FileOrigin:
         ValueError: If an array's shape or an index doesn't fit the others.
     """
 
-    face: NDArray[np.int64]
+    face: Ints
     corners: NDArray[np.integer]
     n_faces: int
     n_vertices: int
@@ -65,7 +67,7 @@ class FileOrigin:
                 values.setflags(write=False)
             object.__setattr__(self, name, MappingProxyType(held))
 
-    def of_faces(self, kept: NDArray[np.int64]) -> "FileOrigin":
+    def of_faces(self, kept: Ints) -> "FileOrigin":
         """Return the origin of a mesh that keeps these of the faces."""
         return replace(self, face=self.face[kept], corners=self.corners[kept])
 

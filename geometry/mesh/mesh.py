@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from geometry.arrays import Array, Ints, Mask
+
 from .diffusion import surface_laplacian, vertex_areas
 from .extent import enclosing_ball, main_bodies
 from .file_origin import FileOrigin
@@ -67,8 +69,8 @@ class TriangleMesh:
             is out of range or there is no face.
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    vertices: Array
+    faces: Ints
     source: MeshSource | None = None
     origin: FileOrigin | None = None
 
@@ -97,22 +99,22 @@ class TriangleMesh:
             object.__setattr__(self, name, values)
 
     @cached_property
-    def corners(self) -> NDArray[np.float64]:
+    def corners(self) -> Array:
         """Corner positions of each face in [m], shape (n_f, 3, 3)."""
         return _read_only(self.vertices[self.faces])
 
     @cached_property
-    def _cross(self) -> NDArray[np.float64]:
+    def _cross(self) -> Array:
         a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
         return cross(b - a, c - a)
 
     @cached_property
-    def face_areas(self) -> NDArray[np.float64]:
+    def face_areas(self) -> Array:
         """Area of each face in [m²], shape (n_f,)."""
         return _read_only(0.5 * np.linalg.norm(self._cross, axis=1))
 
     @cached_property
-    def face_normals(self) -> NDArray[np.float64]:
+    def face_normals(self) -> Array:
         """Outward unit normal of each face, (n_f, 3); zero where it has no area."""
         length = 2.0 * self.face_areas[:, None]
         return _read_only(
@@ -122,7 +124,7 @@ class TriangleMesh:
         )
 
     @cached_property
-    def face_centroids(self) -> NDArray[np.float64]:
+    def face_centroids(self) -> Array:
         """Centroid of each face in [m], shape (n_f, 3)."""
         a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
         return _read_only((a + b + c) / 3.0)
@@ -133,7 +135,7 @@ class TriangleMesh:
         return mesh_edges(self.faces)
 
     @cached_property
-    def vertex_areas(self) -> NDArray[np.float64]:
+    def vertex_areas(self) -> Array:
         """A third of the area of each vertex's faces in [m²], shape (n_v,)."""
         return _read_only(vertex_areas(self.vertices, self.faces))
 
@@ -148,7 +150,7 @@ class TriangleMesh:
         return float(self.face_areas.sum())
 
     @cached_property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Array:
         """Lower and upper corner of the bounding box of the faces in [m], (2, 3)."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.faces] = True
@@ -156,19 +158,19 @@ class TriangleMesh:
         return _read_only(np.stack([points.min(axis=0), points.max(axis=0)]))
 
     @cached_property
-    def main(self) -> NDArray[np.bool_]:
+    def main(self) -> Mask:
         """Whether each face belongs to a main body; small fragments don't, (n_f,)."""
         return _read_only(main_bodies(self.faces, self.face_areas))
 
     @cached_property
-    def _ball(self) -> tuple[NDArray[np.float64], float]:
+    def _ball(self) -> tuple[Array, float]:
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.faces[self.main]] = True
         centre, radius = enclosing_ball(self.vertices[used])
         return _read_only(centre), radius
 
     @cached_property
-    def centre(self) -> NDArray[np.float64]:
+    def centre(self) -> Array:
         """Centre of the smallest ball that holds the main bodies in [m], shape (3,)."""
         return self._ball[0]
 
@@ -198,7 +200,7 @@ class TriangleMesh:
         return float(np.max(self._edge_lengths))
 
     @cached_property
-    def _edge_lengths(self) -> NDArray[np.float64]:
+    def _edge_lengths(self) -> Array:
         edges = self.corners - self.corners[:, [2, 0, 1]]
         return np.sqrt(np.einsum("fki,fki->fk", edges, edges))
 

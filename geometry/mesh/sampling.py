@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints, Mask
 
 from .mesh import TriangleMesh
 
@@ -21,15 +22,15 @@ class SurfaceSamples:
         weight: Area that each sample stands for, in [m²].
     """
 
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    points: Array
+    normals: Array
+    faces: Ints
     weight: float
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "SurfaceSamples":
+    def take(self, chosen: Ints | Mask) -> "SurfaceSamples":
         """Return some of the samples, each still standing for the same area."""
         return SurfaceSamples(
             self.points[chosen], self.normals[chosen], self.faces[chosen], self.weight
@@ -37,11 +38,7 @@ class SurfaceSamples:
 
 
 def sample_surface(
-    mesh: TriangleMesh,
-    n: int,
-    *,
-    seed: int,
-    within: NDArray[np.bool_] | None = None,
+    mesh: TriangleMesh, n: int, *, seed: int, within: Mask | None = None
 ) -> SurfaceSamples:
     """Return n samples by stratified sampling along the cumulated area.
 

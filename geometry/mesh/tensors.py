@@ -1,7 +1,8 @@
 """Symmetric tensors on a surface: their average, and their values in a plane."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array
 
 _UPPER = np.triu_indices(3)
 # Entries beside the diagonal stand for two: with the root of two, the sum of squares is
@@ -10,10 +11,7 @@ _DOUBLED = np.where(_UPPER[0] == _UPPER[1], 1.0, np.sqrt(2.0))
 _PACKED_AT = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
-def packed(
-    values: tuple[NDArray[np.float64], NDArray[np.float64]],
-    ways: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> NDArray[np.float64]:
+def packed(values: tuple[Array, Array], ways: tuple[Array, Array]) -> Array:
     """Return k1 d1 d1^T + k2 d2 d2^T as six numbers each, (n, 6), of the same norm.
 
     Args:
@@ -27,12 +25,12 @@ def packed(
     return np.asarray((first + second) * _DOUBLED, dtype=np.float64)
 
 
-def unpacked(tensors: NDArray[np.float64]) -> NDArray[np.float64]:
+def unpacked(tensors: Array) -> Array:
     """Return what `packed` packed, (n, 3, 3)."""
     return (tensors / _DOUBLED)[:, _PACKED_AT]
 
 
-def tangent_planes(normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def tangent_planes(normals: Array) -> Array:
     """Return two unit vectors across each unit normal, as columns, shape (n, 3, 2)."""
     least = np.argmin(np.abs(normals), axis=1)
     rows = np.arange(len(normals))
@@ -44,7 +42,7 @@ def tangent_planes(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([first, cross(normals, first)], axis=2)
 
 
-def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def cross(a: Array, b: Array) -> Array:
     """Return the cross products of rows, (n, 3); numpy's own takes twice as long."""
     product = np.empty_like(a)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -52,7 +50,7 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     return product
 
 
-def lengths(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def lengths(vectors: Array) -> Array:
     """Return sqrt(x^2 + y^2 + z^2) of each row, (n, 3) to (n,).
 
     To the last bit what `np.linalg.norm` gives along axis 1, whose sums over rows of
@@ -62,9 +60,7 @@ def lengths(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.sqrt(x * x + y * y + z * z)
 
 
-def principal(
-    tensors: NDArray[np.float64], planes: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def principal(tensors: Array, planes: Array) -> tuple[Array, Array]:
     """Return eigenvalues, larger first, and unit eigenvectors of tensors in planes.
 
     Args:

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
+from geometry.arrays import Ints, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,17 +19,17 @@ class MeshEdges:
         n_faces: Faces at each edge, shape (n_e,).
     """
 
-    ends: NDArray[np.int64]
-    of_face: NDArray[np.int64]
-    n_faces: NDArray[np.int64]
+    ends: Ints
+    of_face: Ints
+    n_faces: Ints
 
     @property
-    def border(self) -> NDArray[np.bool_]:
+    def border(self) -> Mask:
         """Edges with one face, shape (n_e,)."""
         return self.n_faces == 1
 
 
-def mesh_edges(faces: NDArray[np.int64]) -> MeshEdges:
+def mesh_edges(faces: Ints) -> MeshEdges:
     """Return the edges of triangles (n_f, 3)."""
     begin, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
     low, high = np.minimum(begin, end), np.maximum(begin, end)
@@ -43,9 +44,7 @@ def mesh_edges(faces: NDArray[np.int64]) -> MeshEdges:
     )
 
 
-def adjacent_faces(
-    edges: MeshEdges, *, manifold_only: bool = True
-) -> NDArray[np.int64]:
+def adjacent_faces(edges: MeshEdges, *, manifold_only: bool = True) -> Ints:
     """Return pairs of faces that share an edge, shape (m, 2).
 
     Around an edge of more than two faces, consecutive faces are paired, unless
@@ -54,9 +53,7 @@ def adjacent_faces(
     return face_pairs(edges, manifold_only=manifold_only)[0]
 
 
-def face_pairs(
-    edges: MeshEdges, *, manifold_only: bool = True
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def face_pairs(edges: MeshEdges, *, manifold_only: bool = True) -> tuple[Ints, Ints]:
     """Return `adjacent_faces`, shape (m, 2), and the edge that each pair shares."""
     flat = edges.of_face.ravel()
     if manifold_only or not np.any(edges.n_faces > 2):
@@ -73,7 +70,7 @@ def face_pairs(
     return pairs, flat[order][1:][same]
 
 
-def components(pairs: NDArray[np.int64], n: int) -> tuple[int, NDArray[np.int64]]:
+def components(pairs: Ints, n: int) -> tuple[int, Ints]:
     """Return the number of connected components of n nodes, and each node's, (n,).
 
     Components are numbered by their lowest node.
@@ -89,9 +86,7 @@ def components(pairs: NDArray[np.int64], n: int) -> tuple[int, NDArray[np.int64]
     return int(count), rank[label]
 
 
-def numbered(
-    faces: NDArray[np.int64], n: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def numbered(faces: Ints, n: int) -> tuple[Ints, Ints]:
     """Vertices of n that faces use, ascending, and the faces in their numbers."""
     taken = np.zeros(n, dtype=bool)
     taken[faces] = True

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints
 from geometry.mesh.mesh import TriangleMesh
 
 
@@ -19,12 +19,12 @@ class ClosestPoints:
         distances: Signed distance in [m], positive on the side of the normals, (n,).
     """
 
-    faces: NDArray[np.int64]
-    points: NDArray[np.float64]
-    distances: NDArray[np.float64]
+    faces: Ints
+    points: Array
+    distances: Array
 
 
-def closest_points(mesh: TriangleMesh, points: NDArray[np.float64]) -> ClosestPoints:
+def closest_points(mesh: TriangleMesh, points: Array) -> ClosestPoints:
     """Return the closest point of the mesh to each query point.
 
     The sign is that of (P - C) . n, with n the face normal where the closest point C

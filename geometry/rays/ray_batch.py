@@ -9,7 +9,8 @@ time, since rays and tree drive each other out of the cache at every change.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Ints, Mask, Single
 
 from .rays import RayCaster
 
@@ -27,8 +28,8 @@ class Source:
         distance: Of the origin from the middle of the mesh.
     """
 
-    origin: NDArray[np.float32]
-    along: NDArray[np.float32] | None
+    origin: Single
+    along: Single | None
     distance: float
 
 
@@ -45,10 +46,10 @@ class SampleSet:
         back: Diameter of a ball about the middle that holds the mesh and all samples.
     """
 
-    order: NDArray[np.int64] | None
-    points: NDArray[np.float32]
-    normals: NDArray[np.float32]
-    heights: NDArray[np.float32]
+    order: Ints | None
+    points: Single
+    normals: Single
+    heights: Single
     back: float
 
     def __len__(self) -> int:
@@ -84,12 +85,8 @@ class RayBatch:
         return len(self._start) - self.filled
 
     def add_facing(
-        self,
-        samples: SampleSet,
-        part: slice,
-        source: Source,
-        wanted: NDArray[np.bool_] | None,
-    ) -> NDArray[np.int64]:
+        self, samples: SampleSet, part: slice, source: Source, wanted: Mask | None
+    ) -> Ints:
         """Add the rays of some samples that face a device.
 
         Args:
@@ -125,7 +122,7 @@ class RayBatch:
         np.negative(rise, out=rise)
         self._aim(start, rise, fresh, source, samples.back)
 
-    def clear(self) -> NDArray[np.bool_]:
+    def clear(self) -> Mask:
         """Trace all rays in the order in which they were added, and forget them.
 
         Returns:
@@ -137,9 +134,7 @@ class RayBatch:
             self._start[rays, :3], self._along[rays, :3], self._reach[rays]
         )
 
-    def _climbs(
-        self, samples: SampleSet, part: slice, source: Source
-    ) -> NDArray[np.float32]:
+    def _climbs(self, samples: SampleSet, part: slice, source: Source) -> Single:
         """Return N . (P - O), or N . L if parallel: negative where a sample faces."""
         normals = samples.normals[:, part]
         n = normals.shape[1]
@@ -154,12 +149,7 @@ class RayBatch:
         return climb
 
     def _aim(
-        self,
-        start: NDArray[np.float32],
-        rise: NDArray[np.float32],
-        fresh: slice,
-        source: Source,
-        back: float,
+        self, start: Single, rise: Single, fresh: slice, source: Source, back: float
     ) -> None:
         """Make rays of points and what they climb (at most 0), in place.
 
@@ -192,7 +182,7 @@ class RayBatch:
         self.filled = fresh.stop
 
 
-def _fill(rows: NDArray[np.float32], vector: NDArray[np.float32]) -> None:
+def _fill(rows: Single, vector: Single) -> None:
     """Set every row to a vector and a zero."""
     whole = np.append(vector, np.float32(0.0)).view(np.complex128)
     # As one item of 16 bytes, not four to a row in an inner loop of length four.

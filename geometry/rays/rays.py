@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 from embreex.mesh_construction import TriangleMesh as _EmbreeMesh
 from embreex.rtcore_scene import EmbreeScene
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask, Single
 from geometry.mesh.mesh import TriangleMesh
 
 # Rays in one call of embree: their arrays stay in the second-level cache.
@@ -74,16 +74,11 @@ class RayCaster:
         """
         return max(self.mesh.radius, 0.5 * self.reach / self.scale)
 
-    def local(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+    def local(self, points: Array) -> Single:
         """Return points in the caster's own frame, shape (n, 3)."""
         return np.ascontiguousarray((points - self.middle) * self.scale, np.float32)
 
-    def occluded(
-        self,
-        origins: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        distances: NDArray[np.float64],
-    ) -> NDArray[np.bool_]:
+    def occluded(self, origins: Array, directions: Array, distances: Array) -> Mask:
         """Return whether anything is hit closer than a distance along each ray.
 
         Args:
@@ -112,12 +107,7 @@ class RayCaster:
         self.share(trace, self.chunks(len(directions)))
         return blocked
 
-    def blocked_local(
-        self,
-        start: NDArray[np.float32],
-        along: NDArray[np.float32],
-        reach: NDArray[np.float32],
-    ) -> NDArray[np.bool_]:
+    def blocked_local(self, start: Single, along: Single, reach: Single) -> Mask:
         """Return whether rays in the caster's own frame are blocked; checks nothing.
 
         For engines that prepare float32 rays themselves, in their own threads: one call
@@ -132,9 +122,7 @@ class RayCaster:
         answer = self._scene.run(start, along, reach, query="OCCLUDED")
         return np.equal(answer, 0)
 
-    def first_hits(
-        self, origins: NDArray[np.float64], directions: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def first_hits(self, origins: Array, directions: Array) -> tuple[Ints, Array]:
         """Return the first face that each ray hits, and how far away it is.
 
         The distance is recomputed in float64 from the plane of the face.
@@ -210,8 +198,8 @@ class RayCaster:
         return self._pool[1]
 
     def _rays(
-        self, origins: NDArray[np.float64], directions: NDArray[np.float64], part: slice
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        self, origins: Array, directions: Array, part: slice
+    ) -> tuple[Single, Single]:
         along = np.ascontiguousarray(directions[part], dtype=np.float32)
         if origins.ndim == 1:
             return np.broadcast_to(self.local(origins), along.shape), along
@@ -225,9 +213,7 @@ def equal_parts(n: int, most: int, multiple: int = 1) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(ends)]
 
 
-def _checked(
-    origins: NDArray[np.float64], directions: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _checked(origins: Array, directions: Array) -> tuple[Array, Array]:
     origins = np.asarray(origins, dtype=np.float64)
     directions = np.asarray(directions, dtype=np.float64)
     if directions.ndim != 2 or directions.shape[1] != 3:

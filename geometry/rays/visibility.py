@@ -23,6 +23,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask, Single
 from geometry.mesh.mesh import TriangleMesh
 
 from .ray_batch import RayBatch, SampleSet, Source
@@ -61,13 +62,7 @@ class Visibility:
         self._slack = local
         self._own = threading.local()
 
-    def samples(
-        self,
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        *,
-        sort: bool = True,
-    ) -> SampleSet:
+    def samples(self, points: Array, normals: Array, *, sort: bool = True) -> SampleSet:
         """Return samples made ready for queries.
 
         Args:
@@ -100,12 +95,12 @@ class Visibility:
 
     def blocked(
         self,
-        origin: NDArray[np.float64],
-        points: NDArray[np.float64] | SampleSet,
-        normals: NDArray[np.float64] | None = None,
+        origin: Array,
+        points: Array | SampleSet,
+        normals: Array | None = None,
         *,
-        along: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.bool_]:
+        along: Array | None = None,
+    ) -> Mask:
         """Return whether something stands between a device and points.
 
         Args:
@@ -150,9 +145,7 @@ class Visibility:
         own.batch.filled = 0
         return own.batch
 
-    def source(
-        self, origin: NDArray[np.float64], along: NDArray[np.float64] | None = None
-    ) -> Source:
+    def source(self, origin: Array, along: Array | None = None) -> Source:
         """Return a device in the caster's own frame.
 
         Raises:
@@ -179,7 +172,7 @@ class Visibility:
         )
 
 
-def morton_order(points: NDArray[np.float32]) -> NDArray[np.int64]:
+def morton_order(points: Single) -> Ints:
     """Return the order of points along a Morton curve, 10 bits an axis, shape (n,)."""
     if len(points) == 0:
         return np.empty(0, dtype=np.int64)
@@ -197,7 +190,7 @@ def morton_order(points: NDArray[np.float32]) -> NDArray[np.int64]:
     return np.argsort(code, kind="stable")
 
 
-def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
+def _dot(a: Single, b: Single) -> Single:
     """Return the product of columns, in this order of summation, shape (n,)."""
     total = a[0] * b[0]
     total += a[1] * b[1]
@@ -205,11 +198,11 @@ def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
     return total
 
 
-def _columns(rows: NDArray[np.floating]) -> NDArray[np.float32]:
+def _columns(rows: NDArray[np.floating]) -> Single:
     return np.ascontiguousarray(rows.T, dtype=np.float32)
 
 
-def _finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _finite(name: str, values: Array) -> Array:
     values = np.asarray(values, dtype=np.float64)
     if not np.all(np.isfinite(values)):
         raise ValueError(f"{name} must be finite numbers")

@@ -1,7 +1,8 @@
 """Which device sees which sample, on all cores."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints, Mask
 
 from .ray_batch import SampleSet, Source
 from .rays import equal_parts
@@ -13,13 +14,13 @@ _GROUP = 1 << 19
 
 def visibility_matrix(
     visibility: Visibility,
-    origins: NDArray[np.float64],
-    points: NDArray[np.float64] | SampleSet,
-    normals: NDArray[np.float64] | None = None,
+    origins: Array,
+    points: Array | SampleSet,
+    normals: Array | None = None,
     *,
-    along: NDArray[np.float64] | None = None,
-    candidates: NDArray[np.bool_] | None = None,
-) -> NDArray[np.bool_]:
+    along: Array | None = None,
+    candidates: Mask | None = None,
+) -> Mask:
     """Return which device (row) sees which sample (column), shape (m, n).
 
     An entry is set where the pair is a candidate and the segment between them is free.
@@ -73,12 +74,12 @@ def _trace(
     visibility: Visibility,
     samples: SampleSet,
     sources: list[Source],
-    candidates: NDArray[np.bool_] | None,
-    seen: NDArray[np.bool_],
+    candidates: Mask | None,
+    seen: Mask,
 ) -> None:
     """Set what some devices see, in the caller's order; `seen` is all false before."""
     batch = visibility.batch()
-    waiting: list[tuple[int, NDArray[np.int64]]] = []
+    waiting: list[tuple[int, Ints]] = []
 
     def flush() -> None:
         clear, begin = batch.clear(), 0

@@ -1,8 +1,8 @@
 """Fragments that splitting leaves join the piece beside them that they fit best."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.topology import components
 
 from .cone_sums import CONE_SHARE, Patch, renumbered, unit
@@ -12,7 +12,7 @@ _ROOM = 0.7
 _EQUAL = 1e-9
 
 
-def join_fragments(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def join_fragments(patch: Patch, piece: Ints) -> Ints:
     """Give connected faces without a piece to adjacent ones; -1 where they fit none.
 
     No piece takes more area outside its cone than leaves the last of `CONE_SHARE` in.
@@ -25,7 +25,7 @@ def join_fragments(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.where((joined >= 0) & lost[joined], piece, joined)
 
 
-def _join(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def _join(patch: Patch, piece: Ints) -> Ints:
     piece = piece.copy()
     sums, areas = patch.sums(piece)
     axis = unit(sums)
@@ -51,7 +51,7 @@ def _join(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     return piece
 
 
-def _fragments(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def _fragments(patch: Patch, piece: Ints) -> Ints:
     """Number connected faces without a piece, -1 for the others."""
     free = piece < 0
     links = patch.links[free[patch.links].all(axis=1)]
@@ -60,18 +60,13 @@ def _fragments(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
     return renumbered(label)
 
 
-def _single(patch: Patch, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def _single(patch: Patch, piece: Ints) -> Ints:
     """Number the faces without a piece, -1 for the others."""
     free = piece[: patch.n] < 0
     return np.where(free, np.cumsum(free) - 1, -1)
 
 
-def _best(
-    patch: Patch,
-    fragment: NDArray[np.int64],
-    piece: NDArray[np.int64],
-    axis: NDArray[np.float64],
-) -> NDArray[np.int64]:
+def _best(patch: Patch, fragment: Ints, piece: Ints, axis: Array) -> Ints:
     """The adjacent piece whose axis is nearest to each fragment's mean, else -1."""
     sums, _ = patch.sums(fragment)
     owner = np.full(len(sums), -1, dtype=np.int64)
@@ -90,9 +85,7 @@ def _best(
     return owner
 
 
-def _within(
-    owner: NDArray[np.int64], out: NDArray[np.float64], room: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _within(owner: Ints, out: Array, room: Array) -> Mask:
     """Which fragments their pieces have room for, the best fitting first."""
     taken = np.zeros(len(owner), dtype=bool)
     waiting = np.flatnonzero(owner >= 0)

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Ints
 
 # Share of a piece's area whose normals must lie in its cone: while it is cut and
 # merged, and after fragments have joined it.
@@ -23,9 +24,9 @@ class Patch:
         cos_half: Cosine of the half angle of the cone.
     """
 
-    normals: NDArray[np.float64]
-    areas: NDArray[np.float64]
-    links: NDArray[np.int64]
+    normals: Array
+    areas: Array
+    links: Ints
     cos_half: float
 
     @property
@@ -33,9 +34,7 @@ class Patch:
         """Number of faces."""
         return len(self.areas)
 
-    def sums(
-        self, piece: NDArray[np.int64], count: int = 0
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sums(self, piece: Ints, count: int = 0) -> tuple[Array, Array]:
         """Return area-weighted sums of normals (k, 3) and areas (k,) of pieces."""
         count = max(count, int(piece.max(initial=-1)) + 1)
         # What is in no piece is counted too, before the first.
@@ -47,12 +46,10 @@ class Patch:
         return np.stack(sums[:3], axis=1), sums[3]
 
     @cached_property
-    def _weighted(self) -> NDArray[np.float64]:
+    def _weighted(self) -> Array:
         return np.ascontiguousarray((self.normals * self.areas[:, None]).T)
 
-    def cosines(
-        self, piece: NDArray[np.int64], axis: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def cosines(self, piece: Ints, axis: Array) -> Array:
         """Return each face's normal times the axis (k, 3) of its piece, or 0, (n,)."""
         cosines = np.zeros(self.n)
         held = np.flatnonzero(piece >= 0)
@@ -61,7 +58,7 @@ class Patch:
             cosines[held] = np.einsum("ij,ij->i", normals, axes)
         return cosines
 
-    def shares(self, piece: NDArray[np.int64]) -> NDArray[np.float64]:
+    def shares(self, piece: Ints) -> Array:
         """Return the share of each piece's area in the cone about its mean, (k,)."""
         sums, areas = self.sums(piece)
         axis = unit(sums)
@@ -70,13 +67,13 @@ class Patch:
         return np.divide(held, areas, out=np.ones_like(areas), where=areas > 0)
 
 
-def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def unit(vectors: Array) -> Array:
     """Return vectors (k, 3) of length one; zero stays."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.maximum(length, 1e-300)
 
 
-def renumbered(piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def renumbered(piece: Ints) -> Ints:
     """Return numbers without gaps in the same order; -1 stays."""
     used = np.zeros(int(piece.max(initial=-1)) + 2, dtype=bool)
     used[piece] = True
@@ -86,7 +83,7 @@ def renumbered(piece: NDArray[np.int64]) -> NDArray[np.int64]:
     return number[piece]
 
 
-def merged(patch: Patch, piece: NDArray[np.int64], share: float) -> NDArray[np.int64]:
+def merged(patch: Patch, piece: Ints, share: float) -> Ints:
     """Join adjacent pieces as long as some union has the share of its area in a cone.
 
     The smallest goes first, and to the neighbour with which its mean normal is longest.
@@ -122,12 +119,7 @@ class _Merging:
     """Pieces while they are merged: sums, faces and neighbours of each."""
 
     def __init__(
-        self,
-        patch: Patch,
-        share: float,
-        sums: NDArray[np.float64],
-        areas: NDArray[np.float64],
-        faces: list[NDArray[np.int64]],
+        self, patch: Patch, share: float, sums: Array, areas: Array, faces: list[Ints]
     ) -> None:
         self._patch, self._share = patch, share
         self._sums, self._areas, self.faces = sums, areas, faces
@@ -184,7 +176,7 @@ class _Merging:
         return held >= self._share * float(self._areas[i] + self._areas[j])
 
 
-def _members(piece: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
+def _members(piece: Ints, count: int) -> list[Ints]:
     held = np.flatnonzero(piece >= 0)
     order = held[np.argsort(piece[held], kind="stable")]
     ends = np.cumsum(np.bincount(piece[held], minlength=count))[:-1]

@@ -1,8 +1,8 @@
 """Cut surface into connected pieces whose normals fit one cone."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.diffusion import diffused, graph_laplacian
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import components
@@ -42,13 +42,13 @@ def check_cone_options(min_region_share: float, cone_half_angle: float) -> None:
 
 def cone_pieces(
     mesh: TriangleMesh,
-    chosen: NDArray[np.bool_],
-    pairs: NDArray[np.int64],
+    chosen: Mask,
+    pairs: Ints,
     least: float,
     half_angle: float,
     *,
     keep_all: bool = False,
-) -> list[NDArray[np.int64]]:
+) -> list[Ints]:
     """Connected pieces that fit the cone, largest area first.
 
     At least 95 % of a piece's area has its averaged normal (`averaged_normals`: a face
@@ -90,9 +90,7 @@ def cone_pieces(
     return _by_area(faces, piece, patch.areas, mesh.area)
 
 
-def _more_kept(
-    patch: Patch, piece: NDArray[np.int64], least: float
-) -> NDArray[np.int64]:
+def _more_kept(patch: Patch, piece: Ints, least: float) -> Ints:
     """The pieces for half the least area, and so on, until enough of it is kept."""
     enough = _LEAST_KEPT * float(patch.areas.sum())
     if patch.areas[piece >= 0].sum() >= enough:
@@ -110,9 +108,7 @@ def _more_kept(
     return piece
 
 
-def _pieces(
-    patch: Patch, split: NDArray[np.int64], least: float, *, keep_all: bool = False
-) -> NDArray[np.int64]:
+def _pieces(patch: Patch, split: Ints, least: float, *, keep_all: bool = False) -> Ints:
     """Number the pieces that fit and have the least area; -1: dropped."""
     # The last entry is that of -1.
     areas = np.append(patch.sums(split)[1], 0.0)
@@ -125,9 +121,7 @@ def _pieces(
     return renumbered(merged(patch, piece, CONE_SHARE[1]))
 
 
-def averaged_normals(
-    mesh: TriangleMesh, pairs: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def averaged_normals(mesh: TriangleMesh, pairs: Ints) -> Array:
     """Return unit normals of the faces averaged over 1 % of the mesh's size, (n_f, 3).
 
     One implicit step of diffusion between adjacent faces (m, 2), weighted by the
@@ -146,9 +140,7 @@ def averaged_normals(
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 
 
-def normal_cone(
-    mesh: TriangleMesh, faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], float]:
+def normal_cone(mesh: TriangleMesh, faces: Ints) -> tuple[Array, float]:
     """Mean normal, and the half angle about it that holds 98 % of the area."""
     normals, areas = mesh.face_normals[faces], mesh.face_areas[faces]
     axis = areas @ normals
@@ -160,7 +152,7 @@ def normal_cone(
     return axis, float(angle[order[at]])
 
 
-def _split(patch: Patch, active: NDArray[np.bool_], least: float) -> NDArray[np.int64]:
+def _split(patch: Patch, active: Mask, least: float) -> Ints:
     """Connected pieces that fit, of the active faces; -1: too small to be cut on."""
     piece = np.full(patch.n, -1, dtype=np.int64)
     part = np.where(active, 0, -1)
@@ -186,7 +178,7 @@ def _split(patch: Patch, active: NDArray[np.bool_], least: float) -> NDArray[np.
     return piece
 
 
-def _core(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _core(patch: Patch, part: Ints) -> Mask:
     """Faces in the cone about the mean of their part's normals, moved to its middle."""
     sums, areas = patch.sums(part)
     axis = sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-300)
@@ -204,7 +196,7 @@ def _core(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.bool_]:
     return core
 
 
-def _connected(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.int64]:
+def _connected(patch: Patch, part: Ints) -> Ints:
     """Number the connected parts; -1 stays."""
     a, b = part[patch.links].T
     same = patch.links[(a == b) & (a >= 0)]
@@ -213,12 +205,7 @@ def _connected(patch: Patch, part: NDArray[np.int64]) -> NDArray[np.int64]:
     return renumbered(label)
 
 
-def _by_area(
-    faces: NDArray[np.int64],
-    piece: NDArray[np.int64],
-    areas: NDArray[np.float64],
-    total: float,
-) -> list[NDArray[np.int64]]:
+def _by_area(faces: Ints, piece: Ints, areas: Array, total: float) -> list[Ints]:
     """Faces of each piece, largest first; equal up to rounding, lowest face first."""
     held = np.flatnonzero(piece >= 0)
     if not len(held):

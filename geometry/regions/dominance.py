@@ -1,8 +1,8 @@
 """Which faces are dominant: the highest curvedness, whole plateaus, no small parts."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.curvature.curvature import CurvatureField
 from geometry.curvature.face_curvature import FLAT, averaged_on_faces
 from geometry.mesh.mesh import TriangleMesh
@@ -19,9 +19,7 @@ _TIE_BAND, _PLATEAU_BAND = 0.02, 0.1
 _PLATEAU_SHARES = (0.15, 0.35)
 
 
-def face_curvedness(
-    mesh: TriangleMesh, field: CurvatureField
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def face_curvedness(mesh: TriangleMesh, field: CurvatureField) -> tuple[Array, Mask]:
     """Return the curvedness [1/m] by which faces are ranked, and its trust, (n_f,).
 
     sqrt((k1^2 + k2^2) / 2) of each vertex, no more than half over the field's scale,
@@ -41,12 +39,12 @@ def face_curvedness(
 
 def dominant_faces(
     mesh: TriangleMesh,
-    curvedness: NDArray[np.float64],
-    trusted: NDArray[np.bool_],
-    pairs: NDArray[np.int64],
+    curvedness: Array,
+    trusted: Mask,
+    pairs: Ints,
     area_share: float,
     least: float,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Return which faces are dominant, shape (n_f,).
 
     Args:
@@ -66,7 +64,7 @@ def dominant_faces(
     return _without_small_components(mesh, dominant, judged, pairs, least)
 
 
-def _on_main_bodies(mesh: TriangleMesh, least: float) -> NDArray[np.bool_]:
+def _on_main_bodies(mesh: TriangleMesh, least: float) -> Mask:
     """Faces of bodies that are large enough to hold a region, shape (n_f,).
 
     A fragment is curved more than anything, and would take up the share.
@@ -77,10 +75,7 @@ def _on_main_bodies(mesh: TriangleMesh, least: float) -> NDArray[np.bool_]:
 
 
 def _cut(
-    mesh: TriangleMesh,
-    curvedness: NDArray[np.float64],
-    judged: NDArray[np.bool_],
-    area_share: float,
+    mesh: TriangleMesh, curvedness: Array, judged: Mask, area_share: float
 ) -> float:
     """Curvedness from which a face is dominant; below a plateau, never through it."""
     faces = np.flatnonzero(judged)
@@ -98,12 +93,8 @@ def _cut(
 
 
 def _without_small_components(
-    mesh: TriangleMesh,
-    dominant: NDArray[np.bool_],
-    judged: NDArray[np.bool_],
-    pairs: NDArray[np.int64],
-    least: float,
-) -> NDArray[np.bool_]:
+    mesh: TriangleMesh, dominant: Mask, judged: Mask, pairs: Ints, least: float
+) -> Mask:
     """Fill small holes of trusted surface, then drop small islands."""
     for state in (False, True):
         same = pairs[

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.curvature.curvature import CurvatureField
 from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
@@ -29,9 +29,9 @@ class Region:
     """
 
     id: int
-    faces: NDArray[np.int64]
+    faces: Ints
     area_m2: float
-    mean_normal: NDArray[np.float64]
+    mean_normal: Array
     cone_angle: float
     mean_curvedness: float
 
@@ -50,10 +50,10 @@ class DominantRegions:
     """
 
     regions: tuple[Region, ...]
-    face_region: NDArray[np.int64]
-    steep: NDArray[np.float64]
+    face_region: Ints
+    steep: Array
     dominant_share: float
-    trusted: NDArray[np.bool_]
+    trusted: Mask
 
     def __iter__(self) -> Iterator[Region]:
         return iter(self.regions)
@@ -111,10 +111,10 @@ def dominant_regions(
 
 def regions_of_pieces(
     mesh: TriangleMesh,
-    pieces: Sequence[NDArray[np.int64]],
-    curvedness: NDArray[np.float64],
-    steep: NDArray[np.float64],
-    trusted: NDArray[np.bool_],
+    pieces: Sequence[Ints],
+    curvedness: Array,
+    steep: Array,
+    trusted: Mask,
 ) -> DominantRegions:
     """Return pieces (each the ascending indices of its faces) as numbered regions.
 
@@ -132,12 +132,7 @@ def regions_of_pieces(
     return DominantRegions(regions, face_region, steep, share, trusted)
 
 
-def _region(
-    number: int,
-    mesh: TriangleMesh,
-    faces: NDArray[np.int64],
-    curvedness: NDArray[np.float64],
-) -> Region:
+def _region(number: int, mesh: TriangleMesh, faces: Ints, curvedness: Array) -> Region:
     axis, angle = normal_cone(mesh, faces)
     areas = mesh.face_areas[faces]
     axis.setflags(write=False)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geometry.arrays import Array, Mask
 from geometry.curvature.curvature import CurvatureField
 from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
@@ -56,9 +57,7 @@ def regions_of_faces(
     return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
 
 
-def lightest_corner(
-    weight: ArrayLike, corners: NDArray[np.integer]
-) -> NDArray[np.float64]:
+def lightest_corner(weight: ArrayLike, corners: NDArray[np.integer]) -> Array:
     """Return for each face the least weight of its corners, shape (n_f,).
 
     Args:
@@ -81,7 +80,7 @@ def lightest_corner(
 
 def heaviest_faces(
     mesh: TriangleMesh, weight: ArrayLike, *, area_share: float = 0.2
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Return the faces of highest weight, a share of the area, shape (n_f,).
 
     The weight takes the place of the curvedness in `dominant_regions`. Faces of equal

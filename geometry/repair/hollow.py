@@ -8,8 +8,8 @@ with lengths of the object.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import adjacent_faces, components
 from geometry.rays.rays import RayCaster
@@ -71,9 +71,9 @@ class _Sight:
         inside: Shape (n,).
     """
 
-    openness: NDArray[np.float64]
-    wall: NDArray[np.float64]
-    inside: NDArray[np.bool_]
+    openness: Array
+    wall: Array
+    inside: Mask
 
 
 def measure_shell(caster: RayCaster) -> MeshShell:
@@ -108,9 +108,7 @@ def measure_shell(caster: RayCaster) -> MeshShell:
     )
 
 
-def lies_inside(
-    caster: RayCaster, faces: NDArray[np.int64], points: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def lies_inside(caster: RayCaster, faces: Ints, points: Array) -> Mask:
     """Return whether points of a surface lie inside it, shape (n,).
 
     A point does if less than a twentieth of its cosine-weighted hemisphere is free, or
@@ -149,7 +147,7 @@ def _sight(caster: RayCaster, spots: Spots) -> _Sight:
     return _Sight(openness, wall, inside)
 
 
-def _bodies(mesh: TriangleMesh) -> NDArray[np.int64] | None:
+def _bodies(mesh: TriangleMesh) -> Ints | None:
     """The body of each face, connected over edges; None where there are too many."""
     pairs = adjacent_faces(mesh.edges, manifold_only=False)
     count, body = components(pairs, len(mesh.faces))
@@ -162,9 +160,7 @@ def _mean_wall(mesh: TriangleMesh) -> float:
     return float(2.0 / 3.0 * (mesh.face_areas @ height) / mesh.area)
 
 
-def _weighted_median(
-    values: NDArray[np.float64], weights: NDArray[np.float64]
-) -> float:
+def _weighted_median(values: Array, weights: Array) -> float:
     order = np.argsort(values, kind="stable")
     cumulated = np.cumsum(weights[order])
     middle = int(np.searchsorted(cumulated, 0.5 * cumulated[-1]))

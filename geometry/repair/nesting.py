@@ -1,8 +1,8 @@
 """Which pieces of a surface lie wholly inside which others."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
 from geometry.rays.rays import RayCaster
@@ -22,12 +22,8 @@ _MAX_PAIRS = 1 << 24
 
 
 def containers(
-    mesh: TriangleMesh,
-    patch: NDArray[np.int64],
-    holding: NDArray[np.bool_],
-    asked: NDArray[np.bool_],
-    caster: RayCaster,
-) -> list[NDArray[np.int64]]:
+    mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask, caster: RayCaster
+) -> list[Ints]:
     """Return the patches that wholly hold each patch, the outermost first.
 
     A point lies inside a patch if a ray from it crosses the patch an odd number
@@ -46,7 +42,7 @@ def containers(
         For each patch, the patches that hold it; none where it wasn't asked.
     """
     n = len(holding)
-    held: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n
+    held: list[Ints] = [np.zeros(0, np.int64)] * n
     inner = _in_some_box(mesh, patch, holding, asked)
     if not inner.any():
         return held
@@ -71,19 +67,12 @@ def containers(
     return held
 
 
-def _span(
-    row: NDArray[np.int64], holder: NDArray[np.int64], index: int
-) -> NDArray[np.int64]:
+def _span(row: Ints, holder: Ints, index: int) -> Ints:
     """Holders of one patch; rows are sorted."""
     return holder[np.searchsorted(row, index) : np.searchsorted(row, index + 1)]
 
 
-def _in_some_box(
-    mesh: TriangleMesh,
-    patch: NDArray[np.int64],
-    holding: NDArray[np.bool_],
-    asked: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+def _in_some_box(mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask) -> Mask:
     """Whether the box of each asked patch lies in that of another that may hold it."""
     order = np.argsort(patch, kind="stable")
     start = np.searchsorted(patch[order], np.arange(len(holding)))
@@ -104,14 +93,10 @@ def _in_some_box(
 
 
 def _spots_inside(
-    mesh: TriangleMesh,
-    patch: NDArray[np.int64],
-    spots: Spots,
-    n: int,
-    caster: RayCaster,
-) -> NDArray[np.int64]:
+    mesh: TriangleMesh, patch: Ints, spots: Spots, n: int, caster: RayCaster
+) -> Ints:
     """Keys ``own patch * n + other`` for each spot that lies inside the other."""
-    votes: list[NDArray[np.int64]] = []
+    votes: list[Ints] = []
     for direction in fibonacci_cap(3, np.array([0.31, 0.52, 0.8]), 1.2):
         keys, crossed = np.unique(
             _crossings(mesh, patch, spots.points, direction, n, caster),
@@ -125,17 +110,17 @@ def _spots_inside(
 
 def _crossings(
     mesh: TriangleMesh,
-    patch: NDArray[np.int64],
-    points: NDArray[np.float64],
-    direction: NDArray[np.float64],
+    patch: Ints,
+    points: Array,
+    direction: Array,
     n: int,
     caster: RayCaster,
-) -> NDArray[np.int64]:
+) -> Ints:
     """One key ``point * n + patch`` for each wall that the ray of a point meets."""
     step = _STEP * caster.extent
     alive = np.arange(len(points))
     at = points + step * direction
-    keys: list[NDArray[np.int64]] = []
+    keys: list[Ints] = []
     for _ in range(_MAX_WALLS):
         along = np.broadcast_to(direction, at.shape)
         faces, distances = caster.first_hits(at, along)

@@ -13,8 +13,8 @@ don't depend on which way a face is wound.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 
@@ -38,15 +38,15 @@ class Spots:
         turns: Angle in [rad] by which each spot's rays are turned about its normal.
     """
 
-    faces: NDArray[np.int64]
-    points: NDArray[np.float64]
-    frames: NDArray[np.float64]
-    turns: NDArray[np.float64]
+    faces: Ints
+    points: Array
+    frames: Array
+    turns: Array
 
     def __len__(self) -> int:
         return len(self.faces)
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "Spots":
+    def take(self, chosen: Ints | Mask) -> "Spots":
         """Return some of the spots."""
         return Spots(
             self.faces[chosen],
@@ -56,7 +56,7 @@ class Spots:
         )
 
     @property
-    def normals(self) -> NDArray[np.float64]:
+    def normals(self) -> Array:
         """Unit normals, shape (n, 3)."""
         return self.frames[:, 2]
 
@@ -72,17 +72,17 @@ class Outlook:
     """
 
     n_rays: int
-    escaped: NDArray[np.int64]
-    met_front: NDArray[np.int64]
+    escaped: Ints
+    met_front: Ints
 
 
 def spots_on(
     mesh: TriangleMesh,
     n: int,
     *,
-    group: NDArray[np.int64] | None = None,
+    group: Ints | None = None,
     least: int = 1,
-    within: NDArray[np.bool_] | None = None,
+    within: Mask | None = None,
 ) -> Spots:
     """Return spots spread over faces in proportion to their area.
 
@@ -114,7 +114,7 @@ def spots_on(
     return _spots(mesh, faces[chosen])
 
 
-def _spots(mesh: TriangleMesh, faces: NDArray[np.int64]) -> Spots:
+def _spots(mesh: TriangleMesh, faces: Ints) -> Spots:
     a, b, c = _ordered_corners(mesh, faces)
     i = np.arange(len(faces)) + 0.5
     u, v = (np.modf(i * k)[0] for k in _R2)
@@ -123,9 +123,7 @@ def _spots(mesh: TriangleMesh, faces: NDArray[np.int64]) -> Spots:
     return spots_at(mesh, faces, a + u[:, None] * (b - a) + v[:, None] * (c - a))
 
 
-def spots_at(
-    mesh: TriangleMesh, faces: NDArray[np.int64], points: NDArray[np.float64]
-) -> Spots:
+def spots_at(mesh: TriangleMesh, faces: Ints, points: Array) -> Spots:
     """Return spots at given points of faces.
 
     Args:
@@ -143,9 +141,7 @@ def spots_at(
     return Spots(faces, points, frames, turns)
 
 
-def _ordered_corners(
-    mesh: TriangleMesh, faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _ordered_corners(mesh: TriangleMesh, faces: Ints) -> tuple[Array, Array, Array]:
     order = np.argsort(mesh.faces[faces], axis=1)[:, :, None]
     corners = np.take_along_axis(mesh.corners[faces], order, axis=1)
     return corners[:, 0], corners[:, 1], corners[:, 2]

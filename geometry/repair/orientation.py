@@ -8,8 +8,8 @@ the rules.
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import Repair, TriangleMesh
 from geometry.mesh.topology import MeshEdges, adjacent_faces, components
 from geometry.rays.rays import RayCaster
@@ -36,7 +36,7 @@ _BULGY = 0.02
 _LINING = 0.5
 
 
-def orient(mesh: TriangleMesh) -> tuple[NDArray[np.int64], tuple[Repair, ...]]:
+def orient(mesh: TriangleMesh) -> tuple[Ints, tuple[Repair, ...]]:
     """Return the faces wound consistently and outwards, and what was changed.
 
     Winding is made consistent inside each patch, after its majority. Then:
@@ -84,9 +84,7 @@ def orient(mesh: TriangleMesh) -> tuple[NDArray[np.int64], tuple[Repair, ...]]:
     return faces, tuple(repair for repair in repairs if repair.count)
 
 
-def _consistent(
-    mesh: TriangleMesh,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _consistent(mesh: TriangleMesh) -> tuple[Ints, Ints]:
     """Faces wound alike within each patch, and the patch of each face."""
     if not _alike(mesh.faces, mesh.edges).any():
         pairs = adjacent_faces(mesh.edges)
@@ -101,9 +99,7 @@ def _consistent(
     return np.where(flip[:, None], mesh.faces[:, ::-1], mesh.faces), patch
 
 
-def _closed_patches(
-    mesh: TriangleMesh, patch: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _closed_patches(mesh: TriangleMesh, patch: Ints) -> tuple[Mask, Mask]:
     """Whether each patch bounds a volume, and which edges two faces run alike.
 
     A patch does if it meets each of its edges an even number of times, as often
@@ -123,7 +119,7 @@ def _closed_patches(
     return closed, alike
 
 
-def _alike(faces: NDArray[np.int64], edges: MeshEdges) -> NDArray[np.bool_]:
+def _alike(faces: Ints, edges: MeshEdges) -> Mask:
     """Whether the two faces at an edge run it the same way, shape (n_e,)."""
     forward = faces < faces[:, [1, 2, 0]]
     way = np.where(forward, 1, -1).ravel()
@@ -131,9 +127,7 @@ def _alike(faces: NDArray[np.int64], edges: MeshEdges) -> NDArray[np.bool_]:
     return (edges.n_faces == 2) & (balance != 0)
 
 
-def _volumes(
-    mesh: TriangleMesh, patch: NDArray[np.int64], area: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _volumes(mesh: TriangleMesh, patch: Ints, area: Array) -> Array:
     """Signed volume of each patch in [m³]; it means something for closed ones."""
     weight = mesh.face_areas
     middle = np.stack(
@@ -147,12 +141,7 @@ def _volumes(
     return np.bincount(patch, weight * height) / 3.0
 
 
-def _by_visibility(
-    caster: RayCaster,
-    patch: NDArray[np.int64],
-    closed: NDArray[np.bool_],
-    verdict: NDArray[np.int64],
-) -> NDArray[np.int64]:
+def _by_visibility(caster: RayCaster, patch: Ints, closed: Mask, verdict: Ints) -> Ints:
     """Decide open patches by which of their sides is seen more: 1 front, -1 back."""
     n = len(closed)
     spots = spots_on(
@@ -171,12 +160,8 @@ def _by_visibility(
 
 
 def _by_holder(
-    caster: RayCaster,
-    patch: NDArray[np.int64],
-    closed: NDArray[np.bool_],
-    volume: NDArray[np.float64],
-    verdict: NDArray[np.int64],
-) -> NDArray[np.int64]:
+    caster: RayCaster, patch: Ints, closed: Mask, volume: Array, verdict: Ints
+) -> Ints:
     """Decide what lies inside a closed patch after those that hold it."""
     asked = closed | (verdict == 0)
     area = np.bincount(patch, caster.mesh.face_areas)

@@ -1,8 +1,8 @@
 """Clean raw triangles: weld, and drop what isn't finite, has no area or is doubled."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import MeshError, Repair
 from geometry.mesh.tensors import cross
 
@@ -13,15 +13,15 @@ _HUGE = 1e60
 # More broken faces than this share, and the rest can't be taken for the object.
 _MAX_BROKEN = 0.1
 
-_Vertices = NDArray[np.float64]
-_Faces = NDArray[np.int64]
+_Vertices = Array
+_Faces = Ints
 # Vertices, faces, which of the faces handed in stayed (None: all), what was done.
-_Step = tuple[_Vertices, _Faces, NDArray[np.bool_] | None, tuple[Repair, ...]]
+_Step = tuple[_Vertices, _Faces, Mask | None, tuple[Repair, ...]]
 
 
 def clean(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[_Vertices, _Faces, NDArray[np.int64], tuple[Repair, ...]]:
+    vertices: Array, faces: Ints
+) -> tuple[_Vertices, _Faces, Ints, tuple[Repair, ...]]:
     """Return a mesh that every later stage can take, and what was changed.
 
     In this order: faces with a corner that isn't finite, and such vertices, are
@@ -61,8 +61,8 @@ def _worded(repairs: list[Repair]) -> str:
     return ", ".join(f"{r.kind}: {r.count}" for r in repairs)
 
 
-def _drop_non_finite(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
-    finite: NDArray[np.bool_] = np.all(np.abs(vertices) < _HUGE, axis=1)
+def _drop_non_finite(vertices: Array, faces: Ints) -> _Step:
+    finite: Mask = np.all(np.abs(vertices) < _HUGE, axis=1)
     if finite.all():
         return vertices, faces, None, ()
     keep = np.all(finite[faces], axis=1)
@@ -80,15 +80,13 @@ def _drop_non_finite(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     return vertices[finite], faces, keep, repairs
 
 
-def _weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+def _weld(vertices: Array, faces: Ints) -> _Step:
     first, where = _identical(vertices)
     repair = Repair("vertices welded", len(vertices) - len(first))
     return vertices[first], where[faces], None, (repair,)
 
 
-def _identical(
-    vertices: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _identical(vertices: Array) -> tuple[Ints, Ints]:
     """Return the first of each group of equal rows, in order, and each row's group."""
     # Adding zero turns -0.0 into 0.0, which has other bits but is the same place.
     bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)
@@ -108,7 +106,7 @@ def _identical(
     return first[order], rank[where.reshape(-1)]
 
 
-def _drop_flat(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+def _drop_flat(vertices: Array, faces: Ints) -> _Step:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     double_area = np.linalg.norm(cross(b - a, c - a), axis=1)
     sides = np.stack([b - a, c - b, a - c])
@@ -118,7 +116,7 @@ def _drop_flat(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step
     return vertices, faces[keep], keep, (repair,)
 
 
-def _drop_doubled(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+def _drop_doubled(vertices: Array, faces: Ints) -> _Step:
     low, middle, high = np.sort(faces, axis=1).T
     n = len(vertices)
     # The pair key fits 64 bits up to three thousand million vertices.
@@ -133,7 +131,7 @@ def _drop_doubled(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _S
     return vertices, faces[keep], keep, (repair,)
 
 
-def _drop_unused(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Step:
+def _drop_unused(vertices: Array, faces: Ints) -> _Step:
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     repair = Repair("unreferenced vertices removed", int((~used).sum()))

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-_Array = NDArray[np.float64]
+from geometry.arrays import Array
 
 _UNKNOWNS = 4
 _ROUNDS = 200
@@ -42,14 +41,14 @@ class BestSphere:
         chi_square: The sum of squares at tau.
     """
 
-    centre: _Array
+    centre: Array
     radius: float
-    covariance: _Array
+    covariance: Array
     shape_sigma: float
-    residuals: _Array
+    residuals: Array
     chi_square: float
 
-    def point_covariances(self, outward: _Array) -> _Array:
+    def point_covariances(self, outward: Array) -> Array:
         """Return the covariance of surface points c + rho u, shape (n, 3, 3) [m^2].
 
         ::
@@ -66,7 +65,7 @@ class BestSphere:
         return of_fit + bumps
 
 
-def fit_sphere(points: _Array, covariances: _Array) -> BestSphere:
+def fit_sphere(points: Array, covariances: Array) -> BestSphere:
     """Return the sphere through points, weighted by what is known of each.
 
     Args:
@@ -95,7 +94,7 @@ def fit_sphere(points: _Array, covariances: _Array) -> BestSphere:
     return _weighted(points, covariances, start, shape_sigma)
 
 
-def _algebraic(points: _Array) -> _Array:
+def _algebraic(points: Array) -> Array:
     """Centre and radius from |X|^2 = 2 c.X + rho^2 - |c|^2, which is linear, (4,)."""
     mean = points.mean(axis=0)
     offsets = points - mean
@@ -111,7 +110,7 @@ def _algebraic(points: _Array) -> _Array:
 
 
 def _weighted(
-    points: _Array, covariances: _Array, start: _Array, shape_sigma: float
+    points: Array, covariances: Array, start: Array, shape_sigma: float
 ) -> BestSphere:
     """The least-squares sphere for one tau, by Gauss-Newton."""
     state = start.copy()
@@ -136,8 +135,8 @@ def _weighted(
 
 
 def _linear(
-    points: _Array, covariances: _Array, state: _Array, shape_sigma: float
-) -> tuple[_Array, _Array, _Array]:
+    points: Array, covariances: Array, state: Array, shape_sigma: float
+) -> tuple[Array, Array, Array]:
     """Jacobian by (c, rho), residuals and weights at a state."""
     offsets = points - state[:3]
     reach = np.linalg.norm(offsets, axis=1)

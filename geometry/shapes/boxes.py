@@ -8,9 +8,9 @@ products of their edges (the separating axes; Gottschalk, Lin and Manocha 1996).
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Array = NDArray[np.float64]
+from geometry.arrays import Array, Mask
+
 # Squared length below which a cross product of unit edges gives no direction.
 _PARALLEL = 1e-18
 
@@ -25,12 +25,12 @@ class OrientedBox:
         half: Half of each side [m], shape (3,).
     """
 
-    centre: _Array
-    axes: _Array
-    half: _Array
+    centre: Array
+    axes: Array
+    half: Array
 
     @property
-    def corners(self) -> _Array:
+    def corners(self) -> Array:
         """The eight corners, shape (8, 3)."""
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij"))
         return self.centre + (signs.reshape(3, -1).T * self.half) @ self.axes
@@ -44,7 +44,7 @@ class OrientedBox:
         """Return the box with every face moved outwards."""
         return replace(self, half=self.half + by_m)
 
-    def local(self, points: _Array) -> _Array:
+    def local(self, points: Array) -> Array:
         """Return points (..., 3) along the box's axes, from its middle."""
         return (points - self.centre) @ self.axes.T
 
@@ -61,7 +61,7 @@ def boxes_overlap(a: OrientedBox, b: OrientedBox) -> bool:
     return not np.any(apart & (np.einsum("ij,ij->i", tried, tried) > _PARALLEL))
 
 
-def lines_cross(box: OrientedBox, starts: _Array, ends: _Array) -> NDArray[np.bool_]:
+def lines_cross(box: OrientedBox, starts: Array, ends: Array) -> Mask:
     """Return which straight lines from starts to ends share a point with a box.
 
     A line is in the slab between two opposite faces on an interval of its length; it
@@ -87,7 +87,7 @@ def lines_cross(box: OrientedBox, starts: _Array, ends: _Array) -> NDArray[np.bo
     return first <= np.minimum(leave.min(axis=1), 1.0)
 
 
-def triangles_touch(box: OrientedBox, corners: _Array) -> NDArray[np.bool_]:
+def triangles_touch(box: OrientedBox, corners: Array) -> Mask:
     """Return which triangles share a point with a box.
 
     Args:

@@ -3,8 +3,8 @@
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 
 _PHI = (1.0 + np.sqrt(5.0)) / 2.0
@@ -56,9 +56,7 @@ def sphere(radius: float, *, subdivisions: int = 4) -> TriangleMesh:
     return TriangleMesh(radius * vertices, faces)
 
 
-def icosahedron_faces(
-    corners: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def icosahedron_faces(corners: Array) -> tuple[Ints, Mask]:
     """Return the triangles between the corners (12, 3) of an icosahedron of edge 2.
 
     Returns:
@@ -71,9 +69,7 @@ def icosahedron_faces(
     return faces, np.linalg.det(corners[faces]) > 0.0
 
 
-def _quartered(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _quartered(vertices: Array, faces: Ints) -> tuple[Array, Ints]:
     """Cut each face in four at the middles of its edges."""
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     unique, where = np.unique(edges, axis=0, return_inverse=True)

@@ -17,9 +17,8 @@ Source: Lee and Krim, 2014, section VI, the case without prior ranges.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Array = NDArray[np.float64]
+from geometry.arrays import Array
 
 _ROUNDS = 100
 _SETTLED = 1e-12
@@ -40,11 +39,11 @@ class SightLines:
         range_sigmas: q, their standard deviations in [m]; NaN likewise, shape (n,).
     """
 
-    origins: _Array
-    directions: _Array
-    sigmas: _Array
-    ranges: _Array
-    range_sigmas: _Array
+    origins: Array
+    directions: Array
+    sigmas: Array
+    ranges: Array
+    range_sigmas: Array
 
     def __len__(self) -> int:
         return len(self.origins)
@@ -61,8 +60,8 @@ class SightedPoint:
         n_free: Degrees of freedom: 2 a direction, 1 a distance, less 3.
     """
 
-    position: _Array
-    covariance: _Array
+    position: Array
+    covariance: Array
     chi_square: float
     n_free: int
 
@@ -101,12 +100,12 @@ def locate(lines: SightLines) -> SightedPoint:
     return _judged(lines, point, information)
 
 
-def _pulled(across: _Array, along: _Array, lines: SightLines, feet: _Array) -> _Array:
+def _pulled(across: Array, along: Array, lines: SightLines, feet: Array) -> Array:
     pull = np.einsum("nij,nj->i", across, lines.origins)
     return pull + np.einsum("nij,nj->i", along, feet)
 
 
-def _judged(lines: SightLines, point: _Array, information: _Array) -> SightedPoint:
+def _judged(lines: SightLines, point: Array, information: Array) -> SightedPoint:
     offsets = point - lines.origins
     depth = np.einsum("ni,ni->n", offsets, lines.directions)
     if not np.all(depth > 0.0):

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints
 from geometry.shapes.primitives import icosahedron_faces
 
 
@@ -24,15 +24,13 @@ class GeodesicGrid:
     """
 
     frequency: int
-    directions: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    home: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    lattice: NDArray[np.int64]
+    directions: Array
+    faces: Ints
+    home: Ints
+    steps: Ints
+    lattice: Ints
 
-    def interpolate(
-        self, values: NDArray[np.float64], onto: "GeodesicGrid"
-    ) -> NDArray[np.float64]:
+    def interpolate(self, values: Array, onto: "GeodesicGrid") -> Array:
         """Return values of this grid's directions at those of a finer one, linearly.
 
         Args:
@@ -90,9 +88,7 @@ def geodesic_grid(frequency: int) -> GeodesicGrid:
     )
 
 
-def _shared_points(
-    triangles: NDArray[np.int64], steps: NDArray[np.int64], n: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _shared_points(triangles: Ints, steps: Ints, n: int) -> tuple[Ints, Ints]:
     """Number of each face's points with shared ones merged, and where each is first.
 
     Points are told apart by whole numbers, never by nearness: the sorted corners that
@@ -107,7 +103,7 @@ def _shared_points(
     return number.reshape(20, -1), first
 
 
-def _cells(lattice: NDArray[np.int64], total: NDArray[np.int64]) -> NDArray[np.int64]:
+def _cells(lattice: Ints, total: Ints) -> Ints:
     n = lattice.shape[1] - 1
     here, right, up, across = (
         lattice[:, :-1, :-1],
@@ -120,7 +116,7 @@ def _cells(lattice: NDArray[np.int64], total: NDArray[np.int64]) -> NDArray[np.i
     return np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
 
 
-def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _icosahedron() -> tuple[Array, Ints]:
     golden = 0.5 * (1.0 + 5.0**0.5)
     signs = [(a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     corners = np.array(

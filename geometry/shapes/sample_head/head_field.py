@@ -10,13 +10,13 @@ that every machine gets the same numbers.
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array
 
 from .head_shape import HeadShape
 
-_Array: TypeAlias = NDArray[np.float64]
 _Point: TypeAlias = tuple[float, float, float]
-_Points: TypeAlias = tuple[_Array, _Array, _Array]
+_Points: TypeAlias = tuple[Array, Array, Array]
 
 # Half width of the strip in which |x| is rounded off, so that halves join smoothly.
 _SEAM = 1.5
@@ -25,7 +25,7 @@ _EAR_COS, _EAR_SIN = 0.9781476, 0.2079117
 _EYEBALL = 12.0
 
 
-def head_field(shape: HeadShape, points: _Array) -> _Array:
+def head_field(shape: HeadShape, points: Array) -> Array:
     """Return the field of a head: negative inside, about the distance in [mm].
 
     Args:
@@ -49,7 +49,7 @@ def neck_base(s: HeadShape) -> float:
     return -s.face_length - s.neck_length
 
 
-def _skull_and_jaw(s: HeadShape, p: _Points) -> _Array:
+def _skull_and_jaw(s: HeadShape, p: _Points) -> Array:
     front, back, top = -0.5 * s.depth, 0.5 * s.depth, s.crown_height
     skull, cheek, jaw = 0.5 * s.width, 0.5 * s.cheek_width, 0.5 * s.jaw_width
     chin, k = -s.face_length, s.face_length / 113.0
@@ -72,7 +72,7 @@ def _skull_and_jaw(s: HeadShape, p: _Points) -> _Array:
     return _join(field, cheekbone, 32)
 
 
-def _brow_and_eyes(s: HeadShape, p: _Points, field: _Array) -> _Array:
+def _brow_and_eyes(s: HeadShape, p: _Points, field: Array) -> Array:
     ridge, eye_x = -0.5 * s.depth - s.brow_ridge, 0.5 * s.eye_spacing
     eye_y = -0.5 * s.depth + s.eye_depth
     peak = (eye_x + 1, ridge + 14, 20.0)
@@ -92,7 +92,7 @@ def _brow_and_eyes(s: HeadShape, p: _Points, field: _Array) -> _Array:
     return _join(field, eyeball, 1.0)
 
 
-def _nose(s: HeadShape, p: _Points, field: _Array) -> _Array:
+def _nose(s: HeadShape, p: _Points, field: Array) -> Array:
     front, half, base = -0.5 * s.depth, 0.5 * s.nose_width, 4 - s.nose_length
     lip = front + 3.0
     tip = (0.0, lip - s.nose_projection + 9.5, base + 9)
@@ -115,7 +115,7 @@ def _nose(s: HeadShape, p: _Points, field: _Array) -> _Array:
     return _carve(field, nostril, 3)
 
 
-def _mouth_and_chin(s: HeadShape, p: _Points, field: _Array) -> _Array:
+def _mouth_and_chin(s: HeadShape, p: _Points, field: Array) -> Array:
     front, half, red = -0.5 * s.depth, 0.5 * s.mouth_width, s.lip_fullness
     middle, lips = -74.0 * s.face_length / 113.0, front + 1.5
     field = _join(field, _ellipsoid(p, (0, front + 25, middle + 3), (26, 22, 20)), 20)
@@ -135,7 +135,7 @@ def _mouth_and_chin(s: HeadShape, p: _Points, field: _Array) -> _Array:
     return _carve(field, furrow, 9)
 
 
-def _ear_relief(s: HeadShape, p: _Points) -> _Array:
+def _ear_relief(s: HeadShape, p: _Points) -> Array:
     """How far the ear lifts the side of the head outwards in [mm], shape (n,).
 
     A relief over the (y, z) plane: a disc that rises from its front edge to its rear
@@ -156,28 +156,28 @@ def _ear_relief(s: HeadShape, p: _Points) -> _Array:
     return s.ear_standoff * disc * height * at_the_side
 
 
-def _radius(a: _Array, a_scale: float, b: _Array, b_scale: float) -> _Array:
+def _radius(a: Array, a_scale: float, b: Array, b_scale: float) -> Array:
     return np.sqrt((a / a_scale) ** 2 + (b / b_scale) ** 2)
 
 
-def _fade(value: _Array, full: float, none: float) -> _Array:
+def _fade(value: Array, full: float, none: float) -> Array:
     """1 up to `full`, 0 from `none` on, twice continuously differentiable between."""
     t = np.clip((value - full) / (none - full), 0.0, 1.0)
     return 1.0 - t * t * t * (10.0 + t * (6.0 * t - 15.0))
 
 
-def _join(a: _Array, b: _Array, width: float) -> _Array:
+def _join(a: Array, b: Array, width: float) -> Array:
     """Smooth minimum: union, rounded where the two fields differ by less than width."""
     blend = np.maximum(width - np.abs(a - b), 0.0)
     return np.minimum(a, b) - blend * blend * blend * (1.0 / (6.0 * width * width))
 
 
-def _carve(field: _Array, tool: _Array, width: float) -> _Array:
+def _carve(field: Array, tool: Array, width: float) -> Array:
     """Smooth difference: what `tool` holds is taken away; for a plane, pass height."""
     return -_join(-field, tool, width)
 
 
-def _ellipsoid(p: _Points, centre: _Point, radii: _Point) -> _Array:
+def _ellipsoid(p: _Points, centre: _Point, radii: _Point) -> Array:
     """First-order distance to an ellipsoid: k0 (k0 - 1) / k1."""
     scaled = [(v - c) / r for v, c, r in zip(p, centre, radii, strict=True)]
     k0 = np.sqrt(sum(v * v for v in scaled))
@@ -185,7 +185,7 @@ def _ellipsoid(p: _Points, centre: _Point, radii: _Point) -> _Array:
     return k0 * (k0 - 1.0) / np.maximum(k1, 1e-9)
 
 
-def _rod(p: _Points, a: _Point, b: _Point, radius_a: float, radius_b: float) -> _Array:
+def _rod(p: _Points, a: _Point, b: _Point, radius_a: float, radius_b: float) -> Array:
     """Distance to the segment from a to b, less a radius that varies along it."""
     along = [end - start for start, end in zip(a, b, strict=True)]
     away = [v - start for v, start in zip(p, a, strict=True)]

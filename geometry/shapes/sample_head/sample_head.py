@@ -12,8 +12,8 @@ closed and doesn't cut itself.
 from math import ceil, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array
 from geometry.mesh.mesh import MeshError, TriangleMesh
 
 from .geodesic import GeodesicGrid, geodesic_grid
@@ -22,7 +22,6 @@ from .head_shape import HeadShape as HeadShape
 
 DEFAULT_FACES = 40_000
 
-_Array = NDArray[np.float64]
 
 # The point inside that sees the whole surface, in [mm].
 _HEART = np.array([0.0, 20.0, -4.0])
@@ -102,7 +101,7 @@ def head_as_obj(mesh: TriangleMesh, ending: str) -> str:
     return header + vertices + faces
 
 
-def _even_directions(shape: HeadShape, grid: GeodesicGrid) -> tuple[_Array, _Array]:
+def _even_directions(shape: HeadShape, grid: GeodesicGrid) -> tuple[Array, Array]:
     """Directions whose triangles on the head are even, and radii near the surface."""
     coarse = grid
     if grid.frequency > _RELAXED_FREQUENCY:
@@ -115,7 +114,7 @@ def _even_directions(shape: HeadShape, grid: GeodesicGrid) -> tuple[_Array, _Arr
     return points / radii[:, None], radii
 
 
-def _relax(shape: HeadShape, grid: GeodesicGrid) -> tuple[_Array, _Array]:
+def _relax(shape: HeadShape, grid: GeodesicGrid) -> tuple[Array, Array]:
     """Move every vertex along the surface towards where its faces' area is.
 
     Each step puts a vertex at the mean of the centroids of its faces, weighted by their
@@ -141,7 +140,7 @@ def _relax(shape: HeadShape, grid: GeodesicGrid) -> tuple[_Array, _Array]:
     return directions, radii
 
 
-def _gather(grid: GeodesicGrid, values: _Array) -> _Array:
+def _gather(grid: GeodesicGrid, values: Array) -> Array:
     """Sum the values of the faces about each vertex, (n_f, k) to (n_v, k)."""
     n = len(grid.directions)
     corners = grid.faces.T
@@ -154,9 +153,7 @@ def _gather(grid: GeodesicGrid, values: _Array) -> _Array:
     )
 
 
-def _surface_radii(
-    shape: HeadShape, directions: _Array, guess: _Array | None
-) -> _Array:
+def _surface_radii(shape: HeadShape, directions: Array, guess: Array | None) -> Array:
     """Distance from the heart to the surface along each direction, in [mm]."""
     inner = np.full(len(directions), np.nan)
     outer = np.full(len(directions), np.nan)
@@ -172,7 +169,7 @@ def _surface_radii(
     return _bisect(shape, directions, inner, outer)
 
 
-def _outermost_inside(shape: HeadShape, directions: _Array) -> _Array:
+def _outermost_inside(shape: HeadShape, directions: Array) -> Array:
     found = np.full(len(directions), _NEAREST)
     for radius in np.arange(_NEAREST, _FARTHEST, _STEP):
         at = np.full(len(directions), radius)
@@ -180,9 +177,7 @@ def _outermost_inside(shape: HeadShape, directions: _Array) -> _Array:
     return found
 
 
-def _bisect(
-    shape: HeadShape, directions: _Array, inner: _Array, outer: _Array
-) -> _Array:
+def _bisect(shape: HeadShape, directions: Array, inner: Array, outer: Array) -> Array:
     for _ in range(_BISECTIONS):
         middle = 0.5 * (inner + outer)
         inside = _field_along(shape, directions, middle) < 0.0
@@ -193,7 +188,7 @@ def _bisect(
     return inner + (outer - inner) * below / (below - above)
 
 
-def _field_along(shape: HeadShape, directions: _Array, radii: _Array) -> _Array:
+def _field_along(shape: HeadShape, directions: Array, radii: Array) -> Array:
     field = np.empty(len(radii))
     for start in range(0, len(radii), _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -201,5 +196,5 @@ def _field_along(shape: HeadShape, directions: _Array, radii: _Array) -> _Array:
     return field
 
 
-def _length(vectors: _Array) -> _Array:
+def _length(vectors: Array) -> Array:
     return np.sqrt(np.sum(vectors * vectors, axis=1))
