@@ -18,27 +18,35 @@ def n_threads() -> int:
 
 
 def mapped(
-    function: Callable[[_Item], _Result], items: Iterable[_Item]
+    function: Callable[[_Item], _Result],
+    items: Iterable[_Item],
+    threads: int | None = None,
 ) -> list[_Result]:
     """Return the results of a function for all items, in their order.
 
-    The items go to threads: it pays where the function spends its time in numpy and
-    scipy, which let go of the interpreter. What an item gives must not depend on the
-    others, so that the number of threads changes nothing; nor may it call this again,
-    since it would wait for a thread that waits for it.
+    The items go to threads: it pays where the function spends its time in numpy, scipy
+    or embree, which let go of the interpreter. What an item gives must not depend on
+    the others, so that the number of threads (default: all cores) changes nothing.
     """
     todo = list(items)
-    threads = min(n_threads(), len(todo))
-    if threads < 2:
-        return [function(item) for item in todo]
-    # One thread takes every second item, say: handing them out one by one costs more.
-    shares = [todo[k::threads] for k in range(threads)]
+    results: dict[int, _Result] = {}
+    queue = iter(range(len(todo)))
 
-    def done(share: list[_Item]) -> list[_Result]:
-        return [function(item) for item in share]
+    def drain() -> None:
+        for index in queue:
+            results[index] = function(todo[index])
 
-    parts = list(_pool(os.getpid()).map(done, shares))
-    return [parts[i % threads][i // threads] for i in range(len(todo))]
+    helpers = min(threads or n_threads(), len(todo)) - 1
+    others = [_pool(os.getpid()).submit(drain) for _ in range(helpers)]
+    # The caller works too: no thread has to be woken for the last item, and one that
+    # calls this from a thread needs no other.
+    try:
+        drain()
+    finally:
+        for other in others:
+            if not other.cancel():
+                other.result()
+    return [results[index] for index in range(len(todo))]
 
 
 @cache

@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 from support import curved_shapes
 
 from geometry.curvature.curvature import CurvatureField, principal_curvatures
-from geometry.mesh.diffusion import diffused, surface_laplacian, vertex_areas
+from geometry.mesh.diffusion import diffused
 from geometry.mesh.mesh import TriangleMesh
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -84,7 +84,7 @@ def moved_route(mesh: TriangleMesh) -> Found:
     valid = principal_curvatures(mesh).valid
     v = mesh.vertices / mesh.mean_edge
     length = 0.5 * 0.02 * mesh.size / mesh.mean_edge
-    mass, laplacian = vertex_areas(v, mesh.faces), surface_laplacian(v, mesh.faces)
+    mass, laplacian = TriangleMesh(v, mesh.faces).vertex_areas, mesh.laplacian
     return *_quadric(mesh, diffused(v, mass, laplacian, length)), valid
 
 

@@ -63,15 +63,6 @@ class CurvatureField:
         """sqrt((k_max^2 + k_min^2) / 2) in [1/m], shape (n_v,)."""
         return np.sqrt(0.5 * (self.k_max**2 + self.k_min**2))
 
-    @cached_property
-    def tensors(self) -> Array:
-        """k_max d_max d_max^T + k_min d_min d_min^T in [1/m], shape (n_v, 3, 3)."""
-        a, b = self.direction_max, self.direction_min
-        return (
-            self.k_max[:, None, None] * a[:, :, None] * a[:, None, :]
-            + self.k_min[:, None, None] * b[:, :, None] * b[:, None, :]
-        )
-
 
 def principal_curvatures(
     mesh: TriangleMesh, radius: float | None = None

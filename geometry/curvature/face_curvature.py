@@ -18,24 +18,12 @@ FLAT = 0.05
 
 
 def steep_directions(mesh: TriangleMesh, field: CurvatureField) -> Array:
-    """Return T1 of every face, for a target that is the whole surface.
-
-    Shape (n_f, 3): unit and in the face's plane; zero where |k1 - k2| <= 0.3
-    max(|k1|, |k2|), where the face is flat, and where its curvature isn't trusted.
-    """
-    return face_curvature(mesh, field)[1]
-
-
-def face_curvature(
-    mesh: TriangleMesh, field: CurvatureField
-) -> tuple[Array, Array, Mask]:
-    """Return curvedness [1/m], steep direction and trust of each face.
+    """Return T1 of every face: unit and in its plane, shape (n_f, 3).
 
     The smoothed tensors of a face's corners are averaged and projected into its plane;
-    the eigenvalues of that 2 x 2 form are its principal curvatures.
-
-    Returns:
-        Shapes (n_f,), (n_f, 3) and (n_f,).
+    the eigenvalues of that 2 x 2 form are its principal curvatures. Zero where
+    |k1 - k2| <= 0.3 max(|k1|, |k2|), where the face is flat, and where its curvature
+    isn't trusted.
 
     Raises:
         ValueError: If the field is of another mesh.
@@ -47,9 +35,9 @@ def face_curvature(
     largest = magnitude.max(axis=0)
     curvedness = np.sqrt(0.5 * (k**2).sum(axis=0))
     steep = np.where((magnitude[0] >= magnitude[1])[:, None], ways[0], ways[1])
-    curvedness = np.where(trusted & (curvedness * mesh.size > FLAT), curvedness, 0.0)
-    directed = (k[0] - k[1] > _ISOTROPIC * largest) & (curvedness > 0)
-    return curvedness, np.where(directed[:, None], steep, 0.0), trusted
+    curved = trusted & (curvedness * mesh.size > FLAT)
+    directed = (k[0] - k[1] > _ISOTROPIC * largest) & curved
+    return np.where(directed[:, None], steep, 0.0)
 
 
 def averaged_on_faces(

@@ -4,7 +4,7 @@ import igl
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
-from geometry.mesh.tensors import cross, packed
+from geometry.mesh.tensors import area_normals, cross, packed, summed, unit
 from geometry.mesh.topology import numbered
 
 # A quadric has six coefficients: one ring is too few. More rings would reach farther on
@@ -86,15 +86,9 @@ def _shortest_edges(vertices: Array, faces: Ints) -> Array:
 
 def _vertex_normals(vertices: Array, faces: Ints) -> Array:
     """Unit normals averaged over the area of each vertex's faces, (n, 3)."""
-    corners = vertices[faces]
-    weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = [
-        np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
-        for part in weighted.T
-    ]
-    normals = np.stack(sums, axis=1)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.where(length > 0, normals / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
+    weighted = np.repeat(area_normals(vertices[faces]), 3, axis=0)
+    normals = unit(summed(weighted, faces.ravel(), len(vertices)))
+    return np.where(np.any(normals, axis=1, keepdims=True), normals, [0.0, 0.0, 1.0])
 
 
 def _with_normals(vertices: Array, faces: Ints) -> Ints:
@@ -103,13 +97,10 @@ def _with_normals(vertices: Array, faces: Ints) -> Ints:
     Two faces on the same three corners, turned against each other, do that.
     """
     while len(faces):
-        corners = vertices[faces]
-        weighted = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        weighted = area_normals(vertices[faces])
         size = np.linalg.norm(weighted, axis=1)
-        sums = [
-            np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices))
-            for part in (*weighted.T, size)
-        ]
+        each = np.repeat(np.column_stack([weighted, size]), 3, axis=0)
+        sums = summed(each, faces.ravel(), len(vertices)).T
         length = np.linalg.norm(sums[:3], axis=0)
         lost = ~(length > _CANCELLED * sums[3])
         kept = (size > 0) & ~lost[faces].any(axis=1)

@@ -84,12 +84,8 @@ class Silhouettes:
         )
         self._planes = ProductSigns(np.column_stack([mesh.face_normals, -anchors]))
         self._normals = mesh.face_normals
-        # Vertices that no face uses may lie anywhere.
-        used = np.zeros((len(self._vertices), 1), dtype=bool)
-        used[mesh.faces] = True
-        self._heights = ProductSigns(
-            np.column_stack([np.where(used, self._vertices, 0.0), np.ones(len(used))])
-        )
+        used = np.where(mesh.used[:, None], self._vertices, 0.0)
+        self._heights = ProductSigns(np.column_stack([used, np.ones(len(used))]))
         self._faces = mesh.faces
         # Both orders of two faces that agree on their outside.
         f, g = pairs[self._turned == _NONE].T

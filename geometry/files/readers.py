@@ -17,7 +17,7 @@ import numpy as np
 from geometry.arrays import Ints
 from geometry.mesh.file_origin import FileOrigin
 from geometry.mesh.mesh import MeshError, MeshSource, Repair, TriangleMesh
-from geometry.mesh.topology import numbered
+from geometry.mesh.topology import numbered, used_vertices
 from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
 
@@ -137,9 +137,7 @@ def _without_far(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints, tuple[Repair, 
 
 def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
     """Longest side of the box of the main bodies, and what lies well outside of it."""
-    used = np.zeros(len(mesh.vertices), dtype=bool)
-    used[mesh.faces[mesh.main]] = True
-    points = mesh.vertices[used]
+    points = mesh.vertices[used_vertices(mesh.faces[mesh.main], len(mesh.vertices))]
     low, high = points.min(axis=0), points.max(axis=0)
     longest = float((high - low).max())
     # What stands out by less changes no size that anyone reads.

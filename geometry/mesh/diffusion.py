@@ -67,15 +67,6 @@ def graph_laplacian(ends: Ints, weights: Array, n: int) -> csr_array:
     return coo_array((values, (rows, columns)), (n, n)).tocsr()
 
 
-def vertex_areas(vertices: Array, faces: Ints) -> Array:
-    """Return a third of the area of each vertex's faces, shape (n,)."""
-    corners = vertices[faces]
-    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1) / 6.0
-    corner = np.repeat(areas, 3)
-    return np.bincount(faces.ravel(), corner, len(vertices)).astype(np.float64)
-
-
 def diffused(values: Array, mass: Array, laplacian: csr_array, length: float) -> Array:
     """Return x of (M + length^2/2 L) x = M values: one implicit step of diffusion.
 

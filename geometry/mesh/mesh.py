@@ -10,11 +10,11 @@ from scipy.sparse import csr_array
 
 from geometry.arrays import Array, Ints, Mask
 
-from .diffusion import surface_laplacian, vertex_areas
+from .diffusion import surface_laplacian
 from .extent import enclosing_ball, main_bodies
 from .file_origin import FileOrigin
-from .tensors import cross
-from .topology import MeshEdges, mesh_edges
+from .tensors import area_normals
+from .topology import MeshEdges, mesh_edges, used_vertices
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -105,8 +105,7 @@ class TriangleMesh:
 
     @cached_property
     def _cross(self) -> Array:
-        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
-        return cross(b - a, c - a)
+        return area_normals(self.corners)
 
     @cached_property
     def face_areas(self) -> Array:
@@ -137,7 +136,9 @@ class TriangleMesh:
     @cached_property
     def vertex_areas(self) -> Array:
         """A third of the area of each vertex's faces in [m²], shape (n_v,)."""
-        return _read_only(vertex_areas(self.vertices, self.faces))
+        thirds = np.repeat(self.face_areas / 3.0, 3)
+        areas = np.bincount(self.faces.ravel(), thirds, len(self.vertices))
+        return _read_only(areas.astype(np.float64))
 
     @cached_property
     def laplacian(self) -> csr_array:
@@ -150,11 +151,14 @@ class TriangleMesh:
         return float(self.face_areas.sum())
 
     @cached_property
+    def used(self) -> Mask:
+        """Whether some face uses each vertex; others may lie anywhere, (n_v,)."""
+        return _read_only(used_vertices(self.faces, len(self.vertices)))
+
+    @cached_property
     def bounds(self) -> Array:
         """Lower and upper corner of the bounding box of the faces in [m], (2, 3)."""
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[self.faces] = True
-        points = self.vertices[used]
+        points = self.vertices[self.used]
         return _read_only(np.stack([points.min(axis=0), points.max(axis=0)]))
 
     @cached_property
@@ -164,8 +168,7 @@ class TriangleMesh:
 
     @cached_property
     def _ball(self) -> tuple[Array, float]:
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[self.faces[self.main]] = True
+        used = used_vertices(self.faces[self.main], len(self.vertices))
         centre, radius = enclosing_ball(self.vertices[used])
         return _read_only(centre), radius
 

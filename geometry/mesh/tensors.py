@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from geometry.arrays import Array
+from geometry.arrays import Array, Ints
 
 _UPPER = np.triu_indices(3)
 # Entries beside the diagonal stand for two: with the root of two, the sum of squares is
@@ -38,7 +38,7 @@ def tangent_planes(normals: Array) -> Array:
     first = np.zeros_like(normals)
     first[rows, (least + 1) % 3] = normals[rows, (least + 2) % 3]
     first[rows, (least + 2) % 3] = -normals[rows, (least + 1) % 3]
-    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
+    first = unit(first)
     return np.stack([first, cross(normals, first)], axis=2)
 
 
@@ -48,6 +48,23 @@ def cross(a: Array, b: Array) -> Array:
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         product[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
     return product
+
+
+def area_normals(corners: Array) -> Array:
+    """Return normals of triangles (n, 3, 3), twice as long as their areas, (n, 3)."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    return cross(b - a, c - a)
+
+
+def unit(vectors: Array) -> Array:
+    """Return vectors (k, 3) of length one; zero stays."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.maximum(length, 1e-300)
+
+
+def summed(vectors: Array, of: Ints, n: int) -> Array:
+    """Return the sums of rows (m, k) that belong to each of n things, shape (n, k)."""
+    return np.stack([np.bincount(of, column, n) for column in vectors.T], axis=1)
 
 
 def lengths(vectors: Array) -> Array:

@@ -86,8 +86,22 @@ def components(pairs: Ints, n: int) -> tuple[int, Ints]:
     return int(count), rank[label]
 
 
+def used_vertices(faces: Ints, n: int) -> Mask:
+    """Return which of n vertices faces use, shape (n,)."""
+    used = np.zeros(n, dtype=bool)
+    used[faces] = True
+    return used
+
+
+def grouped(group: Ints, count: int) -> list[Ints]:
+    """Return the members of each group, ascending; -1 is no group."""
+    held = np.flatnonzero(group >= 0)
+    order = held[np.argsort(group[held], kind="stable")]
+    ends = np.cumsum(np.bincount(group[held], minlength=count))
+    return [np.asarray(part) for part in np.split(order, ends)[:count]]
+
+
 def numbered(faces: Ints, n: int) -> tuple[Ints, Ints]:
     """Vertices of n that faces use, ascending, and the faces in their numbers."""
-    taken = np.zeros(n, dtype=bool)
-    taken[faces] = True
-    return np.flatnonzero(taken), (np.cumsum(taken) - 1)[faces]
+    used = used_vertices(faces, n)
+    return np.flatnonzero(used), (np.cumsum(used) - 1)[faces]

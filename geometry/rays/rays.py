@@ -5,9 +5,7 @@ reach and what slack they are given is the caller's business. The planner's visi
 and the checkers each bring a policy of their own.
 """
 
-import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from itertools import pairwise
 
@@ -17,6 +15,8 @@ from embreex.rtcore_scene import EmbreeScene
 
 from geometry.arrays import Array, Ints, Mask, Single
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import numbered
+from geometry.parallel import mapped
 
 # Rays in one call of embree: their arrays stay in the second-level cache.
 CHUNK = 1 << 14
@@ -53,15 +53,11 @@ class RayCaster:
         half = 0.5 * float(np.linalg.norm(high - low))
         self.scale = float(np.exp2(-np.floor(np.log2(half)))) if half > 0 else 1.0
         self.reach = half * self.scale
-        self._pool: tuple[int, ThreadPoolExecutor] | None = None
         self._scene = EmbreeScene(robust=True)
         # Vertices that no face uses may lie anywhere, also beyond float32.
-        used = np.zeros(len(mesh.vertices), dtype=bool)
-        used[mesh.faces] = True
+        used, faces = numbered(mesh.faces, len(mesh.vertices))
         vertices = self.local(mesh.vertices[used])
-        number = np.cumsum(used, dtype=np.int32) - 1
-        faces = np.ascontiguousarray(number[mesh.faces], dtype=np.int32)
-        _EmbreeMesh(self._scene, vertices, faces)
+        _EmbreeMesh(self._scene, vertices, np.ascontiguousarray(faces, dtype=np.int32))
         # The first call commits the scene; do it here, where no thread races.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
 
@@ -165,37 +161,14 @@ class RayCaster:
         """
         return equal_parts(n, CHUNK, self.threads if n >= 1024 * self.threads else 1)
 
-    def share(
-        self, work: Callable[[slice], None], parts: Iterable[slice], *, least: int = 2
-    ) -> None:
+    def share(self, work: Callable[[slice], None], parts: Iterable[slice]) -> None:
         """Do work on every part, shared among the threads; the first failure is raised.
 
         Args:
             work: What to do with a part; writes to places of its own.
             parts: The parts.
-            least: Parts below which no thread is worth its while.
         """
-        parts = list(parts)
-        queue = iter(parts)
-
-        def drain() -> None:
-            for part in queue:
-                work(part)
-
-        helpers = min(self.threads, len(parts)) - 1 if len(parts) >= least else 0
-        others = [self._workers().submit(drain) for _ in range(helpers)]
-        # The caller works too: no thread has to be woken for the last part.
-        try:
-            drain()
-        finally:
-            for other in others:
-                other.result()
-
-    def _workers(self) -> ThreadPoolExecutor:
-        # A forked child has the pool but not its threads.
-        if self._pool is None or self._pool[0] != os.getpid():
-            self._pool = (os.getpid(), ThreadPoolExecutor(self.threads - 1))
-        return self._pool[1]
+        mapped(work, parts, self.threads)
 
     def _rays(
         self, origins: Array, directions: Array, part: slice

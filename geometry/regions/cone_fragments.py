@@ -3,9 +3,10 @@
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
+from geometry.mesh.tensors import unit
 from geometry.mesh.topology import components
 
-from .cone_sums import CONE_SHARE, Patch, renumbered, unit
+from .cone_sums import CONE_SHARE, Patch, renumbered
 
 _MAX_ROUNDS = 12
 _ROOM = 0.7

@@ -6,6 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from geometry.arrays import Array, Ints
+from geometry.mesh.tensors import unit
+from geometry.mesh.topology import grouped
 
 # Share of a piece's area whose normals must lie in its cone: while it is cut and
 # merged, and after fragments have joined it.
@@ -67,12 +69,6 @@ class Patch:
         return np.divide(held, areas, out=np.ones_like(areas), where=areas > 0)
 
 
-def unit(vectors: Array) -> Array:
-    """Return vectors (k, 3) of length one; zero stays."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.maximum(length, 1e-300)
-
-
 def renumbered(piece: Ints) -> Ints:
     """Return numbers without gaps in the same order; -1 stays."""
     used = np.zeros(int(piece.max(initial=-1)) + 2, dtype=bool)
@@ -96,7 +92,7 @@ def merged(patch: Patch, piece: Ints, share: float) -> Ints:
     key = np.unique(met.min(axis=1) * count + met.max(axis=1))
     met = np.stack(np.divmod(key, count), axis=1)
     sums, areas = patch.sums(piece)
-    work = _Merging(patch, share, sums, areas, _members(piece, len(areas)))
+    work = _Merging(patch, share, sums, areas, grouped(piece, len(areas)))
     for a, b in met.tolist():
         work.near.setdefault(a, set()).add(b)
         work.near.setdefault(b, set()).add(a)
@@ -174,10 +170,3 @@ class _Merging:
             inside = self._patch.normals[self.faces[k]] @ axis >= self._patch.cos_half
             held += float(self._patch.areas[self.faces[k]] @ inside)
         return held >= self._share * float(self._areas[i] + self._areas[j])
-
-
-def _members(piece: Ints, count: int) -> list[Ints]:
-    held = np.flatnonzero(piece >= 0)
-    order = held[np.argsort(piece[held], kind="stable")]
-    ends = np.cumsum(np.bincount(piece[held], minlength=count))[:-1]
-    return list(np.split(order, ends))

@@ -5,7 +5,8 @@ import numpy as np
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.diffusion import diffused, graph_laplacian
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import components
+from geometry.mesh.tensors import unit
+from geometry.mesh.topology import components, grouped
 from geometry.parallel import mapped
 
 from .cone_fragments import join_fragments
@@ -87,7 +88,7 @@ def cone_pieces(
     piece = _pieces(patch, split, least, keep_all=keep_all)
     if not keep_all and patch.areas.sum() >= _NO_REST * mesh.area:
         piece = _more_kept(patch, piece, least)
-    return _by_area(faces, piece, patch.areas, mesh.area)
+    return [faces[own] for own in _by_area(patch, piece, mesh.area)]
 
 
 def _more_kept(patch: Patch, piece: Ints, least: float) -> Ints:
@@ -137,7 +138,7 @@ def averaged_normals(mesh: TriangleMesh, pairs: Ints) -> Array:
     length = _AVERAGED_SHARE * mesh.size / unit
     areas = mesh.face_areas / (unit * unit)
     normals = diffused(np.array(mesh.face_normals), areas, laplacian, length)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return unit(normals)
 
 
 def normal_cone(mesh: TriangleMesh, faces: Ints) -> tuple[Array, float]:
@@ -181,7 +182,7 @@ def _split(patch: Patch, active: Mask, least: float) -> Ints:
 def _core(patch: Patch, part: Ints) -> Mask:
     """Faces in the cone about the mean of their part's normals, moved to its middle."""
     sums, areas = patch.sums(part)
-    axis = sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-300)
+    axis = unit(sums)
     members = np.flatnonzero(part >= 0)
     first = np.full(len(areas), patch.n, dtype=np.int64)
     first[part[members][::-1]] = members[::-1]
@@ -191,8 +192,7 @@ def _core(patch: Patch, part: Ints) -> Mask:
     for _ in range(_SHIFTS):
         core = (part >= 0) & (patch.cosines(part, axis) >= patch.cos_half)
         sums, _ = patch.sums(np.where(core, part, -1), len(areas))
-        length = np.linalg.norm(sums, axis=1, keepdims=True)
-        axis = np.where(length > 0, sums / np.maximum(length, 1e-300), axis)
+        axis = np.where(np.any(sums, axis=1, keepdims=True), unit(sums), axis)
     return core
 
 
@@ -205,15 +205,10 @@ def _connected(patch: Patch, part: Ints) -> Ints:
     return renumbered(label)
 
 
-def _by_area(faces: Ints, piece: Ints, areas: Array, total: float) -> list[Ints]:
-    """Faces of each piece, largest first; equal up to rounding, lowest face first."""
-    held = np.flatnonzero(piece >= 0)
-    if not len(held):
-        return []
-    _, first, number = np.unique(piece[held], return_index=True, return_inverse=True)
-    area = np.bincount(number, areas[held])
-    rank = np.lexsort((first, -np.round(area / (_AREA_DIGITS * total))))
-    order = np.argsort(number, kind="stable")
-    ends = np.cumsum(np.bincount(number))[:-1]
-    parts = np.split(faces[held[order]], ends)
-    return [parts[i] for i in rank]
+def _by_area(patch: Patch, piece: Ints, total: float) -> list[Ints]:
+    """Members of each piece, largest first; equal up to rounding, lowest face first."""
+    areas = patch.sums(piece)[1]
+    members = grouped(piece, len(areas))
+    first = [own[0] for own in members]
+    rank = np.lexsort((first, -np.round(areas / (_AREA_DIGITS * total))))
+    return [members[i] for i in rank]

@@ -90,7 +90,7 @@ def measure_shell(caster: RayCaster) -> MeshShell:
     area = mesh.face_areas
     areas = np.array([mesh.area]) if body is None else np.bincount(body, area)
     weight = (areas[: len(n_spots)] / np.maximum(n_spots, 1))[of]
-    leaks = look_out(caster, spots, _RAYS_BEHIND, behind=True).escaped
+    leaks = look_out(caster, spots, _RAYS_BEHIND, behind=True)
     if weight @ leaks > _LEAK * _RAYS_BEHIND * mesh.area:
         return MeshShell(OPEN, None, None, 0.0, 0.0)
     sight = _sight(caster, spots)
@@ -129,7 +129,7 @@ def _kind(share: float, wall_m: float | None, thin_m: float) -> str:
 
 
 def _sight(caster: RayCaster, spots: Spots) -> _Sight:
-    openness = look_out(caster, spots, _RAYS).escaped / _RAYS
+    openness = look_out(caster, spots, _RAYS) / _RAYS
     wall = np.full(len(spots), np.inf)
     start = spots.points - _OFFSET * caster.extent * spots.normals
     behind, distance = caster.first_hits(start, -spots.normals)
@@ -142,7 +142,7 @@ def _sight(caster: RayCaster, spots: Spots) -> _Sight:
     unsure = np.flatnonzero(thin & ~inside & (openness < LESS_THAN_BEHIND))
     points = spots.points[unsure] - wall[unsure, None] * spots.normals[unsure]
     other = spots_at(caster.mesh, behind[unsure], points)
-    beyond = look_out(caster, other, _RAYS).escaped / _RAYS
+    beyond = look_out(caster, other, _RAYS) / _RAYS
     inside[unsure] = openness[unsure] < LESS_THAN_BEHIND * beyond
     return _Sight(openness, wall, inside)
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import grouped
 from geometry.poses import fibonacci_cap
 from geometry.rays.rays import RayCaster
 
@@ -42,10 +43,9 @@ def containers(
         For each patch, the patches that hold it; none where it wasn't asked.
     """
     n = len(holding)
-    held: list[Ints] = [np.zeros(0, np.int64)] * n
     inner = _in_some_box(mesh, patch, holding, asked)
     if not inner.any():
-        return held
+        return [np.zeros(0, np.int64)] * n
     least = int(np.clip(_MAX_SPOTS // int(inner.sum()), 4, _SPOTS))
     spots = spots_on(mesh, 0, group=patch, least=least, within=inner[patch])
     pairs = np.concatenate(
@@ -61,15 +61,8 @@ def containers(
     keep = (counts >= _WHOLLY * least) & holding[holder] & (row != holder)
     row, holder = row[keep], holder[keep]
     depth = np.bincount(row, minlength=n)
-    for index in np.unique(row):
-        mine = holder[row == index] if n < 64 else _span(row, holder, index)
-        held[index] = mine[np.argsort(depth[mine], kind="stable")]
-    return held
-
-
-def _span(row: Ints, holder: Ints, index: int) -> Ints:
-    """Holders of one patch; rows are sorted."""
-    return holder[np.searchsorted(row, index) : np.searchsorted(row, index + 1)]
+    mine = [holder[own] for own in grouped(row, n)]
+    return [own[np.argsort(depth[own], kind="stable")] for own in mine]
 
 
 def _in_some_box(mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask) -> Mask:

@@ -61,21 +61,6 @@ class Spots:
         return self.frames[:, 2]
 
 
-@dataclass(frozen=True, eq=False)
-class Outlook:
-    """What the rays of each spot met.
-
-    Attributes:
-        n_rays: Rays of each spot.
-        escaped: How many met nothing, shape (n,).
-        met_front: How many met a face from its outer side first, shape (n,).
-    """
-
-    n_rays: int
-    escaped: Ints
-    met_front: Ints
-
-
 def spots_on(
     mesh: TriangleMesh,
     n: int,
@@ -149,8 +134,8 @@ def _ordered_corners(mesh: TriangleMesh, faces: Ints) -> tuple[Array, Array, Arr
 
 def look_out(
     caster: RayCaster, spots: Spots, n_rays: int, *, behind: bool = False
-) -> Outlook:
-    """Cast rays from spots over the cosine-weighted hemisphere and see what they meet.
+) -> Ints:
+    """Return how many rays over each spot's cosine-weighted hemisphere escape, (n,).
 
     Args:
         caster: Of the mesh that the spots lie on.
@@ -163,7 +148,6 @@ def look_out(
     radius, height = np.sqrt(k), np.sqrt(1.0 - k)
     around = np.arange(n_rays) * _GOLDEN
     escaped = np.empty(len(spots), dtype=np.int64)
-    met_front = np.empty(len(spots), dtype=np.int64)
     offset = side * _OFFSET * caster.extent
     step = max(_MAX_RAYS // n_rays, 1)
     for begin in range(0, len(spots), step):
@@ -177,7 +161,5 @@ def look_out(
         ).reshape(-1, 3)
         start = np.repeat(spots.points[part] + offset * normal, n_rays, axis=0)
         hit, _ = caster.first_hits(start, along)
-        towards = np.einsum("ij,ij->i", caster.mesh.face_normals[hit], along) < 0
         escaped[part] = (hit < 0).reshape(-1, n_rays).sum(axis=1)
-        met_front[part] = ((hit >= 0) & towards).reshape(-1, n_rays).sum(axis=1)
-    return Outlook(n_rays, escaped, met_front)
+    return escaped

@@ -149,7 +149,7 @@ def _by_visibility(caster: RayCaster, patch: Ints, closed: Mask, verdict: Ints) 
     )
     owner = patch[spots.faces]
     front, back = (
-        np.bincount(owner, look_out(caster, spots, _RAYS, behind=side).escaped, n)
+        np.bincount(owner, look_out(caster, spots, _RAYS, behind=side), n)
         for side in (False, True)
     )
     lead, total = front - back, front + back

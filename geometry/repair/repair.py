@@ -4,7 +4,8 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import MeshError, Repair
-from geometry.mesh.tensors import cross
+from geometry.mesh.tensors import area_normals
+from geometry.mesh.topology import numbered
 
 # A triangle whose height is below this share of its longest side has no normal.
 _FLAT = 1e-10
@@ -107,10 +108,10 @@ def _identical(vertices: Array) -> tuple[Ints, Ints]:
 
 
 def _drop_flat(vertices: Array, faces: Ints) -> _Step:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    double_area = np.linalg.norm(cross(b - a, c - a), axis=1)
-    sides = np.stack([b - a, c - b, a - c])
-    longest = np.einsum("kij,kij->ki", sides, sides).max(axis=0)
+    corners = vertices[faces]
+    double_area = np.linalg.norm(area_normals(corners), axis=1)
+    sides = corners - np.roll(corners, 1, axis=1)
+    longest = np.einsum("ikj,ikj->ik", sides, sides).max(axis=1)
     keep = double_area > _FLAT * longest
     repair = Repair("zero-area faces removed", len(faces) - int(keep.sum()))
     return vertices, faces[keep], keep, (repair,)
@@ -132,7 +133,6 @@ def _drop_doubled(vertices: Array, faces: Ints) -> _Step:
 
 
 def _drop_unused(vertices: Array, faces: Ints) -> _Step:
-    used = np.zeros(len(vertices), dtype=bool)
-    used[faces] = True
-    repair = Repair("unreferenced vertices removed", int((~used).sum()))
-    return vertices[used], (np.cumsum(used) - 1)[faces], None, (repair,)
+    used, local = numbered(faces, len(vertices))
+    repair = Repair("unreferenced vertices removed", len(vertices) - len(used))
+    return vertices[used], local, None, (repair,)

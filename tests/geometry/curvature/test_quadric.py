@@ -6,7 +6,7 @@ import pytest
 from geometry import parallel
 from geometry.curvature.curvature import principal_curvatures
 from geometry.curvature.quadric import fit_quadrics
-from geometry.mesh.diffusion import diffused, surface_laplacian, vertex_areas
+from geometry.mesh.diffusion import diffused, surface_laplacian
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 
@@ -45,7 +45,7 @@ def test_what_no_mesh_can_carry_is_taken_from_around_it() -> None:
 def test_cores_change_no_digit(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
     ball = sphere(1.0, subdivisions=5)
     vertices, faces = np.array(ball.vertices), np.array(ball.faces)
-    mass = vertex_areas(vertices, faces) / ball.mean_edge**2
+    mass = ball.vertex_areas / ball.mean_edge**2
     laplacian = surface_laplacian(vertices, faces)
     values = np.random.default_rng(0).normal(size=(len(vertices), 30))
 
