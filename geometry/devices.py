@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import Array, Mask
+from .arrays import Array, Mask
 
 _UNDISTORT_STEPS = 12
 

@@ -23,9 +23,8 @@ from geometry.arrays import Array, Ints, Mask
 from geometry.rays.rays import CHUNK, equal_parts
 from geometry.rays.visibility import Visibility
 
+from .cube_cells import mark_segments, pieces
 from .cube_map import CubeMap
-from .cube_segments import mark_segments
-from .map_pieces import pieces
 from .silhouettes import Silhouettes
 
 # Cosines are exact to this.

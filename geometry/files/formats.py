@@ -16,10 +16,10 @@ import numpy as np
 from geometry.arrays import Array, Ints
 from geometry.mesh.file_origin import FileOrigin, Properties
 
-from .file_numbers import FormatError
 from .gltf_format import read_glb, read_gltf
 from .ply_format import ply_surface, read_ply
 from .polygons import cut_polygons
+from .reading import FormatError
 from .stl_format import read_stl
 from .text_formats import read_obj, read_off
 from .three_mf_format import read_three_mf

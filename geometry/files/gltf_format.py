@@ -1,38 +1,27 @@
 """Strict reader of the triangles of glTF 2.0, GLB and .gltf with its buffers."""
 
-import base64
-import binascii
 import json
 import struct
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from geometry.arrays import Array, Ints
+from geometry.files.gltf_buffers import (
+    _COMPONENTS,
+    PACKED,
+    QUANTIZED,
+    Buffers,
+    Fetch,
+    Tree,
+    item,
+)
 
-from .file_numbers import FormatError
-from .scene_parts import ScenePart, joined
+from .reading import FormatError, ScenePart, joined
 
-Fetch = Callable[[str], bytes]
-_Tree = Mapping[str, Any]
-
-_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}
 _COMPONENTS[5125] = "<u4"
-_INDICES = (5121, 5123, 5125)
-_FLOAT = 5126
-_WIDTH = {"SCALAR": 1, "VEC3": 3}
 # Required extensions that leave the triangles as the core format stores them.
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
-_QUANTIZED = "KHR_mesh_quantization"
-_PACKED = (
-    "KHR_draco_mesh_compression",
-    "EXT_meshopt_compression",
-    "KHR_meshopt_compression",
-)
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
@@ -88,7 +77,7 @@ def read_gltf(
     if not isinstance(tree, dict):
         raise FormatError("its JSON isn't an object")
     _check_extensions(tree)
-    buffers = _Buffers(tree, fetch, stored)
+    buffers = Buffers(tree, fetch, stored)
     meshes: dict[int, list[tuple[Array, Ints]]] = {}
     parts: list[ScenePart] = []
     units: set[str] = set()
@@ -96,7 +85,7 @@ def read_gltf(
         if "mesh" not in node:
             continue
         index = node["mesh"]
-        mesh = _item(tree, "meshes", index)
+        mesh = item(tree, "meshes", index)
         _check_rigid(node, mesh)
         if index not in meshes:
             shapes = [_primitive(tree, buffers, p) for p in mesh["primitives"]]
@@ -110,44 +99,37 @@ def read_gltf(
     return *joined(parts), "".join(units)
 
 
-def _unit(mesh: _Tree) -> str:
+def _unit(mesh: Tree) -> str:
     extras = mesh.get("extras")
     stated = extras.get("units") if isinstance(extras, dict) else None
     return str(stated)[:20] if stated else "m"
 
 
-def _check_extensions(tree: _Tree) -> None:
+def _check_extensions(tree: Tree) -> None:
     version = str(tree.get("asset", {}).get("version", ""))
     if not version.startswith("2."):
         raise FormatError(f"it is glTF version '{version[:20]}', only 2 is read")
     for name in tree.get("extensionsRequired", ()):
-        if name in _PACKED:
+        if name in PACKED:
             raise FormatError(f"it is compressed with {name}; export it uncompressed")
-        if name != _QUANTIZED and not str(name).startswith(_HARMLESS):
+        if name != QUANTIZED and not str(name).startswith(_HARMLESS):
             raise FormatError(f"it requires the extension {name}, which isn't read")
 
 
-def _item(tree: _Tree, kind: str, index: object) -> Any:  # noqa: ANN401
-    held = tree.get(kind, ())
-    if type(index) is not int or not 0 <= index < len(held):
-        raise FormatError(f"it names entry {index} of {len(held)} {kind}")
-    return held[index]
-
-
-def _placed(tree: _Tree) -> list[tuple[_Tree, Array]]:
+def _placed(tree: Tree) -> list[tuple[Tree, Array]]:
     """Return every node of the default scene with its transform to the world."""
     nodes = tree.get("nodes", ())
     if tree.get("scenes"):
-        roots = _item(tree, "scenes", tree.get("scene", 0)).get("nodes", ())
+        roots = item(tree, "scenes", tree.get("scene", 0)).get("nodes", ())
     else:
         children = {c for node in nodes for c in node.get("children", ())}
         roots = [i for i in range(len(nodes)) if i not in children]
-    placed: list[tuple[_Tree, Array]] = []
+    placed: list[tuple[Tree, Array]] = []
     seen: set[int] = set()
     waiting = [(root, np.eye(4)) for root in reversed(roots)]
     while waiting:
         index, world_from_parent = waiting.pop()
-        node = _item(tree, "nodes", index)
+        node = item(tree, "nodes", index)
         if index in seen:
             raise FormatError(f"its node {index} hangs in two places")
         seen.add(index)
@@ -158,7 +140,7 @@ def _placed(tree: _Tree) -> list[tuple[_Tree, Array]]:
     return placed
 
 
-def _transform(index: int, node: _Tree) -> Array:
+def _transform(index: int, node: Tree) -> Array:
     matrix = np.array(node.get("matrix", np.eye(4).ravel()), dtype=np.float64)
     if matrix.shape != (16,):
         raise FormatError(f"its node {index} has a matrix of {matrix.size} numbers")
@@ -177,7 +159,7 @@ def _transform(index: int, node: _Tree) -> Array:
     return matrix @ local
 
 
-def _check_rigid(node: _Tree, mesh: _Tree) -> None:
+def _check_rigid(node: Tree, mesh: Tree) -> None:
     """Refuse what is shown in another shape than it is stored in."""
     if "skin" in node:
         raise FormatError("a skeleton poses its mesh, which isn't read; apply the pose")
@@ -188,7 +170,7 @@ def _check_rigid(node: _Tree, mesh: _Tree) -> None:
 
 
 def _primitive(
-    tree: _Tree, buffers: "_Buffers", primitive: _Tree
+    tree: Tree, buffers: "Buffers", primitive: Tree
 ) -> tuple[Array, Ints] | None:
     mode = primitive.get("mode", _TRIANGLES)
     if mode in (0, 1, 2, 3):
@@ -212,99 +194,3 @@ def _primitive(
     # Triangles of no area join strips to one another.
     a, b, c = faces.T
     return points.astype(np.float64), faces[(a != b) & (b != c) & (c != a)]
-
-
-class _Buffers:
-    """The numbers that accessors name, with every offset held to what is there."""
-
-    def __init__(self, tree: _Tree, fetch: Fetch | None, stored: bytes | None) -> None:
-        self._tree = tree
-        self._fetch = fetch
-        self._stored = stored
-        self._read: dict[int, bytes] = {}
-
-    def values(self, index: object, kind: str) -> NDArray[np.generic]:
-        """Return the rows of an accessor, (count, 1) or (count, 3)."""
-        accessor = _item(self._tree, "accessors", index)
-        if "sparse" in accessor:
-            raise FormatError("it stores sparse accessors, which aren't read")
-        if "bufferView" not in accessor:
-            raise FormatError(
-                "an accessor stores no data: its compression isn't supported"
-            )
-        component = accessor.get("componentType")
-        if accessor.get("type") != kind or component not in self._allowed(kind):
-            raise FormatError(
-                f"accessor {index} holds {accessor.get('type')} of {component}, "
-                f"where {kind} is needed"
-            )
-        view = _item(self._tree, "bufferViews", accessor["bufferView"])
-        if set(_PACKED) & set(view.get("extensions", ())):
-            raise FormatError("its buffers are compressed; export it uncompressed")
-        dtype = np.dtype(_COMPONENTS[component])
-        values = self._strided(accessor, view, dtype, _WIDTH[kind])
-        if accessor.get("normalized") and component != _FLOAT:
-            return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
-        return values
-
-    def _allowed(self, kind: str) -> Sequence[int]:
-        if kind == "SCALAR":
-            return _INDICES
-        quantized = _QUANTIZED in self._tree.get("extensionsUsed", ())
-        return tuple(c for c in _COMPONENTS if c != 5125) if quantized else (_FLOAT,)
-
-    def _strided(
-        self, accessor: _Tree, view: _Tree, dtype: np.dtype, columns: int
-    ) -> NDArray[np.generic]:
-        """Return the rows, shape (count, columns), each a stride after the last."""
-        data = self._buffer(view.get("buffer"))
-        width = dtype.itemsize * columns
-        count = _natural(accessor, "count")
-        stride = _natural(view, "byteStride", width)
-        begin, size = _natural(view, "byteOffset", 0), _natural(view, "byteLength")
-        offset = _natural(accessor, "byteOffset", 0)
-        if begin + size > len(data):
-            raise FormatError(
-                f"it names {begin + size} bytes of a {len(data)} byte buffer"
-            )
-        if count == 0:
-            return np.empty((0, columns), dtype)
-        if stride < width or offset + (count - 1) * stride + width > size:
-            raise FormatError(f"{count} rows don't fit into a view of {size} bytes")
-        strides = (stride, dtype.itemsize)
-        return np.ndarray((count, columns), dtype, data, begin + offset, strides)
-
-    def _buffer(self, index: object) -> bytes:
-        entry = _item(self._tree, "buffers", index)
-        assert isinstance(index, int)
-        if index not in self._read:
-            data = self._bytes(entry, index)
-            if len(data) < _natural(entry, "byteLength"):
-                raise FormatError(
-                    f"its buffer {index} is cut short: {len(data)} of "
-                    f"{entry['byteLength']} bytes"
-                )
-            self._read[index] = data
-        return self._read[index]
-
-    def _bytes(self, entry: _Tree, index: int) -> bytes:
-        if "uri" not in entry:
-            if index or self._stored is None:
-                raise FormatError(f"its buffer {index} isn't there")
-            return self._stored
-        uri = str(entry["uri"])
-        if uri.startswith("data:"):
-            try:
-                return base64.b64decode(uri.partition(",")[2], validate=True)
-            except binascii.Error as error:
-                raise FormatError(f"its buffer {index}: {error}") from None
-        if self._fetch is None:
-            raise FormatError(f"it needs the file '{uri[:60]}', which isn't beside it")
-        return self._fetch(unquote(uri))
-
-
-def _natural(entry: _Tree, key: str, default: int | None = None) -> int:
-    value = entry.get(key, default)
-    if type(value) is not int or value < 0:
-        raise FormatError(f"its {key} is {value}, must be a whole number from 0 on")
-    return value

@@ -4,67 +4,21 @@ General readers take the first list length for all of an element's rows, or give
 where a file stores strips; a mesh whose rows don't fit its header is refused here.
 """
 
-import re
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import Array, Ints
+from geometry.files.ply_header import (
+    PlyElement,
+    PlyLists,
+    PlyProperty,
+    read_header,
+    shortened,
+)
 
-from .file_numbers import FormatError, numbers, whole
+from .reading import FormatError, numbers, whole
 
-_TYPES = {
-    name: code
-    for code, names in {
-        "i1": ("char", "int8"),
-        "u1": ("uchar", "uint8"),
-        "i2": ("short", "int16"),
-        "u2": ("ushort", "uint16"),
-        "i4": ("int", "int32"),
-        "u4": ("uint", "uint32"),
-        "f4": ("float", "float32"),
-        "f8": ("double", "float64"),
-    }.items()
-    for name in names
-}
-_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS = ("vertex_indices", "vertex_index")
-
-
-@dataclass(frozen=True)
-class PlyProperty:
-    """A column of an element: its name, its type, and the type of its list's length."""
-
-    name: str
-    dtype: str
-    count_dtype: str | None
-
-
-@dataclass(frozen=True, eq=False)
-class PlyLists:
-    """Lists of one property: their values end to end, and the length of each."""
-
-    values: Array | Ints
-    lengths: Ints
-
-
-@dataclass(frozen=True, eq=False)
-class PlyElement:
-    """One element of the header with its rows, column by column.
-
-    Attributes:
-        count: Number of rows.
-        properties: Its columns, in their order.
-        scalars: Values of each plain property, shape (count,).
-        lists: Values of each list property.
-    """
-
-    name: str
-    count: int
-    properties: list[PlyProperty] = field(default_factory=list[PlyProperty])
-    scalars: dict[str, Array] = field(default_factory=dict[str, Array])
-    lists: dict[str, PlyLists] = field(default_factory=dict[str, PlyLists])
 
 
 def read_ply(data: bytes) -> dict[str, PlyElement]:
@@ -74,7 +28,7 @@ def read_ply(data: bytes) -> dict[str, PlyElement]:
         FormatError: If the header can't be understood, or what follows it isn't exactly
             what it promises.
     """
-    order, elements, body = _header(data)
+    order, elements, body = read_header(data)
     cursor = _Cursor(body, order)
     for element in elements:
         cursor.fill(element)
@@ -109,59 +63,6 @@ def ply_surface(elements: dict[str, PlyElement]) -> tuple[Array, PlyLists]:
             f"face {at + 1} has {corners.lengths[at]} corners, must have three or more"
         )
     return points, PlyLists(whole(corners.values), corners.lengths)
-
-
-def _header(data: bytes) -> tuple[str, list[PlyElement], bytes]:
-    found = re.match(rb"ply[ \t]*(\r\n|\r|\n)", data)
-    if found is None:
-        raise FormatError("it has no PLY header")
-    # A lone CR ends lines only where it ends the first; binary data may begin with LF.
-    newline = found[1]
-    end = re.search(newline + rb"end_header[ \t]*" + newline, data)
-    if end is None:
-        raise FormatError("it has no PLY header that ends")
-    lines = data[found.end() : end.start()].decode("latin-1").split(newline.decode())
-    order: str | None = None
-    elements: list[PlyElement] = []
-    for line in lines:
-        words = line.split()
-        if not words or words[0] in ("comment", "obj_info"):
-            continue
-        if words[0] == "format" and len(words) == 3 and words[1] in _ORDERS:
-            order = _ORDERS[words[1]]
-        elif words[0] == "element" and len(words) == 3 and words[2].isdecimal():
-            elements.append(PlyElement(words[1], int(words[2])))
-        elif words[0] == "property" and elements:
-            elements[-1].properties.append(_property(words, line))
-        else:
-            raise FormatError(f"its header has the line '{_short(line)}'")
-    if order is None:
-        raise FormatError("its header doesn't state the format")
-    if len({element.name for element in elements}) != len(elements):
-        raise FormatError("its header declares an element twice")
-    for element in elements:
-        columns = element.properties
-        if len({c.name for c in columns}) < len(columns) or (
-            element.count and not columns
-        ):
-            raise FormatError(
-                f"its element '{_short(element.name)}' has no or equal properties"
-            )
-    return order, elements, data[end.end() :]
-
-
-def _property(words: list[str], line: str) -> PlyProperty:
-    if len(words) == 3 and words[1] in _TYPES:
-        return PlyProperty(words[2], _TYPES[words[1]], None)
-    if len(words) == 5 and words[1] == "list" and words[3] in _TYPES:
-        count = _TYPES.get(words[2], "f4")
-        if not count.startswith("f"):
-            return PlyProperty(words[4], _TYPES[words[3]], count)
-    raise FormatError(f"its header has the line '{_short(line)}'")
-
-
-def _short(text: str) -> str:
-    return ascii(text.strip()[:60])[1:-1]
 
 
 class _Cursor:
@@ -255,7 +156,7 @@ class _Cursor:
         else:
             word = self._words[at // 8]
             if not (word.isascii() and word.isdecimal() and len(word) < 10):
-                raise FormatError(f"the length of a list is '{_short(word)}'")
+                raise FormatError(f"the length of a list is '{shortened(word)}'")
             length = int(word)
         if not 0 <= length <= len(self._body) - end:
             raise self._short_of(element)
@@ -282,8 +183,8 @@ class _Cursor:
     def _short_of(self, element: PlyElement) -> FormatError:
         left = self._left() // (1 if self._order else 8)
         return FormatError(
-            f"it is cut short: {element.count} rows of '{_short(element.name)}' don't "
-            f"fit into the {left} {self._unit} left"
+            f"it is cut short: {element.count} rows of '{shortened(element.name)}' "
+            f"don't fit into the {left} {self._unit} left"
         )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 
-from .file_numbers import FormatError
+from .reading import FormatError
 
 # Corners closer than this share of the outline's width are one place.
 _SAME = 1e-12

@@ -1,16 +1,8 @@
 """Read a mesh file into a repaired, oriented TriangleMesh in metres."""
 
-import bz2
-import gzip
 import hashlib
-import io
-import lzma
-import zipfile
-import zlib
-from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
-from typing import IO
+from pathlib import Path
 
 import numpy as np
 
@@ -21,8 +13,9 @@ from geometry.mesh.topology import numbered, used_vertices
 from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
 
-from .file_numbers import FormatError
+from .archives import file_bytes, unpacked
 from .formats import SUPPORTED, RawMesh, read_format
+from .reading import FormatError
 
 METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 UNITS = ("mm", "cm", "m", "in", "um")
@@ -31,14 +24,11 @@ SIZE_RANGE_M = (1e-3, 100.0)
 _DEFAULT_UNIT = "mm"
 # A tabletop object, to pick the unit that would make sense of an implausible size.
 _LIKELY_SIZE_M = 0.2
-# A small archive can unpack to more than any machine holds.
-_MAX_BYTES = 1 << 32
 # Fragments that stand out by this share of the longest side are reported.
 _STRAY = 0.01
 # Radii from the centre of the main bodies. Rays are precise to about 1e-6 of all that
 # there is, so to 0.1 mm on an object of 1 m.
 _FAR = 100.0
-_PIECE = 1 << 24
 
 
 def load_mesh(
@@ -67,7 +57,7 @@ def load_mesh(
         raise MeshError(f"unit '{unit}' isn't known, use one of {', '.join(UNITS)}")
     if size_mm is not None and not (size_mm > 0 and np.isfinite(size_mm)):
         raise MeshError(f"size must be a positive number of millimetres, got {size_mm}")
-    data = _bytes_of(path)
+    data = file_bytes(path)
     digest = hashlib.sha256(data).hexdigest()
     return usable_mesh(_read(path, data), str(path), digest, unit, size_mm)
 
@@ -197,33 +187,8 @@ def _length(metres: float) -> str:
     return f"{1e3 * metres:.4g} mm"
 
 
-def _bytes_of(path: str | Path) -> bytes:
-    try:
-        data = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise MeshError(f"{path}: no such file; check the path") from None
-    except IsADirectoryError:
-        raise MeshError(f"{path}: is a directory; name one mesh file") from None
-    except (OSError, ValueError) as error:
-        raise MeshError(f"{path}: can't be opened ({error})") from None
-    if not data:
-        raise MeshError(f"{path}: the file is empty (0 bytes); export the mesh again")
-    return data
-
-
 def _read(path: str | Path, data: bytes) -> RawMesh:
-    try:
-        kind, data, fetch = _unpack(Path(path), data)
-    except (
-        OSError,
-        EOFError,
-        zlib.error,
-        lzma.LZMAError,
-        RuntimeError,
-        NotImplementedError,
-        zipfile.BadZipFile,
-    ) as error:
-        raise MeshError(f"{path}: can't be unpacked ({error})") from None
+    kind, data, fetch = unpacked(Path(path), data)
     if kind not in SUPPORTED:
         raise MeshError(
             f"{path}: format '.{kind}' isn't supported; convert it to one of "
@@ -246,71 +211,3 @@ def _known_unit(raw: RawMesh) -> RawMesh:
     if raw.unit is not None and raw.unit not in METRES:
         raise FormatError(f"it states the unit '{raw.unit}', which isn't known")
     return raw
-
-
-_Unpacked = tuple[str, bytes, Callable[[str], bytes] | None]
-
-
-def _unpack(path: Path, data: bytes) -> _Unpacked:
-    """Return the format, its bytes, and how to fetch files that it names."""
-    suffixes = [suffix.lower().lstrip(".") for suffix in path.suffixes] or [""]
-    if suffixes[-1] == "zip":
-        return _from_zip(data)
-    if suffixes[-1] in ("gz", "bz2"):
-        if suffixes[-1] == "gz":
-            with gzip.open(io.BytesIO(data)) as stream:
-                content = _at_most(_pieces(stream))
-        else:
-            content = _at_most(_bunzipped(data))
-        return (suffixes[-2] if len(suffixes) > 1 else ""), content, None
-    return suffixes[-1], data, lambda name: (path.parent / name).read_bytes()
-
-
-def _from_zip(data: bytes) -> _Unpacked:
-    archive = zipfile.ZipFile(io.BytesIO(data))
-    meshes = [
-        name
-        for name in archive.namelist()
-        if PurePosixPath(name).suffix.lower().lstrip(".") in SUPPORTED
-        and not name.startswith("__MACOSX/")
-    ]
-    if len(meshes) != 1:
-        held = ", ".join(meshes[:4]) or "none"
-        raise OSError(f"it must hold one mesh, holds {len(meshes)}: {held}")
-    folder = PurePosixPath(meshes[0]).parent
-
-    def member(name: str) -> bytes:
-        with archive.open(name) as stream:
-            return _at_most(_pieces(stream))
-
-    kind = PurePosixPath(meshes[0]).suffix.lower().lstrip(".")
-    content = member(meshes[0])
-    return kind, content, lambda name: member(str(folder / name))
-
-
-def _bunzipped(data: bytes) -> Iterator[bytes]:
-    # The module's own file takes what is behind a stream and no stream for padding.
-    while data:
-        stream = bz2.BZ2Decompressor()
-        yield stream.decompress(data, _PIECE)
-        while not stream.eof:
-            if stream.needs_input:
-                raise EOFError("it ends before the end of its stream")
-            yield stream.decompress(b"", _PIECE)
-        data = stream.unused_data
-
-
-def _pieces(stream: IO[bytes] | gzip.GzipFile) -> Iterator[bytes]:
-    # Asked for everything at once, gzip sets the largest size aside first.
-    return iter(lambda: stream.read(_PIECE), b"")
-
-
-def _at_most(pieces: Iterable[bytes]) -> bytes:
-    held: list[bytes] = []
-    total = 0
-    for piece in pieces:
-        held.append(piece)
-        total += len(piece)
-        if total > _MAX_BYTES:
-            raise OSError(f"it unpacks to more than {_MAX_BYTES >> 30} GiB")
-    return b"".join(held)

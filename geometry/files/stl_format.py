@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints
 
-from .file_numbers import FormatError, decode, numbers
+from .reading import FormatError, decode, numbers
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 # A facet in words; None stands for a number.
@@ -71,28 +71,18 @@ def _ascii(text: str) -> Array:
 
 def _facets(words: list[str]) -> Array:
     """Return the corners (m, 3, 3) of the facets of one solid."""
-    if len(words) % len(_FACET):
-        raise FormatError(_fault(words))
     size = len(_FACET)
+    # A facet that is cut short comes after all whole ones.
+    faulty = {len(words) // size} if len(words) % size else set[int]()
     for column, word in enumerate(_FACET):
         if word is not None and {w.lower() for w in words[column::size]} - {word}:
-            raise FormatError(_fault(words))
+            of_column = enumerate(words[column::size])
+            faulty.add(next(i for i, other in of_column if other.lower() != word))
+    if faulty:
+        raise FormatError(
+            f"facet {min(faulty) + 1} isn't 'facet normal x y z', 'outer loop', three "
+            "'vertex x y z', 'endloop', 'endfacet'"
+        )
     places = [k for k, word in enumerate(_FACET) if word is None][3:]
     columns = [numbers(words[k::size]) for k in places]
     return np.stack(columns, axis=1).reshape(-1, 3, 3)
-
-
-def _fault(words: list[str]) -> str:
-    """Say which facet is the first that isn't one."""
-    size = len(_FACET)
-    for number, begin in enumerate(range(0, len(words), size), 1):
-        row = words[begin : begin + size]
-        if len(row) < size or any(
-            word is not None and found.lower() != word
-            for found, word in zip(row, _FACET, strict=True)
-        ):
-            return (
-                f"facet {number} isn't 'facet normal x y z', 'outer loop', three "
-                "'vertex x y z', 'endloop', 'endfacet'"
-            )
-    return "a facet can't be understood"

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 
 from geometry.arrays import Array, Ints
 
-from .file_numbers import FormatError, decode, numbers
 from .polygons import end_to_end
+from .reading import FormatError, decode, numbers
 
 # Free-form geometry that has no triangles to give.
 _FREE_FORM = frozenset({"cstype", "curv", "curv2", "surf", "bmat", "bzp", "bsp", "cdc"})

@@ -12,8 +12,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints
 
-from .file_numbers import FormatError, numbers, whole
-from .scene_parts import ScenePart, joined
+from .reading import FormatError, ScenePart, joined, numbers, whole
 
 _NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/"
 _CORE = f"{{{_NAMESPACE}core/2015/02}}"

@@ -134,9 +134,9 @@ def averaged_normals(mesh: TriangleMesh, pairs: Ints) -> Array:
     shared = np.sqrt(np.sqrt(mesh.face_areas[a] * mesh.face_areas[b]))
     weight = np.clip(shared / np.maximum(away, 1e-300), 0.0, _LARGEST_WEIGHT)
     laplacian = graph_laplacian(pairs, weight, len(mesh.faces))
-    unit = mesh.mean_edge
-    length = _AVERAGED_SHARE * mesh.size / unit
-    areas = mesh.face_areas / (unit * unit)
+    edge = mesh.mean_edge
+    length = _AVERAGED_SHARE * mesh.size / edge
+    areas = mesh.face_areas / (edge * edge)
     normals = diffused(np.array(mesh.face_normals), areas, laplacian, length)
     return unit(normals)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from geometry.directions.cube_cells import mark_segments
 from geometry.directions.cube_map import CubeMap, angle_between
-from geometry.directions.cube_segments import mark_segments
 from geometry.directions.widened_maps import WidenedMaps
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from geometry.directions.map_pieces import pieces
+from geometry.directions.cube_cells import pieces
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 0.95, 1.0])

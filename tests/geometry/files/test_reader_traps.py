@@ -481,11 +481,11 @@ def test_a_small_archive_of_much_is_not_set_aside_at_once(
 ) -> None:
     import gzip
 
-    from geometry.files import readers
+    from geometry.files import archives
 
     path = tmp_path / "a.obj.gz"
     path.write_bytes(gzip.compress(b"\n" * (1 << 21)))
-    monkeypatch.setattr(readers, "_MAX_BYTES", 1 << 20)
+    monkeypatch.setattr(archives, "_MAX_BYTES", 1 << 20)
     with pytest.raises(MeshError, match="unpacks to more than"):
         load_mesh(path)
 
