@@ -158,10 +158,7 @@ def _averaged_fit(
     whole: Mask,
     scale: float,
 ) -> tuple[Array, Array, Mask]:
-    """Fit, averaged over a scale in mean edges; and where there was one.
-
-    Only vertices with a whole neighbourhood take part.
-    """
+    """Fit where neighbourhoods are whole, averaged over a scale in mean edges."""
     beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
     if beyond > 0:
         vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))
@@ -188,12 +185,8 @@ def _joined_to(chosen: Mask, laplacian: csr_array) -> Mask:
 
 
 def _near_border(vertices: Array, edges: MeshEdges, reach: float, rings: int) -> Mask:
-    """Vertices on a border or branching edge, or in reach or rings of a long border.
-
-    A neighbourhood that a border cuts in two is fitted on one side only, and the
-    border's own teeth look like curvature. A pinhole, whose rim is shorter than the
-    circumference of the neighbourhood, spoils no more than its rim.
-    """
+    """Vertices on a border or branching edge, or near a long border."""
+    # A pinhole, shorter than the neighbourhood's rim, spoils no more than its own rim.
     n = len(vertices)
     near = np.zeros(n, dtype=bool)
     near[edges.ends[edges.n_faces != 2]] = True

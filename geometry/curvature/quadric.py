@@ -51,10 +51,7 @@ def fit_quadrics(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask, Mask
 
 
 def _fit(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask]:
-    """Curvatures (2, n), larger first, their directions (2, n, 3), and success (n,).
-
-    Where there is no success, all are zero.
-    """
+    """Curvatures (2, n), larger first, directions (2, n, 3), success (n,); or zero."""
     n = len(vertices)
     k, ways, fitted = np.zeros((2, n)), np.zeros((2, n, 3)), np.zeros(n, dtype=bool)
     # libigl reads out of bounds at vertices without a face.
@@ -92,10 +89,7 @@ def _vertex_normals(vertices: Array, faces: Ints) -> Array:
 
 
 def _with_normals(vertices: Array, faces: Ints) -> Ints:
-    """Leave out faces at vertices whose normals cancel: libigl crashes there.
-
-    Two faces on the same three corners, turned against each other, do that.
-    """
+    """Leave out faces at vertices whose normals cancel: libigl crashes there."""
     while len(faces):
         weighted = area_normals(vertices[faces])
         size = np.linalg.norm(weighted, axis=1)

@@ -46,10 +46,7 @@ def mark_segments(
 
 
 def _clipped(starts: Array, ends: Array, face: int) -> tuple[Array, Array, Ints]:
-    """Return gnomonic ends, (m', 2), of the parts of segments on a face, and whose.
-
-    A part lies on the face where |x| <= z and |y| <= z: four half spaces.
-    """
+    """Return gnomonic ends, (m', 2), of the parts of segments on a face, and whose."""
     met = _may_meet(starts, ends, face)
     a, b = (
         np.stack([own.take(met) for own in face_coordinates(vectors, face)])

@@ -72,3 +72,14 @@ def packed(bits: Mask) -> Words:
         whole[:, : bits.shape[1]] = bits
         bits = whole
     return np.packbits(bits.ravel(), bitorder="little").view(np.uint64)
+
+
+def unpacked(words: Words, n: int) -> tuple[Ints, Ints]:
+    """Return the rows and columns of the bits that are set."""
+    some = np.flatnonzero(words)
+    bits = np.unpackbits(
+        words[some].view(np.uint8).reshape(-1, 8), axis=1, count=n, bitorder="little"
+    )
+    # Numpy finds what isn't zero in one dimension five times as fast as in two.
+    column, row = np.divmod(np.flatnonzero(bits.view(np.bool_)), max(n, 1))
+    return row, some[column]

@@ -24,8 +24,9 @@ from geometry.arrays import Array, Ints, Mask, Words
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import lengths
 from geometry.mesh.topology import face_pairs
+from geometry.rays.proximity import triangle_distances
 
-from .product_signs import WORD, ProductSigns, packed
+from .product_signs import WORD, ProductSigns, packed, unpacked
 
 # Points that are asked about at once.
 POINTS = WORD
@@ -177,8 +178,8 @@ class Silhouettes:
             np.bitwise_or.at(counts, self._single_of_face, among[self._single_faces])
             alone = alone & counts
         n = len(sides.local)
-        owners, edges = _unpacked(words, n)
-        more, singles = _unpacked(alone, n)
+        owners, edges = unpacked(words, n)
+        more, singles = unpacked(alone, n)
         ends = np.concatenate([self._ends[edges], self._single_ends[singles]])
         owners = np.concatenate([owners, more])
         # Column by column: rows of three are too short for numpy's loops.
@@ -214,14 +215,16 @@ class Silhouettes:
         """
         local = sides.local
         close = sides.close if among is None else sides.close & among
-        owner, face = _unpacked(close, len(local))
+        owner, face = unpacked(close, len(local))
         other = face != faces[owner]
         face, owner = face[other], owner[other]
         # In the plane of a face, a circle about it leaves few to be looked at.
         away = np.linalg.norm(self._centroids[face] - local[owner], axis=1)
         close = away <= self._radii[face] + reach
         face, owner = face[close], owner[close]
-        near = _distances(local[owner], self._vertices[self._faces[face]]) <= reach
+        near = (
+            triangle_distances(local[owner], self._vertices[self._faces[face]]) <= reach
+        )
         face, owner = face[near], owner[near]
         own = faces[owner]
         normals = self._normals
@@ -232,25 +235,6 @@ class Silhouettes:
         found = np.zeros(len(local), dtype=bool)
         found[owner[~even]] = True
         return found
-
-
-def _distances(points: Array, corners: Array) -> Array:
-    """Return the distance of each point from its triangle, shape (n,)."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1)
-    normals /= np.where(length > 0, length, 1.0)[:, None]
-    height = np.einsum("ij,ij->i", points - corners[:, 0], normals)
-    over = length > 0
-    best = np.full(len(points), np.inf)
-    for k in range(3):
-        start, end = corners[:, k], corners[:, (k + 1) % 3]
-        along, off = end - start, points - start
-        square = np.einsum("ij,ij->i", along, along)
-        share = np.einsum("ij,ij->i", off, along) / np.where(square > 0, square, 1.0)
-        foot = np.clip(share, 0.0, 1.0)[:, None] * along
-        best = np.minimum(best, np.linalg.norm(off - foot, axis=1))
-        over &= np.einsum("ij,ij->i", np.cross(along, off), normals) >= 0.0
-    return np.where(over, np.minimum(best, np.abs(height)), best)
 
 
 def _may_cross(begin: Array, end: Array, axes: Array, half_angle: float) -> Mask:
@@ -264,17 +248,6 @@ def _may_cross(begin: Array, end: Array, axes: Array, half_angle: float) -> Mask
     spread = np.arcsin(np.where(around, 0.0, size) / apart)
     off = np.arccos(np.clip(cosine, -1.0, 1.0))
     return around | (off - spread <= half_angle + _ANGLE)
-
-
-def _unpacked(words: Words, n: int) -> tuple[Ints, Ints]:
-    """Return the rows and columns of the bits that are set."""
-    some = np.flatnonzero(words)
-    bits = np.unpackbits(
-        words[some].view(np.uint8).reshape(-1, 8), axis=1, count=n, bitorder="little"
-    )
-    # Numpy finds what isn't zero in one dimension five times as fast as in two.
-    column, row = np.divmod(np.flatnonzero(bits.view(np.bool_)), max(n, 1))
-    return row, some[column]
 
 
 def _runs_along(faces: Ints, ends: Ints) -> Mask:

@@ -66,12 +66,7 @@ def ply_surface(elements: dict[str, PlyElement]) -> tuple[Array, PlyLists]:
 
 
 class _Cursor:
-    """Takes the rows of one element after the other.
-
-    Text is words, wrapped anyhow; as numbers it is read like binary data in which
-    everything is a float64. Lists are tried at the lengths that those of the first row
-    have, all rows at once; where they differ, row by row.
-    """
+    """Takes the rows of one element after the other; text as if it were float64."""
 
     def __init__(self, body: bytes, order: str) -> None:
         self._order = order

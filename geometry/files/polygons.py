@@ -74,11 +74,7 @@ def cut_polygons(points: Array, sizes: Ints, corners: Ints) -> tuple[Ints, Ints]
 
 
 def _twins_alike(points: Array, outline: Ints) -> Ints:
-    """Let polygons (n, k) with the same corners begin at the same one.
-
-    Else a polygon that is stored twice is cut along other diagonals the second time,
-    and its triangles aren't known as doubles.
-    """
+    """Let polygons (n, k) stored twice begin at one corner, to be cut alike."""
     used, index = np.unique(outline, return_inverse=True)
     place = np.unique(points[used], axis=0, return_inverse=True)[1]
     at = place.ravel()[index.reshape(outline.shape)]

@@ -109,11 +109,7 @@ def usable_mesh(
 
 
 def _without_far(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints, tuple[Repair, ...]]:
-    """Drop fragments so far away that rays at the object would lose their precision.
-
-    Returns:
-        What is left, which of the faces these were, and the repair.
-    """
+    """Drop what is too far for precise rays: what is left, of which faces, repairs."""
     vertices, faces = mesh.vertices, mesh.faces
     far = np.linalg.norm(vertices - mesh.centre, axis=1) > _FAR * mesh.radius
     near = np.flatnonzero(~far[faces].any(axis=1))

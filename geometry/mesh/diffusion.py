@@ -100,11 +100,8 @@ def diffused(values: Array, mass: Array, laplacian: csr_array, length: float) ->
 
 
 def _conjugate_gradients(system: csr_array, rest: Array) -> Array:
-    """Return x of A x = b, shape (n, m), up to the tolerance; b is used up.
-
-    Goes through the rows in blocks that stay in the cache, on all cores: the time goes
-    into memory. Sums are taken block by block, so that no digit depends on the cores.
-    """
+    """Return x of A x = b, shape (n, m), up to the tolerance; b is used up."""
+    # In blocks that stay in the cache, whose sums don't depend on the cores.
     n, m = rest.shape
     rows = max(1, _BLOCK // m)
     parts = [slice(i, min(i + rows, n)) for i in range(0, n, rows)]

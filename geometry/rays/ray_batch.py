@@ -151,10 +151,7 @@ class RayBatch:
     def _aim(
         self, start: Single, rise: Single, fresh: slice, source: Source, back: float
     ) -> None:
-        """Make rays of points and what they climb (at most 0), in place.
-
-        Every step is elementwise, so a ray depends on its sample and device only.
-        """
+        """Make rays of points and what they climb (at most 0), elementwise in place."""
         ray = self._along[fresh]
         if source.along is None:
             # All rays shrink towards their samples by one factor. Starts then lie in a

@@ -65,10 +65,7 @@ def dominant_faces(
 
 
 def _on_main_bodies(mesh: TriangleMesh, least: float) -> Mask:
-    """Faces of bodies that are large enough to hold a region, shape (n_f,).
-
-    A fragment is curved more than anything, and would take up the share.
-    """
+    """Faces of bodies that can hold a region: a fragment would take up the share."""
     count, label = components(mesh.edges.ends, len(mesh.vertices))
     body = label[mesh.faces[:, 0]]
     return np.bincount(body, mesh.face_areas, count)[body] >= least

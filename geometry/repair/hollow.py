@@ -63,13 +63,7 @@ class MeshShell:
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
-    """What is known of each spot.
-
-    Attributes:
-        openness: Share of the cosine-weighted hemisphere that is free, shape (n,).
-        wall: Thickness of the material below in [m], inf where there is none, (n,).
-        inside: Shape (n,).
-    """
+    """Of each spot: free share of the hemisphere, wall below in [m], whether inside."""
 
     openness: Array
     wall: Array

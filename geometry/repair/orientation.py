@@ -100,12 +100,7 @@ def _consistent(mesh: TriangleMesh) -> tuple[Ints, Ints]:
 
 
 def _closed_patches(mesh: TriangleMesh, patch: Ints) -> tuple[Mask, Mask]:
-    """Whether each patch bounds a volume, and which edges two faces run alike.
-
-    A patch does if it meets each of its edges an even number of times, as often
-    one way as the other. Where no winding is consistent (Moebius, Klein), some edge
-    between two faces is run twice the same way.
-    """
+    """Whether each patch bounds a volume, and which edges two faces run alike."""
     edges = mesh.edges
     alike = _alike(mesh.faces, edges)
     n = int(patch.max()) + 1
@@ -115,6 +110,7 @@ def _closed_patches(mesh: TriangleMesh, patch: Ints) -> tuple[Mask, Mask]:
     key = edges.of_face.ravel()[other] * n + patch[other // 3]
     key, counts = np.unique(key, return_counts=True)
     closed[key[counts % 2 == 1] % n] = False
+    # Where no winding is consistent (Moebius, Klein), two faces run an edge alike.
     closed[patch[alike[edges.of_face].any(axis=1)]] = False
     return closed, alike
 

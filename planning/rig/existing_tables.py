@@ -1,12 +1,19 @@
-"""The schema of `[[existing]]`: devices that stand already and stay where they are."""
+"""Existing devices, `[[existing]]`: as a rig file writes them, and in the world."""
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from planning.model.bodies import BodyTable
+from geometry.devices import DeviceModel
+from planning.model.bodies import Body, BodyTable
+from planning.model.device_poses import rounded_pose
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.requirements import Existing, Requirements, Workspace
 from planning.model.table_types import Axis, Name, Table
+from planning.scene.workspace.offered_poses import aimed_poses
 
 _Row = Annotated[list[float], Field(min_length=4, max_length=4)]
 _Rows = Annotated[list[_Row], Field(min_length=4, max_length=4)]
@@ -67,3 +74,70 @@ class ExistingTable(Table):
         """Return plain values as written; without a body of its own no key for it."""
         document = self.model_dump(mode="json")
         return {key: v for key, v in document.items() if key != "body" or v}
+
+    def pose(self, workspace: Workspace, device: DeviceModel) -> NDArray[np.float64]:
+        """Return ``world_from_device`` of the rig's model about the workspace's centre.
+
+        Shape (4, 4), its last column in metres.
+        """
+        centre = np.array(workspace.centre)
+        if self.pose_mm is not None:
+            pose = np.array(self.pose_mm)
+            # The rotation next to what was typed.
+            u, _, vt = np.linalg.svd(pose[:3, :3])
+            pose[:3, :3] = u @ vt
+            pose[:3, 3] = centre + 1e-3 * pose[:3, 3]
+            return pose
+        position = centre + 1e-3 * np.array(self.position_mm)
+        aim = centre + 1e-3 * np.array(self.aim_mm)
+        up, roll = np.array(workspace.up), float(np.radians(self.roll_deg))
+        return aimed_poses(position[None], aim, up, device, roll=roll)[0]
+
+
+def build_existing(
+    tables: Sequence[ExistingTable],
+    workspace: Workspace,
+    devices: Mapping[str, tuple[DeviceModel, Body | None]],
+) -> tuple[Existing, ...]:
+    """Return the devices of `[[existing]]` in the world, as the plan will hold them.
+
+    Args:
+        tables: As written.
+        workspace: Its centre is where their places count from.
+        devices: The rig's model of each kind, and its body.
+    """
+    existing: list[Existing] = []
+    for table in tables:
+        device, body = devices[table.kind]
+        pose = rounded_pose(table.pose(workspace, device))
+        rows = tuple(tuple(row) for row in pose.tolist())
+        body = Body.of(table.body) or body
+        existing.append(Existing(table.name, table.kind, rows, body))
+    return tuple(existing)
+
+
+def check_existing(required: Requirements) -> None:
+    """Refuse more existing devices than are allowed, and two where one can stand.
+
+    Raises:
+        InfeasibleLimitsError: It names the limit, both numbers and what to do.
+    """
+    for kind, most in (
+        ("projector", required.max_projectors),
+        ("camera", required.max_cameras),
+    ):
+        n = len(required.existing_of(kind))
+        if most is not None and n > most:
+            raise InfeasibleLimitsError(
+                f"max_{kind}s = {most} is less than the {n} {kind}s of [[existing]], "
+                f"which stay; raise --max-{kind}s or take one out of the rig file"
+            )
+        places: dict[tuple[float, ...], str] = {}
+        for device in required.existing_of(kind):
+            place = tuple(row[3] for row in device.world_from_device[:3])
+            if place in places:
+                raise InfeasibleLimitsError(
+                    f"existing {kind}s {places[place]!r} and {device.name!r} stand at "
+                    f"the same place; take one out of the rig file or correct it"
+                )
+            places[place] = device.name

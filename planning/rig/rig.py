@@ -20,8 +20,8 @@ from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements
 
 from . import optics
+from .existing_tables import build_existing, check_existing
 from .rig_devices import device_document, parallel_device, pinhole_device
-from .rig_existing import build_existing, check_existing
 from .rig_files import Figure, Preset, list_presets, read_rig
 from .rig_requirements import build_requirements
 from .rig_tables import ParallelTable, PinholeTable, RigTable
@@ -227,13 +227,11 @@ class Rig:
                 not camera.holds_ball(object_radius_m, middle_m),
             ),
         )
-        tables = self.table.existing
-        existing = build_existing(tables, required.workspace, projector, camera)
-        bodies = {"projector": self.projector_body(), "camera": self.camera_body()}
-        existing = tuple(
-            replace(device, body=device.body or bodies[device.kind])
-            for device in existing
-        )
+        devices = {
+            "projector": (projector, self.projector_body()),
+            "camera": (camera, self.camera_body()),
+        }
+        existing = build_existing(self.table.existing, required.workspace, devices)
         required = replace(required, existing=existing)
         check_existing(required)
         return required

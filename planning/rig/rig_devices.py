@@ -94,8 +94,7 @@ def _focal_px(table: PinholeTable) -> tuple[float, float]:
     if table.throw_ratio is not None:
         f = table.throw_ratio * table.resolution_px[0]
     else:
-        focal_m, pixel_m = cast(float, table.focal_mm) * 1e-3, _pixel_m(table)
-        f = focal_m / pixel_m
+        f = cast(float, table.focal_mm) * 1e-3 / _pixel_m(table)
     return f, f
 
 

@@ -120,9 +120,7 @@ def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
 
 def _lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     replaced = {key for key in given if not isinstance(given[key], dict)}
-    for group in _SAME:
-        if replaced & set(group):
-            replaced |= set(group)
+    replaced |= {key for group in _SAME if replaced & set(group) for key in group}
     device = {key: value for key, value in base.items() if key not in replaced}
     focus = given.get("focus")
     if isinstance(focus, dict):
@@ -189,14 +187,13 @@ def _preset(name: str) -> Preset:
 
 
 def _faults(where: str, error: ValidationError) -> list[str]:
-    return [
-        f"{where}: {_fault(tuple(entry['loc']), entry)}"
-        for entry in error.errors(include_url=False)
-    ]
+    entries = error.errors(include_url=False)
+    return [f"{where}: {_fault(entry)}" for entry in entries]
 
 
-def _fault(loc: tuple[int | str, ...], entry: ErrorDetails) -> str:
-    kind, message, path = entry["type"], entry["msg"], _dotted(loc)
+def _fault(entry: ErrorDetails) -> str:
+    kind, message, loc = entry["type"], entry["msg"], entry["loc"]
+    path = _dotted(loc)
     if kind == "missing":
         return f"`{path}` is missing; write it"
     if kind == "extra_forbidden":

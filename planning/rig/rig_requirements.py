@@ -19,20 +19,15 @@ from planning.model.requirements import (
 )
 from planning.scene.workspace.zone_conflicts import check_zones
 
-from .rig_tables import LimitsTable, RigTable
+from .rig_tables import LimitsTable, RequirementsTable, RigTable
 from .wishes import Wishes
-from .zone_tables import build_zones
 
 Overflowing = tuple[bool, bool]
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
-UP_VECTORS: dict[str, tuple[float, float, float]] = {
-    "x": (1.0, 0.0, 0.0),
-    "y": (0.0, 1.0, 0.0),
-    "z": (0.0, 0.0, 1.0),
-    "-x": (-1.0, 0.0, 0.0),
-    "-y": (0.0, -1.0, 0.0),
-    "-z": (0.0, 0.0, -1.0),
+_UP_VECTORS = {
+    **{"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
+    **{"-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0)},
 }
 
 
@@ -59,9 +54,10 @@ def build_requirements(
     target = wishes.target or "dominant"
     _check_choice("target", target, ("dominant", "surface"))
     _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
-    _check_count("max_projectors", wishes.max_projectors)
-    if wishes.max_cameras is not None:
-        _check_count("max_cameras", wishes.max_cameras)
+    for name in ("max_projectors", "max_cameras"):
+        most = getattr(wishes, name)
+        if most is not None and not most >= 1:
+            raise InputError(f"{name} = {most} must be 1 or more")
     _check_positive("tau_m", tau_m)
     workspace = build_workspace(
         table,
@@ -78,13 +74,9 @@ def build_requirements(
     return Requirements(
         max_projectors=wishes.max_projectors,
         max_cameras=wishes.max_cameras,
-        coverage=_share("coverage", wishes.coverage, shares.coverage),
-        dominant_coverage=_share(
-            "dominant_coverage", wishes.dominant_coverage, shares.dominant_coverage
-        ),
-        min_reachable=_share(
-            "min_reachable", wishes.min_reachable, shares.min_reachable
-        ),
+        coverage=_share("coverage", wishes, shares),
+        dominant_coverage=_share("dominant_coverage", wishes, shares),
+        min_reachable=_share("min_reachable", wishes, shares),
         target=target,
         pattern=wishes.pattern,
         projector=_limits_of(ProjectorLimits, table.limits, "projector_"),
@@ -122,8 +114,8 @@ def build_workspace(
     """
     _check_positive("object_radius_m", object_radius_m)
     placement, spec = table.placement, table.workspace
-    _check_choice("up", up or spec.up, tuple(UP_VECTORS))
-    up_vector = UP_VECTORS[up or spec.up]
+    _check_choice("up", up or spec.up, tuple(_UP_VECTORS))
+    up_vector = _UP_VECTORS[up or spec.up]
     axis = np.array(spec.axis or up_vector, dtype=np.float64)
     axis /= np.linalg.norm(axis)
     standoff = placement.standoff_mm * 1e-3
@@ -147,7 +139,7 @@ def build_workspace(
         reference_ring_radius=reference_ring_radius,
         projector_standoff_m=standoff if overflowing[0] else None,
         camera_standoff_m=standoff if overflowing[1] else None,
-        **build_zones(spec, up_vector),
+        **spec.zones(up_vector),
     )
     _check_floor(workspace)
     check_zones(workspace)
@@ -171,13 +163,7 @@ def _check_floor(workspace: Workspace) -> None:
 
 
 def _limits_of(kind: type[_Limits], table: LimitsTable, device: str = "") -> _Limits:
-    """Return limits by their names: `x_m` is `x_mm` of the table, an angle `x_deg`.
-
-    Args:
-        kind: Which limits.
-        table: As written.
-        device: What a key of the table may begin with.
-    """
+    """Return limits by their names: `x_m` is `x_mm` of the table, an angle `x_deg`."""
     written = table.model_dump()
     values: dict[str, Any] = {}
     for field in fields(kind):
@@ -221,18 +207,15 @@ def _check_choice(name: str, value: str, known: tuple[str, ...]) -> None:
         raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}")
 
 
-def _check_count(name: str, value: int) -> None:
-    if not value >= 1:
-        raise InputError(f"{name} = {value} must be 1 or more")
-
-
 def _check_positive(name: str, value: float) -> None:
     if not 0.0 < value < math.inf:
         raise InputError(f"{name} = {value} must be positive and finite")
 
 
-def _share(name: str, value: float | None, default: float) -> float:
-    share = default if value is None else float(value)
+def _share(name: str, wishes: Wishes, table: RequirementsTable) -> float:
+    """Return a share that is asked for, else the rig's."""
+    asked = getattr(wishes, name)
+    share = float(getattr(table, name) if asked is None else asked)
     if not 0.0 < share <= 1.0:
         raise InputError(f"{name} = {share} must be a share, over 0 and at most 1")
     return share

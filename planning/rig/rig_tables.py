@@ -21,7 +21,7 @@ from planning.model.table_types import (
 )
 
 from .existing_tables import ExistingTable
-from .workspace_tables import WorkspaceTable
+from .workspace_tables import WorkspaceTable, check_names
 
 # Far beyond any device, and any table of poses and samples that memory holds.
 MOST_PIXELS, MOST_POSES = 100_000, 100_000
@@ -94,7 +94,7 @@ class PinholeTable(SourcedTable):
     focus: FocusTable | None = None
 
     @model_validator(mode="after")
-    def _check_focal(self) -> Self:
+    def _check_figures(self) -> Self:
         ways = ("focal_px", "focal_mm", "throw_ratio")
         given = [name for name in ways if getattr(self, name) is not None]
         if len(given) != 1:
@@ -104,22 +104,11 @@ class PinholeTable(SourcedTable):
             )
         if self.pixel_um is None and (self.focal_mm is not None or self.focus):
             raise ValueError("needs pixel_um beside focal_mm or [focus]; write it")
-        return self
-
-    @model_validator(mode="after")
-    def _check_principal_point(self) -> Self:
-        if (
-            self.principal_point_px is not None
-            and self.vertical_offset_percent is not None
-        ):
+        if None not in (self.principal_point_px, self.vertical_offset_percent):
             raise ValueError(
                 "has principal_point_px and vertical_offset_percent, which say the "
                 "same; keep one"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _check_range(self) -> Self:
         if self.range_mm is None and self.focus is None:
             raise ValueError("needs range_mm or [focus], the distances that are sharp")
         _check_rising(self.range_mm)
@@ -206,21 +195,17 @@ class LimitsTable(Table):
     max_angle_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = None
 
     @model_validator(mode="after")
-    def _check_tangent(self) -> Self:
-        """The tangent limit must bind, formulation section 2."""
-        rest = 90.0 - self.projector_max_incidence_deg
-        if "min_tangent_angle_deg" in self.model_fields_set:
-            if 0.0 < self.min_tangent_angle_deg <= rest:
-                raise ValueError(
-                    f"min_tangent_angle_deg = {self.min_tangent_angle_deg:g} never "
-                    f"binds: the angle between light and tangent is always at least "
-                    f"90 - projector_max_incidence_deg = {rest:g}; raise it above "
-                    f"{rest:g}, or remove it"
-                )
-        return self
-
-    @model_validator(mode="after")
     def _check_angles(self) -> Self:
+        # The tangent limit must bind, formulation section 2.
+        least = 90.0 - self.projector_max_incidence_deg
+        written = "min_tangent_angle_deg" in self.model_fields_set
+        if written and 0.0 < self.min_tangent_angle_deg <= least:
+            raise ValueError(
+                f"min_tangent_angle_deg = {self.min_tangent_angle_deg:g} never binds: "
+                f"the angle between light and tangent is always at least 90 - "
+                f"projector_max_incidence_deg = {least:g}; raise it above {least:g}, "
+                f"or remove it"
+            )
         low, high = self.min_angle_deg, self.max_angle_deg
         if low is not None and high is not None and not low < high:
             raise ValueError(
@@ -266,8 +251,5 @@ class RigTable(Table):
 
     @model_validator(mode="after")
     def _check_existing(self) -> Self:
-        names = [device.name for device in self.existing]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"existing names {name!r} twice; name them apart")
+        check_names("existing", [device.name for device in self.existing])
         return self

@@ -4,18 +4,21 @@ Lengths are in millimetres and places are relative to the object's centre, in th
 of the mesh file.
 """
 
-from collections.abc import Iterable
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
 
+from planning.model.bodies import Axes, Box, Triple
 from planning.model.table_types import Axis, Name, PositivePair, Sides, Table, UpName
 
 # Cosine above which two directions span no plane.
 _PARALLEL = 1.0 - 1e-9
-# Length below which a vector is no direction.
+# Length below which a vector is no direction, and a cross product no level line.
 _NO_DIRECTION = 1e-9
+_IDENTITY: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class KeepOutTable(Table):
@@ -32,6 +35,12 @@ class KeepOutTable(Table):
     centre_mm: Axis
     size_mm: Sides
     turn_deg: Axis = Field(default=[0.0, 0.0, 0.0])
+
+    def box(self) -> Box:
+        """Return the box in metres."""
+        # Lower-case letters turn about the fixed axes, in this order.
+        turn = Rotation.from_euler("xyz", self.turn_deg, degrees=True).as_matrix()
+        return _box(self.name, self.centre_mm, self.size_mm, _rows(turn.T))
 
 
 class MountingTable(Table):
@@ -69,6 +78,16 @@ class MountingTable(Table):
                     f"{self.normal}; write one that lies in the plane"
                 )
         return self
+
+    def box(self, up: Triple) -> Box:
+        """Return the admissible positions as a box in metres, thin along its z."""
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        first = np.array(self.along or _level(normal, np.array(up)))
+        first = first - (first @ normal) * normal
+        first /= np.linalg.norm(first)
+        axes = np.stack([first, np.cross(normal, first), normal])
+        sizes = [*self.extent_mm, self.thickness_mm]
+        return _box(self.name, self.centre_mm, sizes, _rows(axes))
 
 
 class WorkspaceTable(Table):
@@ -113,8 +132,7 @@ class WorkspaceTable(Table):
     @model_validator(mode="after")
     def _check_names(self) -> Self:
         for key, tables in (("keep_out", self.keep_out), ("mounting", self.mounting)):
-            if (name := _repeated(table.name for table in tables)) is not None:
-                raise ValueError(f"{key} names {name!r} twice; name them apart")
+            check_names(key, [table.name for table in tables])
         return self
 
     def to_document(self) -> dict[str, Any]:
@@ -123,11 +141,50 @@ class WorkspaceTable(Table):
         zones = ("min_mm", "max_mm", "keep_out", "mounting")
         return {key: v for key, v in document.items() if v or key not in zones}
 
+    def zones(self, up: Triple) -> dict[str, Any]:
+        """Return `box`, `keep_out` and `mounting` of `Workspace`, in metres.
 
-def _repeated(names: Iterable[str]) -> str | None:
-    seen: set[str] = set()
+        Args:
+            up: Unit vector that points up, for planes that don't say where they run.
+        """
+        room = None
+        if self.min_mm is not None and self.max_mm is not None:
+            low, high = np.array(self.min_mm), np.array(self.max_mm)
+            room = _box("box", 0.5 * (low + high), high - low, _IDENTITY)
+        return {
+            "box": room,
+            "keep_out": tuple(zone.box() for zone in self.keep_out),
+            "mounting": tuple(plane.box(up) for plane in self.mounting),
+        }
+
+
+def check_names(key: str, names: list[str]) -> None:
+    """Refuse tables of one name.
+
+    Raises:
+        ValueError: It names the first that comes twice.
+    """
     for name in names:
-        if name in seen:
-            return name
-        seen.add(name)
-    return None
+        if names.count(name) > 1:
+            raise ValueError(f"{key} names {name!r} twice; name them apart")
+
+
+def _box(name: str, centre_mm: ArrayLike, size_mm: ArrayLike, axes: Axes) -> Box:
+    centre, half = (
+        cast(Triple, tuple((factor * np.array(mm)).tolist()))
+        for factor, mm in ((1e-3, centre_mm), (1e-3 * 0.5, size_mm))
+    )
+    return Box(name, centre, half, axes)
+
+
+def _level(normal: NDArray[np.float64], up: NDArray[np.float64]) -> list[float]:
+    """A level direction in a plane; where the plane is level, x, or y if up is x."""
+    level = np.cross(up, normal)
+    if np.linalg.norm(level) > _NO_DIRECTION:
+        return level.tolist()
+    return [0.0, 1.0, 0.0] if up[0] else [1.0, 0.0, 0.0]
+
+
+def _rows(axes: NDArray[np.float64]) -> Axes:
+    # Sines of right angles are zero but for rounding; a plan should say so.
+    return cast(Axes, tuple(tuple(row) for row in (np.round(axes, 15) + 0.0).tolist()))

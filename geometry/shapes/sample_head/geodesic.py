@@ -89,11 +89,7 @@ def geodesic_grid(frequency: int) -> GeodesicGrid:
 
 
 def _shared_points(triangles: Ints, steps: Ints, n: int) -> tuple[Ints, Ints]:
-    """Number of each face's points with shared ones merged, and where each is first.
-
-    Points are told apart by whole numbers, never by nearness: the sorted corners that
-    a point lies between, with their integer weights.
-    """
+    """Number of each face's points by whole-numbered names, and where each is first."""
     weights = np.broadcast_to(steps, (20, *steps.shape))
     names = np.broadcast_to(triangles[:, None, :], weights.shape)
     base = 13 * (n + 1)

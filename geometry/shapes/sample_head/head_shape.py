@@ -9,10 +9,7 @@ from geometry.mesh.mesh import MeshError
 
 
 def _length(default: float, least: float, largest: float, deviation: float) -> float:
-    """A proportion in [mm]: at which it stays a head, and its spread among adults.
-
-    Spreads are rounded from anthropometric surveys.
-    """
+    """A proportion in [mm]: where it is a head's, and its spread as surveys have it."""
     spread = {"limits": (least, largest), "deviation": deviation}
     return field(default=default, metadata=spread)
 

@@ -115,11 +115,7 @@ def _even_directions(shape: HeadShape, grid: GeodesicGrid) -> tuple[Array, Array
 
 
 def _relax(shape: HeadShape, grid: GeodesicGrid) -> tuple[Array, Array]:
-    """Move every vertex along the surface towards where its faces' area is.
-
-    Each step puts a vertex at the mean of the centroids of its faces, weighted by their
-    areas, and follows its ray back to the surface by one Newton step.
-    """
+    """Move vertices to where their faces' area is, then back to the surface."""
     directions = grid.directions + _CROWDING
     directions = directions / _length(directions)[:, None]
     radii = _surface_radii(shape, directions, None)
