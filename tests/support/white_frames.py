@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.verify.reconstruction.render.canvas import ImageCanvas
 from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.render import ImageCanvas
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import RenderedView
 

@@ -12,11 +12,11 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from planning.verify.reconstruction.defocus import Defocus, defocus_of
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_pair
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
+from planning.verify.reconstruction.scanner import Defocus, defocus_of
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
 LENS = Defocus(focus_m=1.2, aperture_m=0.012)

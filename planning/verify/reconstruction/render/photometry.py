@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array, Grey, Images
-from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.scanner import Defocus
 
 _WAVELENGTHS_M = (0.009, 0.017, 0.031)
 # Rows that are blurred at a time: what is between both passes stays in the cache.

@@ -8,8 +8,8 @@ from scipy.special import ndtr
 from geometry.rays.rays import CHUNK, equal_parts
 from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
 from planning.verify.reconstruction.calibration import ProjectorCalibration
-from planning.verify.reconstruction.defocus import Defocus
 from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
+from planning.verify.reconstruction.scanner import Defocus
 
 from .occluders import Occluder
 from .view import RenderedView
