@@ -130,8 +130,8 @@ def measured_area(
     among = scene.among((*projectors, *cameras))
 
     def measured(target: Target) -> NDArray[np.bool_]:
-        rows = lit_samples(among, projectors, target)
-        return _any(measured_by(among, cameras, rows))
+        samples = lit_samples(among, projectors, target)
+        return _any(measured_by(among, cameras, samples))
 
     return _union(scene, measured)
 
@@ -169,11 +169,11 @@ def _areas(
     # Another camera needn't stand among those that were chosen.
     among = scene.among(devices.projectors)
     for camera in devices.reference_cameras:
-        left = np.flatnonzero(_any(lit) & ~by_cameras)
-        if not len(left):
+        pending = np.flatnonzero(_any(lit) & ~by_cameras)
+        if not len(pending):
             break
-        rows = LitSamples.of(devices.projectors, target.take(left), lit[left])
-        by_cameras[left] = measured_by(among, [camera], rows)[:, 0]
+        samples = LitSamples.of(devices.projectors, target.take(pending), lit[pending])
+        by_cameras[pending] = measured_by(among, [camera], samples)[:, 0]
     return Areas(
         area_m2=weight * len(target),
         reachable_by_projectors_m2=weight * int(reachable.sum()),
@@ -204,23 +204,23 @@ def _reachable_by_projectors(
     reachable = lit.copy()
     furthest = np.zeros(len(target), dtype=np.int8)
     for projector in devices.reference_projectors:
-        left = np.flatnonzero(~reachable)
-        if not len(left):
+        pending = np.flatnonzero(~reachable)
+        if not len(pending):
             break
-        rest = target.take(left)
+        dark = target.take(pending)
         # What shows its back comes no further than it did before.
-        idle = furthest[left] >= INCIDENCE
-        idle &= lighting.shows_back(projector, rest)
-        left, rest = left[~idle], rest.take(~idle)
+        idle = furthest[pending] >= INCIDENCE
+        idle &= lighting.shows_back(projector, dark)
+        pending, dark = pending[~idle], dark.take(~idle)
         stage = lighting.first_failure(
             projector,
-            rest,
+            dark,
             scene.requirements.projector,
             scene.visibility,
             bodies=scene.bodies,
         )
-        reachable[left] = stage == LIT
-        furthest[left] = np.maximum(furthest[left], stage)
+        reachable[pending] = stage == LIT
+        furthest[pending] = np.maximum(furthest[pending], stage)
     return reachable, furthest
 
 
@@ -245,9 +245,9 @@ def _uncovered(
     lit = stages == LIT
     dark = ~_any(lit)
     causes = [projector_limits.CAUSES[stage] for stage in stages[dark].max(axis=1)]
-    left = np.flatnonzero(_any(lit) & ~measured)
-    rows = LitSamples.of(devices.projectors, target.take(left), lit[left])
-    furthest = furthest_failure(scene, devices.cameras, rows)
+    pending = np.flatnonzero(_any(lit) & ~measured)
+    samples = LitSamples.of(devices.projectors, target.take(pending), lit[pending])
+    furthest = furthest_failure(scene, devices.cameras, samples)
     return causes + [pair_limits.CAUSES[stage] for stage in furthest]
 
 
@@ -263,17 +263,17 @@ def _blocked_by_body(
         return {}
     stopped = np.zeros((len(target), len(scene.bodies)), dtype=bool)
 
-    def note(device: Device, rows: NDArray[np.int64]) -> None:
-        points = target.samples.points[rows]
-        stopped[rows] |= blocked_by(scene.bodies, device, points)
+    def note(device: Device, samples: NDArray[np.int64]) -> None:
+        points = target.samples.points[samples]
+        stopped[samples] |= blocked_by(scene.bodies, device, points)
 
     for p, projector in enumerate(devices.projectors):
         dark = stages[:, p] == projector_limits.BLOCKED
         note(projector, np.flatnonzero(~measured & dark))
-    left = np.flatnonzero(~measured & _any(stages == LIT))
+    pending = np.flatnonzero(~measured & _any(stages == LIT))
     for camera in devices.cameras:
-        stage = view_of(scene, camera, target.take(left)).first_violated
-        note(camera, left[stage == camera_limits.BLOCKED])
+        stage = view_of(scene, camera, target.take(pending)).first_violated
+        note(camera, pending[stage == camera_limits.BLOCKED])
     areas = target.samples.weight * stopped.sum(axis=0)
     every = (*devices.projectors, *devices.cameras)
     return {

@@ -26,7 +26,7 @@ from planning.report.advice.camera_relaxations import (
 )
 from planning.report.advice.demands import Demands, demands
 from planning.report.advice.least_changes import Share
-from planning.report.advice.rig_facts import relaxations_of_cameras as ways
+from planning.report.advice.least_changes import relaxations_of_cameras as ways
 from planning.report.claims import Devices, make_claims
 from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
@@ -138,9 +138,9 @@ def asked_and_checked(name, knob, scene, rows, cameras):
     for camera in cameras:
         found = demands(scene, camera, rows, (knob,))
         now = measured_by(scene, [camera], rows)[:, 0]
-        assert np.array_equal(np.isneginf(found.asked[0]), now)
+        assert np.array_equal(np.isneginf(found.demanded[0]), now)
         assert np.array_equal(found.furthest == MEASURED, now)
-        asks = found.asked[0][np.isfinite(found.asked[0])]
+        asks = found.demanded[0][np.isfinite(found.demanded[0])]
         for value in np.unique(np.quantile(asks, [0.1, 0.5, 0.9])) if len(asks) else ():
             value = asks[np.argmin(np.abs(asks - value))]
             rest = 1e-7 * abs(value)
@@ -151,10 +151,10 @@ def asked_and_checked(name, knob, scene, rows, cameras):
                     turned_to(name, value - rest, scene, rows, camera),
                 )
             )
-            exact = found.asked[0] == value
+            exact = found.demanded[0] == value
             assert least[exact].all()
             assert not under[exact].any()
-            assert np.array_equal(least, found.asked[0] <= value)
+            assert np.array_equal(least, found.demanded[0] <= value)
             helped += int(exact.sum())
     return helped
 
@@ -230,12 +230,12 @@ def test_an_image_asks_for_the_angle_off_its_middle(rig, world):
     (knob,) = (k for k in ways(rig, scene.requirements) if "off its middle" in k.say(1))
     camera = cameras[2]
     found = demands(scene, camera, rows, (knob,))
-    helped = np.isfinite(found.asked[0])
+    helped = np.isfinite(found.demanded[0])
     assert helped.any()
     pose = camera.world_from_device
     ray = rows.target.samples.points[helped] - pose[:3, 3]
     cosine = ray @ pose[:3, 2] / np.linalg.norm(ray, axis=1)
-    assert found.asked[0][helped] == pytest.approx(np.degrees(np.arccos(cosine)))
+    assert found.demanded[0][helped] == pytest.approx(np.degrees(np.arccos(cosine)))
     assert set(found.furthest[helped]) == {CAUSES.index("camera_field")}
 
 
@@ -266,7 +266,7 @@ def test_two_limits_that_forbid_a_sample_are_helped_by_neither(rig, world):
         triangulation={"min_conditioning": 1.0},
     )
     found = demands(none, cameras[0], rows, ways(rig, required))
-    assert np.all(np.isposinf(found.asked))
+    assert np.all(np.isposinf(found.demanded))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -280,7 +280,7 @@ def test_the_least_value_with_which_so_many_are_enough_is_that_of_every_choice(s
 
     class Two(camera_relaxations._Covers):
         def enough(self, value):
-            seen = self.asked <= value
+            seen = self.demanded <= value
             need = 0.9 * seen.any(axis=1).sum()
             most = max(
                 seen[:, list(pair)].any(axis=1).sum()
@@ -391,7 +391,7 @@ def test_a_limit_gives_way_as_far_as_the_share_asks_or_as_it_helps(rig, monkeypa
     monkeypatch.setattr(camera_relaxations, "taken", lambda rows, *_: rows)
     (knob,) = ways(rig, _requirements())[:1]
     table = camera_relaxations._Least((knob,), 20)
-    table.add(scene=None, camera=None, rows=SimpleNamespace(lit=None))
+    table.add(scene=None, camera=None, samples=SimpleNamespace(lit=None))
     for least, degrees, gained in ((0.35, 5, 5), (0.9, 10, 10), (0.1, None, None)):
         changes = table.least_changes(Share(20, 2, least))
         want = {} if degrees is None else {knob.say(degrees): gained}

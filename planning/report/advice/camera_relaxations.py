@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from planning.cameras.camera_cover import CameraStage, NothingMeasuredError, n_fixed
 from planning.model.planned import PlannedCamera
 from planning.proofs.selection import required_samples
+from planning.report.advice.least_changes import relaxations_of_cameras
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
@@ -30,7 +31,6 @@ from planning.scene.workspace.candidates import camera_candidates
 
 from .demands import demands
 from .least_changes import Share, covers_enough, least_changes
-from .rig_facts import relaxations_of_cameras
 
 # What covers cover beyond the requirement, so that fresh samples confirm it.
 _SPARE = 0.003
@@ -67,15 +67,15 @@ def out_of_reach(
         lit_stages(planned, devices.projectors, target) == projector_limits.LIT, 1
     )
     missed = target.take(lit & ~claims.measured_by.any(axis=1))
-    rows = lit_samples(planned, devices.projectors, missed)
-    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(rows.target))
+    samples = lit_samples(planned, devices.projectors, missed)
+    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(samples.target))
     for camera in devices.reference_cameras:
-        table.add(scene=among, camera=camera, rows=rows)
+        table.add(scene=among, camera=camera, samples=samples)
     out = table.furthest < MEASURED
     n = int(lit.sum())
     share = Share(n, n - int(out.sum()), scene.requirements.min_reachable)
-    found = table.least_changes(share)
-    found |= _whole_shell(among, devices.reference_cameras, rows, out, share)
+    changes = table.least_changes(share)
+    changes |= _whole_shell(among, devices.reference_cameras, samples, out, share)
     weight = target.samples.weight
     counts = np.bincount(table.furthest[out], minlength=MEASURED)
     return OutOfReach(
@@ -84,7 +84,7 @@ def out_of_reach(
             for cause, count in zip(CAUSES, counts, strict=True)
             if count
         },
-        share.gains(found),
+        share.gains(changes),
     )
 
 
@@ -96,13 +96,13 @@ def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str
         rig: As written.
         error: With poses, none of which measures a sample.
     """
-    rows = error.samples
-    if not len(rows.target):
+    samples = error.samples
+    if not len(samples.target):
         return "no limit of a camera helps"
-    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(rows.target))
+    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(samples.target))
     for camera in error.cameras:
-        table.add(scene=scene, camera=camera, rows=rows)
-    share = Share(len(rows.target), 0, scene.requirements.min_reachable)
+        table.add(scene=scene, camera=camera, samples=samples)
+    share = Share(len(samples.target), 0, scene.requirements.min_reachable)
     steps = [
         f"{step['change']} would make {100.0 * step['reachable_share']:.1f} % of what "
         f"is lit measurable"
@@ -128,18 +128,21 @@ def for_so_many(
         count: Cameras that are allowed.
     """
     lit = stage.cover.samples
-    rows = taken(lit, np.arange(min(len(lit.target), DRAWS.fewer_devices)), lit.lit)
+    samples = taken(lit, np.arange(min(len(lit.target), DRAWS.fewer_devices)), lit.lit)
     relaxations = relaxations_of_cameras(rig, scene.requirements)
-    asked = np.stack(
-        [demands(scene, camera, rows, relaxations).asked for camera in stage.reference],
+    demanded = np.stack(
+        [
+            demands(scene, camera, samples, relaxations).demanded
+            for camera in stage.reference
+        ],
         axis=2,
     )
-    found: list[str] = []
-    for relaxation, table in zip(relaxations, asked, strict=True):
+    changes: list[str] = []
+    for relaxation, table in zip(relaxations, demanded, strict=True):
         value = _least_enough(relaxation, _Covers(table, scene, count))
         if value is not None:
-            found.append(relaxation.say(value))
-    return tuple(found)
+            changes.append(relaxation.say(value))
+    return tuple(changes)
 
 
 class _Least:
@@ -152,17 +155,21 @@ class _Least:
 
     def __init__(self, relaxations: Sequence[LimitRelaxation], n: int) -> None:
         self._relaxations = relaxations
-        self._asked = np.full((len(relaxations), n), np.inf)
+        self._demanded = np.full((len(relaxations), n), np.inf)
         self.furthest = np.zeros(n, dtype=np.int8)
 
-    def add(self, *, scene: Scene, camera: PlannedCamera, rows: LitSamples) -> None:
+    def add(self, *, scene: Scene, camera: PlannedCamera, samples: LitSamples) -> None:
         """Look at the samples from one camera more."""
-        left = np.flatnonzero(self.furthest < MEASURED)
-        if not len(left):
+        pending = np.flatnonzero(self.furthest < MEASURED)
+        if not len(pending):
             return
-        found = demands(scene, camera, taken(rows, left, rows.lit), self._relaxations)
-        self._asked[:, left] = np.minimum(self._asked[:, left], found.asked)
-        self.furthest[left] = np.maximum(self.furthest[left], found.furthest)
+        of_camera = demands(
+            scene, camera, taken(samples, pending, samples.lit), self._relaxations
+        )
+        self._demanded[:, pending] = np.minimum(
+            self._demanded[:, pending], of_camera.demanded
+        )
+        self.furthest[pending] = np.maximum(self.furthest[pending], of_camera.furthest)
 
     def least_changes(self, share: Share) -> dict[str, int]:
         """Return how far each limit alone must give way, and what that gains.
@@ -170,7 +177,7 @@ class _Least:
         As far as the share asks, or where it can't be had, as far as it helps.
         """
         out = self.furthest < MEASURED
-        return least_changes(self._relaxations, self._asked[:, out], share.wanted)
+        return least_changes(self._relaxations, self._demanded[:, out], share.wanted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,18 +185,18 @@ class _Covers:
     """What so many candidates cover at the most, as one limit gives way.
 
     Attributes:
-        asked: What a sample asks of the limit at a candidate, (n, m).
+        demanded: What a sample asks of the limit at a candidate, (n, m).
         scene: Requirements and seed.
         count: Cameras.
     """
 
-    asked: NDArray[np.float64]
+    demanded: NDArray[np.float64]
     scene: Scene
     count: int
 
     def enough(self, value: float) -> bool:
         """Whether they cover the required share of what is reachable then."""
-        measured = self.asked <= value
+        measured = self.demanded <= value
         share = min(self.scene.requirements.coverage + _SPARE, 1.0)
         required = required_samples(np.any(measured, axis=1), share)
         return covers_enough(
@@ -203,7 +210,7 @@ class _Covers:
 
 def _least_enough(relaxation: LimitRelaxation, covers: _Covers) -> float | None:
     """Return the least value, rounded, at which a cover is enough."""
-    finite = covers.asked[np.isfinite(covers.asked)]
+    finite = covers.demanded[np.isfinite(covers.demanded)]
     values = np.unique(relaxation.rounded(finite)).tolist()
     if not values or not covers.enough(values[-1]):
         return None
@@ -219,7 +226,7 @@ def _least_enough(relaxation: LimitRelaxation, covers: _Covers) -> float | None:
 def _whole_shell(
     scene: Scene,
     cameras: Sequence[PlannedCamera],
-    rows: LitSamples,
+    samples: LitSamples,
     out: NDArray[np.bool_],
     share: Share,
 ) -> dict[str, int]:
@@ -235,10 +242,10 @@ def _whole_shell(
         workspace.n_reference_cameras,
         None if site is None else replace(site, workspace=whole),
     )
-    left = np.flatnonzero(out)
+    pending = np.flatnonzero(out)
     for camera in anywhere:
-        if not len(left):
+        if not len(pending):
             break
-        rest = taken(rows, left, rows.lit)
-        left = left[~measured_by(scene, [camera], rest)[:, 0]]
-    return {"the whole shell as workspace": int(out.sum()) - len(left)}
+        unmeasured = taken(samples, pending, samples.lit)
+        pending = pending[~measured_by(scene, [camera], unmeasured)[:, 0]]
+    return {"the whole shell as workspace": int(out.sum()) - len(pending)}

@@ -35,12 +35,12 @@ class Demands:
     Attributes:
         furthest: Index in `CAUSES` of the limit at which the sample comes furthest,
             `MEASURED` where it is measured, shape (n,).
-        asked: What a sample asks of each relaxation: -inf where it is measured as it
+        demanded: What a sample asks of each relaxation: -inf where it is measured as it
             is, inf where the relaxation alone doesn't help, shape (n_relaxations, n).
     """
 
     furthest: NDArray[np.int8]
-    asked: NDArray[np.float64]
+    demanded: NDArray[np.float64]
 
 
 def light_demands(
@@ -63,19 +63,19 @@ def light_demands(
     rules = scene.requirements.projector
     view = ProjectorView.of(projector, SampleColumns.of(target))
     failed = violated(PROJECTOR_LIMITS, view, rules, len(target))
-    asked = np.empty((len(relaxations), len(target)))
+    demanded = np.empty((len(relaxations), len(target)))
     for k, relaxation in enumerate(relaxations):
         others = np.delete(failed, PROJECTOR_CAUSES.index(relaxation.cause), axis=0)
-        asked[k] = np.where(others.any(axis=0), np.inf, relaxation.ask(view))
-    near = np.flatnonzero(np.isfinite(asked).any(axis=0))
-    asked[:, near[stands_between(scene, projector, target.take(near))]] = np.inf
-    return asked
+        demanded[k] = np.where(others.any(axis=0), np.inf, relaxation.ask(view))
+    near = np.flatnonzero(np.isfinite(demanded).any(axis=0))
+    demanded[:, near[stands_between(scene, projector, target.take(near))]] = np.inf
+    return demanded
 
 
 def demands(
     scene: Scene,
     camera: PlannedCamera,
-    rows: LitSamples,
+    samples: LitSamples,
     relaxations: Sequence[LimitRelaxation],
 ) -> Demands:
     """Return what lit samples ask of the limits at a camera's pose.
@@ -83,11 +83,11 @@ def demands(
     Args:
         scene: With the bodies that stand in the way.
         camera: As it stands.
-        rows: Lit samples.
+        samples: Lit samples.
         relaxations: Limits that may give way.
     """
     scene.check_cancelled()
-    required, target = scene.requirements, rows.target
+    required, target = scene.requirements, samples.target
     rays = CameraRays.of(camera, target)
     failed = violated(CAMERA_LIMITS, rays, required.camera, len(target))
     causes = [CAUSES.index(relaxation.cause) for relaxation in relaxations]
@@ -105,27 +105,29 @@ def demands(
     )
     furthest[near] = np.minimum(furthest[near], between)
     near = near[(between == SEEN) & (hopeful | seen)[near]]
-    asked = np.full_like(asks, np.inf)
+    demanded = np.full_like(asks, np.inf)
     for pair in pairs_of(
         required.triangulation,
-        rows,
+        samples,
         _viewed(camera, rays.take(near)),
         samples=near,
     ):
-        some, quality = pair.samples, pair.quality
-        furthest[some] = np.where(
-            seen[some], np.maximum(furthest[some], pair.first_violated), furthest[some]
+        indices, quality = pair.samples, pair.quality
+        furthest[indices] = np.where(
+            seen[indices],
+            np.maximum(furthest[indices], pair.first_violated),
+            furthest[indices],
         )
-        of_pair = violated(PAIR_LIMITS, quality, required.triangulation, len(some))
-        table = np.concatenate([failed[:, some], of_pair])
+        of_pair = violated(PAIR_LIMITS, quality, required.triangulation, len(indices))
+        table = np.concatenate([failed[:, indices], of_pair])
         count = table.sum(axis=0)
-        asked[:, some[count == 0]] = -np.inf
+        demanded[:, indices[count == 0]] = -np.inf
         for k, (cause, relaxation) in enumerate(zip(causes, relaxations, strict=True)):
             alone = table[cause] & (count == 1)
-            ask = asks[k, some] if cause < SEEN else relaxation.ask(quality)
-            least = np.minimum(asked[k, some], ask)
-            asked[k, some] = np.where(alone, least, asked[k, some])
-    return Demands(furthest, asked)
+            ask = asks[k, indices] if cause < SEEN else relaxation.ask(quality)
+            least = np.minimum(demanded[k, indices], ask)
+            demanded[k, indices] = np.where(alone, least, demanded[k, indices])
+    return Demands(furthest, demanded)
 
 
 def _viewed(camera: PlannedCamera, rays: CameraRays) -> ViewedSamples:

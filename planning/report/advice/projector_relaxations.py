@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import NothingLitError
+from planning.report.advice.least_changes import relaxations_of_projectors
 from planning.scene import lighting
 from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
@@ -22,7 +23,6 @@ from planning.scene.workspace.candidates import projector_candidates
 
 from .demands import light_demands
 from .least_changes import Share, least_changes
-from .rig_facts import relaxations_of_projectors
 
 
 def reachability_relaxations(
@@ -87,8 +87,8 @@ def _least(
     relaxations = relaxations_of_projectors(scene.requirements, device)
     least = np.full((len(relaxations), len(dark)), np.inf)
     for projector in projectors:
-        asked = light_demands(scene, projector, dark, relaxations)
-        least = np.minimum(least, asked)
+        demanded = light_demands(scene, projector, dark, relaxations)
+        least = np.minimum(least, demanded)
     return least_changes(relaxations, least, wanted)
 
 

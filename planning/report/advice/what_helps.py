@@ -32,10 +32,10 @@ def with_relaxations(
     areas, least = coverage.target, partial.scene.requirements.min_reachable
     if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
-            found = reachability_relaxations(
+            relaxations = reachability_relaxations(
                 partial.scene, devices.reference_projectors, (partial.tilt, 0.0)
             )
-        coverage = coverage.changed(relaxations=found)
+        coverage = coverage.changed(relaxations=relaxations)
     if falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least):
         with _timed(clock):
             out = out_of_reach(partial.scene, partial.request.rig, devices, claims)

@@ -15,6 +15,7 @@ import numpy as np
 from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.selection import required_samples
+from planning.report.advice.least_changes import relaxations_of_projectors
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
@@ -22,7 +23,6 @@ from planning.scene.workspace.view_tiles import Site
 
 from .demands import light_demands
 from .least_changes import covers_enough
-from .rig_facts import relaxations_of_projectors
 
 # Poses for larger tiles: so many times as wide and high, so many that look at the
 # centre.
@@ -55,7 +55,7 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
         if relaxation.cause == "projector_beam"
     )
     poses = (*stage.reference, *_over_larger_tiles(site, template))
-    asked = np.stack(
+    demanded = np.stack(
         [light_demands(scene, pose, target, [field])[0] for pose in poses], axis=1
     )
     least = required_samples(candidates.reached[:n], required.dominant_coverage)
@@ -63,10 +63,10 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
     def enough(value: float) -> bool:
         existing = len(required.existing_of("projector"))
         return covers_enough(
-            asked <= value, least, count, n_existing=existing, seed=scene.seed
+            demanded <= value, least, count, n_existing=existing, seed=scene.seed
         )
 
-    low, high = 0, int(np.ceil(asked[np.isfinite(asked)].max(initial=0.0)))
+    low, high = 0, int(np.ceil(demanded[np.isfinite(demanded)].max(initial=0.0)))
     if not enough(high):
         return None
     while high - low > 1:

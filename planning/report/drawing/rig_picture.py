@@ -6,7 +6,6 @@ with distances, and the object close up, coloured by what the plan measures.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from PIL import Image, ImageDraw
 from geometry.rays.rays import RayCaster
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
+from planning.model.words import count_words
 
 from .face_colours import face_colours
 from .figures import (
@@ -55,11 +55,7 @@ def save_rig_picture(
         OSError: If the file can't be written.
     """
     picture = draw_rig(plan, size=size, face_status=face_status)
-
-    def write(file: BinaryIO) -> None:
-        picture.save(file, format="PNG")
-
-    write_atomically(Path(path), write)
+    write_atomically(Path(path), lambda file: picture.save(file, format="PNG"))
 
 
 def draw_rig(
@@ -93,12 +89,13 @@ def draw_rig(
     fine = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     split, head, foot = round(0.57 * fine[0]), round(0.065 * fine[1]), fine[1]
     middle = head + round(0.53 * (foot - head))
-    left = _overview(plan, shader, up, (split, foot - head))
-    top = _from_above(plan, shader, up, (fine[0] - split, middle - head))
-    close = _close_up(plan, shader, up, (fine[0] - split, foot - middle), legend)
+    width = fine[0] - split
+    whole = _devices_panel(plan, shader, up, (split, foot - head), from_above=False)
+    above = _devices_panel(plan, shader, up, (width, middle - head), from_above=True)
+    close = _close_up(plan, shader, up, (width, foot - middle), legend)
     picture = Image.new("RGB", fine, BACKGROUND)
-    picture.paste(left, (0, head))
-    picture.paste(top, (split, head))
+    picture.paste(whole, (0, head))
+    picture.paste(above, (split, head))
     picture.paste(close, (split, middle))
     draw = ImageDraw.Draw(picture)
     for ends in (
@@ -111,41 +108,21 @@ def draw_rig(
     return picture.resize(size, Image.Resampling.BOX)
 
 
-def _overview(
-    plan: RigPlan, shader: Shader, up: NDArray[np.float64], size: tuple[int, int]
-) -> Image.Image:
-    figures, centre = _figures(plan), plan.surface.mesh.centre
-    direction = best_direction(np.array([f.position for f in figures]), centre, up)
-    panel = _scene(plan, figures, shader, direction, up, size)
-    panel.heading("All devices, to scale; x, y, z are the axes of the mesh file")
-    _mark_devices(panel, figures, shader.caster, type_size=17.0, distances=False)
-    return panel.image
-
-
-def _from_above(
-    plan: RigPlan, shader: Shader, up: NDArray[np.float64], size: tuple[int, int]
-) -> Image.Image:
-    figures = _figures(plan)
-    panel = _scene(plan, figures, shader, up, up, size)
-    panel.heading("From above; distances to the object's centre")
-    _mark_devices(panel, figures, shader.caster, type_size=14.0, distances=True)
-    return panel.image
-
-
-def _figures(plan: RigPlan) -> list[DeviceFigure]:
-    reach = 0.09 * max(plan.requirements.workspace.projector_radius_m)
-    return device_figures(plan, body_m=reach)
-
-
-def _scene(
+def _devices_panel(
     plan: RigPlan,
-    figures: Sequence[DeviceFigure],
     shader: Shader,
-    direction: NDArray[np.float64],
     up: NDArray[np.float64],
     size: tuple[int, int],
-) -> Panel:
-    """The object and the zones, in a view that holds all devices."""
+    *,
+    from_above: bool,
+) -> Image.Image:
+    """The object, zones and devices, in a view that holds all; above with distances."""
+    figures, centre = _figures(plan), plan.surface.mesh.centre
+    direction, heading = up, "From above; distances to the object's centre"
+    if not from_above:
+        positions = np.array([figure.position for figure in figures])
+        direction = best_direction(positions, centre, up)
+        heading = "All devices, to scale; x, y, z are the axes of the mesh file"
     vertices = shader.caster.mesh.corners.reshape(-1, 3)
     zones = zone_figures(plan)
     bodies = [line for figure in figures for line in figure.body]
@@ -154,7 +131,17 @@ def _scene(
     panel = Panel(shader.shade(view), view)
     panel.keep_clear(vertices)
     draw_zones(panel, zones, shader.caster)
-    return panel
+    panel.heading(heading)
+    type_size = 14.0 if from_above else 17.0
+    _mark_devices(
+        panel, figures, shader.caster, type_size=type_size, distances=from_above
+    )
+    return panel.image
+
+
+def _figures(plan: RigPlan) -> list[DeviceFigure]:
+    reach = 0.09 * max(plan.requirements.workspace.projector_radius_m)
+    return device_figures(plan, body_m=reach)
 
 
 def draw_zones(panel: Panel, zones: Sequence[ZoneFigure], caster: RayCaster) -> None:
@@ -243,11 +230,9 @@ def _draw_title(
     draw: ImageDraw.ImageDraw, plan: RigPlan, size: tuple[int, int]
 ) -> None:
     """Write how many devices, what object and what is measured into a band."""
-    counts = (
-        f"{len(devices)} {noun}{'' if len(devices) == 1 else 's'}"
-        for devices, noun in ((plan.projectors, "projector"), (plan.cameras, "camera"))
-    )
-    pad, middle, headline = 16 * SUPERSAMPLING, size[1] // 2, ", ".join(counts)
+    projectors = count_words(len(plan.projectors), "projector")
+    headline = f"{projectors}, {count_words(len(plan.cameras), 'camera')}"
+    pad, middle = 16 * SUPERSAMPLING, size[1] // 2
     draw.text((pad, middle), headline, INK, font=font(24.0), anchor="lm")
     extent = 1e3 * np.ptp(plan.surface.mesh.bounds, axis=0)
     name = _shortened(Path(plan.document.meshes[0].path or "").name)

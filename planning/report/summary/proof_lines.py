@@ -17,12 +17,12 @@ _EXCLUDED = {
 
 def proof_lines(plan: RigPlan) -> list[str]:
     """Return what was proved of both counts, and over what."""
-    asked, proofs = plan.requirements, plan.document.certificates
+    requirements, proofs = plan.requirements, plan.document.certificates
     return [
         "",
-        _proof("projector", proofs.projectors, asked.dominant_coverage, "light"),
+        _proof("projector", proofs.projectors, requirements.dominant_coverage, "light"),
         _continuous(proofs.projectors, _freedom(plan)),
-        _proof("camera", proofs.cameras, asked.coverage, "measure")
+        _proof("camera", proofs.cameras, requirements.coverage, "measure")
         + " (given these projectors)",
         _continuous(proofs.cameras, "position, aim and roll"),
         *route_lines(proofs.cameras),
@@ -42,10 +42,10 @@ def route_lines(proof: Certificate) -> list[str]:
         for kind, count in (("cover", routes.cover), ("paper", routes.paper))
         if routes.asked in (kind, "both")
     ]
-    told = f"ROUTES   cameras: {', '.join(counts)}"
+    line = f"ROUTES   cameras: {', '.join(counts)}"
     if routes.asked != "both":
-        return [told]
-    return [f"{told}; taken {names[routes.taken]}: {routes.why}"]
+        return [line]
+    return [f"{line}; taken {names[routes.taken]}: {routes.why}"]
 
 
 def user_selection(plan: RigPlan) -> SelectionRecord | None:

@@ -91,7 +91,7 @@ def range_lines(document: PlanDocument) -> list[str]:
     if ranges is None:
         return []
     ball = ranges.sphere
-    x, y, z = (1e3 * part for part in ball.centre_m)
+    x, y, z = (1e3 * value for value in ball.centre_m)
     radius_sigma = 1e3 * ball.covariance_m2[3][3] ** 0.5
     covered = [row.covered_at_2_sigma for row in document.baselines]
     lines = [

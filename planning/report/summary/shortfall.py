@@ -14,7 +14,7 @@ from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
 # Causes that take less than this share of what is left aren't told.
-_TOLD = 0.01
+_LEAST_SHARE = 0.01
 _CAUSE_WORDS = {limit.name: limit.words for limit in PROJECTOR_LIMITS + MEASURED_LIMITS}
 
 
@@ -42,14 +42,15 @@ def shortfalls(plan: RigPlan) -> tuple[str, ...]:
     )
 
 
-def _reachable(document: PlanDocument, asked: Requirements) -> tuple[str, ...]:
+def _reachable(document: PlanDocument, requirements: Requirements) -> tuple[str, ...]:
     coverage, areas = document.coverage, document.coverage.target
     share = areas.reachable_by_projectors_m2 / areas.area_m2
-    if share >= asked.min_reachable:
+    least = requirements.min_reachable
+    if share >= least:
         return ()
     line = (
         f"only {percent(share)} of the target can be lit from anywhere in the "
-        f"workspace, {percent(asked.min_reachable)} is required (--min-reachable); "
+        f"workspace, {percent(least)} is required (--min-reachable); "
         f"{area_words(areas.area_m2 - areas.reachable_by_projectors_m2)} of "
         f"{area_words(areas.area_m2)} can't be reached: "
         f"{causes_line(coverage.unreachable_by_cause, areas.area_m2)}"
@@ -58,15 +59,16 @@ def _reachable(document: PlanDocument, asked: Requirements) -> tuple[str, ...]:
     return (f"{line}. What would help: {_steps(coverage.relaxations, share)}",)
 
 
-def _measurable(coverage: Coverage, asked: Requirements) -> tuple[str, ...]:
+def _measurable(coverage: Coverage, requirements: Requirements) -> tuple[str, ...]:
     """Whether enough of what is lit is within the cameras' reach."""
     lit, reached = coverage.target.lit_m2, coverage.target.reachable_by_cameras_m2
-    if not lit > 0.0 or reached >= asked.min_reachable * lit:
+    least = requirements.min_reachable
+    if not lit > 0.0 or reached >= least * lit:
         return ()
     share = reached / lit
     return (
         f"only {percent(share)} of what is lit can be measured from anywhere in the "
-        f"workspace, {percent(asked.min_reachable)} is required (--min-reachable); "
+        f"workspace, {percent(least)} is required (--min-reachable); "
         f"{area_words(lit - reached)} of {area_words(lit)} can't be: "
         f"{_areas_line(coverage.unmeasurable_by_cause)}. What "
         f"would help: {_steps(coverage.camera_relaxations, share)}",
@@ -85,8 +87,8 @@ def _steps(relaxations: tuple[Relaxation, ...], share: float) -> str:
 def _areas_line(areas: dict[str, float]) -> str:
     """The causes with their areas, the largest first, but for what is next to none."""
     ranked = sorted(areas.items(), key=lambda pair: -pair[1])
-    told = [pair for pair in ranked if pair[1] >= _TOLD * sum(areas.values())]
-    return "; ".join(f"{area_words(area)} {cause_words(c)}" for c, area in told)
+    phrases = [pair for pair in ranked if pair[1] >= _LEAST_SHARE * sum(areas.values())]
+    return "; ".join(f"{area_words(area)} {cause_words(c)}" for c, area in phrases)
 
 
 def _inside(document: PlanDocument) -> str:
@@ -99,15 +101,15 @@ def _inside(document: PlanDocument) -> str:
     return f"; {area_words(inside)} of it {where}"
 
 
-def _covered(document: PlanDocument, asked: Requirements) -> Iterator[str]:
+def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[str]:
     areas, proofs = document.coverage.target, document.certificates
-    for kind, proof, part, whole, required, deed in (
+    for kind, proof, covered, whole, required, deed in (
         (
             "projectors",
             proofs.projectors,
             areas.lit_m2,
             areas.reachable_by_projectors_m2,
-            asked.dominant_coverage,
+            requirements.dominant_coverage,
             "light {} of the reachable target",
         ),
         (
@@ -115,21 +117,21 @@ def _covered(document: PlanDocument, asked: Requirements) -> Iterator[str]:
             proofs.cameras,
             areas.measured_m2,
             areas.reachable_by_cameras_m2,
-            asked.coverage,
+            requirements.coverage,
             "measure {} of what is lit and measurable",
         ),
     ):
-        share = part / whole if whole > 0 else 0.0
+        share = covered / whole if whole > 0 else 0.0
         if share >= required:
             continue
         devices = kind if proof.count > 1 else kind.removesuffix("s")
         verb = deed if proof.count > 1 else deed.replace(" ", "s ", 1)
         yield (
             f"{proof.count} {devices} {verb.format(percent(share))}, "
-            f"{percent(required)} is required; {area_words(whole - part)} of "
+            f"{percent(required)} is required; {area_words(whole - covered)} of "
             f"{area_words(whole)} are left{_bodies(document.coverage, proof)}. "
             f"{_why(kind, document.coverage)}What would help: "
-            f"{_more(kind, proof, asked, share)}"
+            f"{_remedies(kind, proof, requirements, share)}"
         )
 
 
@@ -150,22 +152,24 @@ def _why(kind: str, coverage: Coverage) -> str:
 def _bodies(coverage: Coverage, proof: Certificate) -> str:
     """Whose bodies stand in the way of how much, the largest area first."""
     ranked = sorted(coverage.blocked_by_body_m2.items(), key=lambda pair: -pair[1])
-    told = [
+    phrases = [
         f"{1e6 * area:.0f} mm² blocked by the body of {name}"
         for name, area in ranked
         if area > 0.0
     ]
     if proof.but_for_bodies:
-        told.append(
+        phrases.append(
             f"{proof.but_for_bodies} would do if their bodies didn't collide or "
             f"stand in each other's way"
         )
-    return f" ({', '.join(told)})" if told else ""
+    return f" ({', '.join(phrases)})" if phrases else ""
 
 
-def _more(kind: str, proof: Certificate, asked: Requirements, share: float) -> str:
+def _remedies(
+    kind: str, proof: Certificate, requirements: Requirements, share: float
+) -> str:
     needed = proof.needed
-    allowed = getattr(asked, f"max_{kind}")
+    allowed = getattr(requirements, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {_down(share)} accepts this plan"
     # Where bodies are in the way, more devices may be no help.
@@ -177,9 +181,9 @@ def _more(kind: str, proof: Certificate, asked: Requirements, share: float) -> s
         if needed.lower_bound == needed.count
         else f"at least {needed.lower_bound} proved over the candidates"
     )
-    more = f"--max-{kind} {needed.count} ({bound})"
+    option_of_count = f"--max-{kind} {needed.count} ({bound})"
     field = () if needed.wider_field is None else (needed.wider_field,)
-    return ", ".join((more, *needed.relaxations, *field, f"or {accept}"))
+    return ", ".join((option_of_count, *needed.relaxations, *field, f"or {accept}"))
 
 
 def _down(share: float) -> str:
