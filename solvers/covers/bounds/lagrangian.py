@@ -28,6 +28,7 @@ from .relaxation import cheapest_rows, rounding
 
 _LOOK_BACK = 30
 _MEMORY, _FRESH = 0.9, 0.1
+_MOST_STEPS = 200
 # Squared; below it nothing is lacking.
 _LEAST_LACK = 1e-18
 _Array = NDArray[np.float64]
@@ -52,8 +53,6 @@ def tighten(
     target: float,
     start: _Array,
     budget: WorkBudget,
-    *,
-    max_steps: int = 200,
 ) -> Ascent:
     """Lower the weight that K sets cover at most, until below a target or it stalls.
 
@@ -63,14 +62,13 @@ def tighten(
         target: Weight below which the bound need not go.
         start: Multipliers to start from, shape (n_e,).
         budget: Work; two matrix products a step.
-        max_steps: Steps at most.
 
     Returns:
         Multipliers in [0, w]; the value is the bound, negated.
     """
     dual = _WeightDual(cover, n_sets, target)
     share = np.clip(start / cover.weights, 0.0, 1.0)
-    best, value = dual.climb(share, -target, budget, max_steps)
+    best, value = dual.climb(share, -target, budget, _MOST_STEPS)
     return Ascent(best * cover.weights, value)
 
 

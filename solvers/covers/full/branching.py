@@ -49,10 +49,7 @@ class Tree(ABC):
         budget: Work; where it ends, the least bound of what is open is returned.
 
     Attributes:
-        covers: Whether set s covers row e, shape (n_e, n_s); every row is covered.
         cut: A node goes where its bound exceeds this.
-        size: Sets of a known cover.
-        budget: Work.
         linear: The program that bounds nodes.
         made: Nodes kept so far.
     """
