@@ -16,6 +16,7 @@ from planning.proofs.selection import required_samples
 from planning.scene.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
+from planning.scene.patterns.ring_pattern import RingPattern
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -210,7 +211,7 @@ def pose_program(
         half_panel_m=None if pinhole else tuple(device.half_panel),
         pixel_margin=_PIXEL_MARGIN,
         beam_radius_m=np.inf if pinhole else device.beam_radius or np.inf,
-        ring_radius=float(projector.ring_radii[-1]),
+        ring_radius=RingPattern(projector).outermost,
         ring_from_device=inverse(projector.world_from_ring)
         @ projector.world_from_device,
         up=up,

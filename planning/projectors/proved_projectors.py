@@ -18,6 +18,7 @@ from planning.proofs.selection import fewest_count, select_fewest
 from planning.scene.existing import existing_projectors
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
+from planning.scene.patterns.pattern import pattern_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -102,7 +103,7 @@ def _lit_by_existing(
     Their axes may yet be turned, so rings don't count: more that is free can only lower
     the bound.
     """
-    ringless = replace(template, ring_radii=np.array([0.0, np.inf]))
+    ringless = pattern_of(template).everywhere()
     projectors = existing_projectors(scene.requirements, ringless, (0.0, 0.0))
     if not projectors:
         return np.zeros(len(samples), dtype=bool)

@@ -237,7 +237,7 @@ def _whole_shell(
         return {}
     site = scene.site("camera", cameras[0].device)
     anywhere = camera_candidates(
-        replace(cameras[0], existing=""),
+        cameras[0],
         whole,
         workspace.n_reference_cameras,
         None if site is None else replace(site, workspace=whole),

@@ -12,6 +12,7 @@ from geometry.poses import transform
 from planning.model.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.scene.patterns.ring_pattern import RingPattern
 
 from .picture_view import Colour, facing
 
@@ -76,7 +77,7 @@ def _figure(
     depth = max(float((centre - position) @ pose[:3, 2]), body_m)
     model = device.device
     if isinstance(model, ParallelModel):
-        radius = _beam_radius(device)
+        radius = _beam_radius(device, model)
         local_body, local_beam = _parallel(model, radius, depth)
     else:
         local_body, local_beam = _pinhole(model, body_m, depth)
@@ -95,14 +96,12 @@ def _figure(
     )
 
 
-def _beam_radius(device: PlannedProjector | PlannedCamera) -> float:
+def _beam_radius(
+    device: PlannedProjector | PlannedCamera, model: ParallelModel
+) -> float:
     """Radius that a parallel projector lights, inf where only its panel limits it."""
-    limits = [np.inf]
-    if isinstance(device, PlannedProjector):
-        limits.append(float(device.ring_radii[-1]))
-        if isinstance(device.device, ParallelModel) and device.device.beam_radius:
-            limits.append(device.device.beam_radius)
-    return min(limits)
+    projects = isinstance(device, PlannedProjector)
+    return min(model.beam_reach, RingPattern(device).outermost if projects else np.inf)
 
 
 def _pinhole(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import DeviceModel, ParallelModel, turned_to
+from geometry.devices import DeviceModel, turned_to
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import fibonacci_cap, look_at
 from planning.model.requirements import Workspace
@@ -175,14 +175,14 @@ def _distances(site: Site) -> Iterator[tuple[float, int]]:
     """Distances from the surface, and how many tiles more than are needed."""
     yield site.standoff_m, 0
     yield site.standoff_m, 1
-    if isinstance(site.device, ParallelModel):
-        return
     slant = float(np.hypot(1.0, np.hypot(*site.device.half_rectangle(1.0))))
     far = min(
         site.standoff_m + site.workspace.object_radius_m,
         site.device.range_m[1] / slant,
     )
-    if far > _FARTHER * site.standoff_m:
+    near_half, far_half = map(site.device.half_rectangle, (site.standoff_m, far))
+    # Parallel light is no wider farther off.
+    if far > _FARTHER * site.standoff_m and np.all(far_half > near_half):
         yield far, 0
 
 
