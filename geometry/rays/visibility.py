@@ -93,6 +93,16 @@ class Visibility:
         back = 1.001 * 2.0 * max(self.caster.reach, farthest)
         return SampleSet(order, padded, facing, _dot(facing, across), back)
 
+    def prepared(
+        self, points: Array | SampleSet, normals: Array | None, *, sort: bool
+    ) -> SampleSet:
+        """Return `samples` of points, unless they are ready already."""
+        if isinstance(points, SampleSet):
+            return points
+        if normals is None:
+            raise ValueError("points need the normals of their faces")
+        return self.samples(points, normals, sort=sort)
+
     def blocked(
         self,
         origin: Array,
@@ -116,12 +126,7 @@ class Visibility:
         Raises:
             ValueError: If shapes disagree or a number isn't finite.
         """
-        if isinstance(points, SampleSet):
-            samples = points
-        else:
-            if normals is None:
-                raise ValueError("points need the normals of their faces")
-            samples = self.samples(points, normals, sort=False)
+        samples = self.prepared(points, normals, sort=False)
         source = self.source(origin, along)
         blocked = np.empty(len(samples), dtype=bool)
 

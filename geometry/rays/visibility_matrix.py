@@ -42,12 +42,7 @@ def visibility_matrix(
     Raises:
         ValueError: If shapes disagree or a number isn't finite.
     """
-    if isinstance(points, SampleSet):
-        samples = points
-    elif normals is None:
-        raise ValueError("points need the normals of their faces")
-    else:
-        samples = visibility.samples(points, normals)
+    samples = visibility.prepared(points, normals, sort=True)
     origins = np.asarray(origins, dtype=np.float64)
     shape = (len(origins), len(samples))
     if origins.ndim != 2 or (along is not None and np.shape(along) != origins.shape):

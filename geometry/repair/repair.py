@@ -14,15 +14,11 @@ _HUGE = 1e60
 # More broken faces than this share, and the rest can't be taken for the object.
 _MAX_BROKEN = 0.1
 
-_Vertices = Array
-_Faces = Ints
 # Vertices, faces, which of the faces handed in stayed (None: all), what was done.
-_Step = tuple[_Vertices, _Faces, Mask | None, tuple[Repair, ...]]
+_Step = tuple[Array, Ints, Mask | None, tuple[Repair, ...]]
 
 
-def clean(
-    vertices: Array, faces: Ints
-) -> tuple[_Vertices, _Faces, Ints, tuple[Repair, ...]]:
+def clean(vertices: Array, faces: Ints) -> tuple[Array, Ints, Ints, tuple[Repair, ...]]:
     """Return a mesh that every later stage can take, and what was changed.
 
     In this order: faces with a corner that isn't finite, and such vertices, are
@@ -51,15 +47,12 @@ def clean(
             origin = origin[kept]
         repairs += [repair for repair in made if repair.count]
         if len(faces) == 0:
+            worded = ", ".join(f"{r.kind}: {r.count}" for r in repairs)
             raise MeshError(
-                f"none of its {n_faces} faces is usable ({_worded(repairs)}); "
+                f"none of its {n_faces} faces is usable ({worded}); "
                 "export the mesh again"
             )
     return vertices, faces, origin, tuple(repairs)
-
-
-def _worded(repairs: list[Repair]) -> str:
-    return ", ".join(f"{r.kind}: {r.count}" for r in repairs)
 
 
 def _drop_non_finite(vertices: Array, faces: Ints) -> _Step:

@@ -22,7 +22,6 @@ from planning.scene.workspace.zone_conflicts import check_zones
 from .rig_tables import LimitsTable, RequirementsTable, RigTable
 from .wishes import Wishes
 
-Overflowing = tuple[bool, bool]
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
 _UP_VECTORS = {
@@ -39,7 +38,7 @@ def build_requirements(
     wishes: Wishes,
     *,
     tau_m: float,
-    overflowing: Overflowing = (False, False),
+    overflowing: tuple[bool, bool],
 ) -> Requirements:
     """Return what a plan must reach; `Rig.requirements` documents the arguments.
 
@@ -59,7 +58,7 @@ def build_requirements(
         if most is not None and not most >= 1:
             raise InputError(f"{name} = {most} must be 1 or more")
     _check_positive("tau_m", tau_m)
-    workspace = build_workspace(
+    workspace = _workspace(
         table,
         reference_ring_radius,
         mesh_centre,
@@ -87,13 +86,13 @@ def build_requirements(
     )
 
 
-def build_workspace(
+def _workspace(
     table: RigTable,
     reference_ring_radius: float,
     mesh_centre: Sequence[float] | NDArray[np.float64],
     object_radius_m: float,
     up: str | None,
-    overflowing: Overflowing = (False, False),
+    overflowing: tuple[bool, bool],
 ) -> Workspace:
     """Return where devices may stand about an object.
 
@@ -106,11 +105,6 @@ def build_workspace(
     the part of it that they look at, which may be as near to the centre as it likes::
 
         s - p <= |Q - centre| <= s + R + p
-
-    Raises:
-        InputError: If an argument isn't usable.
-        InfeasibleLimitsError: If the floor lies above every admissible position, or the
-            box or every mounting plane lies outside the shell.
     """
     _check_positive("object_radius_m", object_radius_m)
     placement, spec = table.placement, table.workspace
