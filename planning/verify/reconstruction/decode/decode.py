@@ -4,20 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
-from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 from .edges import SATURATED, ImageEdges, find_edges
+from .ring_chains import chains
 from .triangulate import RingHits, intersect_rings
 
-# Neighbours along a ring edge are looked for this far away in the image [px].
-_NEAR_PX = 2.6
 # Edges in a row that make a piece of surface. Single ones are often false, three hardly
 # more often than a dozen, and ribs are but a few pixels wide.
 _MIN_CHAIN = 3
@@ -29,10 +25,6 @@ _MIN_NAMED = 1.0 / 3.0
 # where few rings flip it, steps of depth may outnumber them.
 _UNNAMED_SHARE = 0.02
 _UNNAMED_LEAST = 10
-# The next ring is looked for this far away [px].
-_NEXT_RING_PX = 100.0
-# Keeps rings apart when neighbours are looked for.
-_RING_APART_PX = 1000.0
 # tan(65 degrees) along a ring, tan(75 degrees) from ring to ring, where a gap is wide
 # enough to mix surface with step.
 _MAX_SLANT = 2.14
@@ -164,7 +156,7 @@ def measure_edges(
     rays = camera.rays(edges.pixels)
     radii = patterns.coordinate(edges.rings)
     hits = intersect_rings(camera.centre, rays, radii, edges.roots, projector)
-    length, across = _chains(edges, hits, camera.focal_px, max_slant)
+    length, across = chains(edges, hits, camera.focal_px, max_slant)
     causes = {
         "no_intersection": ~np.isfinite(hits.distances),
         "root": _doubtful_root(edges, rays, patterns, calibration),
@@ -231,48 +223,6 @@ def _out_of_order(edges: ImageEdges) -> bool:
     least = max(_UNNAMED_LEAST, _UNNAMED_SHARE * int(edges.flips.sum()))
     contradicted = (unnamed > least) & (edges.named < _MIN_NAMED * edges.flips)
     return bool(np.any(contradicted))
-
-
-def _chains(
-    edges: ImageEdges, hits: RingHits, focal_px: float, max_slant: float
-) -> tuple[Indices, Array]:
-    """How far edges go on as a surface, along their rings and from ring to ring.
-
-    Slant is the change of distance between edges in units of a pixel's width there:
-    the tangent of the incidence in one direction.
-
-    Returns:
-        Edges in the unbroken chain of each, links steeper than `max_slant` left out;
-        and the slant towards the next rings, the lesser of both sides, NaN where
-        neither is near. Both (n,).
-    """
-    length = np.zeros(len(edges), dtype=np.int64)
-    across = np.full(len(edges), np.nan)
-    rows = np.flatnonzero(np.isfinite(hits.distances))
-    if len(rows) == 0:
-        return length, across
-    t = hits.distances[rows]
-    place = np.column_stack([edges.pixels[rows], _RING_APART_PX * edges.rings[rows]])
-    tree = KDTree(place)
-    one, other = tree.query_pairs(_NEAR_PX, output_type="ndarray").T
-    run = np.linalg.norm(place[one] - place[other], axis=1) * (t[one] / focal_px)
-    linked = np.abs(t[one] - t[other]) <= max_slant * run
-    ends = one[linked], other[linked]
-    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(rows), len(rows)))
-    _, chain = connected_components(links, directed=False)
-    length[rows] = np.bincount(chain)[chain]
-
-    def towards(ring: int) -> Array:
-        near = place + np.array([0.0, 0.0, ring * _RING_APART_PX])
-        apart, nearest = tree.query(near, distance_upper_bound=_NEXT_RING_PX)
-        found = (nearest < len(rows)) & (apart > 0.5)
-        steps = np.abs(t[np.where(found, nearest, 0)] - t)
-        return np.where(
-            found, steps * focal_px / (np.where(found, apart, 1.0) * t), np.nan
-        )
-
-    across[rows] = np.fmin(towards(1), towards(-1))
-    return length, across
 
 
 def _cloud(
