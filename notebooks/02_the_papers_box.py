@@ -36,8 +36,7 @@ from planning.experiments.paper_figures import (
     draw_viewpoints,
 )
 from planning.experiments.point_panels import PanelStage
-from planning.experiments.run import run_experiment
-from planning.experiments.second_sequence import double_density
+from planning.experiments.run import double_density, run_experiment
 from planning.experiments.setups import box_experiment
 from planning.experiments.table import cloud_lines, ring_lines, setup_lines
 
@@ -128,11 +127,11 @@ print("\n".join(ring_lines(outcome)))
 # sequence with its rings midway doubles the density all the same.
 
 # %%
-doubled = double_density(outcome)
-print("\n".join(cloud_lines((doubled.first, doubled.both))))
-draw_densities(doubled.first, doubled.both, stage)
+both = double_density(outcome)
+print("\n".join(cloud_lines((outcome.union, both))))
+draw_densities(outcome.union, both, stage)
 
 # %%
 assert outcome.union.errors.rms_m < 0.03e-3
 assert outcome.merged.complete[1] > 0.98
-assert doubled.both.complete[0] > doubled.first.complete[0] + 0.05
+assert both.complete[0] > outcome.union.complete[0] + 0.05

@@ -27,7 +27,7 @@ from pathlib import Path
 
 from planning import RequirementError, load_mesh, load_rig, plan_rig
 from planning.cli.other_commands import write_sample
-from planning.experiments.one_image import Prior
+from planning.experiments.ground_truth import Prior
 from planning.experiments.paper_figures import (
     draw_camera_images,
     draw_errors,

@@ -19,10 +19,13 @@ from pathlib import Path
 import numpy as np
 
 from geometry.files.readers import load_mesh
-from planning.experiments.one_image import Prior, judged_labels
-from planning.experiments.point_errors import Errors, MeasuredErrors
-from planning.experiments.run import DARK, Outcome, run_experiment
-from planning.experiments.second_sequence import double_density
+from planning.experiments.ground_truth import (
+    Errors,
+    MeasuredErrors,
+    Prior,
+    judged_labels,
+)
+from planning.experiments.run import DARK, Outcome, double_density, run_experiment
 from planning.experiments.setups import (
     FACE_RADII_M,
     box_experiment,
@@ -104,11 +107,9 @@ def rings(outcomes: dict[tuple[str, str], Outcome]) -> None:
     print("Shares of the circumference that landed; P2's mirror them.\n")
     rows: list[list[str]] = []
     for (name, variant), outcome in outcomes.items():
-        union = outcome.union
         for ring in outcome.outcomes:
             if ring.projector != "P1":
                 continue
-            own = (union.cloud.projector == 0) & (union.cloud.ring == ring.ring)
             rows.append(
                 [
                     name,
@@ -118,7 +119,7 @@ def rings(outcomes: dict[tuple[str, str], Outcome]) -> None:
                     *(f"{share:.3f}" for share in ring.seen.values()),
                     *(f"{share:.3f}" for share in ring.measured.values()),
                     f"{ring.measured_by_any:.3f}",
-                    *numbers(Errors.of(union.distances[own])),
+                    *numbers(outcome.errors_of(ring)),
                 ]
             )
     head = ["object", "lens", "radius", "landed", "seen by C1", "C2"]
@@ -131,10 +132,9 @@ def second_sequences(outcomes: dict[tuple[str, str], Outcome]) -> None:
     print("## A second sequence, its rings midway between the first's\n")
     rows: list[list[str]] = []
     for (name, variant), outcome in outcomes.items():
-        doubled = double_density(outcome, threads=1)
-        for one in (doubled.first, doubled.both):
-            title = "both" if one is doubled.both else "first"
-            rows.append([name, variant, title, *cloud_row(one)])
+        both = double_density(outcome, threads=1)
+        rows.append([name, variant, "first", *cloud_row(outcome.union)])
+        rows.append([name, variant, "both", *cloud_row(both)])
     table(["object", "lens", "sequences", *CLOUD], rows)
 
 

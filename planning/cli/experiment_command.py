@@ -13,7 +13,7 @@ from typing import Any
 import click
 from PIL import Image
 
-from planning.experiments.one_image import Prior
+from planning.experiments.ground_truth import MeasuredErrors, Prior
 from planning.experiments.paper_figures import (
     draw_camera_images,
     draw_densities,
@@ -22,12 +22,14 @@ from planning.experiments.paper_figures import (
     draw_viewpoints,
 )
 from planning.experiments.point_panels import PanelStage
-from planning.experiments.run import DARK, Outcome, run_experiment
-from planning.experiments.second_sequence import Doubled, double_density
+from planning.experiments.run import (
+    DARK,
+    Outcome,
+    double_density,
+    run_experiment,
+)
 from planning.experiments.setups import Experiment, box_experiment, face_experiment
 from planning.experiments.table import (
-    cloud_lines,
-    doubled_document,
     outcome_document,
     outcome_lines,
 )
@@ -67,13 +69,23 @@ def experiment_command(options: Mapping[str, Any]) -> int:
             prior=prior,
             progress=lambda done, total: say(report, f"pair {done} of {total}"),
         )
-        doubled = None
+        both = None
         if options["second_sequence"]:
             say(report, "second sequence")
-            doubled = double_density(outcome, seed=seed, threads=threads)
+            both = double_density(outcome, seed=seed, threads=threads)
         say(report, "drawing")
-        files = _save(outcome, doubled, folder)
-    _print(outcome, doubled, files, as_json=options["as_json"])
+        document = outcome_document(outcome, both)
+        files = [
+            *_save_pictures(outcome, both, folder),
+            *_save_cloud(outcome, folder / "cloud.ply"),
+            _save_document(document, folder / "result.json"),
+        ]
+    if options["as_json"]:
+        print_json(document | {"files": files})
+        return 0
+    click.echo("\n".join([*outcome_lines(outcome, both), ""]))
+    for name in files:
+        click.echo(f"wrote {name}")
     return 0
 
 
@@ -87,7 +99,10 @@ def experiment_of(options: Mapping[str, Any]) -> Experiment:
     )
 
 
-def _save(outcome: Outcome, doubled: Doubled | None, folder: Path) -> list[str]:
+def _save_pictures(
+    outcome: Outcome, both: MeasuredErrors | None, folder: Path
+) -> list[str]:
+    """Write every picture; return the paths."""
     stage = PanelStage(outcome.experiment.mesh)
     pictures = {
         "cameras.png": draw_camera_images(outcome),
@@ -95,44 +110,29 @@ def _save(outcome: Outcome, doubled: Doubled | None, folder: Path) -> list[str]:
         "redundancy.png": draw_redundancy(outcome, stage),
         "errors.png": draw_errors(outcome, stage),
     }
-    if doubled is not None:
-        pictures["densities.png"] = draw_densities(doubled.first, doubled.both, stage)
+    if both is not None:
+        pictures["densities.png"] = draw_densities(outcome.union, both, stage)
     for name, picture in pictures.items():
         _write_picture(picture, folder / name)
-    files = [str(folder / name) for name in pictures]
-    cloud = folder / "cloud.ply"
-    if len(outcome.merged.cloud):
-        CloudFile.of(outcome.reconstruction.merged, _MM).save(cloud)
-        files.append(str(cloud))
-    else:
-        remove_cloud(cloud)
-    result = folder / "result.json"
-    text = json.dumps(_document(outcome, doubled), indent=1, allow_nan=False) + "\n"
-    write_atomically(result, lambda file: file.write(text.encode()))
-    return [*files, str(result)]
+    return [str(folder / name) for name in pictures]
 
 
 def _write_picture(picture: Image.Image, path: Path) -> None:
+    """Write a picture as a PNG file."""
     write_atomically(path, lambda file: picture.save(file, format="PNG"))
 
 
-def _document(outcome: Outcome, doubled: Doubled | None) -> dict[str, Any]:
-    document = outcome_document(outcome)
-    if doubled is not None:
-        document["second_sequence"] = doubled_document(doubled)
-    return document
+def _save_cloud(outcome: Outcome, path: Path) -> list[str]:
+    """Write the merged cloud; without points none, and none of an earlier run stays."""
+    if not len(outcome.merged.cloud):
+        remove_cloud(path)
+        return []
+    CloudFile.of(outcome.reconstruction.merged, _MM).save(path)
+    return [str(path)]
 
 
-def _print(
-    outcome: Outcome, doubled: Doubled | None, files: list[str], *, as_json: bool
-) -> None:
-    if as_json:
-        print_json(_document(outcome, doubled) | {"files": files})
-        return
-    click.echo("\n".join(outcome_lines(outcome)))
-    if doubled is not None:
-        click.echo("")
-        click.echo("\n".join(cloud_lines((doubled.first, doubled.both))))
-    click.echo("")
-    for name in files:
-        click.echo(f"wrote {name}")
+def _save_document(document: Mapping[str, Any], path: Path) -> str:
+    """Write every number; return the path."""
+    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+    write_atomically(path, lambda file: file.write(text.encode()))
+    return str(path)

@@ -11,8 +11,8 @@ from planning.verify.reconstruction.render.render import render_lines
 from planning.verify.reconstruction.render.rendered import RenderedScene
 from planning.verify.reconstruction.single_shot.single_shot import drawn_lines
 
+from .ground_truth import MeasuredErrors
 from .paper_devices import CAMERA_PX
-from .point_errors import MeasuredErrors
 from .point_panels import (
     KEPT,
     PROJECTORS,

@@ -1,24 +1,31 @@
 """Runs an experiment: one viewpoint, several, merged, and held to the truth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
-from planning.verify.reconstruction.arrays import Mask
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.reconstruct import conclude, reconstruct
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import Progress
+from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.single_shot import (
     decoded_pairs,
     shoot_rig,
 )
 
-from .one_image import LabelCount, Prior, judged_labels
-from .point_errors import MeasuredErrors, measured
+from .ground_truth import (
+    Errors,
+    LabelCount,
+    MeasuredErrors,
+    Prior,
+    judged_labels,
+    measured,
+)
 from .ring_outcomes import RingOutcome, lit_and_seen, ring_outcomes
 from .setups import Experiment
 
@@ -62,6 +69,13 @@ class Outcome:
         """Every cloud that was held to the truth, from few devices to all."""
         return (self.single, *self.viewpoints, self.union, self.merged)
 
+    def errors_of(self, ring: RingOutcome) -> Errors:
+        """Return the errors of all points of a ring."""
+        cloud = self.union.cloud
+        ids = [projector.id for projector in self.experiment.scanner.projectors]
+        of_ring = cloud.projector == ids.index(ring.projector)
+        return Errors.of(self.union.distances[of_ring & (cloud.ring == ring.ring)])
+
     @property
     def stays(self) -> Mask:
         """Which of all points stay where redundancy is removed, shape (n,)."""
@@ -90,7 +104,7 @@ def run_experiment(
     """
     scanner, labels = experiment.scanner, None
     if prior is None:
-        found = reconstruct(
+        result = reconstruct(
             scanner,
             seed=seed,
             threads=threads,
@@ -107,45 +121,36 @@ def run_experiment(
             progress=progress,
         )
         pairs = decoded_pairs(shots)
-        found = conclude(scanner, pairs, seed=seed, photometry=photometry)
+        result = conclude(scanner, pairs, seed=seed, photometry=photometry)
         labels = judged_labels(scanner, shots)
-    samples, visible = observable(experiment, seed)
-    everything, merged = found.everything, found.merged.cloud
-    names = [camera.id for camera in scanner.cameras]
-    first = f"{scanner.projectors[0].id} with {names[0]}"
+    samples = sample_surface(experiment.mesh, _SAMPLES, seed=seed)
+    able = lit_and_seen(scanner, samples.points, samples.normals)
+    samples = samples.take(able)
+    everything = result.everything
+
+    def held(name: str, cloud: Cloud) -> MeasuredErrors:
+        return measured(name, cloud, experiment.mesh, samples, experiment.gap_m)
+
+    first = f"{scanner.projectors[0].id} with {scanner.cameras[0].id}"
     by_one = (everything.camera == 0) & (everything.projector == 0)
-    gap_m = experiment.gap_m
-    mesh = experiment.mesh
-    viewpoints = tuple(
-        measured(
-            f"{name}, all projectors",
-            everything.take(everything.camera == c),
-            mesh,
-            samples,
-            gap_m,
-        )
-        for c, name in enumerate(names)
-    )
     return Outcome(
         experiment,
         photometry,
-        found,
+        result,
         samples,
-        visible,
-        measured(first, everything.take(by_one), mesh, samples, gap_m),
-        viewpoints,
-        measured("all points", everything, mesh, samples, gap_m),
-        measured("merged", merged, mesh, samples, gap_m),
+        float(np.mean(able)),
+        held(first, everything.take(by_one)),
+        tuple(
+            held(
+                f"{camera.id}, all projectors", everything.take(everything.camera == c)
+            )
+            for c, camera in enumerate(scanner.cameras)
+        ),
+        held("all points", everything),
+        held("merged", result.merged.cloud),
         ring_outcomes(scanner, everything),
         labels,
     )
-
-
-def observable(experiment: Experiment, seed: int) -> tuple[SurfaceSamples, float]:
-    """Return samples of what could be measured, and their share of the surface."""
-    samples = sample_surface(experiment.mesh, _SAMPLES, seed=seed)
-    able = lit_and_seen(experiment.scanner, samples.points, samples.normals)
-    return samples.take(able), float(np.mean(able))
 
 
 def _keys(cloud: Cloud) -> NDArray[np.void]:
@@ -153,3 +158,56 @@ def _keys(cloud: Cloud) -> NDArray[np.void]:
     devices = np.column_stack([cloud.projector, cloud.camera, cloud.ring])
     rows = np.ascontiguousarray(np.column_stack([devices, cloud.pixels]))
     return rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))).ravel()
+
+
+def midway(radii: Array) -> Array:
+    """Return radii midway between the rings, the first between centre and ring."""
+    return 0.5 * (np.concatenate([[0.0], radii[:-1]]) + radii)
+
+
+def second_sequence(scanner: Scanner) -> Scanner:
+    """Return a rig whose projectors draw their rings midway between its own."""
+    shifted = [
+        replace(one, pattern=replace(one.pattern, radii=midway(one.pattern.radii)))
+        for one in scanner.projectors
+    ]
+    return replace(scanner, projectors=tuple(shifted))
+
+
+def joined_sequences(first: Cloud, second: Cloud) -> Cloud:
+    """Return both clouds with their rings numbered outwards, the second's before."""
+    return Cloud.join(
+        [
+            replace(first, ring=(2 * first.ring + 1).astype(np.int16)),
+            replace(second, ring=(2 * second.ring).astype(np.int16)),
+        ]
+    )
+
+
+def double_density(
+    outcome: Outcome, *, seed: int = 0, threads: int = 2
+) -> MeasuredErrors:
+    """Measure an experiment's object again, with rings between those of before.
+
+    The paper's future work: "sampling density determination given the density of
+    previous light sources". Finer rings in one sequence would come too near each other
+    in the images; a second sequence doubles the density and keeps their distance.
+
+    Args:
+        outcome: What the first sequence gave.
+        seed: Of the first sequence; the second's noise is another.
+        threads: Worker threads; the result doesn't depend on them.
+
+    Returns:
+        All points of both; rings are numbered outwards through both.
+    """
+    experiment = outcome.experiment
+    second = reconstruct(
+        second_sequence(experiment.scanner),
+        seed=seed + 1,
+        threads=threads,
+        photometry=outcome.photometry,
+    )
+    cloud = joined_sequences(outcome.reconstruction.everything, second.everything)
+    samples = outcome.samples
+    return measured("both sequences", cloud, experiment.mesh, samples, experiment.gap_m)

@@ -10,11 +10,9 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 
-from .one_image import LabelCount
+from .ground_truth import Errors, LabelCount, MeasuredErrors
 from .paper_devices import CAMERA_PX, PROJECTOR_PX
-from .point_errors import Errors, MeasuredErrors
 from .run import Outcome
-from .second_sequence import Doubled
 from .setups import Experiment
 
 _MM = 1e3
@@ -70,7 +68,7 @@ def ring_lines(outcome: Outcome) -> list[str]:
         lines.append(
             f"{ring.projector + ' ' + str(ring.ring + 1):10s}{radius:7.1f}"
             f"{ring.on_object:9.3f}{seen}{measured}{ring.measured_by_any:9.3f}"
-            f"{_numbers(_of_ring(outcome, ring.projector, ring.ring))}"
+            f"{_numbers(outcome.errors_of(ring))}"
         )
     return lines
 
@@ -88,8 +86,13 @@ def label_line(labels: LabelCount) -> str:
     )
 
 
-def outcome_lines(outcome: Outcome) -> list[str]:
-    """Return everything that there is to read of an experiment."""
+def outcome_lines(outcome: Outcome, both: MeasuredErrors | None = None) -> list[str]:
+    """Return everything that there is to read of an experiment.
+
+    Args:
+        outcome: What the first sequence gave.
+        both: What it gave with a second one; None: there was none.
+    """
     return [
         *setup_lines(outcome.experiment),
         f"{100 * outcome.visible:.1f} % of the surface is inside the outermost ring, "
@@ -100,13 +103,20 @@ def outcome_lines(outcome: Outcome) -> list[str]:
         "",
         *ring_lines(outcome),
         *([] if outcome.labels is None else ["", label_line(outcome.labels)]),
+        *([] if both is None else ["", *cloud_lines((outcome.union, both))]),
     ]
 
 
-def outcome_document(outcome: Outcome) -> dict[str, Any]:
+def outcome_document(
+    outcome: Outcome, both: MeasuredErrors | None = None
+) -> dict[str, Any]:
     """Return the same as plain values, in metres."""
     experiment = outcome.experiment
     scanner = experiment.scanner
+    second = {}
+    if both is not None:
+        clouds = {"first": outcome.union, "both": both}
+        second["second_sequence"] = {k: _cloud_document(v) for k, v in clouds.items()}
     return {
         "experiment": experiment.name,
         "variant": experiment.variant,
@@ -134,25 +144,10 @@ def outcome_document(outcome: Outcome) -> dict[str, Any]:
         "labels": None if outcome.labels is None else vars(outcome.labels),
         "clouds": [_cloud_document(one) for one in outcome.clouds],
         "rings": [
-            {
-                "projector": ring.projector,
-                "ring": ring.ring,
-                "on_object": ring.on_object,
-                "seen": ring.seen,
-                "measured": ring.measured,
-                "measured_by_any": ring.measured_by_any,
-                "errors": _of_ring(outcome, ring.projector, ring.ring).to_document(),
-            }
+            vars(ring) | {"errors": vars(outcome.errors_of(ring))}
             for ring in outcome.outcomes
         ],
-    }
-
-
-def doubled_document(doubled: Doubled) -> dict[str, Any]:
-    """Return what a second sequence added, as plain values."""
-    return {
-        "first": _cloud_document(doubled.first),
-        "both": _cloud_document(doubled.both),
+        **second,
     }
 
 
@@ -171,17 +166,10 @@ def _device_document(
 def _cloud_document(one: MeasuredErrors) -> dict[str, Any]:
     return {
         "name": one.name,
-        "errors": one.errors.to_document(),
+        "errors": vars(one.errors),
         "completeness_half_gap": one.complete[0],
         "completeness_one_gap": one.complete[1],
     }
-
-
-def _of_ring(outcome: Outcome, projector: str, ring: int) -> Errors:
-    ids = [one.id for one in outcome.experiment.scanner.projectors]
-    cloud = outcome.union.cloud
-    own = (cloud.projector == ids.index(projector)) & (cloud.ring == ring)
-    return Errors.of(outcome.union.distances[own])
 
 
 def _numbers(errors: Errors) -> str:

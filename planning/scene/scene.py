@@ -14,9 +14,9 @@ from geometry.mesh.sampling import sample_surface
 from geometry.rays.visibility import Visibility
 from geometry.repair.hollow import MeshShell, measure_shell
 from planning.model.requirements import Requirements, Workspace
-from planning.scene.draws import DRAWS, Draw
 from planning.scene.workspace.view_tiles import Site
 
+from .draws import DRAWS, Draw
 from .placed_bodies import Device, PlacedBody, bodies_of, existing_bodies
 from .samples import Target
 

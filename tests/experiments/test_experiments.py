@@ -15,7 +15,7 @@ from support.plain_shapes import box, grid, joined
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.experiments.one_image import Prior, judged_labels, true_labels
+from planning.experiments.ground_truth import Errors, Prior, judged_labels, true_labels
 from planning.experiments.paper_devices import (
     CAMERA_PX,
     PRINTED,
@@ -29,11 +29,16 @@ from planning.experiments.paper_figures import (
     draw_redundancy,
     draw_viewpoints,
 )
-from planning.experiments.point_errors import Errors
 from planning.experiments.point_panels import RINGS, PanelStage, signed_colours
 from planning.experiments.ring_outcomes import lit_and_seen, ring_outcomes
-from planning.experiments.run import DARK, Outcome, run_experiment
-from planning.experiments.second_sequence import double_density, midway, second_sequence
+from planning.experiments.run import (
+    DARK,
+    Outcome,
+    double_density,
+    midway,
+    run_experiment,
+    second_sequence,
+)
 from planning.experiments.setups import (
     FACE_RADII_M,
     box_experiment,
@@ -332,8 +337,7 @@ def test_a_second_sequence_doubles_the_density(of_box):
         of_box.experiment.scanner.projectors, shifted.projectors, strict=True
     ):
         np.testing.assert_allclose(after.pattern.radii, before.pattern.radii - 0.006)
-    doubled = double_density(of_box, threads=1)
-    first, both = doubled.first, doubled.both
+    first, both = of_box.union, double_density(of_box, threads=1)
     assert 1.8 < len(both.cloud) / len(first.cloud) < 2.2
     assert first.complete[0] < 0.92
     assert both.complete[0] > 0.98

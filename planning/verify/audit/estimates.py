@@ -82,6 +82,23 @@ class Estimator:
         return POINT * whole_m2 + 3.0 * float(np.sqrt(variance))
 
 
+def share_error(
+    count: NDArray[np.float64], n: int, n_claimed: int
+) -> NDArray[np.float64]:
+    """Return the standard error of the difference of two estimates of a share.
+
+    One success and one failure are added, as in `Estimator.tolerance`.
+
+    Args:
+        count: Successes among the audit's samples, of any shape.
+        n: Number of these samples.
+        n_claimed: Samples behind the plan's claims.
+    """
+    p = (count + 1.0) / (n + 2.0)
+    return np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / max(n_claimed, 1)))
+
+
 def _variance(share: float, n: int) -> float:
+    """Return the variance of a share of n samples."""
     p = (n * share + 1.0) / (n + 2.0)
     return max(p * (1.0 - p), 0.0) / n

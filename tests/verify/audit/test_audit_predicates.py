@@ -222,6 +222,8 @@ def test_the_audit_imports_nothing_of_the_planner():
     allowed = {
         "planning.model.document.device_records",
         "planning.model.document.certificates",
+        "planning.model.document.check_records",
+        "planning.model.document.part",
         "planning.model.document.coverage_records",
         "planning.model.document.input_records",
         "planning.model.planned",

@@ -10,7 +10,7 @@ from planning.model.document.coverage_records import ExposureSchedule, Overlap
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples
-from planning.verify.audit.estimates import Estimator
+from planning.verify.audit.estimates import Estimator, share_error
 from planning.verify.audit.predicates.audit_devices import AuditProjector
 from planning.verify.audit.predicates.audit_optics import dot
 from planning.verify.audit.predicates.occlusion import Shadow, free_of
@@ -84,12 +84,8 @@ def _clearly_some(both: NDArray[np.bool_], estimator: Estimator) -> bool:
     """Whether that many samples can't be what a set of the planner's size misses."""
     inside = estimator.samples.in_target
     for within in (inside, ~inside):
-        n, k = int(within.sum()), int((both & within).sum())
-        if n == 0:
-            continue
-        p = (k + 1.0) / (n + 2.0)
-        error = np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / max(estimator.n_claimed, 1)))
-        if k / n > _DEVIATIONS * error:
+        n, k = int(within.sum()), np.array((both & within).sum(), float)
+        if n and k / n > _DEVIATIONS * share_error(k, n, estimator.n_claimed):
             return True
     return False
 

@@ -6,6 +6,7 @@ from scipy.sparse.csgraph import connected_components
 
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.estimates import share_error
 
 # Parts that share so much of the target can be registered with each other.
 _OVERLAP = 0.01
@@ -76,6 +77,4 @@ def _overlaps(
     """Share of the target that each two cameras measure, and its tolerance."""
     n = measured.shape[1]
     shared = measured.astype(np.float64) @ measured.T
-    p = (shared + 1.0) / (n + 2.0)
-    error = np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / max(n_claimed, 1)))
-    return shared / n, _DEVIATIONS * error
+    return shared / n, _DEVIATIONS * share_error(shared, n, n_claimed)

@@ -6,13 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from planning.model.bodies import Body, Box
+from planning.model.bodies import Body
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_optics import in_frame
-from planning.verify.audit.predicates.occlusion import Block, block_of, touches
+from planning.verify.audit.predicates.occlusion import (
+    Block,
+    block_of,
+    block_of_zone,
+    touches,
+)
 
 _ROUNDING = 1e-9
 
@@ -91,8 +96,10 @@ def _audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
 def _audit_zones(
     key: str, block: Block, plan: RigPlan, findings: AuditFindings
 ) -> None:
+    """Check that a body stands above the floor, in the box and off keep-out zones."""
     space = plan.requirements.workspace
-    offsets = block.corners - np.array(space.centre)
+    centre = np.array(space.centre)
+    offsets = block.corners - centre
     if space.floor_m is not None:
         lowest = float((offsets @ np.array(space.up)).min())
         findings.holds(
@@ -101,7 +108,7 @@ def _audit_zones(
             f"reaches {1e3 * (space.floor_m - lowest):.3g} mm below the floor",
         )
     if space.box is not None:
-        room = _zone(space.box, plan)
+        room = block_of_zone(space.box, centre)
         beyond = np.abs(in_frame(room.world_from_box, block.corners)) - room.half
         out = float(beyond.max())
         findings.holds(
@@ -109,14 +116,7 @@ def _audit_zones(
         )
     for zone in space.keep_out:
         findings.holds(
-            not block.overlaps(_zone(zone, plan)),
+            not block.overlaps(block_of_zone(zone, centre)),
             key,
             f"reaches into the keep-out volume {zone.name!r}",
         )
-
-
-def _zone(zone: Box, plan: RigPlan) -> Block:
-    frame = np.eye(4)
-    frame[:3, :3] = np.array(zone.axes).T
-    frame[:3, 3] = np.array(plan.requirements.workspace.centre) + zone.centre_m
-    return Block(zone.name, frame, np.array(zone.half_m))

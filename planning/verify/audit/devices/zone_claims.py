@@ -10,6 +10,8 @@ from planning.model.bodies import Box
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.predicates.audit_optics import in_frame
+from planning.verify.audit.predicates.occlusion import Block, block_of_zone
 
 _Array = NDArray[np.float64]
 _KEY = "requirements.workspace"
@@ -89,11 +91,13 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
 
 def _depth_inside(box: Box, offsets: _Array) -> _Array:
     """Least distance to any of the six planes, negative beyond one, shape (n,)."""
-    local = (offsets - np.array(box.centre_m)) @ np.array(box.axes).T
-    return np.min(np.array(box.half_m) - np.abs(local), axis=1)
+    block = block_of_zone(box, np.zeros(3))
+    local = in_frame(block.world_from_box, offsets)
+    return np.min(block.half - np.abs(local), axis=1)
 
 
 def _audit_box(key: str, box: Box, findings: AuditFindings) -> None:
+    """Check that axes are a rotation, and sides positive."""
     turn = np.array(box.axes)
     error = float(np.abs(turn @ turn.T - np.eye(3)).max())
     findings.holds(
@@ -111,20 +115,20 @@ def _audit_box(key: str, box: Box, findings: AuditFindings) -> None:
 def _audit_room(
     key: str, box: Box, table: Mapping[str, Any], findings: AuditFindings
 ) -> None:
-    low, high = np.array(table["min_mm"]), np.array(table["max_mm"])
-    corners = _corners(np.eye(3), 0.5e-3 * (low + high), 0.5e-3 * (high - low))
-    _audit_corners(key.removesuffix(".0"), box, corners, findings)
+    """Compare the room with the least and largest corner that are stated."""
+    low, high = 1e-3 * np.array(table["min_mm"]), 1e-3 * np.array(table["max_mm"])
+    stated = Block.at(box.name, np.eye(3), 0.5 * (low + high), 0.5 * (high - low))
+    _audit_corners(key.removesuffix(".0"), box, stated, findings)
 
 
 def _audit_volume(
     key: str, box: Box, table: Mapping[str, Any], findings: AuditFindings
 ) -> None:
+    """Compare a keep-out volume with the centre, size and turns that are stated."""
     turn = _turned(np.radians(table["turn_deg"]))
-    centre, half = (
-        1e-3 * np.array(table["centre_mm"]),
-        0.5e-3 * np.array(table["size_mm"]),
-    )
-    _audit_corners(key, box, _corners(turn, centre, half), findings)
+    centre, size = (1e-3 * np.array(table[name]) for name in ("centre_mm", "size_mm"))
+    stated = Block.at(box.name, turn, centre, 0.5 * size)
+    _audit_corners(key, box, stated, findings)
 
 
 def _audit_plane(
@@ -161,17 +165,10 @@ def _turned(angles: _Array) -> _Array:
     return turn
 
 
-def _corners(turn: _Array, centre: _Array, half: _Array) -> _Array:
-    """The eight corners, first axis slowest, shape (8, 3)."""
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij"))
-    return centre + (signs.reshape(3, -1).T * half) @ turn.T
-
-
-def _audit_corners(key: str, box: Box, stated: _Array, findings: AuditFindings) -> None:
-    claimed = _corners(
-        np.array(box.axes).T, np.array(box.centre_m), np.array(box.half_m)
-    )
-    off = float(np.abs(claimed - stated).max())
+def _audit_corners(key: str, box: Box, stated: Block, findings: AuditFindings) -> None:
+    """Compare the corners of a zone with those that are stated."""
+    claimed = block_of_zone(box, np.zeros(3))
+    off = float(np.abs(claimed.corners - stated.corners).max())
     findings.holds(
         off <= _ROUNDING,
         key,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
+from planning.model.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
@@ -39,6 +40,13 @@ class Block:
     name: str
     world_from_box: _Array
     half: _Array
+
+    @classmethod
+    def at(cls, name: str, turn: _Array, middle: _Array, half: _Array) -> "Block":
+        """Return a box of axes that are the columns of a rotation, about its middle."""
+        frame = np.eye(4)
+        frame[:3, :3], frame[:3, 3] = turn, middle
+        return cls(name, frame, half)
 
     @property
     def corners(self) -> _Array:
@@ -82,10 +90,15 @@ def block_of(device: _Device) -> Block | None:
     """Return a device's body in the world; None where it has none."""
     if device.body is None:
         return None
-    pose = device.world_from_device
-    frame = pose.copy()
-    frame[:3, 3] += pose[:3, :3] @ np.array(device.body.centre_m)
-    return Block(device.id, frame, np.array(device.body.half_m))
+    turn, origin = device.world_from_device[:3, :3], device.world_from_device[:3, 3]
+    middle = origin + turn @ np.array(device.body.centre_m)
+    return Block.at(device.id, turn, middle, np.array(device.body.half_m))
+
+
+def block_of_zone(zone: Box, centre: _Array) -> Block:
+    """Return a zone in the frame in which the workspace's centre is at `centre`."""
+    middle, turn = centre + zone.centre_m, np.array(zone.axes).T
+    return Block.at(zone.name, turn, middle, np.array(zone.half_m))
 
 
 def bodies_but(plan: RigPlan, device: _Device) -> tuple[Block, ...]:
