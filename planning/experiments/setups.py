@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box
-from geometry.shapes.sample_head.sample_head import HeadShape, sample_head
+from geometry.shapes.sample_head.sample_head import sample_head
 from planning.model.requirements import CheckLimits
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.light_laws import LightName
@@ -109,7 +109,6 @@ def face_experiment(
     variant: Variant = "printed",
     distortion: float = 0.0,
     radii_m: Array = FACE_RADII_M,
-    shape: HeadShape | None = None,
 ) -> Experiment:
     """Return the head under 2 projectors of circles of 1, 2 and 4 inches.
 
@@ -118,9 +117,8 @@ def face_experiment(
         variant: Focal length and image centre.
         distortion: k1 of the cameras' lenses; the decoder knows it.
         radii_m: Other radii than the paper's [m], rising.
-        shape: Proportions of the head; default those of the sample.
     """
-    mesh = _head(shape or HeadShape())
+    mesh = _head()
     return _experiment("face", mesh, _FACE_TARGET, radii_m, light, variant, distortion)
 
 
@@ -135,8 +133,9 @@ def single(experiment: Experiment, *, projector: int = 0, camera: int = 0) -> Sc
 
 
 @cache
-def _head(shape: HeadShape) -> TriangleMesh:
-    return sample_head(shape, n_faces=_HEAD_FACES)
+def _head() -> TriangleMesh:
+    """Return the head of the sample."""
+    return sample_head(n_faces=_HEAD_FACES)
 
 
 def _experiment(
