@@ -97,6 +97,7 @@ class PanelStage:
         return _framed(panel.image, title, legend)
 
     def _hidden(self, points: Array) -> Mask:
+        """Which points lie behind the object, (n,)."""
         if len(points) == 0:
             return np.zeros(0, dtype=bool)
         mesh = self.caster.mesh

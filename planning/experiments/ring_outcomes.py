@@ -112,6 +112,7 @@ def _landed(
 def _lights(
     projector: ProjectorCalibration, points: Array, normals: Array, caster: RayCaster
 ) -> Mask:
+    """Whether a ring pattern falls on points of the surface, (n,)."""
     pixels, _ = projector.panel(points)
     _, beams, away = projector.aim(points)
     lit = projector.in_panel(pixels)
@@ -152,4 +153,5 @@ def _measured(cloud: Cloud, which: tuple[int, int, int], points: Array) -> Mask:
 
 
 def _share(values: Mask) -> float:
+    """Share of places; 0 without any."""
     return float(np.mean(values)) if len(values) else 0.0

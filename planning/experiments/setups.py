@@ -147,6 +147,7 @@ def _experiment(
     variant: Variant,
     distortion: float,
 ) -> Experiment:
+    """Place the devices of the paper about an object."""
     printed = VARIANTS[variant]
     optics = Optics(printed.focal_px, printed.centre_px, distortion)
     gap_m = float(np.median(np.diff(radii_m, prepend=0.0)))

@@ -164,6 +164,7 @@ def _device_document(
 
 
 def _cloud_document(one: MeasuredErrors) -> dict[str, Any]:
+    """Errors and completeness of a cloud, as plain values."""
     return {
         "name": one.name,
         "errors": vars(one.errors),

@@ -134,6 +134,7 @@ def audit_plan(
 
 
 def _require_shapes(surface: Surface) -> None:
+    """Raise unless the arrays of surface.npz have their shapes."""
     for name in ("reference_projectors", "reference_rings", "reference_cameras"):
         poses = getattr(surface, name)
         whole = poses.ndim == 3 and poses.shape[1:] == (4, 4)

@@ -107,6 +107,7 @@ def _draw(
     n: int,
     rng: np.random.Generator,
 ) -> AuditSamples:
+    """Draw n points of some faces, uniformly by area."""
     areas = np.where(within, surface.mesh.face_areas, 0.0)
     total = float(areas.sum())
     faces = rng.choice(len(areas), size=n, p=areas / total)

@@ -211,5 +211,6 @@ def _still(key: str, covariance: _Array, pull: _Array, findings: AuditFindings) 
 def _same(
     key: str, claimed: Sequence[object], covariance: _Array, findings: AuditFindings
 ) -> None:
+    """Check a covariance against the inverse of the information."""
     slack = 1e-5 * float(np.abs(covariance).max())
     findings.array(key, claimed, covariance, slack, "the inverse of the information")

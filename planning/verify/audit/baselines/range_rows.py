@@ -36,6 +36,7 @@ def _audit_row(
     claimed: RangesRecord,
     findings: AuditFindings,
 ) -> None:
+    """Check d_max, its sigma and the verdict of one row."""
     largest = claimed.stated["camera.max_incidence"]
     limit = _limit(section, largest)
     gradient = np.array(
@@ -74,6 +75,7 @@ def _spread(section: SeamPlane, claimed: RangesRecord) -> NDArray[np.float64]:
 
 
 def _at(section: SeamPlane, step: NDArray[np.float64], largest: float) -> float:
+    """d_max with E moved by a step [m]."""
     return _limit(replace(section, meeting=section.meeting + step), largest)
 
 

@@ -163,6 +163,7 @@ def audit_groups_of_light(
 def _overlapping(
     names: list[str], overlaps: tuple[Overlap, ...]
 ) -> dict[str, set[str]]:
+    """Projectors that each overlaps by the claimed areas."""
     near: dict[str, set[str]] = {name: set() for name in names}
     for overlap in overlaps:
         one, other = overlap.projectors

@@ -136,6 +136,7 @@ def _audit_limits(case: AuditCase, findings: AuditFindings) -> None:
 
 
 def _audit_scales(case: AuditCase, findings: AuditFindings) -> None:
+    """Check that units and scales of the mesh files agree."""
     for place, mesh in enumerate(case.plan.document.meshes):
         key, truth = f"meshes.{place}.scale_to_m", _METRES.get(mesh.unit)
         findings.holds(

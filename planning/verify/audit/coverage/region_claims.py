@@ -45,6 +45,7 @@ def _audit_margin(
     lit: NDArray[np.float64],
     findings: AuditFindings,
 ) -> None:
+    """Check one margin against assigned and all lit samples."""
     n = len(assigned)
     if claimed is None or len(lit) == 0:
         findings.holds(

@@ -123,6 +123,7 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
 
 
 def _audit_rig(case: AuditCase, findings: AuditFindings) -> None:
+    """Check that existing devices are those of the rig, where it has them."""
     plan = case.plan
     stated = {str(table.get("name")): table for table in plan.document.rig.existing}
     names = sorted(device.name for device in plan.requirements.existing)

@@ -134,6 +134,7 @@ def _audit_volume(
 def _audit_plane(
     key: str, box: Box, table: Mapping[str, Any], findings: AuditFindings
 ) -> None:
+    """Compare a mounting plane with centre, extent and normal that are stated."""
     normal = np.array(table["normal"], dtype=np.float64)
     sizes = [*table["extent_mm"], table["thickness_mm"]]
     for name, claimed, truth in (

@@ -164,6 +164,7 @@ def touches(block: Block, caster: RayCaster) -> bool:
 
 
 def _bodies(devices: Iterable[_Device]) -> tuple[Block, ...]:
+    """The bodies of those devices that have one."""
     blocks = (block_of(device) for device in devices)
     return tuple(block for block in blocks if block is not None)
 

@@ -159,8 +159,10 @@ def _pass_free(
 
 
 def _or(limit: float | None, otherwise: float) -> float:
+    """A limit, or a value that binds nothing where there is none."""
     return otherwise if limit is None else limit
 
 
 def _angle(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The angle of a cosine that rounding may have pushed past 1 [rad]."""
     return np.arccos(np.clip(cosine, -1.0, 1.0))
