@@ -175,7 +175,9 @@ def served(plan: RigPlan) -> SurfaceSamples:
 def rig(mesh: TriangleMesh, light: str = "diverging") -> RigPlan:
     """Return two projectors and three cameras about the front of an object."""
     plan = RIGS.small_rig(mesh, light)
-    plan.to_document()["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
+    document = plan.to_document()
+    document["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
+    plan = RigPlan.from_document(document, plan.surface)
     return RigPlan.from_document(plan.to_document(), plan.surface)
 
 

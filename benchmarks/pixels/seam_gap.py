@@ -36,8 +36,9 @@ def wall_rig(baseline: float) -> RigPlan:
         [_projector()],
         [_camera("C1", -0.5 * baseline), _camera("C2", 0.5 * baseline)],
     )
-    plan.to_document()["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
-    return RigPlan.from_document(plan.to_document(), plan.surface)
+    document = plan.to_document()
+    document["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
+    return RigPlan.from_document(document, plan.surface)
 
 
 def predicted_limit() -> float:
