@@ -10,7 +10,7 @@ from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
-from planning.proofs.candidate_certificate import BODIES_LEFT_OUT, certificate
+from planning.proofs.candidate_certificate import certificate
 from planning.proofs.conflicts import Interference, resolve_others
 from planning.proofs.selection import (
     CandidateCover,
@@ -244,9 +244,9 @@ def camera_stage(
         n = len(cover.selection.chosen)
         others = resolve_others(cover.interference, candidates, others, n)
     area = cover.samples.target.samples.weight
-    proof = certificate(candidates, cover.selection, others, area)
-    if cover.has_bodies:
-        proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
+    proof = certificate(
+        candidates, cover.selection, others, area, bodied=cover.has_bodies
+    )
     by_count = {n: cover.among_candidates(of) for n, of in others.by_count.items()}
     return CameraStage(cover.cameras, cover, by_count, proof, routes)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from planning.model.document.certificates import Certificate
 from planning.model.planned import PlannedProjector
-from planning.proofs.candidate_certificate import BODIES_LEFT_OUT, certificate
+from planning.proofs.candidate_certificate import certificate
 from planning.proofs.conflicts import (
     ProjectorInterference,
     resolve_conflicts,
@@ -79,9 +79,8 @@ class ProjectorStage:
             most_area = selection.chosen
         others = marginals(cover, selection)
         others = resolve_others(crowd, cover, others, len(selection.chosen))
-        proof = certificate(cover, selection, others, samples.samples.weight)
-        if crowd.bodied:
-            proof = proof.changed(bounds_leave_out=BODIES_LEFT_OUT)
+        area = samples.samples.weight
+        proof = certificate(cover, selection, others, area, bodied=crowd.bodied)
         proof = proof.changed(
             excluded_pairs={
                 cause: int((candidates.stages == index).sum())

@@ -16,7 +16,7 @@ from planning.model.document.certificates import (
 from .selection import CandidateCover, Marginals, Selection
 
 # What a certificate says where chosen devices have bodies.
-BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
+_BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
 
 
 def certificate(
@@ -24,6 +24,8 @@ def certificate(
     selection: Selection,
     others: Marginals,
     sample_area_m2: float,
+    *,
+    bodied: bool = False,
 ) -> Certificate:
     """Return the plan's certificate: what was proved, and over what.
 
@@ -34,6 +36,7 @@ def certificate(
         selection: Candidates taken.
         others: The best candidates of other counts.
         sample_area_m2: Area that a sample stands for.
+        bodied: Whether bodies of chosen devices may be in the way.
     """
     n_samples, n_candidates = cover.covers.shape
     count, existing = len(selection.chosen), cover.n_existing
@@ -62,11 +65,12 @@ def certificate(
         best_area=_best_area(by_count, count),
         one_fewer=_one_fewer(by_count, count, existing),
     )
-    if existing:
-        proof = proof.changed(given=existing)
-    if selection.but_for_bodies is not None:
-        proof = proof.changed(but_for_bodies=selection.but_for_bodies)
-    return proof
+    extras = {
+        "given": existing or None,
+        "but_for_bodies": selection.but_for_bodies,
+        "bounds_leave_out": _BODIES_LEFT_OUT if bodied else None,
+    }
+    return proof.changed(**{k: v for k, v in extras.items() if v is not None})
 
 
 def _best_area(by_count: tuple[CountArea, ...], count: int) -> BestArea:

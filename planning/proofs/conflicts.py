@@ -82,12 +82,12 @@ class ProjectorInterference:
         bodies = bodies_of(device for device in chosen if not device.existing)
         lit = self.lit[:, columns]
         for k, column in enumerate(columns):
-            device, own = self.devices[column], np.flatnonzero(lit[:, k])
+            device, at = self.devices[column], np.flatnonzero(lit[:, k])
             if collide(device, bodies):
                 lit[:, k] = False
                 continue
-            points = self.samples.samples.points[own]
-            lit[own[blocked_by(bodies, device, points).any(axis=1)], k] = False
+            points = self.samples.samples.points[at]
+            lit[at[blocked_by(bodies, device, points).any(axis=1)], k] = False
         return lit
 
     def stand_together(self, chosen: Sequence[int]) -> bool:
@@ -128,9 +128,10 @@ def resolve_conflicts(
         # How many would do it, were more allowed.
         demand = replace(demand, required=selection.required, most=more)
         enough, there = _compatible(crowd, cover, selection.smallest, demand)
-        found = enough if there >= selection.required else selection.smallest
-        smallest = max((found, resolved), key=len)
-        if found is not enough or len(enough) > selection.needed:
+        cover_found = there >= selection.required
+        fewest = enough if cover_found else selection.smallest
+        smallest = max((fewest, resolved), key=len)
+        if not cover_found or len(enough) > selection.needed:
             but_for_bodies = selection.needed
     bound = selection.n_covered_bound
     if len(resolved) != len(chosen):
@@ -235,8 +236,8 @@ def _harmless(
         return covers
     for column in np.flatnonzero(covers.any(axis=0)):
         if column not in standing:
-            left = crowd.covers([*standing, int(column)], standing)
-            if before - int(left.any(axis=1).sum()) > spare:
+            after = crowd.covers([*standing, int(column)], standing)
+            if before - int(after.any(axis=1).sum()) > spare:
                 covers[:, column] = False
     return covers
 
@@ -250,11 +251,11 @@ def _completed(
 ) -> list[int]:
     """Return the candidates that stand, with others to cover what is required."""
     problem = replace(cover_problem(covers, 0), fixed=np.array(standing, np.int64))
-    found = np.array(standing, dtype=np.int64)
+    taken = np.array(standing, dtype=np.int64)
     least = min(max(len(standing), len(tried)), demand.most)
     for count in range(least, demand.most + 1):
-        found = solve_max_coverage(problem, count, seed=seed, budget=_BUDGET).selected
-        if covers[:, found].any(axis=1).sum() >= demand.required:
+        taken = solve_max_coverage(problem, count, seed=seed, budget=_BUDGET).selected
+        if covers[:, taken].any(axis=1).sum() >= demand.required:
             break
     useful = np.asarray(covers.any(axis=0))
-    return sorted(i for i in map(int, found) if useful[i] or i in standing)
+    return sorted(i for i in map(int, taken) if useful[i] or i in standing)

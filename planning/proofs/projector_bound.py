@@ -55,8 +55,8 @@ def bound_projectors(
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, shadows=0.0)
     shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
-    cube, asked = CubeMap(1 << effort.finest), scene.requirements.projector
-    limits = DirectionLimits(asked.max_incidence, asked.min_tangent_angle)
+    cube, required = CubeMap(1 << effort.finest), scene.requirements.projector
+    limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
     workspace, device = scene.requirements.workspace, template.device
     near = workspace.projector_radius_m[0]
     tree: DirectionTree | PositionTree
@@ -112,9 +112,9 @@ def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.boo
     near, far = workspace.projector_radius_m
     slack = cube.radii + float(np.arcsin(min(1.0, aside / near))) + 1e-9
     along = np.arccos(np.clip(cube.centres @ np.array(workspace.axis), -1.0, 1.0))
-    kept = along <= workspace.half_angle + slack
+    passed = along <= workspace.half_angle + slack
     if workspace.floor_m is not None:
         lowest = workspace.floor_m / (far if workspace.floor_m > 0 else near)
         above = np.arccos(np.clip(cube.centres @ np.array(workspace.up), -1.0, 1.0))
-        kept &= above <= np.arccos(np.clip(lowest, -1.0, 1.0)) + slack
-    return kept & may_stand(workspace, cube.centres, slack, near, far)
+        passed &= above <= np.arccos(np.clip(lowest, -1.0, 1.0)) + slack
+    return passed & may_stand(workspace, cube.centres, slack, near, far)

@@ -17,6 +17,7 @@ from solvers.bit_rows import sparse_rows
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
 
+# Counts beyond the one taken for which the best candidates are reported.
 MORE = 2
 # Counted work for the marginal table's other counts, where no proof is claimed.
 _MARGINAL_BUDGET = 3e8
@@ -60,7 +61,7 @@ class Marginals:
     """What other numbers of candidates than the one taken would give.
 
     Attributes:
-        by_count: Best candidates found for 1, 2, ... k + `more` devices.
+        by_count: Best candidates found for 1, 2, ... k + 2 devices.
         n_covered: Samples that these cover, and the proven most that as many
             candidates cover.
         greedy: Candidates that the greedy cover takes.
@@ -193,21 +194,18 @@ def required_samples(reached: NDArray[np.bool_], share: float) -> int:
     return int(np.ceil(share * int(reached.sum()) - 1e-9))
 
 
-def marginals(
-    cover: CandidateCover, selection: Selection, *, more: int = MORE
-) -> Marginals:
+def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
     """Return the best candidates for every other count, for the table in the plan.
 
     Args:
         cover: As the selection was made from.
         selection: As it is kept.
-        more: Counts beyond the one taken for which the best is wanted.
     """
     taken = len(selection.chosen)
     by_count: dict[int, NDArray[np.int64]] = {}
     n_covered: dict[int, tuple[int, int]] = {}
     best = np.empty(0, dtype=np.int64)
-    most = min(taken + more, cover.covers.shape[1])
+    most = min(taken + MORE, cover.covers.shape[1])
     for count in range(max(1, cover.n_existing), most + 1):
         if count == taken:
             best = selection.chosen

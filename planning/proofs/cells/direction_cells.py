@@ -61,13 +61,13 @@ class DirectionTree:
         level, cell = self.place(cells)
         split = level < len(self.levels) - 1
         parents = np.repeat(np.flatnonzero(split), 4)
-        own = quarters(level[split], cell[split]).ravel()
+        quarter = quarters(level[split], cell[split]).ravel()
         level = level[parents]
         rows = np.empty((parents.size, self.levels[0].shape[1]), dtype=np.uint64)
         for finer in np.unique(level):
-            some = level == finer
-            rows[some] = self.levels[finer + 1][own[some]]
-        return CellBatch(_first(level + 1) + own, parents, rows)
+            at = level == finer
+            rows[at] = self.levels[finer + 1][quarter[at]]
+        return CellBatch(_first(level + 1) + quarter, parents, rows)
 
     def spread_cells(self) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
         """Return cells of one size that hold every direction, and their rows."""

@@ -95,13 +95,13 @@ def _farthest(device: PinholeModel, reach: float) -> float:
     k1, k2, p1, p2, k3 = device.distortion
     aside = 3.0 * (abs(p1) + abs(p2))
     radial = np.array([k3, 0.0, k2, 0.0, k1, 0.0, 1.0, 0.0])
-    rest = np.array([0.0, 0.0, 0.0, 0.0, 0.0, aside, 0.0, reach])
+    bend = np.array([0.0, 0.0, 0.0, 0.0, 0.0, aside, 0.0, reach])
     # Beyond the largest root of both, either sign of the radial part is too large.
-    roots = np.concatenate([np.roots(radial - rest), np.roots(-radial - rest)])
+    roots = np.concatenate([np.roots(radial - bend), np.roots(-radial - bend)])
     real = roots.real[np.abs(roots.imag) <= _ROOTS * (1.0 + np.abs(roots))]
     rho = float(real.max(initial=reach)) * (1.0 + _ROOTS) + _ROOTS
     beyond = 2.0 * rho + 1.0
-    over = abs(np.polyval(radial, beyond)) - np.polyval(rest, beyond)
+    over = abs(np.polyval(radial, beyond)) - np.polyval(bend, beyond)
     return rho if over > 0.0 else float("inf")
 
 
