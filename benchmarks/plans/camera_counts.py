@@ -192,7 +192,7 @@ def _by_default(job: Job) -> Found:
     told = "no neighbours" if gain is None else " -> ".join(_mm(a) for a in apart)
     cells = (
         str(len(after.cameras)),
-        str(proof["candidates"]["lower_bound"]),
+        str(proof.candidates.lower_bound),
         _count(routes.cover),
         _count(routes.paper),
         routes.taken,
