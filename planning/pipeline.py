@@ -92,20 +92,19 @@ def plan_rig(
         RequirementError: If a requirement is missed; it carries the best plan.
         TimeLimitError: If the time limit came before any plan.
     """
-    wishes = Wishes(
-        max_projectors=max_projectors,
-        max_cameras=max_cameras,
-        target=target,
-        dominant_coverage=dominant_coverage,
-        coverage=coverage,
-        min_reachable=min_reachable,
-        accuracy_mm=accuracy_mm,
-        up=up,
-    )
     request = request_of(
         mesh,
         rig,
-        wishes,
+        Wishes(
+            max_projectors=max_projectors,
+            max_cameras=max_cameras,
+            target=target,
+            dominant_coverage=dominant_coverage,
+            coverage=coverage,
+            min_reachable=min_reachable,
+            accuracy_mm=accuracy_mm,
+            up=up,
+        ),
         select=select,
         weight=weight,
         seed=seed,
@@ -160,18 +159,7 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
     """Sections III and VI: regions, projectors, cameras; each the fewest."""
     ready = prepared(request, clock)
     stage = bounded_projectors(ready, first_projectors(ready, clock), clock)
-    projectors, cameras = placed(request, ready.scene, stage, clock)
-    return PartialPlan(
-        request,
-        ready.scene,
-        ready.regions,
-        ready.curvature_radius_m,
-        ready.tilt,
-        stage,
-        projectors,
-        cameras,
-        cameras.cameras,
-    )
+    return placed(ready, stage, clock)
 
 
 def _checked(plan: RigPlan, partial: PartialPlan, clock: Stopwatch) -> RigPlan:

@@ -1,7 +1,7 @@
 """What stands before any device does: request, target, limits and rings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from planning.model.errors import InputError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
-from planning.report.partial_plan import PlanRequest
+from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.range_guard import Guard, guarded
 from planning.rig.rig import Rig
 from planning.rig.wishes import TargetName, Wishes
@@ -26,9 +26,6 @@ from planning.scene.clearance import check_existing_clearance
 from planning.scene.interest import Select, Weight, interest_of
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
-
-# Upwards in the image: where the ring axis points until the cameras are known.
-_FIRST_AZIMUTH = -float(np.pi / 2)
 
 
 def request_of(
@@ -46,17 +43,8 @@ def request_of(
 ) -> PlanRequest:
     """Return what is asked, of a surface whose long edges are cut.
 
-    Args:
-        mesh: As in `plan_rig`.
-        rig: Likewise; tightened by what isn't known of a body of ranges.
-        wishes: What is asked beside what the rig says.
-        select: As in `plan_rig`.
-        weight: Likewise.
-        seed: Likewise.
-        threads: Likewise.
-        command: Likewise.
-        prove: Likewise.
-        cameras_by: Likewise.
+    Args are those of `plan_rig`, with what it asks beside the rig as one value. Limits
+    of the rig are tightened by what isn't known of a body of ranges.
 
     Raises:
         InputError: If the target is none, or there are several meshes.
@@ -104,39 +92,12 @@ def _whole(target: str | None, selected: bool) -> TargetName:
 
 
 def _single(mesh: TriangleMesh | Sequence[TriangleMesh]) -> TriangleMesh:
-    if isinstance(mesh, TriangleMesh):
-        return mesh
-    if len(mesh) != 1:
+    meshes = [mesh] if isinstance(mesh, TriangleMesh) else mesh
+    if len(meshes) != 1:
         raise InputError(
-            f"{len(mesh)} meshes: one rig for several isn't built yet, give one"
+            f"{len(meshes)} meshes: one rig for several isn't built yet, give one"
         )
-    return mesh[0]
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A request, ready to have devices placed.
-
-    Attributes:
-        request: What is asked.
-        scene: Surface, target and requirements.
-        regions: The target.
-        curvature_radius_m: Physical scale of the curvature.
-        template: A projector that stands nowhere: light, optics and rings.
-        tilt: Tilt or shift of ring axes.
-    """
-
-    request: PlanRequest
-    scene: Scene
-    regions: DominantRegions
-    curvature_radius_m: float
-    template: PlannedProjector
-    tilt: float
-
-    @property
-    def ring_offset(self) -> tuple[float, float]:
-        """Tilt and azimuth of the ring axis until the cameras are known."""
-        return self.tilt, _FIRST_AZIMUTH
+    return meshes[0]
 
 
 def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
@@ -173,7 +134,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
     )
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
     check_existing_clearance(scene, template, camera)
-    return Prepared(request, scene, regions, field.radius, template, tilt)
+    return Prepared(request, scene, regions, field.radius, template, camera, tilt)
 
 
 def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
@@ -210,17 +171,11 @@ def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64], f
         # What is looked at from beside reaches to the corners of the image.
         outer = corner
     radii = uniform_radii(outer, gap if parallel else gap / rig.standoff_m)
+    x, y, z = bearing(mesh, np.array(workspace.axis)).tolist()
     workspace = replace(
-        workspace,
-        reference_ring_radius=float(radii[-1]),
-        bearing=_direction(bearing(mesh, np.array(workspace.axis))),
+        workspace, reference_ring_radius=float(radii[-1]), bearing=(x, y, z)
     )
     return replace(requirements, workspace=workspace), radii, tilt
-
-
-def _direction(vector: NDArray[np.float64]) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z
 
 
 def _steep(regions: DominantRegions, target: str | None) -> NDArray[np.float64]:

@@ -1,8 +1,7 @@
 """The stages of planning, each of which takes a partial plan further."""
 
+from collections.abc import Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from planning.cameras.camera_cover import (
     CameraStage,
@@ -15,7 +14,6 @@ from planning.cameras.proved_cameras import bound_stage
 from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.projector_poses import widen_margins
@@ -25,11 +23,9 @@ from planning.proofs.candidate_certificate import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.what_helps import falls_short
-from planning.report.partial_plan import PartialPlan, PlanRequest
+from planning.report.partial_plan import PartialPlan, Prepared
 from planning.rings.ring_stage import space_rings
-from planning.scene.scene import Scene
 
-from .prepare import Prepared
 from .proofs import camera_bound, projector_bound
 
 
@@ -39,22 +35,16 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
     Raises:
         InfeasibleLimitsError: If no candidate lights any sample.
     """
-    rig = ready.request.rig
+    n_poses = ready.request.rig.n_projector_poses
     with clock.stage("projectors", "projectors: candidates and cover"):
         try:
             stage = plan_projectors(
-                ready.scene,
-                ready.template,
-                rig.n_projector_poses,
-                ring_offset=ready.ring_offset,
+                ready.scene, ready.template, n_poses, ring_offset=ready.ring_offset
             )
         except NothingLitError as error:
             helps = nothing_lit(ready.scene, error)
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
-        clock.say(
-            f"  {len(stage.projectors)} of {len(stage.reference)} candidates; at least "
-            f"{stage.certificate.candidates.lower_bound} are needed"
-        )
+        _say_count(stage, stage.projectors, clock)
     return stage
 
 
@@ -72,34 +62,35 @@ def bounded_projectors(
     return stage
 
 
-def placed(
-    request: PlanRequest,
-    scene: Scene,
-    stage: ProjectorStage,
-    clock: Stopwatch,
-) -> tuple[tuple[PlannedProjector, ...], CameraStage]:
-    """Poses of widest margin for chosen projectors, and the cameras for them."""
-    rig = request.rig
+def placed(ready: Prepared, stage: ProjectorStage, clock: Stopwatch) -> PartialPlan:
+    """Return poses of widest margin for chosen projectors, and the cameras for them.
+
+    Raises:
+        InfeasibleLimitsError: If no camera measures any lit sample.
+    """
+    request = ready.request
     with clock.stage("projector_poses", "projector poses: widest margins"):
-        projectors = widen_margins(scene, stage)
+        projectors = widen_margins(ready.scene, stage)
     with clock.stage("cameras", "cameras: candidates, measurability and cover"):
-        n_cameras = rig.n_camera_poses
-        camera = PlannedCamera(
-            "", np.eye(4), rig.camera_device(), body=rig.camera_body()
-        )
-        scene = scene.among(projectors)
-        candidates = camera_candidate_views(scene, camera, n_cameras)
+        scene = ready.scene.among(projectors)
+        views = camera_candidate_views(scene, ready.camera, request.rig.n_camera_poses)
         try:
-            solution = place_cameras(scene, projectors, candidates, request.cameras_by)
+            solution = place_cameras(scene, projectors, views, request.cameras_by)
         except NothingMeasuredError as error:
-            helps = nothing_measured(scene, rig, error)
+            helps = nothing_measured(scene, request.rig, error)
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
         cameras = solution.stage
-        clock.say(
-            f"  {len(cameras.cameras)} of {len(cameras.reference)} candidates; at "
-            f"least {cameras.certificate.candidates.lower_bound} are needed"
-        )
-    return solution.projectors, cameras
+        _say_count(cameras, cameras.cameras, clock)
+    return PartialPlan(ready, stage, solution.projectors, cameras, cameras.cameras)
+
+
+def _say_count(
+    stage: ProjectorStage | CameraStage, devices: Sequence[object], clock: Stopwatch
+) -> None:
+    clock.say(
+        f"  {len(devices)} of {len(stage.reference)} candidates; at least "
+        f"{stage.certificate.candidates.lower_bound} are needed"
+    )
 
 
 def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
@@ -118,19 +109,15 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
                 f"{1e3 * moved.smallest_after_m:.0f} mm"
             )
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
+        scene, request = partial.scene, partial.request
         final = follow_cameras(
-            partial.scene,
-            partial.projectors,
-            moved.cameras,
-            stage,
-            partial.request.cameras_by,
+            scene, partial.projectors, moved.cameras, stage, request.cameras_by
         )
-        scene = partial.scene.among((*final.projectors, *moved.cameras))
         rings = space_rings(
-            scene,
+            scene.among((*final.projectors, *moved.cameras)),
             final.projectors,
             moved.cameras,
-            partial.request.rig.ring_spacing,
+            request.rig.ring_spacing,
             final.stage.cover.samples,
         )
     return replace(
@@ -185,15 +172,7 @@ def _one_projector_more(
         return None
     clock.say("  fresh samples fall short: one projector more")
     stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
-    projectors, cameras = placed(partial.request, partial.scene, stage, clock)
-    return replace(
-        partial,
-        stage=stage,
-        projectors=projectors,
-        rings=None,
-        camera_stage=cameras,
-        cameras=cameras.cameras,
-    )
+    return placed(partial.ready, stage, clock)
 
 
 def _one_camera_more(

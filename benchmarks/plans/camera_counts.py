@@ -38,11 +38,11 @@ from planning.cameras.camera_stage import CameraSolution, place_cameras
 from planning.cameras.routes import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
-from planning.prepare import Prepared, prepared
+from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
 from planning.report.assemble import write_plan
-from planning.report.partial_plan import PartialPlan, PlanRequest
+from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
@@ -214,11 +214,7 @@ def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:
     """The plan of the paper's route alone, and what the audit says of it."""
     ready, placed, clock = job.ready, job.place("paper"), job.clock
     draft = PartialPlan(
-        replace(job.request, cameras_by="paper"),
-        ready.scene,
-        ready.regions,
-        ready.curvature_radius_m,
-        ready.tilt,
+        replace(ready, request=replace(job.request, cameras_by="paper")),
         job.stage,
         placed.projectors,
         placed.stage,

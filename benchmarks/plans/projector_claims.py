@@ -26,10 +26,10 @@ from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from planning.model.device_poses import moved_to, rounded_pose
 from planning.model.errors import InfeasibleLimitsError
-from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.share_margin import margin_at_share
+from planning.report.partial_plan import Prepared
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import projector_limits

@@ -37,11 +37,11 @@ from planning.cameras.camera_stage import move_axes
 from planning.model.device_poses import ring_frame
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.prepare import Prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.selection import required_samples
+from planning.report.partial_plan import Prepared
 from planning.rings.axis_moves import AxisJudge
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages

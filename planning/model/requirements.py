@@ -4,12 +4,14 @@ These values are written into the plan file, so that each claim can be recompute
 the plan and the surface alone. A limit that is None doesn't bind.
 """
 
+import json
 from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal
 
 from .bodies import Body, Box
 
+# Of a workspace: zones and standoffs that aren't given have no key.
 _LEFT_OUT = (
     "box",
     "keep_out",
@@ -235,24 +237,12 @@ class Requirements:
 
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
-        document = asdict(self)
-        # Zones and standoffs that aren't given have no key.
-        document["workspace"] = {
-            key: _listed(value)
-            for key, value in document["workspace"].items()
-            if value or key not in _LEFT_OUT
-        }
-        existing = [
-            {key: value for key, value in table.items() if key != "body" or value}
-            for table in document.pop("existing")
-        ]
-        return document | ({"existing": _listed(existing)} if existing else {})
-
-
-def _listed(value: object) -> object:
-    """Return a value with lists for tuples, as JSON gives it back."""
-    if isinstance(value, dict):
-        return {key: _listed(part) for key, part in value.items()}
-    if isinstance(value, (tuple, list)):
-        return [_listed(part) for part in value]
-    return value
+        # By way of JSON, which turns tuples to lists and keeps every float.
+        document = json.loads(json.dumps(asdict(self)))
+        devices = [(device, ("body",)) for device in document["existing"]]
+        tables = [(document["workspace"], _LEFT_OUT), (document, ("existing",))]
+        for table, names in devices + tables:
+            for name in names:
+                if not table[name]:
+                    del table[name]
+        return document

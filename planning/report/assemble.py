@@ -43,7 +43,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     )
     coverage = entries.coverage_record(claims)
     coverage = with_relaxations(coverage, partial, devices, claims, clock)
-    regions = entries.region_records(partial.regions, claims)
+    regions = entries.region_records(partial.ready.regions, claims)
     overlaps, schedule = overlap_records(standing.scene, devices.projectors)
     surface, requirements = (
         _surface(partial, devices),
@@ -123,8 +123,8 @@ def _surface_record(partial: PartialPlan, surface: Surface) -> SurfaceRecord:
     return SurfaceRecord(
         path="surface.npz",
         sha256=surface.sha256(),
-        curvature_radius_m=partial.curvature_radius_m,
-        dominant_share=partial.regions.dominant_share,
+        curvature_radius_m=partial.ready.curvature_radius_m,
+        dominant_share=partial.ready.regions.dominant_share,
         selection=entries.selection_record(
             partial.scene.mesh, partial.scene.region, partial.request.interest
         ),

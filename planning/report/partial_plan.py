@@ -1,6 +1,7 @@
 """A plan in the making: what was ordered, and the stages as far as they came."""
 
 from dataclasses import dataclass
+from math import pi
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
@@ -50,23 +51,57 @@ class PlanRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class PartialPlan:
-    """All stages as far as they came; enough to write a plan from.
+class Prepared:
+    """A request, ready to have devices placed.
 
-    `projectors` have evenly spaced rings; `rings` holds those that cameras let finer.
+    Attributes:
+        request: What is asked.
+        scene: Surface, target and requirements.
+        regions: The target.
+        curvature_radius_m: Physical scale of the curvature.
+        template: A projector that stands nowhere: light, optics and rings.
+        camera: A camera that stands nowhere.
+        tilt: Tilt or shift of ring axes.
     """
 
     request: PlanRequest
     scene: Scene
     regions: DominantRegions
     curvature_radius_m: float
+    template: PlannedProjector
+    camera: PlannedCamera
     tilt: float
+
+    @property
+    def ring_offset(self) -> tuple[float, float]:
+        """Tilt of the ring axis; upwards in the image until cameras are known."""
+        return self.tilt, -float(pi / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class PartialPlan:
+    """All stages as far as they came; enough to write a plan from.
+
+    `projectors` have evenly spaced rings; `rings` holds those that cameras let finer.
+    """
+
+    ready: Prepared
     stage: ProjectorStage
     projectors: tuple[PlannedProjector, ...]
     camera_stage: CameraStage
     cameras: tuple[PlannedCamera, ...]
     truncated: bool = False
     rings: RingStage | None = None
+
+    @property
+    def request(self) -> PlanRequest:
+        """What is asked."""
+        return self.ready.request
+
+    @property
+    def scene(self) -> Scene:
+        """Surface, target and requirements."""
+        return self.ready.scene
 
     @property
     def final_projectors(self) -> tuple[PlannedProjector, ...]:
