@@ -38,9 +38,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
         marginal = marginal_records(partial, devices, claims)
-    standing = replace(
-        partial, scene=scene.among((*devices.projectors, *devices.cameras))
-    )
+    among = scene.among((*devices.projectors, *devices.cameras))
+    standing = replace(partial, ready=replace(partial.ready, scene=among))
     coverage = entries.coverage_record(claims)
     coverage = with_relaxations(coverage, partial, devices, claims, clock)
     regions = entries.region_records(partial.ready.regions, claims)
