@@ -196,7 +196,7 @@ def _quality(
 ) -> str:
     """Measured / lit, and the rms and 95th percentile of s_N in micrometres."""
     rows = lit_samples(scene, projectors, scene.target_samples(Draw(ROWS, 900)))
-    sigma = AxisJudge(scene, projectors, cameras, rows).sigma.min(axis=0)
+    sigma = AxisJudge.of(scene, cameras, rows).sigma.min(axis=0)
     known = 1e6 * sigma[np.isfinite(sigma)]
     return (
         f"{len(known) / len(sigma):.4f}, {np.sqrt(np.mean(known**2)):.0f}, "

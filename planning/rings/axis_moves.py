@@ -5,7 +5,7 @@ starts; the exact predicate decides, on the cover's samples and on fresh ones.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from planning.scene.draws import DRAWS
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import PairQuality
 from planning.scene.measured import LitSamples, lit_samples, pairs_of, taken
-from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.patterns.ring_pattern import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
@@ -58,7 +57,7 @@ def move_ring_axes(
         samples: Lit samples that the cameras were chosen on.
     """
     fresh = lit_samples(scene, projectors, scene.target_samples(DRAWS.axes))
-    judges = tuple(AxisJudge(scene, projectors, cameras, r) for r in (samples, fresh))
+    judges = [AxisJudge.of(scene, cameras, lit) for lit in (samples, fresh)]
     around = lit_samples(scene, projectors, scene.surface_samples(DRAWS.axes))
     points = around.target.samples.points
     held = [points[around.lit[:, p]] for p in range(len(projectors))]
@@ -69,48 +68,39 @@ def move_ring_axes(
     return tuple(moved)
 
 
+@dataclass(frozen=True, eq=False)
 class AxisJudge:
-    """Samples, how the cameras see them, and the best s_N by each projector."""
+    """Samples, how the cameras see them, and the best s_N by each projector.
 
-    def __init__(
-        self,
-        scene: Scene,
-        projectors: Sequence[PlannedProjector],
-        cameras: Sequence[PlannedCamera],
-        samples: LitSamples,
-    ) -> None:
-        self.scene, self.samples = scene, samples
-        self.views = tuple(view_of(scene, c, samples.target) for c in cameras)
-        self.sigma = np.stack(
-            [self.sigma_with(projector, p) for p, projector in enumerate(projectors)]
-        )
+    Attributes:
+        scene: Surface and requirements.
+        samples: Lit samples, with the rings of the projectors as they stand.
+        views: What each camera sees of them.
+        sigma: Least s_N over the cameras in [m]; inf where none measures, (n_p, n).
+    """
 
-    def sigma_with(self, projector: PlannedProjector, p: int) -> NDArray[np.float64]:
-        """Least s_N of projector p over the cameras in [m]; inf if not measured."""
-        limits = self.scene.requirements.triangulation
-        points = self.samples.target.samples.points
-        samples = self.samples.with_surfaces(p, code_surfaces(projector, points))
-        least = np.full(len(samples.target), np.inf)
-        for seen in self.views:
-            for pair in pairs_of(limits, samples, seen, projectors=[p]):
-                good = pair.samples[pair.measured]
-                found = pair.quality.sigma[pair.measured]
-                least[good] = np.minimum(least[good], found)
-        return least
+    scene: Scene
+    samples: LitSamples
+    views: tuple[ViewedSamples, ...]
+    sigma: NDArray[np.float64]
 
-    def with_axis(self, projector: PlannedProjector, p: int) -> NDArray[np.float64]:
-        """Return `sigma` with another axis of projector p, shape (projectors, n)."""
-        trial = self.sigma.copy()
-        trial[p] = self.sigma_with(projector, p)
-        return trial
+    @classmethod
+    def of(
+        cls, scene: Scene, cameras: Sequence[PlannedCamera], samples: LitSamples
+    ) -> "AxisJudge":
+        """Look at lit samples with cameras."""
+        views = tuple(view_of(scene, c, samples.target) for c in cameras)
+        limits = scene.requirements.triangulation
+        each = range(len(samples.lights))
+        sigma = np.stack([_least_sigma(limits, samples, views, p) for p in each])
+        return cls(scene, samples, views, sigma)
 
-    def keep(
-        self, projector: PlannedProjector, p: int, sigma: NDArray[np.float64]
-    ) -> None:
-        """Go on with another axis of projector p, and `with_axis` of it."""
-        points = self.samples.target.samples.points
-        self.samples = self.samples.with_surfaces(p, code_surfaces(projector, points))
-        self.sigma = sigma
+    def with_axis(self, projector: PlannedProjector, p: int) -> "AxisJudge":
+        """Return the same with another axis of projector p."""
+        limits, sigma = self.scene.requirements.triangulation, self.sigma.copy()
+        samples = self.samples.with_code(p, projector)
+        sigma[p] = _least_sigma(limits, samples, self.views, p)
+        return replace(self, samples=samples, sigma=sigma)
 
     def holds(self, projector: PlannedProjector, p: int) -> bool:
         """Whether what a projector lights is inside its largest ring."""
@@ -119,28 +109,41 @@ class AxisJudge:
         )
 
 
+def _least_sigma(
+    limits: TriangulationLimits,
+    samples: LitSamples,
+    views: Sequence[ViewedSamples],
+    p: int,
+) -> NDArray[np.float64]:
+    least = np.full(len(samples.target), np.inf)
+    for seen in views:
+        for pair in pairs_of(limits, samples, seen, projectors=[p]):
+            good = pair.samples[pair.measured]
+            sigma = pair.quality.sigma[pair.measured]
+            least[good] = np.minimum(least[good], sigma)
+    return least
+
+
 def _move(
-    judges: tuple[AxisJudge, ...],
+    judges: list[AxisJudge],
     moved: list[PlannedProjector],
     p: int,
     held: NDArray[np.float64],
 ) -> bool:
-    """Move one axis if that is better; the judges keep what it then measures."""
+    """Move one axis if that is better; the judges then go by it."""
     scene, projector = judges[0].scene, moved[p]
     scene.check_cancelled()
     for axis in proposals(
         axis_program(scene, moved, p, judges[0].samples, judges[0].views)
     ):
         frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
-        trial_axis = replace(projector, world_from_ring=frame)
-        lit = all(judge.holds(trial_axis, p) for judge in judges)
-        if not (lit and inside_rings(trial_axis, held)):
+        turned = replace(projector, world_from_ring=frame)
+        lit = all(judge.holds(turned, p) for judge in judges)
+        if not (lit and inside_rings(turned, held)):
             continue
-        trials = [judge.with_axis(trial_axis, p) for judge in judges]
-        if better(trials, [judge.sigma for judge in judges]):
-            moved[p] = trial_axis
-            for judge, trial in zip(judges, trials, strict=True):
-                judge.keep(trial_axis, p, trial)
+        trials = [judge.with_axis(turned, p) for judge in judges]
+        if better([t.sigma for t in trials], [judge.sigma for judge in judges]):
+            moved[p], judges[:] = turned, trials
             return True
     return False
 

@@ -18,8 +18,7 @@ from planning.scene.limits import projector_limits
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
-# Rays that miss the object's ball by more than this share of its radius aren't cast.
-_ROOM = 1.001
+_AZIMUTHS = 360
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +27,6 @@ class BeamProfile:
 
     Attributes:
         coordinates: Ring coordinates of the rows, rising, shape (n_c,).
-        azimuths: About the ring axis, from its x towards y in [rad], shape (n_a,).
         heights: In ring coordinates, z of the point that is hit in [m]; NaN for none.
         lit: Whether the projector lights that point: every limit of eq. (2) holds.
         target: Whether it lies in the target.
@@ -37,7 +35,6 @@ class BeamProfile:
     """
 
     coordinates: NDArray[np.float64]
-    azimuths: NDArray[np.float64]
     heights: NDArray[np.float64]
     lit: NDArray[np.bool_]
     target: NDArray[np.bool_]
@@ -54,7 +51,7 @@ def cast_beam(
     scene: Scene,
     projector: PlannedProjector,
     coordinates: NDArray[np.float64],
-    n_azimuths: int,
+    n_azimuths: int = _AZIMUTHS,
 ) -> BeamProfile:
     """Cast a projector's light against the surface.
 
@@ -68,70 +65,42 @@ def cast_beam(
     """
     step = 2.0 * np.pi / n_azimuths
     azimuths = np.arange(0.5, n_azimuths, dtype=np.float64) * step
-    shape = len(coordinates), n_azimuths
-    origins, rays = beam_rays(projector, coordinates, azimuths)
-    aimed = np.flatnonzero(_near(scene, origins, rays))
-    start = origins if origins.ndim == 1 else origins[aimed]
-    faces, distances = scene.visibility.caster.first_hits(start, rays[aimed])
-    hit = faces >= 0
-    found, faces = aimed[hit], faces[hit]
-    begin = origins if origins.ndim == 1 else origins[found]
-    points = begin + distances[hit][:, None] * rays[found]
+    frame = projector.world_from_ring
+    spokes = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
+    flat = (coordinates[:, None, None] * spokes).reshape(-1, 2)
+    origins, rays = light_of(projector.device).ring_rays(frame, flat)
+    faces, distances = scene.visibility.caster.first_hits(origins, rays)
+    hit = np.flatnonzero(faces >= 0)
+    points = np.broadcast_to(origins, rays.shape)[hit]
+    points = points + distances[hit][:, None] * rays[hit]
     inside = lighting.in_panel(projector, points)
-    found, faces, points = found[inside], faces[inside], points[inside]
-    normals = scene.mesh.face_normals[faces]
-    met = Target(SurfaceSamples(points, normals, faces, 0.0), scene.steep[faces])
+    hit, points = hit[inside], points[inside]
+    faces = faces[hit]
     # What the ray meets first, no part of the surface hides.
-    limits, bodies = scene.requirements.projector, scene.bodies
-    stage = lighting.first_failure(projector, met, limits, None, bodies=bodies)
-    ring = points - projector.world_from_ring[:3, 3]
-    heights = ring @ projector.world_from_ring[:3, 2]
+    stage = lighting.first_failure(
+        projector,
+        on_faces(scene, points, faces),
+        scene.requirements.projector,
+        None,
+        bodies=scene.bodies,
+    )
+    shape = len(coordinates), n_azimuths
     return BeamProfile(
         coordinates,
-        azimuths,
-        _spread(heights, found, np.nan, shape),
-        _spread(stage == projector_limits.LIT, found, False, shape),
-        _spread(scene.target_faces[faces], found, False, shape),
-        _spread(faces, found, -1, shape),
-        _spread(points, found, np.nan, shape),
+        _spread((points - frame[:3, 3]) @ frame[:3, 2], hit, np.nan, shape),
+        _spread(stage == projector_limits.LIT, hit, False, shape),
+        _spread(scene.target_faces[faces], hit, False, shape),
+        _spread(faces, hit, -1, shape),
+        _spread(points, hit, np.nan, shape),
     )
 
 
-def beam_rays(
-    projector: PlannedProjector,
-    coordinates: NDArray[np.float64],
-    azimuths: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the rays of a grid, row by row.
-
-    Args:
-        projector: Ring frame and kind of light.
-        coordinates: Ring coordinates of the rows, shape (n_c,).
-        azimuths: Of the columns in [rad], shape (n_a,).
-
-    Returns:
-        Origins in [m], (3,) in diverging light, else (n, 3); unit directions, (n, 3).
-    """
-    frame = projector.world_from_ring
-    flat = np.column_stack(
-        [
-            np.outer(coordinates, np.cos(azimuths)).ravel(),
-            np.outer(coordinates, np.sin(azimuths)).ravel(),
-        ]
-    )
-    return light_of(projector.device).ring_rays(frame, flat)
-
-
-def _near(
-    scene: Scene, origins: NDArray[np.float64], rays: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Whether rays pass through the ball about the bounding box."""
-    low, high = scene.mesh.bounds
-    offsets = 0.5 * (low + high) - origins
-    along = np.einsum("ij,ij->i", np.broadcast_to(offsets, rays.shape), rays)
-    square = np.sum(offsets * offsets, axis=-1) - along * along
-    reach = 0.5 * _ROOM * float(np.linalg.norm(high - low))
-    return (along > -reach) & (square <= reach * reach)
+def on_faces(
+    scene: Scene, points: NDArray[np.float64], faces: NDArray[np.int64]
+) -> Target:
+    """Return points (n, 3) on faces (n,) of the surface as samples."""
+    normals = scene.mesh.face_normals[faces]
+    return Target(SurfaceSamples(points, normals, faces, 0.0), scene.steep[faces])
 
 
 def _spread(

@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.sampling import SurfaceSamples
 from geometry.mesh.topology import face_pairs
 from planning.model.planned import PlannedProjector
 from planning.scene.lighting import first_failure
 from planning.scene.lights import light_on
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns.pattern import code_surfaces
-from planning.scene.samples import Target
 from planning.scene.scene import Scene
+
+from .beam_profile import on_faces
 
 # As in geometry.curvature: sharper turns are creases of the object, not facets.
 _SHARPEST_FACET = np.deg2rad(40.0)
@@ -83,8 +83,7 @@ def crease_errors(
         # Moved aside a little, a point lies on its own face and not on the edge.
         centroids = mesh.face_centroids[faces]
         points = creases.points + 0.02 * (centroids - creases.points)
-        samples = SurfaceSamples(points, mesh.face_normals[faces], faces, 0.0)
-        target = Target(samples, scene.steep[faces])
+        target = on_faces(scene, points, faces)
         stage = first_failure(
             projector,
             target,
@@ -94,7 +93,7 @@ def crease_errors(
         )
         lit &= stage == LIT
         light = light_on(projector, target)
-        across = np.einsum("ij,ij->i", samples.normals, rings.normals)
+        across = np.einsum("ij,ij->i", target.samples.normals, rings.normals)
         slopes.append(across / np.maximum(light.incidence_cos, 1e-9))
     jump = np.abs(slopes[0] - slopes[1])
     return lit, 0.25 * jump * rings.spacing

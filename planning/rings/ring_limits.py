@@ -1,6 +1,5 @@
 """One projector's light on the surface, and what it says of the gaps of its rings."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,10 +12,9 @@ from planning.scene.scene import Scene
 from .beam_profile import BeamProfile, cast_beam
 from .ring_creases import Creases
 from .ring_curvature import chord_errors, ring_curvature, smooth_stretches
-from .ring_pitch import least_gaps, projector_gaps
-from .ring_spacing import GapLimits, spaced_radii
+from .ring_pitch import cells_at, least_gaps, projector_gaps
+from .ring_spacing import GapLimits
 
-_AZIMUTHS = 360
 # Cells of the ring coordinate in an even gap; a chord spans as many.
 CELLS = 4
 # Where nothing is lit few rings remain, for an object that stands a little aside.
@@ -24,65 +22,58 @@ _UNLIT = 4.0
 # Least kappa on lit surface as a share of the largest: rings that curvature leaves over
 # go to flat and creased pieces, whose ribs and pins may be narrower than a gap.
 _LEAST_KAPPA = 0.01
-_MIN_PITCH_PX = 6.0
+_NO_SAMPLES = np.zeros((2, 0))
 
 
 @dataclass(frozen=True, eq=False)
 class RingBeam:
-    """How a projector's light meets the surface, and how fine its rings may be.
+    """How a projector's light meets the surface.
 
     Attributes:
         projector: As placed, with evenly spaced rings.
         edges: Borders of the cells of the ring coordinate, shape (n + 1,).
         profile: First hits, on the rows `edges[1:]`.
         errors: Of chords over one even gap [m], shape (n, n_azimuths).
-        smooth: Which chords count: lit all along, no step and no crease.
+        counted: Which chords count: lit all along, no step and no crease; on the target
+            alone, if any is.
         lit: Cells in which anything is lit, shape (n,).
-        drawable: Least gap that the projector draws, shape (n,).
-        floor: h_min: least gap that cameras and projector separate, shape (n,).
     """
 
     projector: PlannedProjector
     edges: NDArray[np.float64]
     profile: BeamProfile
     errors: NDArray[np.float64]
-    smooth: NDArray[np.bool_]
+    counted: NDArray[np.bool_]
     lit: NDArray[np.bool_]
-    drawable: NDArray[np.float64]
-    floor: NDArray[np.float64]
 
     @property
     def even_gap(self) -> float:
         """Gap of the evenly spaced rings, in the ring coordinate."""
         return CELLS * float(self.edges[1])
 
-    def bound(
-        self, coordinates: NDArray[np.float64], pitch: NDArray[np.float64], px: float
-    ) -> "RingBeam":
-        """Return this with h_min such that samples keep a pitch.
-
-        Args:
-            coordinates: Ring coordinates of the samples, shape (n_samples,).
-            pitch: Pitch of each with even rings [px], same shape.
-            px: Least pitch.
-        """
-        gaps = np.full(len(pitch), self.even_gap)
-        floor = least_gaps(coordinates, gaps, pitch, px, self.edges)
-        # A gap that holds a sample reaches up to its own length to either side of it.
-        floor = _widened(floor, CELLS)
-        floor = np.where(floor > 0.0, floor, self.even_gap)
-        floor = np.minimum(np.maximum(floor, self.drawable), self.even_gap)
-        return replace(self, floor=floor)
-
     def with_lit(self, coordinates: NDArray[np.float64]) -> "RingBeam":
         """Return this with the cells of lit samples added to what is lit."""
         lit = self.lit.copy()
-        lit[_cells(self.edges, coordinates)] = True
+        lit[cells_at(self.edges, coordinates)] = True
         return replace(self, lit=lit)
 
-    def limits(self) -> GapLimits:
-        """Return the limits of the gaps; where nothing is lit rings are few."""
+    def limits(
+        self, samples: NDArray[np.float64] = _NO_SAMPLES, least_px: float = 0.0
+    ) -> GapLimits:
+        """Return the limits of the gaps; where nothing is lit rings are few.
+
+        Args:
+            samples: Ring coordinates of samples and the pitch of each with even rings
+                in [px], shape (2, n).
+            least_px: Least pitch that they keep [px].
+        """
         even = self.even_gap
+        floor = least_gaps(*samples, even, least_px, self.edges)
+        # A gap that holds a sample reaches up to its own length to either side of it.
+        floor = _widened(floor, CELLS)
+        floor = np.where(floor > 0.0, floor, even)
+        drawable = projector_gaps(self.projector, self.edges[1:])
+        floor = np.minimum(np.maximum(floor, drawable), even)
         lit = _widened(self.lit.astype(np.float64), CELLS) > 0.0
         kappa = ring_curvature(self.errors, self.counted, even)
         least = _LEAST_KAPPA * float(kappa.max(initial=0.0)) or 1.0
@@ -91,26 +82,16 @@ class RingBeam:
             self.edges,
             kappa,
             np.where(lit, even, _UNLIT * even),
-            np.where(lit, self.floor, _UNLIT * even),
+            np.where(lit, floor, _UNLIT * even),
             ~lit,
         )
 
-    @property
-    def counted(self) -> NDArray[np.bool_]:
-        """Chords on the target, or on all that is lit where that is none of it."""
-        on_target = self.smooth & self.profile.target
-        return on_target if on_target.any() else self.smooth
-
-    def respaced(self, tolerance: float) -> PlannedProjector:
-        """Return the projector with rings for a largest error between them [m]."""
-        limits = self.limits().needed(tolerance)
-        radii = spaced_radii(limits, len(self.projector.ring_radii))
-        return replace(self.projector, ring_radii=radii)
-
     def errors_under(self, projector: PlannedProjector) -> NDArray[np.float64]:
         """Return the errors of the counted chords at a projector's own gaps, in [m]."""
-        rows, _ = np.nonzero(self.counted)
-        gaps = gap_at(projector, self.profile.coordinates)[rows]
+        radii, rows = projector.ring_radii, np.nonzero(self.counted)[0]
+        ring = np.searchsorted(radii, self.profile.coordinates[rows])
+        ring = np.clip(ring, 1, len(radii) - 1)
+        gaps = radii[ring] - radii[ring - 1]
         return self.errors[self.counted] * (gaps / self.even_gap) ** 2
 
 
@@ -119,44 +100,33 @@ def ring_beam(scene: Scene, projector: PlannedProjector, creases: Creases) -> Ri
     scene.check_cancelled()
     radii = projector.ring_radii
     edges = np.linspace(0.0, float(radii[-1]), CELLS * len(radii) + 1)
-    profile = cast_beam(scene, projector, edges[1:], _AZIMUTHS)
+    profile = cast_beam(scene, projector, edges[1:])
     reach, limit = CELLS // 2, scene.requirements.projector.max_incidence
     smooth = smooth_stretches(projector, profile, reach, limit)
-    drawable = projector_gaps(projector, edges[1:])
+    smooth &= ~_creased(projector, edges, creases, profile.lit.shape)
+    on_target = smooth & profile.target
     return RingBeam(
         projector,
         edges,
         profile,
         chord_errors(profile.heights, profile.coordinates, reach, projector.light),
-        smooth & ~_creased(projector, edges, creases),
+        on_target if on_target.any() else smooth,
         np.asarray(profile.lit.any(axis=1)),
-        drawable,
-        drawable,
     )
 
 
-def gap_at(
-    projector: PlannedProjector, coordinates: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the gap of rings about each ring coordinate, shape (n,)."""
-    radii = projector.ring_radii
-    index = np.clip(np.searchsorted(radii, coordinates), 1, len(radii) - 1)
-    return radii[index] - radii[index - 1]
-
-
-def least_pitch_px(scene: Scene) -> float:
-    """Return the least pitch of rings in [px]; 6 where it doesn't bind."""
-    return scene.requirements.triangulation.min_ring_pitch_px or _MIN_PITCH_PX
-
-
 def _creased(
-    projector: PlannedProjector, edges: NDArray[np.float64], creases: Creases
+    projector: PlannedProjector,
+    edges: NDArray[np.float64],
+    creases: Creases,
+    shape: tuple[int, ...],
 ) -> NDArray[np.bool_]:
     """Cells of the grid whose chord may cross a crease."""
-    masked = np.zeros((len(edges) - 1, _AZIMUTHS), dtype=bool)
+    masked = np.zeros(shape, dtype=bool)
+    n_azimuths = shape[1]
     ring = creases.points - projector.world_from_ring[:3, 3]
     ring = ring @ projector.world_from_ring[:3, :3]
-    degree = 2.0 * np.pi / _AZIMUTHS
+    degree = 2.0 * np.pi / n_azimuths
     turn = np.arctan2(ring[:, 1], ring[:, 0]) % (2.0 * np.pi)
     column = np.floor(turn / degree).astype(np.int64)
     row = np.searchsorted(edges, ring_coordinate(projector, creases.points)) - 1
@@ -170,14 +140,8 @@ def _creased(
         inside = (row + down >= 0) & (row + down < len(masked))
         for aside in range(-most, most + 1):
             near = inside & (width >= abs(aside))
-            masked[row[near] + down, (column[near] + aside) % _AZIMUTHS] = True
+            masked[row[near] + down, (column[near] + aside) % n_azimuths] = True
     return masked
-
-
-def _cells(
-    edges: NDArray[np.float64], coordinates: Sequence[float] | NDArray[np.float64]
-) -> NDArray[np.int64]:
-    return np.clip(np.searchsorted(edges, coordinates) - 1, 0, len(edges) - 2)
 
 
 def _widened(values: NDArray[np.float64], cells: int) -> NDArray[np.float64]:

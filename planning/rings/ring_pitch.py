@@ -15,7 +15,8 @@ from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
-MIN_PROJECTOR_PX = 3.0
+from .ring_radii import MIN_PROJECTOR_PX
+
 _AZIMUTHS = 72
 # Rings are planned this much wider than they must be: samples are but samples.
 _ROOM = 1.08
@@ -39,8 +40,7 @@ def best_pitch(
         In [px], 0 where no pair of this projector measures, shape (n, n_projectors).
     """
     for p, projector in enumerate(projectors):
-        points = samples.target.samples.points
-        samples = samples.with_surfaces(p, code_surfaces(projector, points))
+        samples = samples.with_code(p, projector)
     best = np.zeros((len(samples.target), len(projectors)))
     for seen in views:
         for pair in pairs_of(scene.requirements.triangulation, samples, seen):
@@ -70,8 +70,8 @@ def users(
 
 def least_gaps(
     coordinates: NDArray[np.float64],
-    gaps: NDArray[np.float64],
     pitch: NDArray[np.float64],
+    gap: float,
     min_pitch: float,
     edges: NDArray[np.float64],
 ) -> NDArray[np.float64]:
@@ -81,8 +81,8 @@ def least_gaps(
 
     Args:
         coordinates: Ring coordinates of samples, shape (n,).
-        gaps: Gap at each of them, shape (n,).
-        pitch: Pitch of each at that gap in [px], shape (n,).
+        pitch: Pitch of each at an even gap in [px], shape (n,).
+        gap: That gap.
         min_pitch: Least pitch [px].
         edges: Borders of equal cells of the ring coordinate, shape (n_cells + 1,).
 
@@ -90,10 +90,16 @@ def least_gaps(
         0 where a cell holds no sample, shape (n_cells,).
     """
     least = np.zeros(len(edges) - 1)
-    cell = np.searchsorted(edges, coordinates) - 1
-    cell = np.clip(cell, 0, len(least) - 1)
-    np.maximum.at(least, cell, _ROOM * gaps * min_pitch / pitch)
+    cells = cells_at(edges, coordinates)
+    np.maximum.at(least, cells, _ROOM * gap * min_pitch / pitch)
     return least
+
+
+def cells_at(
+    edges: NDArray[np.float64], coordinates: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return the cell that holds each ring coordinate, shape (n,)."""
+    return np.clip(np.searchsorted(edges, coordinates) - 1, 0, len(edges) - 2)
 
 
 def projector_gaps(
@@ -134,12 +140,7 @@ def widest_gap(
     lit, the spacing over all samples stands in.
     """
     samples = lit_samples(scene, projectors, target)
+    gaps = [ring.spacing[samples.lit[:, p]] for p, ring in enumerate(samples.surfaces)]
     if not len(samples.target):
-        rings = [code_surfaces(p, target.samples.points) for p in projectors]
-        return float(max(ring.spacing.max() for ring in rings))
-    return float(
-        max(
-            ring.spacing[samples.lit[:, p]].max(initial=0.0)
-            for p, ring in enumerate(samples.surfaces)
-        )
-    )
+        gaps = [code_surfaces(p, target.samples.points).spacing for p in projectors]
+    return float(max(gap.max(initial=0.0) for gap in gaps))

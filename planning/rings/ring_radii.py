@@ -13,7 +13,8 @@ from planning.model.device_poses import frame_along, ring_frame, shifted_frame
 from planning.model.requirements import TriangulationLimits
 from solvers.poses.axis_program import axis_direction
 
-_MIN_GAP_PROJECTOR_PX = 3.0
+MIN_PROJECTOR_PX = 3.0
+_MIN_PITCH_PX = 6.0
 # The gap is chosen for a camera that meets the surface at 60 degrees.
 _GAP_FACING = 0.5
 
@@ -100,9 +101,13 @@ def ring_gap(
         limits: Its `min_ring_pitch_px`; 6 px where it doesn't bind.
         distance: From the devices to the surface [m].
     """
-    pitch = limits.min_ring_pitch_px or 6.0
-    for_camera = pitch * distance / (camera.focal_px * _GAP_FACING)
-    return max(for_camera, _MIN_GAP_PROJECTOR_PX * projector.pixel_m(distance))
+    for_camera = least_pitch_px(limits) * distance / (camera.focal_px * _GAP_FACING)
+    return max(for_camera, MIN_PROJECTOR_PX * projector.pixel_m(distance))
+
+
+def least_pitch_px(limits: TriangulationLimits) -> float:
+    """Return the least pitch of rings in [px]; 6 where it doesn't bind."""
+    return limits.min_ring_pitch_px or _MIN_PITCH_PX
 
 
 def uniform_radii(outer: float, gap: float) -> NDArray[np.float64]:

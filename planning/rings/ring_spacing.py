@@ -40,22 +40,15 @@ class GapLimits:
     finest: NDArray[np.float64]
     free: NDArray[np.bool_]
 
-    def needed(self, tolerance: float) -> "GapLimits":
-        """Return the limits with h_max no more than sqrt(8 e_tol / kappa).
-
-        Args:
-            tolerance: e_tol, largest error of a chord along the beam [m].
-        """
-        gap = np.sqrt(8.0 * tolerance / np.maximum(self.kappa, _FLAT))
-        return replace(self, coarsest=np.minimum(self.coarsest, gap))
-
     def density(self, scale: float) -> NDArray[np.float64]:
         """Return d(c) for a scale s of sqrt(kappa), shape (n,)."""
         wish = np.maximum(scale * np.sqrt(self.kappa), 1.0 / self.coarsest)
         return np.minimum(wish, 1.0 / self.finest)
 
 
-def spaced_radii(limits: GapLimits, n_rings: int) -> NDArray[np.float64]:
+def spaced_radii(
+    limits: GapLimits, n_rings: int, tolerance: float = np.inf
+) -> NDArray[np.float64]:
     """Return ring radii at equal steps of the integral of the density.
 
     As many as wanted; more where h_max asks for them, fewer where h_min doesn't let
@@ -64,10 +57,14 @@ def spaced_radii(limits: GapLimits, n_rings: int) -> NDArray[np.float64]:
     Args:
         limits: Of the gaps.
         n_rings: Wanted number of rings.
+        tolerance: e_tol, largest error of a chord along the beam [m]: no gap is wider
+            than sqrt(8 e_tol / kappa).
 
     Returns:
         Rising, at least 2, the last the outermost ring.
     """
+    gap = np.sqrt(8.0 * tolerance / np.maximum(limits.kappa, _FLAT))
+    limits = replace(limits, coarsest=np.minimum(limits.coarsest, gap))
     cell = np.diff(limits.edges)
     density = limits.density(_scale(limits, float(n_rings)))
     total = float(np.sum(density * cell))

@@ -9,12 +9,13 @@ that a wider one didn't, so fewer cameras are too few for the final rings, too.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.document.device_records import CreasesRecord, RingsRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 from planning.scene.camera_views import view_of
@@ -27,8 +28,10 @@ from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
 from .ring_creases import Creases, crease_errors, find_creases
-from .ring_limits import RingBeam, least_pitch_px, ring_beam
+from .ring_limits import RingBeam, ring_beam
 from .ring_pitch import best_pitch, users
+from .ring_radii import least_pitch_px
+from .ring_spacing import spaced_radii
 
 Spacing = Literal["uniform", "curvature"]
 
@@ -42,12 +45,12 @@ class RingStage:
     Attributes:
         projectors: As placed, with their own radii.
         even_radii: Those that each had before.
-        reports: `rings` of each projector in the plan: plain JSON values.
+        records: `rings` of each projector in the plan.
     """
 
     projectors: tuple[PlannedProjector, ...]
     even_radii: tuple[NDArray[np.float64], ...]
-    reports: tuple[dict[str, Any], ...]
+    records: tuple[RingsRecord, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +85,14 @@ def space_rings(
     beams = tuple(ring_beam(scene, projector, creases) for projector in even)
     if proved is not None:
         beams = tuple(b.with_lit(_lit_at(b, proved, p)) for p, b in enumerate(beams))
-    final, kept, beams = _spaced(scene, even, cameras, beams)
-    if spacing == "uniform":
-        final, kept = even, frozenset[int]()
-    reports = tuple(
-        {
-            "spacing": "uniform" if final[p] is even[p] else "curvature",
-            "kept_even": p in kept,
-            **_report(scene, beams[p], final[p], creases),
-        }
-        for p in range(len(even))
+    final, losing = even, frozenset[int]()
+    if spacing == "curvature":
+        final, losing = _spaced(scene, even, cameras, beams)
+    records = tuple(
+        rings_record(scene, beam, final[p], creases, kept_even=p in losing)
+        for p, beam in enumerate(beams)
     )
-    return RingStage(final, tuple(p.ring_radii for p in even), reports)
+    return RingStage(final, tuple(p.ring_radii for p in even), records)
 
 
 def tolerance_m(requirements: Requirements) -> float:
@@ -111,26 +110,28 @@ def _spaced(
     even: tuple[PlannedProjector, ...],
     cameras: Sequence[PlannedCamera],
     beams: tuple[RingBeam, ...],
-) -> tuple[tuple[PlannedProjector, ...], frozenset[int], tuple[RingBeam, ...]]:
+) -> tuple[tuple[PlannedProjector, ...], frozenset[int]]:
     """Space rings; samples of a fresh draw that this loses join those that bind.
 
     Returns:
-        The projectors; those that keep even rings, since samples were lost to the last;
-        and the beams with the gaps that cameras separate.
+        The projectors; those that keep even rings, since samples were lost to the last.
     """
     every, tolerance = range(len(even)), tolerance_m(scene.requirements)
+    least_px = least_pitch_px(scene.requirements.triangulation)
     draw = _draw(scene, even, cameras, 0)
     binding = _binding(scene, even, draw, np.ones(len(draw.samples.target), dtype=bool))
     lost = np.zeros(0, dtype=bool)
     final = even
     for attempt in range(1, _ROUNDS + 1):
         beams = tuple(
-            beam.with_lit(_lit_at(beam, draw.samples, p)).bound(
-                binding[p][0], binding[p][1], least_pitch_px(scene)
-            )
+            beam.with_lit(_lit_at(beam, draw.samples, p))
             for p, beam in enumerate(beams)
         )
-        final = tuple(beam.respaced(tolerance) for beam in beams)
+        limits = [beams[p].limits(binding[p], least_px) for p in every]
+        final = tuple(
+            replace(p, ring_radii=spaced_radii(bound, len(p.ring_radii), tolerance))
+            for p, bound in zip(even, limits, strict=True)
+        )
         draw = _draw(scene, even, cameras, attempt)
         lost = _lost(scene, draw, final)
         if not lost.any():
@@ -142,7 +143,7 @@ def _spaced(
         kept |= set(np.flatnonzero((draw.pitch[lost] > 0).any(axis=0)).tolist())
         final = tuple(even[p] if p in kept else final[p] for p in every)
         lost = _lost(scene, draw, final)
-    return final, frozenset(kept), beams
+    return final, frozenset(kept)
 
 
 def _draw(
@@ -196,22 +197,36 @@ def _lost(
     return np.asarray((draw.pitch > 0).any(axis=1) & ~(after > 0).any(axis=1))
 
 
-def _report(
-    scene: Scene, beam: RingBeam, final: PlannedProjector, creases: Creases
-) -> dict[str, Any]:
-    """What a plan says of a projector's rings; gaps h along m and errors in [m]."""
+def rings_record(
+    scene: Scene,
+    beam: RingBeam,
+    final: PlannedProjector,
+    creases: Creases,
+    *,
+    kept_even: bool,
+) -> RingsRecord:
+    """Return what a plan says of a projector's rings.
+
+    Args:
+        scene: Surface and requirements.
+        beam: Of the projector with even rings.
+        final: With its final rings.
+        creases: Of the surface.
+        kept_even: Whether others would have lost measured samples.
+    """
     lit, error = crease_errors(scene, final, creases)
-    tolerance = tolerance_m(scene.requirements)
     # Rounding decides whether the last row lies inside the last ring.
     shone = beam.profile.points[:-1][beam.profile.lit[:-1]]
-    spacing = code_surfaces(final, shone).spacing
-    errors = beam.errors_under(final)
-    return {
-        "n_even": len(beam.projector.ring_radii),
-        "gap_m": [float(spacing.min()), float(spacing.max())] if len(spacing) else None,
-        "over_tolerance": float((errors > tolerance).mean()) if len(errors) else 0.0,
-        "creases": {
-            "length_m": float(creases.length[lit].sum()),
-            "max_error_m": float(error[lit].max(initial=0.0)),
-        },
-    }
+    gaps = code_surfaces(final, shone).spacing
+    errors = beam.errors_under(final) > tolerance_m(scene.requirements)
+    return RingsRecord(
+        spacing="uniform" if final is beam.projector else "curvature",
+        kept_even=kept_even,
+        n_even=len(beam.projector.ring_radii),
+        gap_m=(float(gaps.min()), float(gaps.max())) if len(gaps) else None,
+        over_tolerance=float(errors.mean()) if len(errors) else 0.0,
+        creases=CreasesRecord(
+            length_m=float(creases.length[lit].sum()),
+            max_error_m=float(error[lit].max(initial=0.0)),
+        ),
+    )

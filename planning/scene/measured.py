@@ -58,8 +58,9 @@ class LitSamples:
             tuple(code_surfaces(projector, points) for projector in projectors),
         )
 
-    def with_surfaces(self, p: int, surfaces: CodeSurfaces) -> "LitSamples":
-        """Return the samples with other surfaces of equal code of one projector."""
+    def with_code(self, p: int, projector: PlannedProjector) -> "LitSamples":
+        """Return the samples with the surfaces of equal code of projector p anew."""
+        surfaces = code_surfaces(projector, self.target.samples.points)
         others = self.surfaces[:p], self.surfaces[p + 1 :]
         return replace(self, surfaces=(*others[0], surfaces, *others[1]))
 

@@ -66,7 +66,7 @@ def ball(request):
 def errors(scene, projectors, cameras, target):
     """Whether each is measured, and the rms of the least s_N."""
     rows = lit_samples(scene, projectors, target)
-    sigma = AxisJudge(scene, projectors, cameras, rows).sigma.min(axis=0)
+    sigma = AxisJudge.of(scene, cameras, rows).sigma.min(axis=0)
     measured = measured_by(scene, cameras, rows).any(axis=1)
     assert np.array_equal(np.isfinite(sigma), measured)
     return measured, np.sqrt(np.mean(sigma[measured] ** 2)), rows.lit
@@ -131,7 +131,7 @@ def test_no_axis_leaves_lit_samples_outside_the_last_ring(ball):
     ]
     rows = lit_samples(scene, tight, cover.samples.target)
     assert np.array_equal(rows.lit, cover.samples.lit)
-    views = AxisJudge(scene, tight, cover.cameras, rows).views
+    views = AxisJudge.of(scene, cover.cameras, rows).views
     program = axis_program(scene, tight, 0, rows, views)
     coordinate = ring_coordinate(tight[0], points[rows.lit[:, 0]])
     inside = coordinate <= 0.99 * tight[0].ring_radii[-1]
@@ -177,7 +177,7 @@ def test_what_is_lit_beside_the_target_stays_lit_too(ball):
 def test_the_best_proposal_is_tried_first(ball):
     """Near or far: from a start that blind curves close in, far is better."""
     scene, projectors, cover = ball
-    views = AxisJudge(scene, projectors, cover.cameras, cover.samples).views
+    views = AxisJudge.of(scene, cover.cameras, cover.samples).views
     offered = []
     for p in range(len(projectors)):
         program = axis_program(scene, projectors, p, cover.samples, views)
@@ -215,7 +215,7 @@ def test_the_program_scores_pairs_as_the_exact_predicate_does(ball):
         scene, requirements=replace(scene.requirements, triangulation=limits)
     )
     rows = lit_samples(scene, fine, cover.samples.target)
-    views = AxisJudge(scene, fine, cover.cameras, rows).views
+    views = AxisJudge.of(scene, cover.cameras, rows).views
     program = axis_program(scene, fine, 1, rows, views)
     scores = pair_scores(program, program.start)
     lit = np.flatnonzero(rows.lit[:, 1])

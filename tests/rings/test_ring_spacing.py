@@ -121,8 +121,7 @@ def test_as_many_rings_as_wanted_fewer_where_too_fine_more_where_too_coarse():
 
 def test_a_tolerance_asks_for_more_rings():
     """h <= sqrt(8 e / kappa): 0.02 for e = 5e-5 and kappa = 1, so 50 rings."""
-    asked = limits(np.ones(100), coarsest=0.5).needed(5e-5)
-    assert len(spaced_radii(asked, 3)) == 50
+    assert len(spaced_radii(limits(np.ones(100), coarsest=0.5), 3, 5e-5)) == 50
 
 
 def test_free_cells_take_what_is_left_of_a_gap():

@@ -100,7 +100,7 @@ def test_the_light_meets_the_ball_where_the_closed_form_says():
 def test_what_even_rings_measure_stays_measured(bench, spaced):
     scene, even, cameras = bench
     final = spaced.projectors[0]
-    assert spaced.reports[0]["spacing"] == "curvature"
+    assert spaced.records[0].spacing == "curvature"
     assert final.ring_radii[-1] == even.ring_radii[-1]
     target = scene.target_samples(Draw(4000, 77))
     before = measured(scene, even, cameras, target)
@@ -165,16 +165,16 @@ def test_errors_between_rings_fall(bench, spaced):
         for projector in (even, spaced.projectors[0])
     )
     assert after < 0.9 * before
-    assert spaced.reports[0]["over_tolerance"] <= 0.01
+    assert spaced.records[0].over_tolerance <= 0.01
 
 
 def test_uniform_leaves_the_rings_and_reports(bench):
     scene, projector, cameras = bench
     stage = space_rings(scene, [projector], cameras, "uniform")
     assert stage.projectors[0] is projector
-    report = stage.reports[0]
-    assert report["spacing"] == "uniform"
-    assert not report["kept_even"]
+    record = stage.records[0]
+    assert record.spacing == "uniform"
+    assert not record.kept_even
 
 
 def test_rings_that_would_lose_samples_are_not_taken(bench, monkeypatch):
@@ -183,7 +183,7 @@ def test_rings_that_would_lose_samples_are_not_taken(bench, monkeypatch):
     monkeypatch.setattr(ring_pitch, "_ROOM", 0.5)
     stage = space_rings(scene, [projector], cameras, "curvature")
     assert stage.projectors[0] is projector
-    assert stage.reports[0]["kept_even"]
+    assert stage.records[0].kept_even
 
 
 def test_the_best_pitch_is_that_of_a_loop_over_pairs(bench):
@@ -203,11 +203,11 @@ def test_a_rings_share_of_the_ball_is_all_or_nothing_about_its_axis():
     scene, projector, cameras = made("parallel")
     radii = np.array([0.03, 0.07, 0.08, 0.09, 0.097, 0.11])
     shares = ring_shares(scene, replace(projector, ring_radii=radii), cameras)
-    assert shares.on_object.tolist() == [1.0, 1.0, 1.0, 1.0, 1.0, 0.0]
-    assert shares.on_target.tolist() == shares.on_object.tolist()
+    assert shares.on_object == (1.0, 1.0, 1.0, 1.0, 1.0, 0.0)
+    assert shares.on_target == shares.on_object
     # Lit up to 60 degrees of incidence, R = a sin 60 = 0.0866.
-    assert np.all(shares.measured[3:] == 0.0)
-    assert np.all(shares.measured[:3] > 0.3)
+    assert max(shares.measured[3:]) == 0.0
+    assert min(shares.measured[:3]) > 0.3
 
 
 def test_a_shifted_ring_lands_on_the_ball_for_an_arc():

@@ -74,8 +74,8 @@ def projector_records(
             min_margin_rad=claims.min_margin_rad[p],
             lit_area_m2=claims.lit_area_m2[p],
         ).changed(
-            rings=None if rings is None else rings.reports[p],
-            ring_shares=ring_shares(scene, projector, devices.cameras).to_document(),
+            rings=None if rings is None else rings.records[p],
+            ring_shares=ring_shares(scene, projector, devices.cameras),
         )
         for p, projector in enumerate(devices.projectors)
     )

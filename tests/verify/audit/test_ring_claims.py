@@ -14,7 +14,7 @@ from planning.model.plan import RigPlan
 from planning.rings.ring_creases import find_creases
 from planning.rings.ring_limits import ring_beam
 from planning.rings.ring_shares import ring_shares
-from planning.rings.ring_stage import _report
+from planning.rings.ring_stage import rings_record
 from planning.scene.scene import Scene
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
@@ -49,8 +49,9 @@ def with_claims(plan: RigPlan, light: str) -> RigPlan:
     for entry, old, new in zip(
         document["projectors"], even, plan.projectors, strict=True
     ):
-        report = _report(scene, ring_beam(scene, old, creases), new, creases)
-        entry["rings"] = {"spacing": "curvature", "kept_even": False} | report
+        beam = ring_beam(scene, old, creases)
+        record = rings_record(scene, beam, new, creases, kept_even=False)
+        entry["rings"] = record.to_document()
         shares = ring_shares(scene, new, plan.cameras)
         entry["ring_shares"] = shares.to_document()
     return RigPlan.from_document(document, surface)
