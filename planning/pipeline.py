@@ -6,7 +6,7 @@ from dataclasses import replace
 from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.cameras.routes import CamerasBy
+from planning.model.document.certificates import CamerasBy
 from planning.model.errors import TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from planning.cameras.camera_cover import (
-    CameraStage,
     NothingMeasuredError,
     camera_candidate_views,
 )
 from planning.cameras.camera_routes import widest_route
 from planning.cameras.camera_stage import follow_cameras, place_cameras
-from planning.cameras.proved_cameras import bound_stage
+from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan

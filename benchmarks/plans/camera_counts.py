@@ -35,7 +35,7 @@ from planning import load_mesh, load_rig, verify_plan
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_routes import widest_route
 from planning.cameras.camera_stage import CameraSolution, place_cameras
-from planning.cameras.routes import CamerasBy
+from planning.model.document.certificates import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.prepare import prepared

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.baselines.baseline_terms import BaselineLimits, RingsOnSurface
-from planning.cameras.baselines.camera_aims import at_poses
+from planning.cameras.baselines.camera_moves import at_poses
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import (
     WidestBaselines,

@@ -6,17 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
-from planning.proofs.candidate_certificate import certificate
-from planning.proofs.conflicts import Interference, resolve_others
+from planning.proofs.conflicts import Interference
 from planning.proofs.selection import (
     CandidateCover,
     Selection,
-    marginals,
-    others_instead,
     select_fewest,
 )
 from planning.scene.camera_views import CandidateViews
@@ -33,8 +29,6 @@ from planning.scene.measured import (
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import camera_candidates
-
-from .routes import Routes
 
 _ROUNDS = 3
 
@@ -88,30 +82,6 @@ class CameraCover:
     def among_candidates(self, chosen: NDArray[np.int64]) -> tuple[PlannedCamera, ...]:
         """Return candidates by their index."""
         return tuple(self.candidates.cameras[i] for i in chosen)
-
-
-@dataclass(frozen=True, eq=False)
-class CameraStage:
-    """Cameras with what was proved of their number.
-
-    Attributes:
-        cameras: As they stand.
-        cover: Candidates and samples, to prove the count again under other ring axes.
-        by_count: Best cameras found for each number of them.
-        certificate: What was proved, as the plan says it.
-        routes: What either route needs; None where none was compared.
-    """
-
-    cameras: tuple[PlannedCamera, ...]
-    cover: CameraCover
-    by_count: dict[int, tuple[PlannedCamera, ...]]
-    certificate: Certificate
-    routes: Routes | None = None
-
-    @property
-    def reference(self) -> tuple[PlannedCamera, ...]:
-        """The candidates."""
-        return self.cover.candidates.cameras
 
 
 def camera_candidate_views(
@@ -230,25 +200,6 @@ def _measured(
     samples = lit_samples(scene, projectors, target)
     views = candidates.on(samples.target)
     return samples, measured_by(scene, candidates.cameras, samples, views)
-
-
-def camera_stage(
-    scene: Scene, cover: CameraCover, routes: Routes | None = None
-) -> CameraStage:
-    """Return the cameras of a cover, with the best ones for every other count."""
-    candidates = candidate_cover(scene, cover.measured)
-    others = marginals(candidates, cover.selection)
-    if cover.by_count is not None:
-        others = others_instead(others, cover.by_count, candidates)
-    if cover.interference is not None:
-        n = len(cover.selection.chosen)
-        others = resolve_others(cover.interference, candidates, others, n)
-    area = cover.samples.target.samples.weight
-    proof = certificate(
-        candidates, cover.selection, others, area, bodied=cover.has_bodies
-    )
-    by_count = {n: cover.among_candidates(of) for n, of in others.by_count.items()}
-    return CameraStage(cover.cameras, cover, by_count, proof, routes)
 
 
 def candidate_cover(scene: Scene, measured: NDArray[np.bool_]) -> CandidateCover:

@@ -23,6 +23,7 @@ from planning.cameras.paper.paper_cameras import (
     cover_of,
     route_among,
 )
+from planning.model.document.certificates import CamerasBy, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
@@ -39,14 +40,8 @@ from .camera_baselines import (
     widen_baselines,
 )
 from .camera_bodies import resolved_cover
-from .camera_cover import (
-    CameraCover,
-    CameraStage,
-    candidate_cover,
-    n_fixed,
-    plan_cameras,
-)
-from .routes import CamerasBy, Routes
+from .camera_cover import CameraCover, candidate_cover, n_fixed, plan_cameras
+from .proved_cameras import CameraStage
 
 _Projectors = tuple[PlannedProjector, ...]
 
@@ -89,7 +84,7 @@ def cover_again(
 
 def better_route(
     scene: Scene, projectors: _Projectors, cover: CameraCover, by: CamerasBy
-) -> tuple[CameraCover, Routes]:
+) -> tuple[CameraCover, RouteCounts, tuple[PlannedCamera, ...]]:
     """Return the cover that needs fewest cameras, and what either route needs.
 
     Args:
@@ -97,9 +92,13 @@ def better_route(
         projectors: As planned, ring axes as the cameras were chosen for.
         cover: From `cover_for` or `cover_again`.
         by: The route that the user wants.
+
+    Returns:
+        Also as many cameras of the paper's route, where the cover's stay.
     """
     if by == "paper":
-        return _by_paper_alone(scene, projectors, cover)
+        cover = _again_if_fewer(scene, projectors, cover)
+        return cover, _counts(by, cover, "the paper's route was asked for"), ()
     route: RouteCameras | None = None
     why = "the cover was asked for"
     if by == "both":
@@ -111,24 +110,33 @@ def better_route(
         except InfeasibleLimitsError:
             pass
     after = _with_more(scene, projectors, cover, route)
-    if route is not None:
-        return after, _compared(scene, cover, after, route)
-    return after, Routes(by, after.selection.needed, None, "cover", why)
+    if route is None:
+        return after, _counts(by, after, why), ()
+    routes = _compared(scene, cover, after, route)
+    as_many = routes.paper == routes.cover == len(after.cameras)
+    rival = route.cameras if as_many and routes.taken == "cover" else ()
+    return after, routes, rival
 
 
-def _by_paper_alone(
+def _again_if_fewer(
     scene: Scene, projectors: _Projectors, cover: CameraCover
-) -> tuple[CameraCover, Routes]:
-    """Take the route once more under the final axes, if fewer aren't ruled out."""
+) -> CameraCover:
+    """Take the paper's route once more for these axes, if fewer aren't ruled out."""
     if cover.selection.lower_bound < cover.selection.needed:
         again = cover_by_paper(scene, projectors, cover.candidates)
         if again.selection.needed < cover.selection.needed:
-            cover = again
+            return again
+    return cover
+
+
+def _counts(by: CamerasBy, cover: CameraCover, why: str) -> RouteCounts:
+    """What is said where one route alone was taken."""
     needed = cover.selection.needed
+    if by != "paper":
+        return RouteCounts(asked=by, cover=needed, paper=None, taken="cover", why=why)
     met = cover.selection.n_covered >= cover.selection.required
     count = needed if met or needed > len(cover.cameras) else None
-    why = "the paper's route was asked for"
-    return cover, Routes("paper", None, count, "paper", why)
+    return RouteCounts(asked=by, cover=None, paper=count, taken="paper", why=why)
 
 
 def widest_route(
@@ -157,13 +165,13 @@ def widest_route(
         samples, stage.cameras, spare_field=spare_field, confirmed=True
     )
     routes = stage.routes
-    if spare_field or routes is None or len(routes.rival) != len(stage.cameras):
+    if spare_field or routes is None or len(stage.rival) != len(stage.cameras):
         return stage, widest
-    rival = widen_baselines(samples, routes.rival, max_evaluations=1, max_programs=0)
+    rival = widen_baselines(samples, stage.rival, max_evaluations=1, max_programs=0)
     if not _clearly_wider(rival, widest):
         return stage, widest
     why = f"as many, {_apart(rival)} instead of {_apart(widest)} apart at the least"
-    routes = replace(routes, taken="paper", why=why)
+    routes = routes.changed(taken="paper", why=why)
     return replace(stage, cameras=rival.cameras, routes=routes), rival
 
 
@@ -232,7 +240,7 @@ def _at_limit(scene: Scene, cover: CameraCover) -> tuple[PlannedCamera, ...]:
 
 def _compared(
     scene: Scene, before: CameraCover, after: CameraCover, route: RouteCameras
-) -> Routes:
+) -> RouteCounts:
     """Say what either route needs, and why one of them is taken.
 
     Args:
@@ -243,27 +251,24 @@ def _compared(
     """
     cover, kept, paper = before.selection.needed, after.selection.needed, route.needed
     required = f"{100.0 * scene.requirements.coverage:g} % is asked"
+    taken, why = "cover", "as many, and the paper's don't stand clearly farther apart"
     if paper is None:
         why = (
             f"the paper's route ended with {_percent(route.reached)} of what is "
             f"reachable, {required}"
         )
-        return Routes("both", kept, None, "cover", why)
-    if paper == kept < cover:
+    elif paper == kept < cover:
         why = "fewer; its cameras stand between the candidates and joined them"
-        return Routes("both", cover, paper, "paper", why)
-    if paper < kept:
+        taken, kept = "paper", cover
+    elif paper < kept:
         why = f"with the {paper} of the paper's route fresh samples fall short"
-        return Routes("both", kept, None, "cover", why)
-    if paper > kept:
+        paper = None
+    elif paper > kept:
         why = (
             f"fewer; without one of its {paper} the paper's route was found to measure "
             f"{_percent(route.best_without_one)} of what is reachable, {required}"
         )
-        return Routes("both", kept, paper, "cover", why)
-    why = "as many, and the paper's don't stand clearly farther apart"
-    rival = route.cameras if len(after.cameras) == paper else ()
-    return Routes("both", kept, paper, "cover", why, rival)
+    return RouteCounts(asked="both", cover=kept, paper=paper, taken=taken, why=why)
 
 
 def _percent(share: float) -> str:

@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.model.document.certificates import Certificate
+from planning.model.document.certificates import CamerasBy, Certificate
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
 from planning.scene.camera_views import CandidateViews
 from planning.scene.scene import Scene
 
-from .camera_cover import CameraCover, CameraStage, camera_stage
+from .camera_cover import CameraCover
 from .camera_routes import better_route, cover_again, cover_for
-from .routes import CamerasBy
+from .proved_cameras import CameraStage, camera_stage
 
 _ROUNDS = 3
 # Share of the measured area for which other cameras aren't worth larger errors.
@@ -50,8 +50,9 @@ def place_cameras(
     """
     cover = cover_for(scene, projectors, candidates, by)
     moved, cover = move_axes(scene, projectors, cover, by)
-    cover, routes = better_route(scene, moved, cover, by)
-    return CameraSolution(moved, camera_stage(scene, cover, routes))
+    cover, routes, rival = better_route(scene, moved, cover, by)
+    stage = replace(camera_stage(scene, cover, routes), rival=rival)
+    return CameraSolution(moved, stage)
 
 
 def move_axes(

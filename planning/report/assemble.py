@@ -148,7 +148,7 @@ def _final_requirements(
 def _certificates(partial: PartialPlan) -> Certificates:
     cameras, routes = partial.camera_stage.certificate, partial.camera_stage.routes
     if routes is not None:
-        cameras = cameras.changed(routes=routes.counts())
+        cameras = cameras.changed(routes=routes)
     return Certificates(projectors=partial.stage.certificate, cameras=cameras)
 
 
@@ -156,17 +156,14 @@ def _baselines(
     partial: PartialPlan, devices: Devices, claims: Claims, requirements: Requirements
 ) -> tuple[BaselineRow, ...]:
     samples = claims.target_samples.samples
-    rows = tuple(
-        BaselineRow(**row)
-        for row in baseline_rows(
-            devices.cameras,
-            SampledSurface(samples.points, samples.normals),
-            claims.measured_by,
-            requirements.camera.max_incidence,
-        )
+    rows = baseline_rows(
+        devices.cameras,
+        SampledSurface(samples.points, samples.normals),
+        claims.measured_by,
+        requirements.camera.max_incidence,
     )
     if partial.request.ranges is None:
-        return rows
+        return tuple(rows)
     body, guard = partial.request.ranges
     return with_spread(rows, devices.cameras, body.ball, guard)
 

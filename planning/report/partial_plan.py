@@ -5,8 +5,8 @@ from math import pi
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
-from planning.cameras.camera_cover import CameraStage
-from planning.cameras.routes import CamerasBy
+from planning.cameras.proved_cameras import CameraStage
+from planning.model.document.certificates import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.rig.range_guard import Guard

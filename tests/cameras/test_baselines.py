@@ -17,7 +17,6 @@ from planning.cameras.baselines.baseline_rows import (
 from planning.cameras.baselines.seams import (
     SampledSurface,
     Seam,
-    adjacency,
     both_orders,
     find_seam,
     neighbouring_pairs,
@@ -70,7 +69,8 @@ def _facing(separation, z=(1.0, 1.0)):
 
 def _rows(cameras, points, normals):
     measured = np.stack([_in_image(camera, points) for camera in cameras], axis=1)
-    return baseline_rows(cameras, SampledSurface(points, normals), measured, THETA)
+    rows = baseline_rows(cameras, SampledSurface(points, normals), measured, THETA)
+    return [row.to_document() for row in rows]
 
 
 def test_a_row_can_be_recomputed_from_the_poses_and_itself():
@@ -236,7 +236,8 @@ def test_a_rigid_motion_keeps_every_length_and_angle_of_a_row():
     there = baseline_rows(moved, surface, measured, THETA)
     for a, b in zip(still, there, strict=True):
         for key in ("standoff1", "C2", "D1", "phi", "phi_max", "d_lateral", "d_axial"):
-            assert b[key] == pytest.approx(a[key], abs=1e-9), key
+            expected = pytest.approx(getattr(a, key), abs=1e-9)
+            assert getattr(b, key) == expected, key
 
 
 def test_seam_samples_are_shared_and_border_on_the_other_stretch():
@@ -272,7 +273,7 @@ def test_every_pair_has_a_seam_in_both_orders_whatever_is_measured():
         normals = np.tile([0.0, 0.0, 1.0], (n, 1))
         measured = rng.random((n, 3)) < rng.uniform(0.05, 0.9)
         surface = SampledSurface(points, normals)
-        for order in both_orders(neighbouring_pairs(measured, surface.adjacent)):
+        for order in both_orders(neighbouring_pairs(measured, surface)):
             assert len(find_seam(order, surface, measured).points), trial
 
 
@@ -291,8 +292,8 @@ def test_two_sides_of_a_thin_wall_are_not_beside_each_other():
     normals = np.concatenate([normals, -normals])
     measured = np.zeros((1600, 2), dtype=bool)
     measured[:800, 0] = measured[800:, 1] = True
-    assert not neighbouring_pairs(measured, adjacency(both, normals))
-    edge = adjacency(points, normals[:800])
+    assert not neighbouring_pairs(measured, SampledSurface(both, normals))
+    edge = SampledSurface(points, normals[:800])
     assert neighbouring_pairs(
         np.stack([points[:, 0] < 0, points[:, 0] >= 0], axis=1), edge
     ) == [(0, 1)]
@@ -313,11 +314,11 @@ def test_one_percent_of_the_target_makes_neighbours_where_no_border_is_shared(
     measured = np.zeros((1000, 2), dtype=bool)
     measured[:20] = measured[20:510, :1] = True
     measured[510:, 1] = True
-    adjacent = adjacency(points, normals)
-    assert neighbouring_pairs(measured, adjacent) == [(0, 1)]
+    surface = SampledSurface(points, normals)
+    assert neighbouring_pairs(measured, surface) == [(0, 1)]
     for share, pairs in ((0.02, [(0, 1)]), (0.0201, [])):
         monkeypatch.setattr("planning.cameras.baselines.seams.MIN_OVERLAP_SHARE", share)
-        assert neighbouring_pairs(measured, adjacent) == pairs
+        assert neighbouring_pairs(measured, surface) == pairs
 
 
 def test_groups_of_parts_that_can_be_registered():

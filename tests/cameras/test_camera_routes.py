@@ -18,7 +18,7 @@ from geometry.shapes.primitives import sphere
 from planning import RigPlan
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_baselines import baseline_samples, held_to_candidates
-from planning.cameras.camera_cover import camera_candidate_views, camera_stage
+from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_routes import (
     _clearly_wider,
     better_route,
@@ -26,9 +26,9 @@ from planning.cameras.camera_routes import (
     widest_route,
 )
 from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
-from planning.cameras.routes import Routes
+from planning.cameras.proved_cameras import camera_stage
 from planning.model.bodies import Body
-from planning.model.document.certificates import Certificate
+from planning.model.document.certificates import Certificate, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
@@ -89,7 +89,7 @@ def fine(ball):
 
 def test_fewer_by_the_paper_join_the_candidates_and_the_proof(ball, coarse):
     scene, projectors, _ = ball
-    cover, better, routes = coarse
+    cover, better, routes, _ = coarse
     assert cover.selection.needed == cover.selection.lower_bound > 3
     assert (routes.cover, routes.paper, routes.taken) == (
         cover.selection.needed,
@@ -110,10 +110,10 @@ def test_fewer_by_the_paper_join_the_candidates_and_the_proof(ball, coarse):
 
 
 def test_a_cover_that_is_as_small_stays_as_it_was(fine):
-    cover, better, routes = fine
+    cover, better, routes, rival = fine
     assert better is cover
     assert (routes.cover, routes.paper, routes.taken) == (3, 3, "cover")
-    assert len(routes.rival) == 3
+    assert len(rival) == 3
 
 
 def test_the_route_is_the_same_on_every_run_and_with_two_threads(ball, coarse):
@@ -154,7 +154,7 @@ def test_too_few_allowed_are_the_best_of_the_route_and_say_what_is_needed(ball):
     cover = cover_by_paper(few, projectors, camera_candidate_views(few, camera, 40))
     assert cover.selection.status == "infeasible"
     assert (len(cover.cameras), cover.selection.needed) == (2, 3)
-    _, routes = better_route(few, projectors, cover, "paper")
+    _, routes, _ = better_route(few, projectors, cover, "paper")
     assert (routes.paper, routes.taken) == (3, "paper")
 
 
@@ -184,12 +184,12 @@ def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
 ):
     draw_fewer(monkeypatch, baselines=600)
     scene, projectors, _ = ball
-    cover, _, routes = fine
+    cover, _, routes, _ = fine
     stage = camera_stage(scene, cover)
     # As if they stood already: they can't slide back.
     fixed = tuple(replace(c, existing="old") for c in _beside(stage.cameras))
     close = replace(stage, cameras=fixed)
-    rivals = replace(close, routes=replace(routes, rival=stage.cameras))
+    rivals = replace(close, routes=routes, rival=stage.cameras)
     taken, slid = widest_route(scene, projectors, rivals)
     assert taken.routes.taken == "paper"
     assert "instead of" in taken.routes.why
@@ -198,7 +198,7 @@ def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
         c.world_from_device.tolist() for c in stage.cameras
     ]
     # Other numbers than the cover's are no rivals.
-    fewer = replace(rivals, routes=replace(routes, rival=stage.cameras[:2]))
+    fewer = replace(rivals, rival=stage.cameras[:2])
     assert widest_route(scene, projectors, fewer)[0] is fewer
 
 
@@ -288,13 +288,13 @@ def test_a_plan_by_the_papers_route_alone_bears_the_audit(planned):
 
 
 def test_the_summary_tells_both_counts_and_why(handmade):
-    told = Routes("both", 3, 4, "cover", "fewer; so").counts()
+    told = RouteCounts(asked="both", cover=3, paper=4, taken="cover", why="fewer; so")
     proof = handmade.build_plan().document.certificates.cameras
     (line,) = route_lines(proof.changed(routes=told))
     assert re.search(
         r"3 by the cover, 4 by the paper.*taken the cover.*fewer; so", line
     )
-    told = Routes("paper", None, 4, "paper", "").counts()
+    told = RouteCounts(asked="paper", cover=None, paper=4, taken="paper", why="")
     (alone,) = route_lines(proof.changed(routes=told))
     assert alone.endswith("4 by the paper's largest baselines")
     assert route_lines(proof) == []

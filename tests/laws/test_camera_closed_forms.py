@@ -163,12 +163,12 @@ def test_neighbours_round_a_body_part_at_d_max(name):
         assert (apart < limit.d_max) == closed
         assert shape.seen(cameras).any(axis=1)[between].all() == closed
         for row in shape.rows(cameras) if closed else ():
-            assert row["d"] == pytest.approx(apart)
-            assert row["d"] < row["d_max"]
+            assert row.d == pytest.approx(apart)
+            assert row.d < row.d_max
             # E lies up to a sample inside camera 1's part.
-            assert row["d_max"] > 0.994 * limit.d_max
+            assert row.d_max > 0.994 * limit.d_max
             if name.startswith("circle"):
-                assert row["d_max"] == pytest.approx(limit.d_max, rel=0.006)
+                assert row.d_max == pytest.approx(limit.d_max, rel=0.006)
 
 
 def wall(length, theta_deg=80.0, n=801):
@@ -212,10 +212,10 @@ def test_a_wall_parts_at_the_sum_of_half_extents(step):
     assert shape.seen([one, two]).any(axis=1)[between].all() == (step < 0.0)
     if step < 0.0:
         for row in shape.rows([one, two]):
-            assert row["d_axial"] == pytest.approx(s1 - s2)
-            assert row["d_lateral"] == pytest.approx(limit + step)
-            assert row["covered"] is True
-            d_lateral_max = np.sqrt(row["d_max"] ** 2 - row["d_axial"] ** 2)
+            assert row.d_axial == pytest.approx(s1 - s2)
+            assert row.d_lateral == pytest.approx(limit + step)
+            assert row.covered is True
+            d_lateral_max = np.sqrt(row.d_max ** 2 - row.d_axial ** 2)
             assert d_lateral_max == pytest.approx(limit, abs=2e-3)
 
 
@@ -256,9 +256,9 @@ def test_a_box_edge_parts_at_the_bent_limit():
             rows = shape.rows(cameras)
             assert rows
             for row in rows:
-                assert row["covered"] is True
-                assert row["delta_surface"] == pytest.approx(np.pi / 2.0)
-                assert row["d_max"] == pytest.approx(limit, abs=4e-3)
+                assert row.covered is True
+                assert row.delta_surface == pytest.approx(np.pi / 2.0)
+                assert row.d_max == pytest.approx(limit, abs=4e-3)
 
 
 def test_fewest_cameras_round_a_box_edge():

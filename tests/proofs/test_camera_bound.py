@@ -14,10 +14,9 @@ from geometry.shapes.primitives import sphere
 from planning.cameras.baselines.coverage_triangle import round_body_limit
 from planning.cameras.camera_cover import (
     camera_candidate_views,
-    camera_stage,
     plan_cameras,
 )
-from planning.cameras.proved_cameras import bound_stage
+from planning.cameras.proved_cameras import bound_stage, camera_stage
 from planning.model.device_poses import ring_frame
 from planning.model.document.certificates import (
     BestArea,

@@ -13,7 +13,8 @@ from support.plain_shapes import grid
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import CameraCover, CameraStage
+from planning.cameras.camera_cover import CameraCover
+from planning.cameras.proved_cameras import CameraStage
 from planning.model.device_poses import ring_frame
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector

@@ -8,17 +8,14 @@ import pytest
 from support.factories import make_camera, make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import (
-    camera_candidate_views,
-    camera_stage,
-    plan_cameras,
-)
+from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.camera_stage import (
     follow_cameras,
     move_axes,
     proves_as_much,
     with_cameras,
 )
+from planning.cameras.proved_cameras import camera_stage
 from planning.model.device_poses import ring_frame
 from planning.rig.rig import load_rig
 from planning.rings.axis_moves import (

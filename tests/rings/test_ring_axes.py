@@ -5,11 +5,8 @@ import pytest
 from support.factories import make_camera, make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import (
-    camera_candidate_views,
-    camera_stage,
-    plan_cameras,
-)
+from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
+from planning.cameras.proved_cameras import camera_stage
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.advice.projector_relaxations import reachability_relaxations
 from planning.report.claims import Devices, make_claims

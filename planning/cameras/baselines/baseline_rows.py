@@ -8,12 +8,12 @@ baseline at which they would part.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
+from planning.model.document.baseline_records import BaselineRow
 from planning.model.planned import PlannedCamera
 
 from .coverage_triangle import SeamAngles, baseline_parts, largest_baseline, seam_angles
@@ -61,7 +61,7 @@ def baseline_rows(
     surface: SampledSurface,
     measured_by: NDArray[np.bool_],
     camera_max_incidence: float,
-) -> list[dict[str, Any]]:
+) -> list[BaselineRow]:
     """Return one row for each order of each neighbouring pair of cameras.
 
     Args:
@@ -72,28 +72,25 @@ def baseline_rows(
         camera_max_incidence: theta, incidence that cameras accept [rad].
 
     Returns:
-        Rows of the plan's `baselines`, JSON values only; `docs/method/baselines.md`
-        defines every key.
+        The plan's `baselines`; `docs/method/baselines.md` defines every key.
     """
-    pairs = neighbouring_pairs(measured_by, surface.adjacent)
-    return [
-        _row(
-            cameras,
-            check_seam(cameras, surface, seam, camera_max_incidence),
-            camera_max_incidence,
-        )
-        for seam in find_seams(both_orders(pairs), surface, measured_by)
-    ]
+    rows: list[BaselineRow] = []
+    pairs = neighbouring_pairs(measured_by, surface)
+    for seam in find_seams(both_orders(pairs), surface, measured_by):
+        pair = [cameras[index] for index in seam.cameras]
+        test = check_seam(pair, surface, seam, camera_max_incidence)
+        rows.append(_row(pair, test, camera_max_incidence))
+    return rows
 
 
 def check_seam(
-    cameras: Sequence[PlannedCamera],
+    pair: Sequence[PlannedCamera],
     surface: SampledSurface,
     seam: Seam,
     camera_max_incidence: float,
 ) -> SeamTest:
-    """Return eqs. (9)-(10) at every sample of a seam."""
-    one, two = (cameras[index] for index in seam.cameras)
+    """Return eqs. (9)-(10) at every sample of the seam of a pair of cameras."""
+    one, two = pair
     points = surface.points[seam.points]
     here, beyond = surface.normals[seam.points], surface.normals[seam.beyond]
     smooth = np.einsum("ij,ij->i", here, beyond) > _CREASE_COSINE
@@ -165,10 +162,10 @@ def half_field(
 
 def _undistorted_edge(device: PinholeModel, along: _Array, towards: _Array) -> _Array:
     """Where a ray leaves the four planes of the image's frustum."""
-    low = (np.array([-0.5, -0.5]) - device.camera_matrix[:2, 2]) / _focal(device)
-    high = (np.array(device.resolution) - 0.5 - device.camera_matrix[:2, 2]) / _focal(
-        device
-    )
+    matrix = device.camera_matrix
+    focal = np.array([matrix[0, 0], matrix[1, 1]])
+    low = (np.array([-0.5, -0.5]) - matrix[:2, 2]) / focal
+    high = (np.array(device.resolution) - 0.5 - matrix[:2, 2]) / focal
     inward = np.array(
         [[1, 0, -low[0]], [-1, 0, high[0]], [0, 1, -low[1]], [0, -1, high[1]]]
     )
@@ -187,23 +184,16 @@ def _distorted_edge(
 
     start = inside(at)
     end = np.where(start, 0.5 * np.pi, -0.5 * np.pi)
-    last, found = at.copy(), np.zeros(len(at), dtype=bool)
-    other = at.copy()
-    for k in range(1, _SCAN + 1):
-        beta = at + (end - at) * k / _SCAN
-        changed = ~found & (inside(beta) != start)
-        other = np.where(changed, beta, other)
-        found |= changed
-        last = np.where(found, last, beta)
+    scan = at + (end - at) * np.arange(_SCAN + 1)[:, None] / _SCAN
+    changed = np.stack([inside(beta) != start for beta in scan])
+    first = np.maximum(changed.argmax(axis=0), 1)
+    each = np.arange(len(at))
+    last, other = scan[first - 1, each], scan[first, each]
     for _ in range(_BISECTIONS):
         middle = 0.5 * (last + other)
         same = inside(middle) == start
         last, other = np.where(same, middle, last), np.where(same, other, middle)
-    return np.where(found, 0.5 * (last + other), spare)
-
-
-def _focal(device: PinholeModel) -> _Array:
-    return np.array([device.camera_matrix[0, 0], device.camera_matrix[1, 1]])
+    return np.where(changed.any(axis=0), 0.5 * (last + other), spare)
 
 
 def _field_beyond(
@@ -222,9 +212,9 @@ def _field_beyond(
 
 
 def _row(
-    cameras: Sequence[PlannedCamera], test: SeamTest, max_incidence: float
-) -> dict[str, Any]:
-    one, two = (cameras[index] for index in test.seam.cameras)
+    pair: Sequence[PlannedCamera], test: SeamTest, max_incidence: float
+) -> BaselineRow:
+    one, two = pair
     i = int(np.argmin(test.slack))
     point = test.points[i]
     angles = test.angles
@@ -238,32 +228,32 @@ def _row(
     phi, phi_max = float(angles.phi[i]), float(test.phi_max[i])
     d_max = float(largest_baseline(d1, d2, phi_max))
     by_field = half2 - angles.beta2[i] < max_incidence - angles.iota2[i]
-    return {
-        "cameras": [one.id, two.id],
-        "E": point.tolist(),
-        "standoff1": float(standoff1),
-        "standoff2": float(standoff2),
-        "C1": float(standoff1 * np.tan(half1)),
-        "C2": float(standoff2 * np.tan(half2)),
-        "D1": d1,
-        "D2": d2,
-        "phi": phi,
-        "phi_max": phi_max,
-        "d": float(np.linalg.norm(centre2 - centre1)),
-        "d_lateral": float(lateral),
-        "d_axial": float(axial),
-        "d_max": d_max if np.isfinite(d_max) else None,
-        "slack": phi_max - phi,
-        "covered": phi < phi_max,
-        "limit": "camera_field" if by_field else "camera_incidence",
-        "beta": [float(angles.beta1[i]), float(angles.beta2[i])],
-        "iota": [float(angles.iota1[i]), float(angles.iota2[i])],
-        "half_field": [float(half1), float(half2)],
-        "max_incidence": max_incidence,
-        "delta_axes": float(angles.delta_axes[i]),
-        "delta_surface": float(angles.delta_surface[i]),
-        "normals": [side[i].tolist() for side in test.normals],
-        "onward": angles.onward[i].tolist(),
-        "shares_border": test.seam.shares_border,
-        "n_seam": len(test.points),
-    }
+    return BaselineRow(
+        cameras=(one.id, two.id),
+        E=point.tolist(),
+        standoff1=float(standoff1),
+        standoff2=float(standoff2),
+        C1=float(standoff1 * np.tan(half1)),
+        C2=float(standoff2 * np.tan(half2)),
+        D1=d1,
+        D2=d2,
+        phi=phi,
+        phi_max=phi_max,
+        d=float(np.linalg.norm(centre2 - centre1)),
+        d_lateral=float(lateral),
+        d_axial=float(axial),
+        d_max=d_max if np.isfinite(d_max) else None,
+        slack=phi_max - phi,
+        covered=phi < phi_max,
+        limit="camera_field" if by_field else "camera_incidence",
+        beta=(float(angles.beta1[i]), float(angles.beta2[i])),
+        iota=(float(angles.iota1[i]), float(angles.iota2[i])),
+        half_field=(float(half1), float(half2)),
+        max_incidence=max_incidence,
+        delta_axes=float(angles.delta_axes[i]),
+        delta_surface=float(angles.delta_surface[i]),
+        normals=[side[i].tolist() for side in test.normals],
+        onward=angles.onward[i].tolist(),
+        shares_border=test.seam.shares_border,
+        n_seam=len(test.points),
+    )

@@ -156,12 +156,13 @@ def _seam_points(
     limits: BaselineLimits,
 ) -> SeamPoints:
     spare, none = max(_SPARE_FIELD, limits.spare_field), np.zeros((0, 3))
-    pair = np.zeros((0, 2))
-    seams = [(pair.astype(np.int64), none, none, none, np.zeros(0), pair)]
+    fields = np.zeros((0, 2))
+    seams = [(fields.astype(np.int64), none, none, none, np.zeros(0), fields)]
     for seam in find_seams(both_orders(pairs), surface, measured_by):
         if not seam.shares_border:
             continue
-        test = check_seam(cameras, surface, seam, limits.max_incidence)
+        pair = [cameras[index] for index in seam.cameras]
+        test = check_seam(pair, surface, seam, limits.max_incidence)
         some = _tight_and_apart(test.slack, test.points, _SEAM_POINTS)
         fields = np.column_stack([test.half_field1, test.half_field2])
         seams.append(

@@ -18,7 +18,7 @@ from planning.scene.workspace.admissible import admissible
 
 from .baseline_rows import check_seam
 from .baseline_terms import BaselineLimits
-from .camera_aims import aims_of, rolls_of
+from .camera_moves import aims_and_rolls
 from .seams import SampledSurface, Seam, both_orders, find_seams, neighbouring_pairs
 
 _Array = NDArray[np.float64]
@@ -58,14 +58,10 @@ def limit_poses(
         bisections: Halvings of the angle between the cameras.
     """
     space = limits.workspace
-    poses = np.stack([camera.world_from_device for camera in cameras])
-    aims = aims_of(poses, measured_by, surface.points, space)
-    rolls = rolls_of(poses, aims, np.array(space.up))
+    aims, rolls = aims_and_rolls(cameras, measured_by, surface.points, space)
     orders = [
         (first, second)
-        for first, second in both_orders(
-            neighbouring_pairs(measured_by, surface.adjacent)
-        )
+        for first, second in both_orders(neighbouring_pairs(measured_by, surface))
         if not cameras[second].existing and only in (None, second)
     ]
     limit: list[PlannedCamera] = []
@@ -75,9 +71,9 @@ def limit_poses(
         one, two = (cameras[i] for i in seam.cameras)
         aim, roll = aims[seam.cameras[1]], float(rolls[seam.cameras[1]])
         moved, now = _along_arc(one, two, aim, roll, space)
-        slack = _slack_along(cameras, surface, _thinned(seam), moved, limits)
+        slack = _slack_along(one, moved, surface, _thinned(seam), limits)
         for share in shares_past:
-            turn = _last_turn(lambda at, s=share, f=slack: f(at, s), now, bisections)
+            turn = _last_turn(slack, share, now, bisections)
             if turn is not None and _may_stand(moved(turn), space):
                 limit.append(moved(turn))
     return limit
@@ -118,33 +114,32 @@ def _along_arc(
 
 
 def _slack_along(
-    cameras: Sequence[PlannedCamera],
+    one: PlannedCamera,
+    moved: Callable[[float], PlannedCamera],
     surface: SampledSurface,
     seam: Seam,
-    moved: Callable[[float], PlannedCamera],
     limits: BaselineLimits,
 ) -> Callable[[float, float], float]:
     """Slack of (10) by camera 2's angle, with a share of the seam past the limit."""
-    pair = list(cameras)
 
     def slack(turn: float, share: float) -> float:
-        pair[seam.cameras[1]] = moved(turn)
-        test = check_seam(pair, surface, seam, limits.max_incidence)
+        test = check_seam((one, moved(turn)), surface, seam, limits.max_incidence)
         return float(np.sort(test.slack)[int(share * (len(seam.points) - 1))])
 
     return slack
 
 
 def _last_turn(
-    slack: Callable[[float], float], now: float, bisections: int
+    slack: Callable[[float, float], float], share: float, now: float, bisections: int
 ) -> float | None:
     """Return the turn next to the present one at which the slack is used up."""
-    if not _LEAST_TURN < now < np.pi - _LEAST_TURN:
+    least, most = _LEAST_TURN, np.pi - _LEAST_TURN
+    if not least < now < most:
         return None
-    low, high = (now, np.pi - _LEAST_TURN) if slack(now) >= 0.0 else (_LEAST_TURN, now)
-    if not (slack(low) >= 0.0 > slack(high)):
+    low, high = (now, most) if slack(now, share) >= 0.0 else (least, now)
+    if not (slack(low, share) >= 0.0 > slack(high, share)):
         return None
     for _ in range(bisections):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if slack(middle) >= 0.0 else (low, middle)
+        low, high = (middle, high) if slack(middle, share) >= 0.0 else (low, middle)
     return low

@@ -30,48 +30,6 @@ _FIRM = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Adjacency:
-    """Which samples lie near each other on the same sheet of the surface.
-
-    Each pair stands in both orders, sorted by the first and then by distance.
-
-    Attributes:
-        first: Sample, shape (e,).
-        second: A near one, shape (e,).
-    """
-
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
-
-
-def adjacency(points: _Array, normals: _Array) -> Adjacency:
-    """Return the near samples of each sample.
-
-    Args:
-        points: Area-true samples in [m], shape (n, 3).
-        normals: Unit normals, shape (n, 3).
-    """
-    n = len(points)
-    k = min(_NEAREST, n - 1)
-    if k < 1:
-        return Adjacency(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
-    found = KDTree(points).query(points, k=k + 1)
-    distance = np.asarray(found[0], dtype=np.float64)
-    near = np.asarray(found[1], dtype=np.int64)
-    first, second = np.repeat(np.arange(n), k + 1), near.ravel()
-    valid = distance.ravel() <= _REACH * np.median(distance[:, -1])
-    valid &= first != second
-    valid &= np.einsum("ij,ij->i", normals[first], normals[second]) > _SAME_SHEET
-    first, second = first[valid], second[valid]
-    # The nearest of one needn't have it among its own nearest.
-    both = np.concatenate([n * first + second, n * second + first])
-    first, second = np.divmod(np.unique(both), n)
-    apart = np.linalg.norm(points[first] - points[second], axis=1)
-    order = np.lexsort((second, apart, first))
-    return Adjacency(first[order], second[order])
-
-
-@dataclass(frozen=True, eq=False)
 class SampledSurface:
     """Area-true samples of the target.
 
@@ -84,9 +42,29 @@ class SampledSurface:
     normals: _Array
 
     @cached_property
-    def adjacent(self) -> Adjacency:
-        """Near samples of each."""
-        return adjacency(self.points, self.normals)
+    def adjacent(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Samples, and for each a near one on the same sheet of the surface, (e,) each.
+
+        A pair stands in both orders, sorted by the first and then by distance.
+        """
+        points, normals, n = self.points, self.normals, len(self.points)
+        k = min(_NEAREST, n - 1)
+        if k < 1:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        nearest = KDTree(points).query(points, k=k + 1)
+        distance = np.asarray(nearest[0], dtype=np.float64)
+        near = np.asarray(nearest[1], dtype=np.int64)
+        first, second = np.repeat(np.arange(n), k + 1), near.ravel()
+        valid = distance.ravel() <= _REACH * np.median(distance[:, -1])
+        valid &= first != second
+        valid &= np.einsum("ij,ij->i", normals[first], normals[second]) > _SAME_SHEET
+        first, second = first[valid], second[valid]
+        # The nearest of one needn't have it among its own nearest.
+        both = np.concatenate([n * first + second, n * second + first])
+        first, second = np.divmod(np.unique(both), n)
+        apart = np.linalg.norm(points[first] - points[second], axis=1)
+        order = np.lexsort((second, apart, first))
+        return first[order], second[order]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +101,8 @@ def find_seam(
         surface: The samples.
         measured_by: Which camera measures which sample, shape (n, n_cameras).
     """
-    points, adjacent = surface.points, surface.adjacent
+    points, (here, there) = surface.points, surface.adjacent
     part1, part2 = measured_by[:, pair[0]], measured_by[:, pair[1]]
-    here, there = adjacent.first, adjacent.second
     out = part1[here] & (part2 & ~part1)[there]
     count = np.bincount(here[out], minlength=len(points))
     onward = _mean(points, part2 & ~part1) - _mean(points, part1 & ~part2)
@@ -166,7 +143,7 @@ def _border(count: NDArray[np.int64], reach: NDArray[np.bool_]) -> NDArray[np.in
 
 
 def neighbouring_pairs(
-    measured_by: NDArray[np.bool_], adjacent: Adjacency
+    measured_by: NDArray[np.bool_], surface: SampledSurface
 ) -> list[tuple[int, int]]:
     """Return the pairs of cameras whose parts overlap or touch by enough of the target.
 
@@ -177,7 +154,7 @@ def neighbouring_pairs(
 
     Args:
         measured_by: Which camera measures which sample, shape (n, n_cameras).
-        adjacent: Of the same samples.
+        surface: The samples.
 
     Returns:
         Pairs (a, b) with a < b, in increasing order.
@@ -187,16 +164,16 @@ def neighbouring_pairs(
     for a, b in combinations(range(measured_by.shape[1]), 2):
         part1, part2 = measured_by[:, a], measured_by[:, b]
         overlaps = np.count_nonzero(part1 & part2) >= least > 0.0
-        if overlaps or _contact(part1, part2, adjacent) >= max(1.0, np.sqrt(least)):
+        if overlaps or _contact(part1, part2, surface) >= max(1.0, np.sqrt(least)):
             pairs.append((a, b))
     return pairs
 
 
 def _contact(
-    part1: NDArray[np.bool_], part2: NDArray[np.bool_], adjacent: Adjacency
+    part1: NDArray[np.bool_], part2: NDArray[np.bool_], surface: SampledSurface
 ) -> int:
     """How many samples lie along the line where two parts meet."""
-    here, there = adjacent.first, adjacent.second
+    here, there = surface.adjacent
     into2 = part1[here] & (part2 & ~part1)[there]
     into1 = part2[here] & (part1 & ~part2)[there]
     return min(len(np.unique(here[into2])), len(np.unique(here[into1])))

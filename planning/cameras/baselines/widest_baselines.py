@@ -17,7 +17,7 @@ from planning.scene.workspace.admissible import admissible
 from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
 
 from .baseline_terms import BaselineLimits, RingsOnSurface, state_baselines
-from .camera_aims import aims_of, at_poses, rolls_of
+from .camera_moves import aims_and_rolls, at_poses, centres_between, poses_of
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]
@@ -110,12 +110,13 @@ class _Search:
         self._measure, self._rings, self._confirm = measure, rings, confirm
         self._confirmed: int | None = None
         self.spent = self.accepted = self.solved = 0
-        self.poses = np.stack([camera.world_from_device for camera in cameras])
+        self.poses = poses_of(cameras)
         self.measured = self._evaluate(self.poses)
         self._floor = _count(self.measured)
-        self.aims = aims_of(self.poses, self.measured, surface.points, limits.workspace)
-        self.rolls = rolls_of(self.poses, self.aims, np.array(limits.workspace.up))
-        self.pairs = neighbouring_pairs(self.measured, surface.adjacent)
+        self.aims, self.rolls = aims_and_rolls(
+            cameras, self.measured, surface.points, limits.workspace
+        )
+        self.pairs = neighbouring_pairs(self.measured, surface)
         self._groups = len(overlap_components(self.measured))
         self._free = np.array([not camera.existing for camera in cameras])
 
@@ -201,9 +202,7 @@ class _Search:
         lost = np.flatnonzero(self.measured.any(axis=1) & ~measured.any(axis=1))
         if _count(measured) < self._floor:
             return False, lost
-        pairs = sorted(
-            {*self.pairs, *neighbouring_pairs(measured, self.surface.adjacent)}
-        )
+        pairs = sorted({*self.pairs, *neighbouring_pairs(measured, self.surface)})
         index = np.array(pairs, dtype=np.int64)
         held = smallest_baseline(centres, index) >= smallest_baseline(
             self.poses[:, :3, 3], index
@@ -254,23 +253,16 @@ class _Search:
         )
 
     def _between(self, centres: _Array, share: _Array) -> _Array:
-        """Centres part of the way, on arcs about the centre or straight on a plane."""
-        if self.limits.workspace.mounting:
-            # An arc would leave the plane.
-            now = self.poses[:, :3, 3]
-            return now + share[:, None] * (centres - now)
-        middle = np.array(self.limits.workspace.centre)
-        start, end = self.poses[:, :3, 3] - middle, centres - middle
-        r0, r1 = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
-        mixed = _arc(start / r0[:, None], end / r1[:, None], share)
-        return middle + (r0 + share * (r1 - r0))[:, None] * mixed
+        start = self.poses[:, :3, 3]
+        return centres_between(start, centres, share, self.limits.workspace)
+
+    def _lengths(self, centres: _Array) -> _Array:
+        """Baselines of neighbours at other centres in [m], one for each pair."""
+        index = np.array(self.pairs, dtype=np.int64)
+        return np.linalg.norm(centres[index[:, 0]] - centres[index[:, 1]], axis=1)
 
     def _gains(self, centres: _Array) -> bool:
-        index = np.array(self.pairs, dtype=np.int64)
-        old, new = (
-            np.linalg.norm(c[index[:, 0]] - c[index[:, 1]], axis=1)
-            for c in (self.poses[:, :3, 3], centres)
-        )
+        old, new = (self._lengths(c) for c in (self.poses[:, :3, 3], centres))
         if new.min() >= old.min() * (1.0 + _GAIN):
             return True
         return bool(new.min() >= old.min() and new.mean() >= old.mean() * (1.0 + _GAIN))
@@ -283,11 +275,8 @@ class _Search:
 
     def _by_baseline(self) -> list[int]:
         """Cameras, those of the shortest baselines first."""
-        index = np.array(self.pairs, dtype=np.int64)
-        centres = self.poses[:, :3, 3]
-        apart = np.linalg.norm(centres[index[:, 0]] - centres[index[:, 1]], axis=1)
-        order = index[np.argsort(apart, kind="stable")].ravel()
-        return [int(c) for c in dict.fromkeys(order.tolist())]
+        order = np.argsort(self._lengths(self.poses[:, :3, 3]), kind="stable")
+        return list(dict.fromkeys(c for i in order for c in self.pairs[i]))
 
     def _evaluate(self, poses: _Array) -> NDArray[np.bool_]:
         self.spent += 1
@@ -296,20 +285,8 @@ class _Search:
     def _smallest(self) -> float | None:
         if not self.pairs:
             return None
-        index = np.array(self.pairs, dtype=np.int64)
-        return smallest_baseline(self.poses[:, :3, 3], index)
+        return float(self._lengths(self.poses[:, :3, 3]).min())
 
 
 def _count(measured: NDArray[np.bool_]) -> int:
     return int(measured.any(axis=1).sum())
-
-
-def _arc(start: _Array, end: _Array, share: _Array) -> _Array:
-    """Unit vectors part of the way from start to end on great circles."""
-    angle = np.arccos(np.clip(np.einsum("ij,ij->i", start, end), -1.0, 1.0))
-    sine = np.maximum(np.sin(angle), 1e-12)
-    near = angle < 1e-9
-    a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
-    b = np.where(near, share, np.sin(share * angle) / sine)
-    mixed = a[:, None] * start + b[:, None] * end
-    return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)

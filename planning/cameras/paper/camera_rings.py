@@ -8,14 +8,13 @@ them stand at a spacing of at most 2 eta, neighbours d_max = 2 S sin(eta) apart 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap
-from planning.cameras.baselines.coverage_triangle import RingLimit, round_body_limit
+from planning.cameras.baselines.coverage_triangle import round_body_limit
 from planning.model.requirements import Workspace
 
 _Array = NDArray[np.float64]
@@ -29,29 +28,16 @@ _PHASES = 2
 _MOST = 36
 
 
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """Directions of cameras on one ring.
-
-    Attributes:
-        axis: Unit vector.
-        limit: From the section across the axis.
-        directions: From the centre of the workspace, shape (n, 3).
-    """
-
-    axis: _Array
-    limit: RingLimit
-    directions: _Array
-
-
 def camera_rings(
     points: _Array,
     workspace: Workspace,
     device: PinholeModel,
     ring_radius: float,
     max_incidence: float,
-) -> Iterator[Ring]:
-    """Yield rings about several axes: of n_min cameras and of some more, turned.
+) -> Iterator[_Array]:
+    """Yield directions from the centre to cameras on rings about several axes, (n, 3).
+
+    Each axis has rings of n_min cameras and of some more, turned.
 
     Args:
         points: Samples of the target in [m], shape (n, 3).
@@ -68,16 +54,13 @@ def camera_rings(
         rho = float(np.sqrt(np.max((offsets**2).sum(axis=1) - along**2)))
         if not 0.0 < rho < ring_radius:
             continue
-        limit = round_body_limit(rho, ring_radius, max_incidence, alpha)
+        fewest = round_body_limit(rho, ring_radius, max_incidence, alpha).n_min
         e2 = np.cross(axis, e1)
-        for n in range(limit.n_min, min(limit.n_min + _MORE, _MOST) + 1):
+        for n in range(fewest, min(fewest + _MORE, _MOST) + 1):
             spacing = 2.0 * np.pi / n
             for phase in range(_PHASES):
                 azimuth = spacing * (np.arange(n) + phase / _PHASES)
-                directions = (
-                    np.cos(azimuth)[:, None] * e1 + np.sin(azimuth)[:, None] * e2
-                )
-                yield Ring(axis, limit, directions)
+                yield np.cos(azimuth)[:, None] * e1 + np.sin(azimuth)[:, None] * e2
 
 
 def _axes(workspace: Workspace) -> Iterator[tuple[_Array, _Array]]:

@@ -37,8 +37,8 @@ def _promising(problem: RouteProblem) -> list[CameraSet]:
 def _measured_rings(problem: RouteProblem) -> list[CameraSet]:
     """The existing cameras, alone and with each ring; all are measured in one go."""
     rings = [
-        problem.stand(ring.directions)
-        for ring in camera_rings(
+        problem.stand(directions)
+        for directions in camera_rings(
             problem.surface.points,
             problem.limits.workspace,
             problem.device,

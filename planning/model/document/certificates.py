@@ -75,10 +75,13 @@ class OneFewer(Part):
     scope: str = "candidates"
 
 
+CamerasBy = Literal["cover", "paper", "both"]
+
+
 class RouteCounts(Part):
     """Cameras by either route, and which was taken; None: it has no answer."""
 
-    asked: Literal["cover", "paper", "both"]
+    asked: CamerasBy
     cover: int | None
     paper: int | None
     taken: Literal["cover", "paper"]

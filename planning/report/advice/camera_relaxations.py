@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.camera_cover import CameraStage, NothingMeasuredError, n_fixed
+from planning.cameras.camera_cover import NothingMeasuredError, n_fixed
+from planning.cameras.proved_cameras import CameraStage
 from planning.model.planned import PlannedCamera
 from planning.proofs.selection import required_samples
 from planning.report.advice.least_changes import relaxations_of_cameras

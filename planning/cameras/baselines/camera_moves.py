@@ -1,0 +1,85 @@
+"""How cameras move: the points that they look at stay, and their rolls."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.poses import look_at
+from planning.model.planned import PlannedCamera
+from planning.model.requirements import Workspace
+
+_Array = NDArray[np.float64]
+
+
+def poses_of(cameras: Sequence[PlannedCamera]) -> _Array:
+    """Return the poses of cameras, shape (k, 4, 4)."""
+    return np.stack([camera.world_from_device for camera in cameras])
+
+
+def at_poses(cameras: Sequence[PlannedCamera], poses: _Array) -> list[PlannedCamera]:
+    """Return the cameras at other poses, shape (k, 4, 4)."""
+    return [
+        replace(camera, world_from_device=pose)
+        for camera, pose in zip(cameras, poses, strict=True)
+    ]
+
+
+def aims_and_rolls(
+    cameras: Sequence[PlannedCamera],
+    measured: NDArray[np.bool_],
+    points: _Array,
+    workspace: Workspace,
+) -> tuple[_Array, _Array]:
+    """Return where cameras look, and their turns about it against `look_at`.
+
+    Args:
+        cameras: As they stand.
+        measured: Which measures which sample, shape (n, k).
+        points: The samples in [m], shape (n, 3).
+        workspace: Its centre stands in where a camera measures nothing.
+
+    Returns:
+        Points on the axes at the mean depth of what each camera measures in [m],
+        (k, 3); rolls in [rad], (k,).
+    """
+    poses = poses_of(cameras)
+    aims = np.empty((len(poses), 3))
+    for c, pose in enumerate(poses):
+        mine = measured[:, c]
+        looked = points[mine].mean(axis=0) if mine.any() else np.array(workspace.centre)
+        depth = (looked - pose[:3, 3]) @ pose[:3, 2]
+        aims[c] = pose[:3, 3] + depth * pose[:3, 2]
+    level = look_at(poses[:, :3, 3], aims, np.array(workspace.up))
+    x = poses[:, :3, 0]
+    along, aside = (np.einsum("ij,ij->i", x, level[:, :3, k]) for k in (0, 1))
+    return aims, np.arctan2(aside, along)
+
+
+def centres_between(
+    start: _Array, end: _Array, share: _Array, workspace: Workspace
+) -> _Array:
+    """Return centres part of the way, on arcs about the centre or straight on a plane.
+
+    Args:
+        start: Centres in [m], shape (k, 3).
+        end: Likewise.
+        share: Of the way, each in [0, 1], shape (k,).
+        workspace: Its centre, and whether cameras are mounted on planes.
+    """
+    if workspace.mounting:
+        # An arc would leave the plane.
+        return start + share[:, None] * (end - start)
+    middle = np.array(workspace.centre)
+    start, end = start - middle, end - middle
+    r0, r1 = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
+    start, end = start / r0[:, None], end / r1[:, None]
+    angle = np.arccos(np.clip(np.einsum("ij,ij->i", start, end), -1.0, 1.0))
+    sine = np.maximum(np.sin(angle), 1e-12)
+    near = angle < 1e-9
+    a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
+    b = np.where(near, share, np.sin(share * angle) / sine)
+    mixed = a[:, None] * start + b[:, None] * end
+    mixed = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+    return middle + (r0 + share * (r1 - r0))[:, None] * mixed
