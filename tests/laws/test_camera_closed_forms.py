@@ -215,7 +215,7 @@ def test_a_wall_parts_at_the_sum_of_half_extents(step):
             assert row.d_axial == pytest.approx(s1 - s2)
             assert row.d_lateral == pytest.approx(limit + step)
             assert row.covered is True
-            d_lateral_max = np.sqrt(row.d_max ** 2 - row.d_axial ** 2)
+            d_lateral_max = np.sqrt(row.d_max**2 - row.d_axial**2)
             assert d_lateral_max == pytest.approx(limit, abs=2e-3)
 
 
