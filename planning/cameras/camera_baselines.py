@@ -7,7 +7,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.baselines.baseline_terms import BaselineLimits, RingsOnSurface
+from planning.cameras.baselines.baseline_limits import BaselineLimits, RingsOnSurface
 from planning.cameras.baselines.camera_moves import at_poses
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import (
@@ -166,24 +166,28 @@ def widen_baselines(
 
 def _confirming(
     samples: BaselineSamples, cameras: Sequence[PlannedCamera]
-) -> Callable[[NDArray[np.float64]], int]:
-    """Count what is measured of further samples, drawn when they are first needed."""
+) -> Callable[[NDArray[np.float64]], bool]:
+    """Whether further samples, drawn when first needed, lose nothing by a move."""
+    scene, projectors = samples.scene, samples.projectors
 
     @cache
-    def drawn() -> tuple[BaselineSamples, int]:
-        scene, projectors = samples.scene, samples.projectors
+    def drawn() -> tuple[BaselineSamples, int, int]:
         target = scene.target_samples(DRAWS.confirming_baselines)
         more = BaselineSamples(
             scene, projectors, lit_samples(scene, projectors, target)
         )
-        return more, more.count_lit(cameras)
+        least_lit = more.count_lit(cameras)
+        return more, least_lit, _count(more.measured(cameras, least_lit))
 
-    def count(poses: NDArray[np.float64]) -> int:
-        more, least_lit = drawn()
-        measured = more.measured(at_poses(cameras, poses), least_lit)
-        return int(measured.any(axis=1).sum())
+    def confirm(poses: NDArray[np.float64]) -> bool:
+        more, least_lit, before = drawn()
+        return _count(more.measured(at_poses(cameras, poses), least_lit)) >= before
 
-    return count
+    return confirm
+
+
+def _count(measured: NDArray[np.bool_]) -> int:
+    return int(measured.any(axis=1).sum())
 
 
 def baseline_limits(scene: Scene, spare_field: float = 0.0) -> BaselineLimits:

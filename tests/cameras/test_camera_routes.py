@@ -219,7 +219,10 @@ def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
     _, slid = widest_route(scene, projectors, stage)
     beyond = slid.measured_by.any(axis=1) & ~covered
     assert beyond.sum() <= 0.002 * covered.sum()
-    assert slid.n_evaluations > 1
+    assert any(
+        not np.array_equal(a.world_from_device, b.world_from_device)
+        for a, b in zip(slid.cameras, stage.cameras, strict=True)
+    )
 
 
 def _beside(cameras):
@@ -235,7 +238,7 @@ def _slid(apart_m, parts):
     measured = np.zeros((10, 2), dtype=bool)
     for column, part in enumerate(parts):
         measured[list(part), column] = True
-    return WidestBaselines((), measured, apart_m, apart_m, 0, 1)
+    return WidestBaselines((), measured, apart_m, apart_m)
 
 
 @pytest.mark.parametrize(

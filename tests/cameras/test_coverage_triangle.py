@@ -11,13 +11,13 @@ from support.closed_forms import (
     bent_limit,
     cylinder_limit,
     flat_limit,
+    round_body_limit,
     sphere_band_limit,
 )
 
 from planning.cameras.baselines.coverage_triangle import (
     baseline_parts,
     largest_baseline,
-    round_body_limit,
     seam_angles,
 )
 

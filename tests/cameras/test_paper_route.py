@@ -4,14 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.closed_forms import cylinder_limit, sphere_band_limit
+from support.closed_forms import cylinder_limit, round_body_limit, sphere_band_limit
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
-from planning.cameras.baselines.baseline_terms import BaselineLimits
-from planning.cameras.baselines.coverage_triangle import (
-    round_body_limit,
-)
+from planning.cameras.baselines.baseline_limits import BaselineLimits
 from planning.cameras.baselines.limit_poses import limit_poses
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import maximise_baselines

@@ -5,16 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.closed_forms import round_body_limit
 
 from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap, look_at
-from planning.cameras.baselines.baseline_terms import (
+from planning.cameras.baselines.baseline_limits import (
     BaselineLimits,
     RingsOnSurface,
     best_rings,
-    state_baselines,
 )
-from planning.cameras.baselines.coverage_triangle import round_body_limit
+from planning.cameras.baselines.baseline_terms import state_baselines
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import maximise_baselines
 from planning.model.bodies import Box
@@ -118,7 +118,7 @@ def test_a_pair_slides_apart_and_loses_nothing(pair):
     assert spread.smallest_after_m == pytest.approx(apart)
     assert spread.smallest_after_m > 1.15 * spread.smallest_before_m
     assert spread.smallest_after_m < round_body_limit(RADIUS, RING, THETA).d_max
-    assert spread.n_accepted > 0
+    assert spread.smallest_after_m > spread.smallest_before_m
     assert _weight(ball, spread.cameras) >= _weight(ball, cameras)
     poses = np.stack([camera.world_from_device for camera in spread.cameras])
     np.testing.assert_array_equal(spread.measured_by, ball.measure(poses))
@@ -131,12 +131,12 @@ def test_a_move_that_more_samples_deny_is_not_taken(pair):
     def apart(poses):
         return float(np.linalg.norm(poses[0, :3, 3] - poses[1, :3, 3]))
 
-    held = ball.spread(cameras, confirm=lambda poses: -apart(poses))
-    assert held.n_accepted == 0
+    held = ball.spread(cameras, confirm=lambda poses: apart(poses) <= apart(start))
+    assert held.smallest_after_m == held.smallest_before_m
     assert held.smallest_after_m == pytest.approx(apart(start))
     limit = 0.5 * (freely.smallest_before_m + freely.smallest_after_m)
-    part = ball.spread(cameras, confirm=lambda poses: float(apart(poses) <= limit))
-    assert part.n_accepted > 0
+    part = ball.spread(cameras, confirm=lambda poses: apart(poses) <= limit)
+    assert part.smallest_after_m > part.smallest_before_m
     assert freely.smallest_before_m < part.smallest_after_m <= limit
 
 
@@ -166,11 +166,11 @@ def test_the_budget_counts_every_call_and_the_answer_repeats(pair):
     _, cameras, first = pair
     ball = _front(np.radians(70.0))
     again = ball.spread(cameras)
-    assert len(ball.calls) == again.n_evaluations == first.n_evaluations <= 16
+    assert 3 < len(ball.calls) <= 16
     for a, b in zip(first.cameras, again.cameras, strict=True):
         np.testing.assert_array_equal(a.world_from_device, b.world_from_device)
     short = _front(np.radians(70.0))
-    assert short.spread(cameras, max_evaluations=3).n_evaluations <= 3
+    short.spread(cameras, max_evaluations=3)
     assert len(short.calls) <= 3
 
 
@@ -189,7 +189,6 @@ def test_no_move_is_taken_that_loses_coverage():
 
     ball.measure = jealous
     spread = ball.spread(cameras)
-    assert spread.n_accepted == 0
     assert spread.smallest_after_m == spread.smallest_before_m
     for before, after in zip(cameras, spread.cameras, strict=True):
         np.testing.assert_array_equal(before.world_from_device, after.world_from_device)
@@ -215,7 +214,7 @@ def test_parts_stay_registered(monkeypatch):
     monkeypatch.setattr("planning.cameras.baselines.seams.MIN_OVERLAP_SHARE", least)
     held = ball.spread(cameras)
     assert np.mean(held.measured_by.all(axis=1)) >= least
-    assert held.n_accepted > 0
+    assert held.smallest_after_m > held.smallest_before_m
 
 
 def test_cone_and_floor_hold():
@@ -228,7 +227,7 @@ def test_cone_and_floor_hold():
     )
     cameras = _cameras(_at(-0.35), _at(0.3))
     spread = ball.spread(cameras, limits=BaselineLimits(THETA, 0.1, space))
-    assert spread.n_accepted > 0
+    assert spread.smallest_after_m > spread.smallest_before_m
     for camera in spread.cameras:
         position = camera.world_from_device[:3, 3]
         distance = np.linalg.norm(position)
@@ -260,7 +259,7 @@ def test_rings_hold_the_conditioning_that_the_caller_demands():
         m[None], np.full((1, n), 4e-3), np.full((1, n), 0.1), np.ones((n, 1), bool)
     )
     spread = ball.spread(cameras, rings=rings)
-    assert spread.n_accepted > 0
+    assert spread.smallest_after_m > spread.smallest_before_m
     assert _weight(ball, spread.cameras) >= before
 
 
@@ -334,7 +333,7 @@ def test_one_camera_or_strangers_have_no_baseline():
     alone = ball.spread(_cameras(_at(0.0)))
     assert alone.smallest_before_m is None
     assert alone.smallest_after_m is None
-    assert alone.n_evaluations == 1
+    assert len(ball.calls) == 1
     sides = _Ball(
         np.concatenate(
             [
@@ -345,7 +344,7 @@ def test_one_camera_or_strangers_have_no_baseline():
     )
     apart = sides.spread(_cameras(_at(0.0), _at(np.pi)))
     assert apart.smallest_before_m is None
-    assert apart.n_accepted == 0
+    assert len(sides.calls) == 1
 
 
 def test_what_stands_already_stays_and_zones_hold_the_others():
@@ -359,7 +358,7 @@ def test_what_stands_already_stays_and_zones_hold_the_others():
     free = ball.spread(cameras, limits=BaselineLimits(THETA, 0.1, _workspace()))
     assert free.cameras[1].world_from_device[1, 3] > 0.39
     spread = ball.spread(cameras, limits=BaselineLimits(THETA, 0.1, space))
-    assert spread.n_accepted > 0
+    assert spread.smallest_after_m > spread.smallest_before_m
     for found in (free, spread):
         moved, old = (s[0].world_from_device for s in (found.cameras, cameras))
         assert np.array_equal(moved, old)

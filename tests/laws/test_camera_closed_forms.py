@@ -13,6 +13,7 @@ from support.closed_forms import (
     bent_limit,
     cylinder_limit,
     flat_limit,
+    round_body_limit,
     sphere_band_limit,
 )
 
@@ -20,9 +21,6 @@ from geometry.devices import PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from planning.cameras.baselines.baseline_rows import baseline_rows
-from planning.cameras.baselines.coverage_triangle import (
-    round_body_limit,
-)
 from planning.cameras.baselines.seams import SampledSurface
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits

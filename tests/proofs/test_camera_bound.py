@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.closed_forms import round_body_limit
 from support.factories import make_requirements, make_scene
 from support.plain_shapes import box, cylinder, grid, joined
 
@@ -11,7 +12,6 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning.cameras.baselines.coverage_triangle import round_body_limit
 from planning.cameras.camera_cover import (
     camera_candidate_views,
     plan_cameras,

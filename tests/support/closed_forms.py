@@ -1,12 +1,42 @@
 """Closed forms of eqs. (9)-(10) on walls, edges, spheres and cylinders."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from planning.cameras.baselines.coverage_triangle import (
-    RingLimit,
-    ring_limit,
-    round_body_limit,
-)
+from planning.cameras.baselines.coverage_triangle import covered_azimuth
+
+
+@dataclass(frozen=True)
+class RingLimit:
+    """Cameras on a ring about a round body.
+
+    Attributes:
+        half_angle: eta, azimuth that a camera covers on either side of itself [rad].
+        n_min: Fewest cameras that cover the whole turn, floor(pi / eta) + 1.
+        d_max: Largest baseline of neighbours, 2 S sin(eta) [m].
+    """
+
+    half_angle: float
+    n_min: int
+    d_max: float
+
+
+def ring_limit(half_angle: float, ring_radius: float) -> RingLimit:
+    """Return the limits of cameras that cover eta [rad] to either side."""
+    n_min = int(np.floor(np.pi / half_angle + 1e-9)) + 1
+    return RingLimit(half_angle, n_min, float(2.0 * ring_radius * np.sin(half_angle)))
+
+
+def round_body_limit(
+    radius: float,
+    ring_radius: float,
+    max_incidence: float,
+    half_field: float | None = None,
+) -> RingLimit:
+    """Return the limits for a disc or cylinder section, cameras facing its centre."""
+    eta = covered_azimuth(radius, ring_radius, max_incidence, half_field)
+    return ring_limit(eta, ring_radius)
 
 
 def flat_limit(half_extent1: float, half_extent2: float) -> float:

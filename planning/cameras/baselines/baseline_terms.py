@@ -5,7 +5,6 @@ come back as kept ones, so that the next one knows of them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from solvers.poses.baseline_problem import (
     SeamPoints,
 )
 
+from .baseline_limits import BaselineLimits, RingsOnSurface, best_rings
 from .baseline_rows import check_seam, half_field
 from .seams import SampledSurface, both_orders, find_seams
 
@@ -29,54 +29,15 @@ _Array = NDArray[np.float64]
 # Few, since each costs time in every step of the program, and what they don't hold is
 # demanded when a proposal loses it: 16 and 24 end no higher, in three times the time.
 _SEAM_POINTS = 6
+_LOST = 24
 _KEPT_POINTS = 8
 # Proposals stay this far inside the limits, since the samples between the kept ones
 # are held only by them.
 _SPARE_INCIDENCE = np.radians(0.3)
 _SPARE_FIELD = np.radians(0.1)
 _SPARE_CONDITIONING = 0.002
-_SPARE_RINGS = 0.002
 _COMFORT = np.radians(5.0)
 _EASE = 0.03
-
-
-@dataclass(frozen=True, eq=False)
-class RingsOnSurface:
-    """The rings of every projector on n samples.
-
-    Attributes:
-        normals: Unit normals m of the ring surfaces, shape (n_p, n, 3).
-        spacing: h, ring spacing along m in [m], shape (n_p, n).
-        noise_px: s_px, edge noise in [px], shape (n_p, n).
-        lit: Whether a projector lights a sample, shape (n, n_p).
-    """
-
-    normals: _Array
-    spacing: _Array
-    noise_px: _Array
-    lit: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineLimits:
-    """What binds a camera whose baselines grow.
-
-    Attributes:
-        max_incidence: theta in [rad].
-        min_conditioning: Least |r.m|.
-        workspace: Where cameras may stand.
-        min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
-        max_sigma_m: Largest s_N [m].
-        spare_field: What seams keep free of the half fields [rad], at least that by
-            which proposals stay inside their limits.
-    """
-
-    max_incidence: float
-    min_conditioning: float
-    workspace: Workspace
-    min_ring_pitch_px: float | None = None
-    max_sigma_m: float | None = None
-    spare_field: float = 0.0
 
 
 def state_baselines(
@@ -210,6 +171,32 @@ def _sole_samples(
     return np.concatenate(pairs)
 
 
+def lost_samples(
+    lost: NDArray[np.int64],
+    centres: _Array,
+    measured_by: NDArray[np.bool_],
+    surface: SampledSurface,
+) -> NDArray[np.int64]:
+    """Return (camera, sample) pairs that would hold some of what a proposal lost.
+
+    Args:
+        lost: Samples.
+        centres: Of the proposal in [m], shape (k, 3).
+        measured_by: Which camera measures which sample now, shape (n, k).
+        surface: The samples.
+
+    Returns:
+        Each with the camera that it faces most, shape (q, 2).
+    """
+    if len(lost) > _LOST:
+        lost = lost[np.linspace(0, len(lost) - 1, _LOST).astype(np.int64)]
+    ray = surface.points[lost][:, None] - centres[None]
+    facing = -np.einsum("ikj,ij->ik", ray, surface.normals[lost])
+    facing = facing / np.linalg.norm(ray, axis=2)
+    holder = np.argmax(np.where(measured_by[lost], facing, -2.0), axis=1)
+    return np.column_stack([holder, lost]).astype(np.int64)
+
+
 def _kept_points(
     cameras: Sequence[PlannedCamera],
     kept: NDArray[np.int64],
@@ -244,63 +231,6 @@ def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
     along = np.broadcast_to(axis, towards.shape)
     half = half_field(camera, along, towards, np.arctan2(distance, depth))
     return np.cos(half - _SPARE_FIELD)
-
-
-def best_rings(
-    camera: PlannedCamera,
-    samples: NDArray[np.int64],
-    surface: SampledSurface,
-    rings: RingsOnSurface,
-    limits: BaselineLimits,
-) -> tuple[_Array, _Array, _Array, _Array]:
-    """Return the ring normals that measure samples best, and what s_N and pitch ask.
-
-    With g = J_r^T v, |g| = c |v| / f, where c is 1 on the optical axis and hardly
-    changes as the camera moves; so the limits become m.r >= q t |v| and
-    -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f).
-
-    Args:
-        camera: As it stands.
-        samples: Which of them, shape (q,).
-        surface: All samples.
-        rings: On all samples.
-        limits: What binds.
-
-    Returns:
-        Ring normals with m.r > 0, (q, 3); q and p in [1/m], 0 where the limit doesn't
-        bind; what the tightest of these limits leaves, in units of a cosine; (q,) each.
-    """
-    pose = camera.world_from_device
-    ray = surface.points[samples] - pose[:3, 3]
-    distance = np.linalg.norm(ray, axis=1)
-    r, normal = ray / distance[:, None], surface.normals[samples]
-    m = rings.normals[:, samples]
-    along = np.einsum("ij,pij->pi", r, m)
-    facing = -np.einsum("ij,ij->i", r, normal)
-    v = normal * along[..., None] + m * facing[:, None]
-    jacobian = pose[:3, :3] @ camera.device.ray_jacobian(ray @ pose[:3, :3])
-    g = np.linalg.norm(np.einsum("ijk,pij->pik", jacobian, v), axis=2)
-    per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
-    sigma, pitch = np.zeros(along.shape), np.zeros(along.shape)
-    if limits.max_sigma_m is not None:
-        sigma = rings.noise_px[:, samples] * per_length / limits.max_sigma_m
-    if limits.min_ring_pitch_px is not None:
-        pitch = limits.min_ring_pitch_px * per_length / rings.spacing[:, samples]
-    reach = distance * np.linalg.norm(v, axis=2)
-    spare = np.minimum(
-        np.abs(along) - np.maximum(limits.min_conditioning, sigma * reach),
-        facing - pitch * reach,
-    )
-    best = np.argmax(np.where(rings.lit[samples].T, spare, -np.inf), axis=0)
-    each = np.arange(len(samples))
-    sign = np.where(along[best, each] < 0.0, -1.0, 1.0)
-    spared = 1.0 + _SPARE_RINGS
-    return (
-        sign[:, None] * m[best, each],
-        spared * sigma[best, each],
-        spared * pitch[best, each],
-        spare[best, each],
-    )
 
 
 def _tight_and_apart(tightness: _Array, points: _Array, n: int) -> NDArray[np.int64]:

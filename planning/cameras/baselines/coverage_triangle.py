@@ -193,28 +193,15 @@ def _wrapped(angle: _Array) -> _Array:
     return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
 
 
-@dataclass(frozen=True)
-class RingLimit:
-    """Cameras on a ring about a round body.
-
-    Attributes:
-        half_angle: eta, azimuth that a camera covers on either side of itself [rad].
-        n_min: Fewest cameras that cover the whole turn, floor(pi / eta) + 1.
-        d_max: Largest baseline of neighbours, 2 S sin(eta) [m].
-    """
-
-    half_angle: float
-    n_min: int
-    d_max: float
-
-
-def round_body_limit(
+def covered_azimuth(
     radius: float,
     ring_radius: float,
     max_incidence: float,
     half_field: float | None = None,
-) -> RingLimit:
-    """Return the limits for a disc or cylinder section, cameras facing its centre.
+) -> float:
+    """Return eta, to which a camera that faces the centre of a disc covers it [rad].
+
+    It covers the section of a cylinder likewise, to either side of itself.
 
     ::
 
@@ -232,11 +219,4 @@ def round_body_limit(
     eta = max_incidence - np.arcsin(ratio * np.sin(max_incidence))
     if half_field is not None and np.sin(half_field) < ratio:
         eta = min(eta, np.arcsin(np.sin(half_field) / ratio) - half_field)
-    return ring_limit(float(eta), ring_radius)
-
-
-def ring_limit(half_angle: float, ring_radius: float) -> RingLimit:
-    """Return the limits of cameras that cover eta [rad] to either side."""
-    # Parts that only touch don't cover: pi/eta = 4 takes five cameras, however rounded.
-    n_min = int(np.floor(np.pi / half_angle + 1e-9)) + 1
-    return RingLimit(half_angle, n_min, float(2.0 * ring_radius * np.sin(half_angle)))
+    return float(eta)

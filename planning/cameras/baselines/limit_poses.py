@@ -16,8 +16,8 @@ from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import admissible
 
+from .baseline_limits import BaselineLimits
 from .baseline_rows import check_seam
-from .baseline_terms import BaselineLimits
 from .camera_moves import aims_and_rolls
 from .seams import SampledSurface, Seam, both_orders, find_seams, neighbouring_pairs
 

@@ -16,13 +16,19 @@ from planning.model.planned import PlannedCamera
 from planning.scene.workspace.admissible import admissible
 from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
 
-from .baseline_terms import BaselineLimits, RingsOnSurface, state_baselines
-from .camera_moves import aims_and_rolls, at_poses, centres_between, poses_of
+from .baseline_limits import BaselineLimits, RingsOnSurface
+from .baseline_terms import lost_samples, state_baselines
+from .camera_moves import (
+    aims_and_rolls,
+    at_poses,
+    centres_between,
+    poses_of,
+)
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]
 Measure = Callable[[_Array], NDArray[np.bool_]]
-Confirm = Callable[[_Array], int]
+Confirm = Callable[[_Array], bool]
 
 _STEPS = (1.0, 0.5, 0.25)
 # Reach of the first proposals, as a share of the largest radius of the shell.
@@ -31,7 +37,6 @@ _MIN_REACH = 0.02
 _SHRINK = 0.4
 # Proposals from one state, each knowing what the one before lost.
 _REPEATS = 4
-_DEMANDS = 24
 # Gains below this share of a baseline aren't worth an evaluation.
 _GAIN = 1e-2
 # Programs end on a limit to their own rounding.
@@ -48,16 +53,12 @@ class WidestBaselines:
         smallest_before_m: Smallest baseline of neighbours before; None without any.
         smallest_after_m: The same after, over all pairs that were neighbours before or
             are now.
-        n_accepted: Moves that were taken.
-        n_evaluations: Times that coverage was evaluated.
     """
 
     cameras: tuple[PlannedCamera, ...]
     measured_by: NDArray[np.bool_]
     smallest_before_m: float | None
     smallest_after_m: float | None
-    n_accepted: int
-    n_evaluations: int
 
 
 def maximise_baselines(
@@ -73,10 +74,9 @@ def maximise_baselines(
 ) -> WidestBaselines:
     """Raise the smallest baseline of neighbouring cameras without losing coverage.
 
-    A move is taken iff as many samples are measured as at the start, `confirm` doesn't
-    find less than at the start either, the overlap graph falls into no more groups, and
-    the smallest baseline of neighbours rises, or their mean does while the smallest
-    stays.
+    A move is taken iff as many samples are measured as at the start, `confirm` agrees,
+    the overlap graph falls into no more groups, and the smallest baseline of neighbours
+    rises, or their mean does while the smallest stays.
 
     Args:
         cameras: As chosen; each keeps the point that it looks at, and its roll.
@@ -85,8 +85,9 @@ def maximise_baselines(
         surface: The samples.
         limits: What binds a camera.
         rings: Rings of each projector on the samples; None: no rings.
-        confirm: Maps poses to how many of more samples are measured, on which no
-            proposal rests: of many moves, those pass that samples happen to favour.
+        confirm: Whether at poses no fewer of more samples are measured than at the
+            start, on which no proposal rests: of many moves, those pass that samples
+            happen to favour.
         max_evaluations: Calls of `measure` at most.
         max_programs: Programs solved at most.
     """
@@ -108,8 +109,7 @@ class _Search:
     ) -> None:
         self.cameras, self.surface, self.limits = cameras, surface, limits
         self._measure, self._rings, self._confirm = measure, rings, confirm
-        self._confirmed: int | None = None
-        self.spent = self.accepted = self.solved = 0
+        self.spent = self.solved = 0
         self.poses = poses_of(cameras)
         self.measured = self._evaluate(self.poses)
         self._floor = _count(self.measured)
@@ -135,8 +135,6 @@ class _Search:
             self.measured,
             before,
             self._smallest(),
-            self.accepted,
-            self.spent,
         )
 
     def _affords(self) -> bool:
@@ -161,10 +159,13 @@ class _Search:
             taken, lost = self._attempt(whole)
             if taken:
                 return True, reach
-            fresh = self._demand(lost, solution.centres, demanded)
-            if not len(fresh):
+            lost = lost_samples(lost, solution.centres, self.measured, self.surface)
+            known, demanded = (
+                demanded,
+                np.unique(np.concatenate([demanded, lost]), axis=0),
+            )
+            if len(demanded) == len(known):
                 break
-            demanded = np.concatenate([demanded, fresh])
         # The first is the boldest, the last loses least: part of either may do.
         ends = proposals[-1:] + proposals[:-1][:1]
         moves = [np.linalg.norm(c - self.poses[:, :3, 3], axis=1).max() for c in ends]
@@ -209,35 +210,10 @@ class _Search:
         )
         if not held or len(overlap_components(measured)) > self._groups:
             return False, none
-        if not self._is_confirmed(poses):
+        if self._confirm is not None and not self._confirm(poses):
             return False, none
         self.poses, self.measured, self.pairs = poses, measured, pairs
-        self.accepted += 1
         return True, none
-
-    def _is_confirmed(self, poses: _Array) -> bool:
-        """Whether more samples agree that nothing is lost since the start."""
-        if self._confirm is None:
-            return True
-        if self._confirmed is None:
-            # Until a move is taken, the poses are those of the start.
-            self._confirmed = self._confirm(self.poses)
-        return self._confirm(poses) >= self._confirmed
-
-    def _demand(
-        self, lost: NDArray[np.int64], centres: _Array, known: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
-        """(camera, sample) pairs that would hold some of the lost samples."""
-        if len(lost) > _DEMANDS:
-            lost = lost[np.linspace(0, len(lost) - 1, _DEMANDS).astype(np.int64)]
-        ray = self.surface.points[lost][:, None] - centres[None]
-        facing = -np.einsum("ikj,ij->ik", ray, self.surface.normals[lost])
-        facing = facing / np.linalg.norm(ray, axis=2)
-        holder = np.argmax(np.where(self.measured[lost], facing, -2.0), axis=1)
-        pairs = np.column_stack([holder, lost]).astype(np.int64)
-        seen = {(int(c), int(i)) for c, i in known}
-        fresh = [p for p in pairs if (int(p[0]), int(p[1])) not in seen]
-        return np.array(fresh, dtype=np.int64).reshape(-1, 2)
 
     def _stated(self, demanded: NDArray[np.int64], reach: float) -> BaselineProblem:
         return state_baselines(

@@ -2,9 +2,9 @@
 
 About an axis through the centre of the workspace, the target's section is taken for a
 disc of radius rho, that of its farthest sample from the axis. Cameras on a ring of
-radius S that face the centre then cover eta to either side of themselves, so n_min of
-them stand at a spacing of at most 2 eta, neighbours d_max = 2 S sin(eta) apart at most
-(`round_body_limit`, `docs/method/baselines.md`).
+radius S that face the centre then cover eta to either side of themselves, so
+floor(pi / eta) + 1 of them stand at a spacing of at most 2 eta (`covered_azimuth`,
+`docs/method/baselines.md`).
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap
-from planning.cameras.baselines.coverage_triangle import round_body_limit
+from planning.cameras.baselines.coverage_triangle import covered_azimuth
 from planning.model.requirements import Workspace
 
 _Array = NDArray[np.float64]
@@ -54,7 +54,9 @@ def camera_rings(
         rho = float(np.sqrt(np.max((offsets**2).sum(axis=1) - along**2)))
         if not 0.0 < rho < ring_radius:
             continue
-        fewest = round_body_limit(rho, ring_radius, max_incidence, alpha).n_min
+        eta = covered_azimuth(rho, ring_radius, max_incidence, alpha)
+        # Parts that only touch don't cover: pi/eta = 4 takes five, however rounded.
+        fewest = int(np.floor(np.pi / eta + 1e-9)) + 1
         e2 = np.cross(axis, e1)
         for n in range(fewest, min(fewest + _MORE, _MOST) + 1):
             spacing = 2.0 * np.pi / n

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.cameras.baselines.baseline_terms import BaselineLimits
+from planning.cameras.baselines.baseline_limits import BaselineLimits
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.model.planned import PlannedCamera

@@ -6,8 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from support.closed_forms import round_body_limit
 
-from planning.cameras.baselines.coverage_triangle import round_body_limit, seam_angles
+from planning.cameras.baselines.coverage_triangle import seam_angles
 from solvers.poses.baseline_nlp import build_baseline_program
 from solvers.poses.baseline_problem import (
     BaselineProblem,

@@ -1,0 +1,112 @@
+"""What binds a camera whose baselines grow, and what rings ask of it on samples."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.planned import PlannedCamera
+from planning.model.requirements import Workspace
+
+from .seams import SampledSurface
+
+_Array = NDArray[np.float64]
+
+# Proposals stay by this share inside what rings ask.
+_SPARE_RINGS = 0.002
+
+
+@dataclass(frozen=True, eq=False)
+class BaselineLimits:
+    """What binds a camera whose baselines grow.
+
+    Attributes:
+        max_incidence: theta in [rad].
+        min_conditioning: Least |r.m|.
+        workspace: Where cameras may stand.
+        min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
+        max_sigma_m: Largest s_N [m].
+        spare_field: What seams keep free of the half fields [rad], at least that by
+            which proposals stay inside their limits.
+    """
+
+    max_incidence: float
+    min_conditioning: float
+    workspace: Workspace
+    min_ring_pitch_px: float | None = None
+    max_sigma_m: float | None = None
+    spare_field: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class RingsOnSurface:
+    """The rings of every projector on n samples.
+
+    Attributes:
+        normals: Unit normals m of the ring surfaces, shape (n_p, n, 3).
+        spacing: h, ring spacing along m in [m], shape (n_p, n).
+        noise_px: s_px, edge noise in [px], shape (n_p, n).
+        lit: Whether a projector lights a sample, shape (n, n_p).
+    """
+
+    normals: _Array
+    spacing: _Array
+    noise_px: _Array
+    lit: NDArray[np.bool_]
+
+
+def best_rings(
+    camera: PlannedCamera,
+    samples: NDArray[np.int64],
+    surface: SampledSurface,
+    rings: RingsOnSurface,
+    limits: BaselineLimits,
+) -> tuple[_Array, _Array, _Array, _Array]:
+    """Return the ring normals that measure samples best, and what s_N and pitch ask.
+
+    With g = J_r^T v, |g| = c |v| / f, where c is 1 on the optical axis and hardly
+    changes as the camera moves; so the limits become m.r >= q t |v| and
+    -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f).
+
+    Args:
+        camera: As it stands.
+        samples: Which of them, shape (q,).
+        surface: All samples.
+        rings: On all samples.
+        limits: What binds.
+
+    Returns:
+        Ring normals with m.r > 0, (q, 3); q and p in [1/m], 0 where the limit doesn't
+        bind; what the tightest of these limits leaves, in units of a cosine; (q,) each.
+    """
+    pose = camera.world_from_device
+    ray = surface.points[samples] - pose[:3, 3]
+    distance = np.linalg.norm(ray, axis=1)
+    r, normal = ray / distance[:, None], surface.normals[samples]
+    m = rings.normals[:, samples]
+    along = np.einsum("ij,pij->pi", r, m)
+    facing = -np.einsum("ij,ij->i", r, normal)
+    v = normal * along[..., None] + m * facing[:, None]
+    jacobian = pose[:3, :3] @ camera.device.ray_jacobian(ray @ pose[:3, :3])
+    g = np.linalg.norm(np.einsum("ijk,pij->pik", jacobian, v), axis=2)
+    per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
+    sigma, pitch = np.zeros(along.shape), np.zeros(along.shape)
+    if limits.max_sigma_m is not None:
+        sigma = rings.noise_px[:, samples] * per_length / limits.max_sigma_m
+    if limits.min_ring_pitch_px is not None:
+        pitch = limits.min_ring_pitch_px * per_length / rings.spacing[:, samples]
+    reach = distance * np.linalg.norm(v, axis=2)
+    spare = np.minimum(
+        np.abs(along) - np.maximum(limits.min_conditioning, sigma * reach),
+        facing - pitch * reach,
+    )
+    best = np.argmax(np.where(rings.lit[samples].T, spare, -np.inf), axis=0)
+    each = np.arange(len(samples))
+    sign = np.where(along[best, each] < 0.0, -1.0, 1.0)
+    spared = 1.0 + _SPARE_RINGS
+    return (
+        sign[:, None] * m[best, each],
+        spared * sigma[best, each],
+        spared * pitch[best, each],
+        spare[best, each],
+    )
