@@ -68,7 +68,7 @@ class RingBeam:
             least_px: Least pitch that they keep [px].
         """
         even = self.even_gap
-        floor = least_gaps(*samples, even, least_px, self.edges)
+        floor = least_gaps(samples[0], samples[1], even, least_px, self.edges)
         # A gap that holds a sample reaches up to its own length to either side of it.
         floor = _widened(floor, CELLS)
         floor = np.where(floor > 0.0, floor, even)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
-from planning.model.document.baseline_records import BaselineRow
+from planning.model.document.device_records import BaselineRow
 from planning.model.planned import PlannedCamera
 
 from .coverage_triangle import SeamAngles, baseline_parts, largest_baseline, seam_angles
@@ -252,7 +252,7 @@ def _row(
         max_incidence=max_incidence,
         delta_axes=float(angles.delta_axes[i]),
         delta_surface=float(angles.delta_surface[i]),
-        normals=[side[i].tolist() for side in test.normals],
+        normals=(test.normals[0][i].tolist(), test.normals[1][i].tolist()),
         onward=angles.onward[i].tolist(),
         shares_border=test.seam.shares_border,
         n_seam=len(test.points),
