@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 from geometry.poses import inverse, transform
 from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import TriangulationLimits
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.limits.camera_limits import ViewedSamples
-from planning.scene.limits.pair_limits import PairQuality
-from planning.scene.measured import LitSamples, lit_samples, pairs_of, taken
+from planning.scene.measured import (
+    LitSamples,
+    least_sigma,
+    lit_samples,
+    pairs_of,
+    taken,
+)
 from planning.scene.patterns.ring_pattern import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
@@ -92,14 +96,14 @@ class AxisJudge:
         views = tuple(view_of(scene, c, samples.target) for c in cameras)
         limits = scene.requirements.triangulation
         each = range(len(samples.lights))
-        sigma = np.stack([_least_sigma(limits, samples, views, p) for p in each])
+        sigma = np.stack([least_sigma(limits, samples, views, p) for p in each])
         return cls(scene, samples, views, sigma)
 
     def with_axis(self, projector: PlannedProjector, p: int) -> "AxisJudge":
         """Return the same with another axis of projector p."""
         limits, sigma = self.scene.requirements.triangulation, self.sigma.copy()
         samples = self.samples.with_code(p, projector)
-        sigma[p] = _least_sigma(limits, samples, self.views, p)
+        sigma[p] = least_sigma(limits, samples, self.views, p)
         return replace(self, samples=samples, sigma=sigma)
 
     def holds(self, projector: PlannedProjector, p: int) -> bool:
@@ -107,21 +111,6 @@ class AxisJudge:
         return inside_rings(
             projector, self.samples.target.samples.points[self.samples.lit[:, p]]
         )
-
-
-def _least_sigma(
-    limits: TriangulationLimits,
-    samples: LitSamples,
-    views: Sequence[ViewedSamples],
-    p: int,
-) -> NDArray[np.float64]:
-    least = np.full(len(samples.target), np.inf)
-    for seen in views:
-        for pair in pairs_of(limits, samples, seen, projectors=[p]):
-            good = pair.samples[pair.measured]
-            sigma = pair.quality.sigma[pair.measured]
-            least[good] = np.minimum(least[good], sigma)
-    return least
 
 
 def _move(
@@ -220,11 +209,18 @@ def axis_program(
     jacobians = np.stack([view.jacobian for view in seen], axis=1)
     slopes = np.einsum("ikja,ikjl->ikal", jacobians, spread)
     noise = limits.noise_px / np.maximum(samples.lights[p].incidence_cos[chosen], 1e-9)
+    conditioning = max(limits.min_conditioning, _LEAST_CONDITIONING)
+    max_sigma, min_pitch = limits.max_sigma_m or np.inf, limits.min_ring_pitch_px or 0.0
     few, others = taken(samples, chosen, samples.lit), np.zeros(len(chosen))
     among = [q for q in range(len(projectors)) if q != p]
     for view in seen:
         for pair in pairs_of(limits, few, view, projectors=among):
-            score = smooth_count(pair.quality, limits)
+            # 1/(1 + e), as `solvers.poses.axis_program` counts a pair.
+            quality = pair.quality
+            excess = (conditioning / np.maximum(quality.conditioning, 1e-12)) ** 2
+            excess += (quality.sigma / max_sigma) ** 2
+            pitch = min_pitch / np.maximum(quality.pitch, 1e-12)
+            score = 1.0 / (1.0 + excess + pitch ** (2 * PITCH_POWER))
             others[pair.samples] = np.maximum(others[pair.samples], score)
     return AxisProgram(
         light=projector.light,
@@ -240,18 +236,7 @@ def axis_program(
         start=ring_axis(pose, device, projector.world_from_ring),
         ring_radius=_RING_SHARE * float(projector.ring_radii[-1]),
         gap=float(projector.ring_radii[1] - projector.ring_radii[0]),
-        min_conditioning=max(limits.min_conditioning, _LEAST_CONDITIONING),
-        max_sigma_m=limits.max_sigma_m or np.inf,
-        min_pitch_px=limits.min_ring_pitch_px or 0.0,
+        min_conditioning=conditioning,
+        max_sigma_m=max_sigma,
+        min_pitch_px=min_pitch,
     )
-
-
-def smooth_count(
-    quality: PairQuality, limits: TriangulationLimits
-) -> NDArray[np.float64]:
-    """Return 1/(1 + e) of a pair at samples, as `axis_program` has it, (n,)."""
-    least = max(limits.min_conditioning, _LEAST_CONDITIONING)
-    excess = (least / np.maximum(quality.conditioning, 1e-12)) ** 2
-    excess += (quality.sigma / (limits.max_sigma_m or np.inf)) ** 2
-    pitch = (limits.min_ring_pitch_px or 0.0) / np.maximum(quality.pitch, 1e-12)
-    return 1.0 / (1.0 + excess + pitch ** (2 * PITCH_POWER))

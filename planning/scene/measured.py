@@ -148,6 +148,29 @@ def pairs_of(
         yield Pair(p, places, chosen, quality, first_pair_failure(quality, limits))
 
 
+def least_sigma(
+    limits: TriangulationLimits,
+    samples: LitSamples,
+    views: Sequence[ViewedSamples],
+    p: int,
+) -> NDArray[np.float64]:
+    """Return the least s_N of projector p over cameras in [m], (n,); inf for none.
+
+    Args:
+        limits: Of pairs.
+        samples: Lit samples.
+        views: How each camera sees them.
+        p: Index of the projector.
+    """
+    least = np.full(len(samples.target), np.inf)
+    for seen in views:
+        for pair in pairs_of(limits, samples, seen, projectors=[p]):
+            good = pair.samples[pair.measured]
+            sigma = pair.quality.sigma[pair.measured]
+            least[good] = np.minimum(least[good], sigma)
+    return least
+
+
 def measured_by(
     scene: Scene,
     cameras: Sequence[PlannedCamera],
