@@ -13,7 +13,10 @@ from .reading import FormatError
 
 Fetch = Callable[[str], bytes]
 Tree = Mapping[str, Any]
-_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}
+_COMPONENTS = {
+    **{5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2"},
+    **{5125: "<u4", 5126: "<f4"},
+}
 _INDICES = (5121, 5123, 5125)
 _FLOAT = 5126
 _WIDTH = {"SCALAR": 1, "VEC3": 3}

@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from geometry.arrays import Array, Ints
 from geometry.files.gltf_buffers import (
-    _COMPONENTS,
     PACKED,
     QUANTIZED,
     Buffers,
@@ -19,7 +18,6 @@ from geometry.files.gltf_buffers import (
 
 from .reading import FormatError, ScenePart, joined
 
-_COMPONENTS[5125] = "<u4"
 # Required extensions that leave the triangles as the core format stores them.
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6

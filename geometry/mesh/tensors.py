@@ -64,7 +64,8 @@ def unit(vectors: Array) -> Array:
 
 def summed(vectors: Array, of: Ints, n: int) -> Array:
     """Return the sums of rows (m, k) that belong to each of n things, shape (n, k)."""
-    return np.stack([np.bincount(of, column, n) for column in vectors.T], axis=1)
+    sums = [np.bincount(of, column, n) for column in vectors.T]
+    return np.stack(sums, axis=1).astype(np.float64, copy=False)
 
 
 def lengths(vectors: Array) -> Array:
