@@ -9,7 +9,7 @@ from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.predicates.audit_devices import (
+from planning.verify.audit.predicates.audit_light import (
     DivergingRays,
     ParallelRays,
     light_from,
