@@ -177,8 +177,7 @@ def rig(mesh: TriangleMesh, light: str = "diverging") -> RigPlan:
     plan = RIGS.small_rig(mesh, light)
     document = plan.to_document()
     document["requirements"]["check"] = RIGS.CHECK | {"tau_m": GAP}
-    plan = RigPlan.from_document(document, plan.surface)
-    return RigPlan.from_document(plan.to_document(), plan.surface)
+    return RigPlan.from_document(document, plan.surface)
 
 
 def main() -> None:
