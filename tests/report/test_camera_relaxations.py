@@ -110,7 +110,7 @@ def turned_to(name, value, scene, rows, camera):
                 replace(rings, spacing=rings.spacing * value / 2.0)
                 for rings in rows.surfaces
             )
-            rows = replace(rows, rings=wider)
+            rows = replace(rows, surfaces=wider)
         case "blur":
             sharp = optics.depth_of_field(0.012, 11.0, value * 3.45e-6, 1.15)
             device = replace(device, range_m=sharp)
