@@ -22,7 +22,7 @@ from planning.rig.range_guard import Guard, guarded
 from planning.rig.rig import Rig
 from planning.rig.wishes import TargetName, Wishes
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
-from planning.scene.clearance import check_existing_clearance
+from planning.scene.bodies.clearance import check_existing_clearance
 from planning.scene.interest import Select, Weight, interest_of
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene

@@ -3,10 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planning.cameras.camera_cover import (
-    NothingMeasuredError,
-    camera_candidate_views,
-)
+from planning.cameras.camera_cover import NothingMeasuredError, camera_candidate_views
 from planning.cameras.camera_routes import widest_route
 from planning.cameras.camera_stage import follow_cameras, place_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage

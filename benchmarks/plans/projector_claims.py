@@ -37,11 +37,7 @@ from planning.scene.samples import Target
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditProjector
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.predicates import (
-    LIT,
-    light_margin,
-    light_steps,
-)
+from planning.verify.audit.predicates.predicates import LIT, light_margin, light_steps
 
 ROWS = 12_000
 STREAM = 800

@@ -7,15 +7,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from geometry.arrays import Array, Ints
-from geometry.files.gltf_buffers import (
-    PACKED,
-    QUANTIZED,
-    Buffers,
-    Fetch,
-    Tree,
-    item,
-)
 
+from .gltf_buffers import PACKED, QUANTIZED, Buffers, Fetch, Tree, item
 from .reading import FormatError, ScenePart, joined
 
 # Required extensions that leave the triangles as the core format stores them.

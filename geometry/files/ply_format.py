@@ -8,14 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import Array, Ints
-from geometry.files.ply_header import (
-    PlyElement,
-    PlyLists,
-    PlyProperty,
-    read_header,
-    shortened,
-)
 
+from .ply_header import PlyElement, PlyLists, PlyProperty, read_header, shortened
 from .reading import FormatError, numbers, whole
 
 _CORNERS = ("vertex_indices", "vertex_index")

@@ -15,7 +15,7 @@ from planning.cameras.baselines.widest_baselines import (
     maximise_baselines,
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene.clearance import lacks_clearance
+from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.measured import LitSamples, lit_samples, measured_by
 from planning.scene.placed_bodies import moves_bodies

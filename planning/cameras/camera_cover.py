@@ -10,15 +10,11 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
 from planning.proofs.conflicts import Interference
-from planning.proofs.selection import (
-    CandidateCover,
-    Selection,
-    select_fewest,
-)
+from planning.proofs.selection import CandidateCover, Selection, select_fewest
+from planning.scene.bodies.clearance import candidates_with_clearance
+from planning.scene.bodies.existing import existing_cameras
 from planning.scene.camera_views import CandidateViews
-from planning.scene.clearance import candidates_with_clearance
 from planning.scene.draws import DRAWS
-from planning.scene.existing import existing_cameras
 from planning.scene.limits import pair_limits
 from planning.scene.measured import (
     LitSamples,

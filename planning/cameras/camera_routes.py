@@ -27,8 +27,8 @@ from planning.model.document.certificates import CamerasBy, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
+from planning.scene.bodies.clearance import with_clearance
 from planning.scene.camera_views import CandidateViews
-from planning.scene.clearance import with_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.measured import measured_by
 from planning.scene.scene import Scene

@@ -7,12 +7,7 @@ import numpy as np
 from geometry.devices import PinholeModel
 from planning.model.document.certificates import Certificate, RouteCounts
 from planning.model.planned import PlannedCamera
-from planning.proofs.all_poses import (
-    BoundQuestion,
-    Effort,
-    joined,
-    with_existing_alone,
-)
+from planning.proofs.all_poses import BoundQuestion, Effort, joined, with_existing_alone
 from planning.proofs.camera_bound import bound_cameras
 from planning.proofs.candidate_certificate import certificate
 from planning.proofs.conflicts import resolve_others

@@ -22,17 +22,9 @@ from planning.experiments.paper_figures import (
     draw_viewpoints,
 )
 from planning.experiments.point_panels import PanelStage
-from planning.experiments.run import (
-    DARK,
-    Outcome,
-    double_density,
-    run_experiment,
-)
+from planning.experiments.run import DARK, Outcome, double_density, run_experiment
 from planning.experiments.setups import Experiment, box_experiment, face_experiment
-from planning.experiments.table import (
-    outcome_document,
-    outcome_lines,
-)
+from planning.experiments.table import outcome_document, outcome_lines
 from planning.model.files import write_atomically
 from planning.verify.reconstruction.cloud_file import (
     CloudFile,

@@ -10,10 +10,11 @@ from typing import NoReturn
 
 import click
 
+from planning.cli.declared.other_declared import rigs, sample, schema, verify
+from planning.cli.declared.plan_declared import rig_command
+from planning.cli.declared.reconstruct_declared import reconstruct
+
 from .console import stop
-from .declared.other_declared import rigs, sample, schema, verify
-from .declared.plan_declared import rig_command
-from .declared.reconstruct_declared import reconstruct
 
 _NOT_BUILT = {
     "report": "writes one self-contained HTML file",

@@ -8,8 +8,9 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
-from .document.coverage_records import Coverage
-from .document.plan_document import FORMAT, VERSION, PlanDocument
+from planning.model.document.coverage_records import Coverage
+from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
+
 from .errors import PlanFileError, PlanningError
 from .files import sha256_of, write_together
 from .planned import PlannedCamera, PlannedProjector

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
 from planning.proofs.selection import CandidateCover
-from planning.scene.clearance import candidates_with_clearance, with_clearance
-from planning.scene.existing import existing_projectors, movable
+from planning.scene.bodies.clearance import candidates_with_clearance, with_clearance
+from planning.scene.bodies.existing import existing_projectors, movable
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.samples import Target, merged

@@ -13,7 +13,7 @@ from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.proofs.selection import required_samples
-from planning.scene.clearance import lacks_clearance
+from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.patterns.ring_pattern import RingPattern

@@ -15,7 +15,7 @@ from planning.proofs.all_poses import (
 )
 from planning.proofs.projector_bound import bound_projectors
 from planning.proofs.selection import fewest_count, select_fewest
-from planning.scene.existing import existing_projectors
+from planning.scene.bodies.existing import existing_projectors
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns.pattern import pattern_of

@@ -20,17 +20,17 @@ from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
 from geometry.mesh.tensors import lengths
+from planning.proofs.cells.aim_cells import AimTree
+from planning.proofs.cells.direction_cells import mesh_reach, open_samples
+from planning.proofs.cells.image_cone import image_cone
+from planning.proofs.cells.measurable_cells import MeasurableCells
+from planning.proofs.cells.position_cells import PositionTree
 from planning.scene.measured import LitSamples
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.cells.cell_bound import CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
-from .cells.aim_cells import AimTree
-from .cells.direction_cells import mesh_reach, open_samples
-from .cells.image_cone import image_cone
-from .cells.measurable_cells import MeasurableCells
-from .cells.position_cells import PositionTree
 
 DEFAULT = Effort(
     finest=7, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000

@@ -18,6 +18,12 @@ from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import Workspace
+from planning.proofs.cells.direction_cells import (
+    DirectionTree,
+    mesh_reach,
+    open_samples,
+)
+from planning.proofs.cells.position_cells import PositionTree
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.admissible import may_stand
@@ -25,8 +31,6 @@ from solvers.bit_rows import BitSum
 from solvers.cells.cell_bound import CellBound, CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
-from .cells.direction_cells import DirectionTree, mesh_reach, open_samples
-from .cells.position_cells import PositionTree
 
 DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8, most_samples=2000)
 PROVE = Effort(finest=7, budget=6e10, shadows=np.inf, offers=150)

@@ -4,10 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from planning.model.document.coverage_records import (
-    CameraMarginal,
-    ProjectorMarginal,
-)
+from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.rings.ring_stage import RingStage
 from planning.scene.scene import Scene

@@ -12,10 +12,7 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import (
-    camera_candidate_views,
-    plan_cameras,
-)
+from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.proved_cameras import bound_stage, camera_stage
 from planning.model.device_poses import ring_frame
 from planning.model.document.certificates import (
@@ -30,12 +27,7 @@ from planning.model.document.certificates import (
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing
 from planning.proofs import all_poses
-from planning.proofs.camera_bound import (
-    DEFAULT,
-    PROVE,
-    bound_cameras,
-    camera_trees,
-)
+from planning.proofs.camera_bound import DEFAULT, PROVE, bound_cameras, camera_trees
 from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells

@@ -24,17 +24,8 @@ from planning.report.drawing.figures import (
     zone_figures,
 )
 from planning.report.drawing.panel import Panel, round_length
-from planning.report.drawing.picture_view import (
-    BACKGROUND,
-    PictureView,
-    facing,
-    fitted,
-)
-from planning.report.drawing.rig_picture import (
-    draw_rig,
-    draw_zones,
-    save_rig_picture,
-)
+from planning.report.drawing.picture_view import BACKGROUND, PictureView, facing, fitted
+from planning.report.drawing.rig_picture import draw_rig, draw_zones, save_rig_picture
 from planning.report.drawing.shader import Shader, draw_mesh
 
 K_PROJECTOR = [[2100.0, 0, 639.5], [0, 2100.0, 399.5], [0, 0, 1]]

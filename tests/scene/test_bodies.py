@@ -37,12 +37,12 @@ from planning.proofs.selection import CandidateCover, marginals, select_fewest
 from planning.report.drawing.figures import device_figures
 from planning.rig.wishes import Wishes
 from planning.scene import lighting, measurability
-from planning.scene.camera_views import camera_views
-from planning.scene.clearance import (
+from planning.scene.bodies.clearance import (
     candidates_with_clearance,
     check_existing_clearance,
     lacks_clearance,
 )
+from planning.scene.camera_views import camera_views
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import camera_limits, projector_limits

@@ -18,12 +18,7 @@ from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
 
 from .baseline_limits import BaselineLimits, RingsOnSurface
 from .baseline_terms import lost_samples, state_baselines
-from .camera_moves import (
-    aims_and_rolls,
-    at_poses,
-    centres_between,
-    poses_of,
-)
+from .camera_moves import aims_and_rolls, at_poses, centres_between, poses_of
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]

@@ -26,10 +26,10 @@ from planning.cameras.camera_cover import (
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection, required_samples
+from planning.scene.bodies.clearance import with_clearance
+from planning.scene.bodies.existing import movable
 from planning.scene.camera_views import CandidateViews
-from planning.scene.clearance import with_clearance
 from planning.scene.draws import DRAWS
-from planning.scene.existing import movable
 from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import cameras_towards

@@ -18,7 +18,6 @@ from planning.cameras.camera_cover import NothingMeasuredError, n_fixed
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.planned import PlannedCamera
 from planning.proofs.selection import required_samples
-from planning.report.advice.least_changes import relaxations_of_cameras
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
@@ -31,7 +30,7 @@ from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import camera_candidates
 
 from .demands import demands
-from .least_changes import Share, covers_enough, least_changes
+from .least_changes import Share, covers_enough, least_changes, relaxations_of_cameras
 
 # What covers cover beyond the requirement, so that fresh samples confirm it.
 _SPARE = 0.003

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import NothingLitError
-from planning.report.advice.least_changes import relaxations_of_projectors
 from planning.scene import lighting
 from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
@@ -22,7 +21,7 @@ from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 
 from .demands import light_demands
-from .least_changes import Share, least_changes
+from .least_changes import Share, least_changes, relaxations_of_projectors
 
 
 def reachability_relaxations(

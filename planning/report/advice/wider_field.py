@@ -15,14 +15,13 @@ import numpy as np
 from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.selection import required_samples
-from planning.report.advice.least_changes import relaxations_of_projectors
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
 from planning.scene.workspace.view_tiles import Site
 
 from .demands import light_demands
-from .least_changes import covers_enough
+from .least_changes import covers_enough, relaxations_of_projectors
 
 # Poses for larger tiles: so many times as wide and high, so many that look at the
 # centre.

@@ -13,18 +13,8 @@ from planning.verify.audit.predicates.audit_devices import AuditProjector
 from planning.verify.audit.predicates.predicates import MEASURED
 from planning.verify.audit.predicates.recompute import pairs_with
 
-from .crease_claims import (
-    ROWS,
-    audit_creases,
-    creases_of,
-    strays,
-)
-from .ring_grid import (
-    AZIMUTHS,
-    RingGrid,
-    audit_extreme,
-    cast_rings,
-)
+from .crease_claims import ROWS, audit_creases, creases_of, strays
+from .ring_grid import AZIMUTHS, RingGrid, audit_extreme, cast_rings
 
 # Of the chords, poses rounded after rings were spaced may turn so many.
 _STRAY_SLACK = 0.005

@@ -12,13 +12,7 @@ from planning.verify.reconstruction.scanner import Scanner
 from .cause_words import in_words
 from .diagnosis import diagnose
 from .inaccurate import where_inaccurate, wrong_roots
-from .missing import (
-    hole_between,
-    left_out_nearby,
-    lit_twice,
-    missing_where,
-    no_edges,
-)
+from .missing import hole_between, left_out_nearby, lit_twice, missing_where, no_edges
 
 # A device whose edges are fewer than this share of what its role gives is all but dark.
 _DARK_SHARE = 0.01

@@ -8,11 +8,11 @@ import numpy as np
 from geometry.shapes.boxes import OrientedBox, triangles_touch
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.scene.placed_bodies import CLEARANCE_M, Device, collide, placed_box
+from planning.scene.scene import Scene
 from planning.scene.workspace.admissible import broken_by_body
 
 from .existing import existing_cameras, existing_projectors
-from .placed_bodies import CLEARANCE_M, Device, collide, placed_box
-from .scene import Scene
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 # Poses that are tried for each wanted, at most.

@@ -1,0 +1,1 @@
+"""Devices that take room: existing ones, housings, and where one has clearance."""
