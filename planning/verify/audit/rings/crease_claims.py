@@ -111,7 +111,7 @@ def strays(
     A chord joins two points of the surface one even gap apart; it errs by (h / even
     gap)^2 of that, h the gap of the rings at its middle. It counts if both ends and the
     middle are lit, neither half rises faster than tan(theta_max) and no crease is near:
-    on the target, or anywhere if none of them is on it. `docs/rings.md`.
+    on the target, or anywhere if none of them is on it. `docs/method/rings.md`.
 
     Args:
         grid: Of `ROWS` rows an even gap.
