@@ -257,7 +257,7 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, name):
     m /= np.linalg.norm(m, axis=1)[:, None]
     spacing, cosine = rng.uniform(1e-3, 6e-3, n), rng.uniform(0.5, 1.0, n)
     light = replace(rows.lights[0], incidence_cos=cosine)
-    rows = replace(rows, lights=(light,), rings=(CodeSurfaces(m, spacing),))
+    rows = replace(rows, lights=(light,), surfaces=(CodeSurfaces(m, spacing),))
     required = scene_of(sphere(0.1), limits=FREE | {limit: value}).requirements
     normals = rows.target.samples.normals
     towards = _turned_by(normals, np.radians(rng.uniform(0, 85, n)), rng)
