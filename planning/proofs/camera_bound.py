@@ -61,9 +61,9 @@ def bound_cameras(
     trees = camera_trees(scene, device, samples, effort)
     tree, shadows = next(trees)
     best = question.searched(tree, effort.budget)
-    for tree, among_shadows in trees:
-        if best.status is CellStatus.PROVED:
-            break
+    # The next tree is asked for only where it is needed: shadows cost most.
+    while best.status is not CellStatus.PROVED and (finer := next(trees, None)):
+        tree, among_shadows = finer
         better = question.searched(tree, effort.budget)
         # Cut short, a finer search may have proved less.
         if better.lower_bound >= best.lower_bound:
