@@ -46,11 +46,8 @@ def output_options(command: _Command) -> _Command:
     return command
 
 
-class Positive(click.FloatRange):
-    """A positive number, perhaps with a largest; NaN and infinity are none."""
-
-    def __init__(self, largest: float | None = None) -> None:
-        super().__init__(0.0, largest, min_open=True)
+class Finite(click.FloatRange):
+    """A number in a range; NaN and infinity are none."""
 
     def convert(
         self,
@@ -63,6 +60,13 @@ class Positive(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} isn't a finite number.", param, ctx)
         return number
+
+
+class Positive(Finite):
+    """A positive number, perhaps with a largest."""
+
+    def __init__(self, largest: float | None = None) -> None:
+        super().__init__(0.0, largest, min_open=True)
 
 
 def reporter(*, quiet: bool) -> Report | None:

@@ -102,14 +102,15 @@ class RigPlan:
         """
         path = Path(path)
         text = _read_text(path)
-        surface_path = path.parent / _surface_name(text, path)
-        plan = cls._parsed(text, Surface.load(surface_path), str(path))
-        if sha256_of(surface_path) != plan.document.surface.sha256:
+        name, digest = _surface_of(text, path)
+        surface_path = path.parent / name
+        # Before it is read: what was damaged on the way may break any reader.
+        if surface_path.is_file() and digest not in (None, sha256_of(surface_path)):
             raise PlanFileError(
                 f"{surface_path}: its SHA-256 isn't the one in {path.name}; "
                 f"the two files must come from one run"
             )
-        return plan
+        return cls._parsed(text, Surface.load(surface_path), str(path))
 
     @classmethod
     def _parsed(cls, text: str, surface: Surface, where: str) -> Self:
@@ -132,8 +133,8 @@ def _read_text(path: Path) -> str:
         raise PlanFileError(f"{path}: not readable ({error})") from None
 
 
-def _surface_name(text: str, path: Path) -> str:
-    """Return the name of a plan's surface, once the text is a plan's of our version.
+def _surface_of(text: str, path: Path) -> tuple[str, object]:
+    """Return name and digest of a plan's surface, of a plan of our version.
 
     Raises:
         PlanFileError: If it isn't.
@@ -149,8 +150,9 @@ def _surface_name(text: str, path: Path) -> str:
             f"{path}: version {document.get('version')}, this program reads {VERSION}"
         )
     surface = document.get("surface")
-    name = surface.get("path") if isinstance(surface, dict) else None
-    return name if isinstance(name, str) else "surface.npz"
+    table = surface if isinstance(surface, dict) else {}
+    name, digest = table.get("path"), table.get("sha256")
+    return name if isinstance(name, str) else "surface.npz", digest
 
 
 def _faults(error: ValidationError) -> str:
@@ -159,7 +161,8 @@ def _faults(error: ValidationError) -> str:
     faults: list[str] = []
     for entry in entries[:_MOST_FAULTS]:
         where = ".".join(map(str, entry["loc"])) or "the file"
-        rule = entry["msg"].removeprefix("Value error, ").removeprefix("Input ")
+        rule = entry["msg"].removeprefix("Value error, ")
+        rule = rule.removeprefix("Input ").removeprefix("Tuple ")
         value = repr(entry["input"])
         value = value if len(value) <= 60 else f"{value[:57]}..."
         missing = entry["type"] == "missing"

@@ -1,10 +1,13 @@
 """The surface as planned: what every claim in a plan speaks about."""
 
 import hashlib
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
+from tokenize import TokenError
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -14,15 +17,28 @@ from geometry.mesh.mesh import MeshError, TriangleMesh
 
 from .errors import PlanFileError
 
-_ARRAYS = (
-    "vertices",
-    "faces",
-    "member",
-    "region",
-    "steep",
-    "reference_projectors",
-    "reference_rings",
-    "reference_cameras",
+# Kinds of numbers and the shape of each array; n faces, any number of poses.
+_ARRAYS: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    "vertices": ("f", (None, 3)),
+    "faces": ("iu", (None, 3)),
+    "member": ("iu", (None,)),
+    "region": ("iu", (None,)),
+    "steep": ("f", (None, 3)),
+    "reference_projectors": ("f", (None, 4, 4)),
+    "reference_rings": ("f", (None, 4, 4)),
+    "reference_cameras": ("f", (None, 4, 4)),
+}
+# What numpy and zipfile raise on damaged archives, beside OSError and ValueError.
+_DAMAGED = (
+    BadZipFile,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    RuntimeError,
+    SyntaxError,
+    TypeError,
+    TokenError,
+    zlib.error,
 )
 
 
@@ -72,7 +88,7 @@ class Surface:
             buffer,
             vertices=self.mesh.vertices,
             faces=self.mesh.faces,
-            **{name: getattr(self, name) for name in _ARRAYS[2:]},
+            **{name: getattr(self, name) for name in list(_ARRAYS)[2:]},
         )
         return buffer.getvalue()
 
@@ -84,7 +100,7 @@ class Surface:
             PlanFileError: If the file is missing, broken or lacks an array.
         """
         try:
-            with np.load(path, allow_pickle=False) as archive:
+            with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as archive:
                 arrays = {name: archive[name] for name in _ARRAYS}
         except FileNotFoundError:
             raise PlanFileError(
@@ -93,8 +109,9 @@ class Surface:
             ) from None
         except KeyError as error:
             raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
-        except (OSError, ValueError, EOFError, BadZipFile) as error:
+        except (OSError, ValueError, *_DAMAGED) as error:
             raise PlanFileError(f"{path}: not a readable .npz ({error})") from None
+        _check_arrays(arrays, path)
         try:
             mesh = TriangleMesh(arrays.pop("vertices"), arrays.pop("faces"))
         except MeshError as error:
@@ -106,3 +123,19 @@ class Surface:
                     f"{path}: `{name}` has {len(arrays[name])} rows for {n} faces"
                 )
         return cls(mesh, **arrays)
+
+
+def _check_arrays(arrays: dict[str, NDArray[Any]], path: Path) -> None:
+    """Refuse arrays of other kinds of numbers, or of other shapes."""
+    for name, (kinds, shape) in _ARRAYS.items():
+        array = arrays[name]
+        fits = len(array.shape) == len(shape) and all(
+            want in (None, has) for want, has in zip(shape, array.shape, strict=True)
+        )
+        if not fits or array.dtype.kind not in kinds:
+            sizes = ", ".join("n" if size is None else str(size) for size in shape)
+            number = "floats" if kinds == "f" else "integers"
+            raise PlanFileError(
+                f"{path}: `{name}` must be ({sizes}) {number}, got {array.dtype} of "
+                f"shape {array.shape}; plan again"
+            )

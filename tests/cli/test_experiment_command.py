@@ -103,3 +103,11 @@ def test_a_plan_is_measured_from_single_images_too():
     assert "several rings meet the rays" in (rejection(vague.pairs) or "")
     again = reconstruct_single_shot(one, tolerance_m=1e-3, seed=3)
     np.testing.assert_array_equal(again.merged.cloud.points, found.merged.cloud.points)
+
+
+@pytest.mark.parametrize("option", ["--ambient", "--distortion"])
+def test_what_is_no_number_is_refused_before_the_experiment(option, tmp_path):
+    words = ["reconstruct", "--experiment", "box", option, "nan", "-o", str(tmp_path)]
+    result = CliRunner().invoke(commands, words)
+    assert result.exit_code == 2
+    assert "nan isn't a finite number" in result.output

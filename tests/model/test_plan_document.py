@@ -1,15 +1,19 @@
 """The typed plan: schema, what a file keeps, and faults of a file in one line."""
 
+import contextlib
 import json
 from importlib.resources import files
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from planning.cli.main import commands
 from planning.model.document.plan_document import PlanDocument, plan_schema
 from planning.model.errors import PlanFileError
+from planning.model.files import sha256_of
 from planning.model.plan import RigPlan
+from planning.model.surface import Surface
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +64,8 @@ def test_parts_are_frozen_and_changes_are_validated(plan):
     ("change", "sentence"),
     [
         (lambda d: d.pop("seed"), "seed is missing"),
+        (lambda d: d.update(meshes=[]), "meshes = [] should have at least 1 item"),
+        (lambda d: d["projectors"][0].update(K=None), "K is missing, diverging light"),
         (lambda d: d.update(seed="x"), "seed = 'x' should be a valid integer"),
         (lambda d: d["cameras"][0].pop("K"), "cameras.0.K is missing"),
         (lambda d: d["cameras"].append(None), "cameras.2 = None should be an object"),
@@ -96,3 +102,49 @@ def test_a_broken_plan_is_refused_in_one_line(
     assert "\n" not in message
     result = CliRunner().invoke(commands, ["verify", str(path)])
     assert result.exit_code == 3
+
+
+def _rewritten(folder, **changes):
+    """The plan's arrays, some of them others, with a true digest."""
+    path = folder / "surface.npz"
+    with np.load(path) as archive:
+        arrays = dict(archive) | changes
+    np.savez_compressed(path, **arrays)
+    plan_path = folder / "plan.json"
+    document = json.loads(plan_path.read_text())
+    document["surface"]["sha256"] = sha256_of(path)
+    plan_path.write_text(json.dumps(document))
+    return plan_path
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [
+        ("region", np.array(["a", "b"])),
+        ("region", np.zeros((4, 1), dtype=np.int64)),
+        ("member", np.array(3)),
+        ("steep", np.zeros((4, 3), dtype=complex)),
+        ("reference_cameras", np.zeros((2, 4))),
+        ("faces", np.zeros((2, 3))),
+    ],
+)
+def test_arrays_of_another_kind_or_shape_are_refused(
+    handmade, plan, tmp_path, name, array
+):
+    handmade.save(plan, tmp_path)
+    path = _rewritten(tmp_path, **{name: array})
+    with pytest.raises(PlanFileError, match=rf"`{name}` must be .*, got .* of shape"):
+        RigPlan.load(path)
+
+
+def test_a_surface_that_was_damaged_is_refused(handmade, plan, tmp_path):
+    path = handmade.save(plan, tmp_path)
+    surface = tmp_path / "surface.npz"
+    whole = surface.read_bytes()
+    for place in range(60, len(whole) - 60, len(whole) // 40):
+        surface.write_bytes(whole[:place] + b"\xa5" * 4 + whole[place + 4 :])
+        with pytest.raises(PlanFileError, match="its SHA-256 isn't the one"):
+            RigPlan.load(path)
+        # With a digest of the damaged file, numpy and zlib are what refuse it.
+        with contextlib.suppress(PlanFileError):
+            Surface.load(surface)

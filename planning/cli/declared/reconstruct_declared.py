@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from planning.cli.console import Positive, output_options, run, threads_option
+from planning.cli.console import Finite, Positive, output_options, run, threads_option
 
 
 @click.command()
@@ -33,13 +33,13 @@ from planning.cli.console import Positive, output_options, run, threads_option
 )
 @click.option(
     "--ambient",
-    type=click.FloatRange(0.0, 10.0),
+    type=Finite(0.0, 10.0),
     metavar="A",
     help="Of the experiment: room light as a share of the projector's [default: 0].",
 )
 @click.option(
     "--distortion",
-    type=click.FloatRange(-0.5, 0.5),
+    type=Finite(-0.5, 0.5),
     metavar="K1",
     help="Of the experiment: k1 of the cameras' lenses [default: 0].",
 )

@@ -100,6 +100,8 @@ class ProjectorRecord(Part):
 
     def _device(self) -> PinholeModel | ParallelModel:
         if self.light == "diverging":
+            if self.K is None:
+                raise ValueError("K is missing, diverging light needs it")
             matrix = np.array(self.K, dtype=np.float64)
             return PinholeModel(matrix, self.resolution, self.range_m)
         if self.pixel_pitch_m is None:

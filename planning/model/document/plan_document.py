@@ -1,9 +1,9 @@
 """The whole plan file, format `ringrig-plan`, version 1."""
 
 import json
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import field_serializer
+from pydantic import Field, field_serializer
 
 from planning.model.requirements import Requirements
 
@@ -58,7 +58,7 @@ class PlanDocument(Part):
     created: str
     command: tuple[str, ...]
     truncated: bool
-    meshes: tuple[MeshRecord, ...]
+    meshes: Annotated[tuple[MeshRecord, ...], Field(min_length=1)]
     surface: SurfaceRecord
     rig: RigRecord
     requirements: Requirements
