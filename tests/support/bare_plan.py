@@ -61,7 +61,7 @@ def bare_plan(
         "created": "",
         "command": [],
         "truncated": False,
-        "meshes": [],
+        "meshes": [_mesh_entry(surface)],
         "surface": {
             "path": "surface.npz",
             "sha256": "",
@@ -93,6 +93,13 @@ def bare_plan(
         "timings_s": {},
     }
     return RigPlan.from_document(_plain(document | sections), surface)
+
+
+def _mesh_entry(surface: Surface) -> dict[str, Any]:
+    mesh = surface.mesh
+    counts = {"n_vertices": len(mesh.vertices), "n_faces": len(mesh.faces)}
+    source = {"path": None, "sha256": None, "unit": "m", "scale_to_m": 1.0}
+    return source | counts | {"area_m2": mesh.area}
 
 
 def _plain(value: Any) -> Any:
