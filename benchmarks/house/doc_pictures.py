@@ -72,9 +72,10 @@ class Job:
     @cached_property
     def captures(self) -> Path:
         """Images that the cameras would take; a cloud is measured from them."""
-        folder, plan = self.folder / "captures", str(self.plan and self.folder)
+        self.plan.save(self.folder / "plan.json")
+        folder = self.folder / "captures"
         words = ["--save-captures", str(folder), "-o", str(self.folder), "--quiet"]
-        _command("reconstruct", f"{plan}/plan.json", *words)
+        _command("reconstruct", str(self.folder / "plan.json"), *words)
         return folder
 
     @cached_property
@@ -329,12 +330,11 @@ def read_cloud(path: Path) -> tuple[Colours, Colours]:
 
 def _command(*words: str) -> None:
     code = "from planning.cli.main import main; main()"
-    subprocess.run(
-        [sys.executable, "-c", code, *words],
-        cwd=ROOT,
-        check=False,
-        stdout=subprocess.DEVNULL,
-    )
+    run = [sys.executable, "-c", code, *words]
+    done = subprocess.run(run, cwd=ROOT, check=False, stdout=subprocess.DEVNULL)
+    # A cloud that misses a limit is written, and is what one picture shows.
+    if done.returncode not in (0, 1):
+        raise SystemExit(f"plan {' '.join(words)} ended with {done.returncode}")
 
 
 def _freedom(job: Job) -> NDArray[np.float64]:

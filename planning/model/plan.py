@@ -12,7 +12,7 @@ from planning.model.document.coverage_records import Coverage
 from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
 
 from .errors import PlanFileError, PlanningError
-from .files import sha256_of, write_together
+from .files import write_together
 from .planned import PlannedCamera, PlannedProjector
 from .requirements import Requirements
 from .surface import Surface
@@ -103,14 +103,8 @@ class RigPlan:
         path = Path(path)
         text = _read_text(path)
         name, digest = _surface_of(text, path)
-        surface_path = path.parent / name
-        # Before it is read: what was damaged on the way may break any reader.
-        if surface_path.is_file() and digest not in (None, sha256_of(surface_path)):
-            raise PlanFileError(
-                f"{surface_path}: its SHA-256 isn't the one in {path.name}; "
-                f"the two files must come from one run"
-            )
-        return cls._parsed(text, Surface.load(surface_path), str(path))
+        surface = Surface.load(path.parent / name, digest)
+        return cls._parsed(text, surface, str(path))
 
     @classmethod
     def _parsed(cls, text: str, surface: Surface, where: str) -> Self:
@@ -133,7 +127,7 @@ def _read_text(path: Path) -> str:
         raise PlanFileError(f"{path}: not readable ({error})") from None
 
 
-def _surface_of(text: str, path: Path) -> tuple[str, object]:
+def _surface_of(text: str, path: Path) -> tuple[str, str | None]:
     """Return name and digest of a plan's surface, of a plan of our version.
 
     Raises:
@@ -152,7 +146,11 @@ def _surface_of(text: str, path: Path) -> tuple[str, object]:
     surface = document.get("surface")
     table = surface if isinstance(surface, dict) else {}
     name, digest = table.get("path"), table.get("sha256")
-    return name if isinstance(name, str) else "surface.npz", digest
+    # What is no name or digest is refused with the rest of the document.
+    return (
+        name if isinstance(name, str) else "surface.npz",
+        digest if isinstance(digest, str) else None,
+    )
 
 
 def _faults(error: ValidationError) -> str:

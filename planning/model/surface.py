@@ -93,15 +93,29 @@ class Surface:
         return buffer.getvalue()
 
     @classmethod
-    def load(cls, path: Path) -> "Surface":
+    def load(cls, path: Path, sha256: str | None = None) -> "Surface":
         """Read `surface.npz`.
 
+        Args:
+            path: The file.
+            sha256: Its digest as the plan has it; None: it isn't compared.
+
         Raises:
-            PlanFileError: If the file is missing, broken or lacks an array.
+            PlanFileError: If the file is missing, another one than the plan's, broken,
+                or lacks an array.
         """
         try:
-            with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as archive:
+            content = path.read_bytes()
+            # Before it is unpacked: what was damaged on the way may break any reader.
+            if sha256 not in (None, hashlib.sha256(content).hexdigest()):
+                raise PlanFileError(
+                    f"{path}: its SHA-256 isn't the one in the plan; "
+                    f"the two files must come from one run"
+                )
+            with np.load(BytesIO(content), allow_pickle=False) as archive:
                 arrays = {name: archive[name] for name in _ARRAYS}
+        except PlanFileError:
+            raise
         except FileNotFoundError:
             raise PlanFileError(
                 f"{path}: no such file; the surface must stand beside the plan, "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import Light
+from .compiled import Light, check_program
 
 # The largest ring is kept by this share, well above IPOPT's tolerance.
 INSET = 1e-6
@@ -64,12 +64,7 @@ class AxisProgram:
         shapes = {"points": (n, 3), "rays": (n, k, 3), "slopes": (n, k, 2, 3)}
         shapes |= {name: (n, k) for name in ("noise", "placement_m", "facing")}
         shapes |= {"others": (n,), "held": (len(self.held), 3), "start": (2,)}
-        for name, shape in shapes.items():
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            if value.shape != shape or not np.all(np.isfinite(value)):
-                raise ValueError(f"{name} must be finite and {shape}")
-        if self.light not in ("diverging", "parallel"):
-            raise ValueError(f"light is {self.light!r}, not diverging or parallel")
+        check_program(self, self.light, shapes)
         for name in ("ring_radius", "gap", "min_conditioning"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise ValueError(f"{name} is {getattr(self, name)}, must be positive")

@@ -3,9 +3,11 @@
 IPOPT has exact derivatives and strict limits, and says nothing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
+
+import numpy as np
 
 Light = Literal["diverging", "parallel"]
 
@@ -17,6 +19,27 @@ SILENT: dict[str, Any] = {
     "ipopt.sb": "yes",
     "ipopt.linear_solver": "mumps",
 }
+
+
+def check_program(
+    program: object, light: str, shapes: Mapping[str, tuple[int, ...]]
+) -> None:
+    """Refuse a program's data.
+
+    Args:
+        program: Has the arrays as attributes.
+        light: Must be a kind of light.
+        shapes: Of each array by its name; all must be finite.
+
+    Raises:
+        ValueError: If something can't be used.
+    """
+    for name, shape in shapes.items():
+        value = np.asarray(getattr(program, name), dtype=np.float64)
+        if value.shape != shape or not np.all(np.isfinite(value)):
+            raise ValueError(f"{name} must be finite and {shape}")
+    if light not in get_args(Light):
+        raise ValueError(f"light is {light!r}, not diverging or parallel")
 
 
 def slots_for(n: int, sizes: Sequence[int]) -> int:

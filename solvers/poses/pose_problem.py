@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import Light
+from .compiled import Light, check_program
 
 # Hard limits are kept by this share of the size, well above IPOPT's tolerance.
 INSET = 1e-6
@@ -76,12 +76,7 @@ class PoseProgram:
             raise ValueError("points is empty: a pose needs a sample to serve")
         shapes = {"points": (n, 3), "normals": (n, 3), "steep": (n, 3)}
         shapes |= {"world_from_device": (4, 4), "centre": (3,), "axis": (3,)}
-        for name, shape in shapes.items():
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            if value.shape != shape or not np.all(np.isfinite(value)):
-                raise ValueError(f"{name} must be finite and {shape}")
-        if self.light not in ("diverging", "parallel"):
-            raise ValueError(f"light is {self.light!r}, not diverging or parallel")
+        check_program(self, self.light, shapes)
         for name in ("range_m", "shell_m"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high < np.inf:

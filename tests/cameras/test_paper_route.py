@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.closed_forms import cylinder_limit, round_body_limit, sphere_band_limit
+from support.factories import make_workspace
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
@@ -18,7 +19,6 @@ from planning.cameras.paper.route_problem import CameraSet, RouteProblem
 from planning.cameras.paper.route_starts import grown
 from planning.model.bodies import Box
 from planning.model.planned import PlannedCamera
-from planning.model.requirements import Workspace
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0
@@ -31,21 +31,7 @@ ETA = round_body_limit(RADIUS, RING, THETA).half_angle
 
 
 def workspace(**changes):
-    values = {
-        "centre": (0.0, 0.0, 0.0),
-        "object_radius_m": RADIUS,
-        "up": (0.0, 0.0, 1.0),
-        "axis": (0.0, 0.0, 1.0),
-        "half_angle": np.pi,
-        "projector_radius_m": (RING, RING),
-        "camera_radius_m": (RING, RING),
-        "floor_m": None,
-        "n_reference_projectors": 1,
-        "n_reference_cameras": 1,
-        "reference_ring_radius": 1.0,
-        **changes,
-    }
-    return Workspace(**values)
+    return make_workspace(RADIUS, RING, **changes)
 
 
 def camera_at(direction):

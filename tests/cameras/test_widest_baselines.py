@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from support.closed_forms import round_body_limit
+from support.factories import make_workspace
 
 from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap, look_at
@@ -19,7 +20,7 @@ from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import maximise_baselines
 from planning.model.bodies import Box
 from planning.model.planned import PlannedCamera
-from planning.model.requirements import TriangulationLimits, Workspace
+from planning.model.requirements import TriangulationLimits
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED
 from planning.scene.measurability import first_pair_failure, pair_quality
@@ -36,21 +37,7 @@ DEVICE = PinholeModel(
 
 
 def _workspace(**changes):
-    values = {
-        "centre": (0.0, 0.0, 0.0),
-        "object_radius_m": RADIUS,
-        "up": (0.0, 0.0, 1.0),
-        "axis": (0.0, 0.0, 1.0),
-        "half_angle": np.pi,
-        "projector_radius_m": (RING, RING),
-        "camera_radius_m": (RING, RING),
-        "floor_m": None,
-        "n_reference_projectors": 1,
-        "n_reference_cameras": 1,
-        "reference_ring_radius": 1.0,
-        **changes,
-    }
-    return Workspace(**values)
+    return make_workspace(RADIUS, RING, **changes)
 
 
 def _cameras(*directions, roll=0.3):

@@ -12,7 +12,7 @@ import pytest
 
 import planning
 from planning.cli.main import main
-from planning.cli.other_commands import write_sample
+from planning.cli.sample_command import write_sample
 from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -146,7 +146,7 @@ def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(
     )
     # What is false shows without the pixels, which the good plan was held against.
     audit_alone = partial(verify_plan, check_pixels=False)
-    monkeypatch.setattr("planning.cli.other_commands.verify_plan", audit_alone)
+    monkeypatch.setattr("planning.cli.verify_command.verify_plan", audit_alone)
     code, out, err = in_process(monkeypatch, capsys, "verify", spoiled, "--quiet")
     assert (code, err) == (1, "")
     assert "measured_m2" in out

@@ -22,13 +22,7 @@ from planning.model.plan import RigPlan
 def folder(rigs, tmp_path_factory) -> Path:
     """A plan of one projector and two cameras in files; its mesh is in inches."""
     body = rigs.bumpy_sphere(0.05, subdivisions=4)
-    cameras = [
-        rigs.camera("C1", rigs.direction(-5.0, -20.0)),
-        rigs.camera("C2", rigs.direction(10.0, 35.0)),
-    ]
-    for entry in cameras:
-        entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
-        entry["resolution"] = [320, 240]
+    cameras = rigs.two_small_cameras()
     lamp = rigs.diverging("P1", rigs.direction(-30.0, 5.0), 0.055, 6.2e-3)
     plan = rigs.plan_of(
         body,

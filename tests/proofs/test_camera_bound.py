@@ -26,7 +26,7 @@ from planning.model.document.certificates import (
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing
-from planning.proofs import all_poses
+from planning.proofs import all_poses, camera_bound
 from planning.proofs.camera_bound import DEFAULT, PROVE, bound_cameras, camera_trees
 from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
@@ -102,6 +102,23 @@ def bounded(scene, share, count, *, n=300, effort=EFFORT, device=None):
     required = int(np.ceil(share * n - 1e-9))
     question = all_poses.BoundQuestion(required, count, n, rows.target.samples.weight)
     return bound_cameras(scene, device or lens(), rows, question, effort)
+
+
+def test_shadows_are_drawn_only_where_the_first_search_leaves_a_doubt(monkeypatch):
+    """One camera sees less than half of a ball: two are proved without any shadow."""
+    drawn = []
+    shadow_maps = camera_bound._shadow_maps
+
+    def noted(*given):
+        drawn.append(given)
+        return shadow_maps(*given)
+
+    monkeypatch.setattr(camera_bound, "_shadow_maps", noted)
+    ball = scene_of(sphere(0.1, subdivisions=3), limits=dict(FREE))
+    assert bounded(ball, 0.6, 2).found.status is CellStatus.PROVED
+    assert not drawn
+    assert bounded(ball, 0.6, 4).found.status is not CellStatus.PROVED
+    assert len(drawn) == 1
 
 
 # ---- under attack

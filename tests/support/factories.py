@@ -7,7 +7,7 @@ import numpy as np
 from geometry.mesh.mesh import TriangleMesh
 from planning import Rig, load_rig
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Requirements
+from planning.model.requirements import Requirements, Workspace
 from planning.rig.wishes import Wishes
 from planning.scene.scene import Scene
 
@@ -44,6 +44,24 @@ def make_scene(
         seed=0,
         threads=1,
     )
+
+
+def make_workspace(object_radius: float, away: float, **changes: Any) -> Workspace:
+    """The whole shell at one distance about an object at the origin."""
+    values = {
+        "centre": (0.0, 0.0, 0.0),
+        "object_radius_m": object_radius,
+        "up": (0.0, 0.0, 1.0),
+        "axis": (0.0, 0.0, 1.0),
+        "half_angle": np.pi,
+        "projector_radius_m": (away, away),
+        "camera_radius_m": (away, away),
+        "floor_m": None,
+        "n_reference_projectors": 1,
+        "n_reference_cameras": 1,
+        "reference_ring_radius": 1.0,
+    }
+    return Workspace(**(values | changes))
 
 
 def make_projector(rig: Rig, radii: Any, **changes: Any) -> PlannedProjector:

@@ -82,6 +82,18 @@ def camera(
     }
 
 
+def two_small_cameras() -> list[dict]:
+    """Two cameras of 320 x 240 px, before an object of 10 cm."""
+    cameras = [
+        camera("C1", direction(-5.0, -20.0)),
+        camera("C2", direction(10.0, 35.0)),
+    ]
+    for entry in cameras:
+        entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
+        entry["resolution"] = [320, 240]
+    return cameras
+
+
 def diverging(
     name: str, position: np.ndarray, reach: float, gap: float
 ) -> dict[str, Any]:

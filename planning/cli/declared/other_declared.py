@@ -29,7 +29,7 @@ from planning.cli.console import debug_option, output_options, run, threads_opti
 @output_options
 def verify(**options: Any) -> None:  # noqa: ANN401
     """Recompute every claim from the files alone, then check from pixels."""
-    from planning.cli.other_commands import verify_command
+    from planning.cli.verify_command import verify_command
 
     run(lambda: verify_command(options), debug=options["debug"])
 
@@ -79,6 +79,6 @@ def schema(debug: bool) -> None:
 @debug_option
 def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
     """Write the sample head, an OBJ file in millimetres."""
-    from planning.cli.other_commands import sample_command
+    from planning.cli.sample_command import sample_command
 
     run(lambda: sample_command(output, faces, variant), debug=debug)

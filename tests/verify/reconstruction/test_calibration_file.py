@@ -22,13 +22,7 @@ from planning.verify.reconstruction.scanner import Scanner
 def plan(request, rigs) -> RigPlan:
     """One projector and two cameras of 320 x 240 px before a waved ball of 10 cm."""
     make = rigs.diverging if request.param == "diverging" else rigs.parallel
-    cameras = [
-        rigs.camera("C1", rigs.direction(-5.0, -20.0)),
-        rigs.camera("C2", rigs.direction(10.0, 35.0)),
-    ]
-    for entry in cameras:
-        entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
-        entry["resolution"] = [320, 240]
+    cameras = rigs.two_small_cameras()
     lamp = make("P1", rigs.direction(-30.0, 5.0), 0.055, 6.2e-3)
     body = rigs.bumpy_sphere(0.05, subdivisions=4)
     plan = rigs.plan_of(body, [lamp], cameras, check=rigs.CHECK | {"tau_m": 6.2e-3})

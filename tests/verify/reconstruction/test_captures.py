@@ -50,13 +50,7 @@ def small_plan(rigs, light: str) -> RigPlan:
         make("P2", rigs.direction(25.0, 15.0), 0.055, 5.5e-3),
     ]
     projectors[0]["ring_radii"] = projectors[0]["ring_radii"][:31]
-    cameras = [
-        rigs.camera("C1", rigs.direction(-5.0, -20.0)),
-        rigs.camera("C2", rigs.direction(10.0, 35.0)),
-    ]
-    for entry in cameras:
-        entry["K"] = [[1600.0, 0.0, 159.5], [0.0, 1600.0, 119.5], [0.0, 0.0, 1.0]]
-        entry["resolution"] = [320, 240]
+    cameras = rigs.two_small_cameras()
     body = rigs.bumpy_sphere(0.05, subdivisions=4)
     plan = rigs.plan_of(body, projectors, cameras, check=rigs.CHECK | {"tau_m": 6.2e-3})
     return plan

@@ -1,0 +1,48 @@
+"""What `plan verify` does."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from geometry.files.readers import UNITS, load_mesh
+from geometry.mesh.mesh import TriangleMesh
+from planning.model.plan import RigPlan
+from planning.verify.verification import verify_plan
+
+from .console import cores, print_json, reporter
+
+
+def verify_command(options: Mapping[str, Any]) -> int:
+    """Audit and check a plan; return 0 if every claim holds, 1 if not."""
+    report = reporter(quiet=options["quiet"])
+    plan = RigPlan.load(options["plan_file"])
+    mesh = None
+    if options["mesh"] is not None:
+        mesh = _same_scale(options["mesh"], plan)
+    truth = None if options["truth"] is None else RigPlan.load(options["truth"])
+    seed = {} if options["seed"] is None else {"seed": options["seed"]}
+    found = verify_plan(
+        plan,
+        mesh,
+        truth=truth,
+        threads=options["threads"] or cores(),
+        progress=report,
+        **seed,
+    )
+    if options["as_json"]:
+        print_json(found.to_document())
+    else:
+        click.echo(found.summary())
+    return 0 if found.passed else 1
+
+
+def _same_scale(path: Path, plan: RigPlan) -> TriangleMesh:
+    """Read a mesh in the unit of the plan's, or at its size where a size was given."""
+    unit = plan.document.meshes[0].unit
+    if unit in UNITS:
+        return load_mesh(path, unit=unit)
+    size = np.ptp(plan.surface.mesh.bounds, axis=0).max()
+    return load_mesh(path, size_mm=1e3 * float(size))
