@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from planning.cameras.camera_cover import NothingMeasuredError, n_fixed
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.planned import PlannedCamera
+from planning.model.words import percent
 from planning.proofs.selection import required_samples
 from planning.report.claims import Claims, Devices
 from planning.rig.rig import Rig
@@ -104,8 +105,8 @@ def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str
         table.add(scene=scene, camera=camera, samples=samples)
     share = Share(len(samples.target), 0, scene.requirements.min_reachable)
     steps = [
-        f"{step['change']} would make {100.0 * step['reachable_share']:.1f} % of what "
-        f"is lit measurable"
+        f"{step['change']} would make {percent(step['reachable_share'])} of what is "
+        f"lit measurable"
         for step in share.gains(table.least_changes(share))
     ]
     if not steps:
