@@ -16,6 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from support import reconstruction_rigs
+from support.image_overlap import (
+    overlap_by_frames,
+    overlap_by_intensity,
+)
 from support.plain_shapes import box
 from support.reconstruction_rigs import reconstruct_plan
 from support.white_frames import balanced_accuracy, best_threshold, render_whites
@@ -34,10 +38,6 @@ from planning.verify.reconstruction.calibration import (
 from planning.verify.reconstruction.check.accuracy import (
     measure_accuracy,
     nearest_distance,
-)
-from planning.verify.reconstruction.check.image_overlap import (
-    overlap_by_frames,
-    overlap_by_intensity,
 )
 from planning.verify.reconstruction.faults.missing import light_falls
 from planning.verify.reconstruction.render.photometry import Photometry

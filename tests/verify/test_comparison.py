@@ -8,18 +8,24 @@ import pytest
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
+from planning.model.document.check_records import ConfusionRecord
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.prediction import receding
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.reconstruction.check.accuracy import Accuracy
 from planning.verify.reconstruction.check.comparison import (
-    Confusion,
     PredictedSamples,
     compare,
+    confusion,
 )
 from planning.verify.reconstruction.cloud import Cloud
 
 TAU = 1e-3
+
+
+def areas(table: ConfusionRecord) -> tuple[float, ...]:
+    """Predicted and measured, missing, unexpected, neither, beside."""
+    return tuple(table.to_document().values())[:5]
 
 
 def cloud_at(points: np.ndarray) -> Cloud:
@@ -53,32 +59,32 @@ def four():
 
 
 def test_areas_are_counted_by_what_was_said_and_what_was_found(four):
-    table = four.tables["target"]["limits"]
-    assert table == Confusion(1 / 6, 3 / 6, 2 / 6, 0.0, 0.0)
+    table = four.confusion.target.limits
+    assert areas(table) == (1 / 6, 3 / 6, 2 / 6, 0.0, 0.0)
     assert table.agreement == pytest.approx(1 / 6)
-    assert table.trivial == pytest.approx(3 / 6)
-    whole = four.tables["surface"]
-    assert whole["limits"] == Confusion(0.1, 0.3, 0.2, 0.4, 0.0)
-    assert whole["floors"] == Confusion(0.3, 0.0, 0.0, 0.7, 0.0)
-    assert whole["floors"].agreement == 1.0
-    assert whole["floors"].trivial == pytest.approx(0.7)
+    assert table.trivial_agreement == pytest.approx(3 / 6)
+    whole = four.confusion.surface
+    assert areas(whole.limits) == (0.1, 0.3, 0.2, 0.4, 0.0)
+    assert areas(whole.floors) == (0.3, 0.0, 0.0, 0.7, 0.0)
+    assert whole.floors.agreement == 1.0
+    assert whole.floors.trivial_agreement == pytest.approx(0.7)
 
 
 def test_every_region_has_its_own_row(four):
-    first, second = four.regions
-    assert (first["id"], second["id"]) == (0, 1)
-    assert first["measured"] == first["predicted"] == 1.0
-    assert first["predicted_missing"] == 0.0
-    assert second["measured"] == pytest.approx(2 / 5)
-    assert second["predicted_missing"] == 1.0
-    assert first["rms_m"] == pytest.approx(3e-5)
-    assert second["bias_m"] == pytest.approx(-4e-5)
-    assert four.dominant["n_points"] == 2
-    assert four.dominant["predicted_missing"] == pytest.approx(3 / 4)
-    assert four.surface["measured"] == pytest.approx(0.3)
+    first, second = four.by_region
+    assert (first.id, second.id) == (0, 1)
+    assert first.measured == first.predicted == 1.0
+    assert first.predicted_missing == 0.0
+    assert second.measured == pytest.approx(2 / 5)
+    assert second.predicted_missing == 1.0
+    assert first.rms_m == pytest.approx(3e-5)
+    assert second.bias_m == pytest.approx(-4e-5)
+    assert four.dominant.n_points == 2
+    assert four.dominant.predicted_missing == pytest.approx(3 / 4)
+    assert four.whole_surface.measured == pytest.approx(0.3)
 
 
-def beside(normal, centre) -> Confusion:
+def beside(normal, centre) -> ConfusionRecord:
     """Table with a sample that isn't predicted, half a gap from one that is."""
     points = np.array([[0.0, 0.0, 0.0], [0.5 * TAU, 0.0, 0.0], [1.0, 0.0, 0.0]])
     normals = np.array([[0.0, 0.0, 1.0], normal, [0.0, 0.0, 1.0]])
@@ -93,25 +99,25 @@ def beside(normal, centre) -> Confusion:
         claimed,
     )
     found = compare(prediction, cloud_at(points[:1]), None, np.full(3, -1), TAU)
-    return found.tables["surface"]["limits"]
+    return found.confusion.surface.limits
 
 
 def test_what_lies_beside_predicted_surface_is_counted_apart():
     table = beside([0.0, 0.0, 1.0], [0.0, 0.0, 9.0])
-    assert table == Confusion(1 / 3, 0.0, 0.0, 1 / 3, 1 / 3)
+    assert areas(table) == (1 / 3, 0.0, 0.0, 1 / 3, 1 / 3)
     assert table.agreement == 1.0
-    assert table.trivial == pytest.approx(0.5)
+    assert table.trivial_agreement == pytest.approx(0.5)
 
 
 def test_surface_that_faces_away_from_the_camera_isnt_beside():
     """On a thin wall the other side is near, too."""
     table = beside([0.0, 0.0, -1.0], [0.0, 0.0, 9.0])
-    assert table == Confusion(1 / 3, 0.0, 0.0, 2 / 3, 0.0)
+    assert areas(table) == (1 / 3, 0.0, 0.0, 2 / 3, 0.0)
 
 
 def test_of_no_area_nothing_is_said():
     sure = np.ones(2, bool)
-    table = Confusion.of(sure, sure, sure, np.zeros(2))
+    table = confusion(sure, sure, sure, np.zeros(2))
     assert table.neither == 1.0
     assert table.agreement == 1.0
 

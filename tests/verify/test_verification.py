@@ -53,14 +53,14 @@ def test_pixels_judge_the_audits_own_samples(verified):
 
 
 def test_what_is_measured_is_what_physics_was_predicted_to_allow(verified):
-    tables = verified[0].reconstruction.comparison.tables["surface"]
+    tables = verified[0].reconstruction.comparison.confusion.surface
     # Here ranges of the devices bind, and the simulated ones are sharp beyond them.
-    assert tables["floors"].agreement >= 0.94
-    assert tables["floors"].agreement > tables["floors"].trivial + 0.02
-    assert tables["floors"].missing <= 0.01
+    assert tables.floors.agreement >= 0.94
+    assert tables.floors.agreement > tables.floors.trivial_agreement + 0.02
+    assert tables.floors.missing <= 0.01
     # The plan's limits are the stricter ones: more is measured, hardly any less.
-    assert tables["limits"].missing <= 0.002
-    assert tables["limits"].unexpected > tables["floors"].unexpected
+    assert tables.limits.missing <= 0.002
+    assert tables.limits.unexpected > tables.floors.unexpected
 
 
 def test_a_false_confusion_table_is_named(handmade, verified):

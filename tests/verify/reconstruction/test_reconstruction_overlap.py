@@ -2,6 +2,11 @@
 
 import numpy as np
 import pytest
+from support.image_overlap import (
+    overlap_by_frames,
+    overlap_by_intensity,
+    three_classes,
+)
 from support.reconstruction_rigs import ringed
 from support.white_frames import balanced_accuracy, best_threshold, render_whites
 
@@ -11,11 +16,6 @@ from geometry.shapes.primitives import sphere
 from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
-)
-from planning.verify.reconstruction.check.image_overlap import (
-    overlap_by_frames,
-    overlap_by_intensity,
-    three_classes,
 )
 from planning.verify.reconstruction.faults.missing import light_falls, lit_twice
 from planning.verify.reconstruction.render.photometry import Photometry

@@ -5,13 +5,18 @@ So may samples in the shade, a little beside what is lit: whether these are says
 of the prediction, and they are counted apart.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from geometry.mesh.sampling import SurfaceSamples
+from planning.model.document.check_records import (
+    ConfusionPair,
+    ConfusionRecord,
+    ConfusionRecords,
+    SurfaceShare,
+)
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
 
@@ -52,94 +57,21 @@ class PredictedSamples:
         return nearest_distance(ideal, self.samples, 1.01 * tau_m) <= tau_m
 
 
-@dataclass(frozen=True)
-class Confusion:
-    """Areas by what was predicted and what was measured, as shares of their sum.
-
-    Attributes:
-        both: Predicted, and measured.
-        missing: Predicted, but not measured.
-        unexpected: Measured, though nothing within tau was predicted.
-        neither: Not measured, and nothing within tau was predicted.
-        beside: Not predicted, but within tau of what was: either may be.
-    """
-
-    both: float
-    missing: float
-    unexpected: float
-    neither: float
-    beside: float
-
-    @classmethod
-    def of(
-        cls, predicted: Mask, near: Mask, measured: Mask, weights: Array
-    ) -> "Confusion":
-        """Count areas; of no area at all, nothing was predicted nor measured.
-
-        Args:
-            predicted: Samples predicted measurable, shape (n,).
-            near: Samples within tau of predicted ones, shape (n,).
-            measured: Samples within tau of a point, shape (n,).
-            weights: Area of each [m²], shape (n,).
-        """
-        total = float(weights.sum())
-        if not total > 0.0:
-            return cls(0.0, 0.0, 0.0, 1.0, 0.0)
-        far = ~predicted & ~near
-        cells = (
-            predicted & measured,
-            predicted & ~measured,
-            far & measured,
-            far & ~measured,
-            ~predicted & near,
-        )
-        return cls(*(float(weights[cell].sum()) / total for cell in cells))
-
-    @property
-    def agreement(self) -> float:
-        """Share of which the prediction is right, of all that isn't beside."""
-        right, wrong = self.both + self.neither, self.missing + self.unexpected
-        return right / (right + wrong) if right > 0.0 else 0.0
-
-    @property
-    def trivial(self) -> float:
-        """Agreement of the better of two predictors: all, or nothing, is measured."""
-        yes, no = self.both + self.unexpected, self.missing + self.neither
-        return max(yes, no) / (yes + no) if yes + no > 0.0 else 0.0
-
-    def to_document(self) -> dict[str, float]:
-        """Return plain JSON values."""
-        derived = {"agreement": self.agreement, "trivial_agreement": self.trivial}
-        return asdict(self) | derived
-
-
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """PredictedSamples against measurement, and what every part of the surface got.
+    """Prediction against measurement, as a plan file records it.
 
     Attributes:
-        tables: By `target` and `surface`, then by `limits` (of the plan) and `floors`.
-        regions: A row for each dominant region.
-        dominant: A row for all of them together; None without any.
-        surface: A row for the whole mesh.
+        confusion: Of target and surface, by the plan's limits and by the floors.
+        by_region: What each dominant region got.
+        dominant: What all of them together got; None without any.
+        whole_surface: What the whole mesh got.
     """
 
-    tables: Mapping[str, Mapping[str, Confusion]]
-    regions: tuple[dict[str, Any], ...]
-    dominant: dict[str, Any] | None
-    surface: dict[str, Any]
-
-    def to_document(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        return {
-            "confusion": {
-                part: {by: table.to_document() for by, table in tables.items()}
-                for part, tables in self.tables.items()
-            },
-            "by_region": list(self.regions),
-            "dominant": self.dominant,
-            "whole_surface": self.surface,
-        }
+    confusion: ConfusionRecords
+    by_region: tuple[SurfaceShare, ...]
+    dominant: SurfaceShare | None
+    whole_surface: SurfaceShare
 
 
 def compare(
@@ -160,47 +92,86 @@ def compare(
     """
     distance = nearest_distance(everything, prediction.samples, 1.01 * tau_m)
     measured = distance <= tau_m
-    weights = prediction.weights
-    parts = {
-        "target": prediction.in_target,
-        "surface": np.ones(len(measured), dtype=bool),
-    }
-    predictions = {
-        by: (_by_any(by_camera), prediction.widened(by_camera, tau_m))
-        for by, by_camera in (
-            ("limits", prediction.claimed),
-            ("floors", prediction.possible),
+    everywhere = np.ones(len(measured), dtype=bool)
+    by_limits, by_floors = (
+        (by_camera.any(axis=0), prediction.widened(by_camera, tau_m))
+        for by_camera in (prediction.claimed, prediction.possible)
+    )
+
+    def tables(area: Mask) -> ConfusionPair:
+        limits, floors = (
+            confusion(
+                predicted[area], near[area], measured[area], prediction.weights[area]
+            )
+            for predicted, near in (by_limits, by_floors)
         )
-    }
-    tables = {
-        name: {
-            by: Confusion.of(own[part], near[part], measured[part], weights[part])
-            for by, (own, near) in predictions.items()
-        }
-        for name, part in parts.items()
-    }
+        return ConfusionPair(limits=limits, floors=floors)
 
-    def row(part: Mask, faces: Mask) -> dict[str, Any]:
-        return _row(prediction, measured, part) | _errors(accuracy, faces)
+    def share(area: Mask, faces: Mask, **id_of_region: int) -> SurfaceShare:
+        shares = _shares(prediction, measured, area)
+        return SurfaceShare(**id_of_region, **shares, **_errors(accuracy, faces))
 
-    ids = [int(i) for i in np.unique(face_region[face_region >= 0])]
     dominant = face_region >= 0
+    ids = [int(i) for i in np.unique(face_region[dominant])]
     return Comparison(
-        tables,
-        tuple({"id": i, **row(prediction.region == i, face_region == i)} for i in ids),
-        row(prediction.region >= 0, dominant) if ids else None,
-        row(parts["surface"], np.ones(len(face_region), dtype=bool)),
+        ConfusionRecords(
+            target=tables(prediction.in_target), surface=tables(everywhere)
+        ),
+        tuple(share(prediction.region == i, face_region == i, id=i) for i in ids),
+        share(prediction.region >= 0, dominant) if ids else None,
+        share(everywhere, np.ones(len(face_region), dtype=bool)),
     )
 
 
-def _by_any(by_camera: Mask) -> Mask:
-    return np.asarray(by_camera.any(axis=0))
+def confusion(
+    predicted: Mask, near: Mask, measured: Mask, weights: Array
+) -> ConfusionRecord:
+    """Return areas by prediction and measurement, as shares of their sum.
+
+    What isn't predicted, but within tau of what was (`near`), is `beside`: either may
+    be. `agreement` is the share of the rest of which the prediction is right, and
+    `trivial_agreement` that of the better of two predictors: all, or nothing, is
+    measured. Of no area at all, nothing was predicted nor measured.
+
+    Args:
+        predicted: Samples predicted measurable, shape (n,).
+        near: Samples within tau of predicted ones, shape (n,).
+        measured: Samples within tau of a point, shape (n,).
+        weights: Area of each [m²], shape (n,).
+    """
+    total = float(weights.sum())
+    far = ~predicted & ~near
+    both, missing, unexpected, neither, beside = (0.0, 0.0, 0.0, 1.0, 0.0)
+    if total > 0.0:
+        both, missing, unexpected, neither, beside = (
+            float(weights[cell].sum()) / total
+            for cell in (
+                predicted & measured,
+                predicted & ~measured,
+                far & measured,
+                far & ~measured,
+                ~predicted & near,
+            )
+        )
+    right, wrong = both + neither, missing + unexpected
+    yes, no = both + unexpected, missing + neither
+    return ConfusionRecord(
+        both=both,
+        missing=missing,
+        unexpected=unexpected,
+        neither=neither,
+        beside=beside,
+        agreement=right / (right + wrong) if right > 0.0 else 0.0,
+        trivial_agreement=max(yes, no) / (yes + no) if yes + no > 0.0 else 0.0,
+    )
 
 
-def _row(prediction: PredictedSamples, measured: Mask, part: Mask) -> dict[str, Any]:
-    """Shares of a part of the surface; null where nothing of it was sampled."""
-    weights = prediction.weights[part]
-    claimed = _by_any(prediction.claimed)[part]
+def _shares(
+    prediction: PredictedSamples, measured: Mask, area: Mask
+) -> dict[str, float | None]:
+    """Shares of a part of the surface; None where nothing of it was sampled."""
+    weights = prediction.weights[area]
+    claimed = prediction.claimed.any(axis=0)[area]
 
     def share(of: Mask, among: Mask) -> float | None:
         total = float(weights[among].sum())
@@ -209,8 +180,8 @@ def _row(prediction: PredictedSamples, measured: Mask, part: Mask) -> dict[str, 
     whole = np.ones(len(weights), dtype=bool)
     return {
         "predicted": share(claimed, whole),
-        "measured": share(measured[part], whole),
-        "predicted_missing": share(~measured[part], claimed),
+        "measured": share(measured[area], whole),
+        "predicted_missing": share(~measured[area], claimed),
     }
 
 

@@ -99,7 +99,7 @@ class Reconstruction:
     def record(self) -> ReconstructionRecord:
         """Return the `reconstruction` part of a plan."""
         accuracy, complete, light = self.accuracy, self.completeness, self.photometry
-        compared = {} if self.comparison is None else self.comparison.to_document()
+        compared = {} if self.comparison is None else vars(self.comparison)
         return ReconstructionRecord(
             n_points=self.n_points,
             n_merged=self.n_merged,
