@@ -74,10 +74,6 @@ class BaselineSamples:
 
         It can't be where bodies collide or leave too little lit, nor where more is
         measured that no candidate covers than is spoken of as nothing.
-
-        Args:
-            cameras: As they are to stand.
-            least_lit: How many samples must stay lit.
         """
         none = np.zeros((len(self.lit.target), len(cameras)), dtype=bool)
         scene, samples = self.scene, self.lit
@@ -103,10 +99,6 @@ def baseline_samples(
 
     On a cover's samples, to which its cameras are fitted, a move seems to lose less
     than it does.
-
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As planned, with their rings.
     """
     lit = lit_samples(scene, projectors, scene.target_samples(DRAWS.baselines))
     return BaselineSamples(scene, tuple(projectors), lit)
@@ -120,11 +112,7 @@ def held_to_candidates(
 ) -> BaselineSamples:
     """Return the samples with which of them any candidate covers.
 
-    Args:
-        samples: For the baselines.
-        candidates: Over which the number of cameras was proved.
-        cover: Samples of the cover.
-        measured: Which candidate measures which of those, shape (n, m).
+    `measured` says which candidate measures which sample of the cover, (n, m).
     """
     if measured[cover.lit.any(axis=1)].any(axis=1).mean() >= _NEARLY:
         return samples
@@ -143,13 +131,8 @@ def widen_baselines(
 ) -> WidestBaselines:
     """Maximise the baselines of cameras; no move is taken that loses coverage.
 
-    Args:
-        samples: On which coverage is held.
-        cameras: As they stand.
-        max_evaluations: Times that coverage is evaluated, at most.
-        max_programs: Baseline programs at most.
-        spare_field: What is kept free of the half fields beyond seams [rad].
-        confirmed: Whether more samples must agree to each move.
+    `spare_field` [rad] of the half fields is kept free beyond seams; if `confirmed`,
+    more samples must agree to each move.
     """
     least_lit = samples.count_lit(cameras)
     return maximise_baselines(

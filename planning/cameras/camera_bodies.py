@@ -101,11 +101,6 @@ def lit_among(
 ) -> NDArray[np.bool_]:
     """Return which projector lights which sample past the bodies of planned cameras.
 
-    Args:
-        projectors: As planned.
-        samples: Lit without these cameras.
-        cameras: As they stand; existing ones were in the way before.
-
     Returns:
         Shape (n, n_projectors).
     """
@@ -124,11 +119,6 @@ def resolved_cover(
     cover: CameraCover,
 ) -> CameraCover:
     """Return a cover whose cameras are compatible, as `resolve_conflicts` says.
-
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As the cover was made for.
-        cover: Chosen without regard to bodies of cameras.
 
     Raises:
         InfeasibleLimitsError: If the body of every camera is in the way.

@@ -83,13 +83,7 @@ class CameraCover:
 def camera_candidate_views(
     scene: Scene, template: PlannedCamera, n_candidates: int
 ) -> CandidateViews:
-    """Return the candidates, existing cameras first: they are in every cover.
-
-    Args:
-        scene: Surface and requirements.
-        template: Optics of the camera.
-        n_candidates: Poses wanted.
-    """
+    """Return the candidates, existing cameras first: they are in every cover."""
     required = scene.requirements
     site = scene.site("camera", template.device)
 
@@ -108,11 +102,7 @@ def plan_cameras(
 ) -> CameraCover:
     """Choose the fewest cameras that measure the required share of what is lit.
 
-    Args:
-        scene: Surface and requirements.
-        projectors: As planned, with their rings.
-        candidates: What they saw they see again.
-        known: Candidates that may do with fewer than the search finds.
+    `known` candidates may do with fewer than the search finds.
 
     Raises:
         NothingMeasuredError: If no candidate measures any lit sample.
@@ -134,12 +124,6 @@ def confirmed_cover(
     """Choose cameras until fresh samples confirm that they measure enough.
 
     Samples that don't confirm it join those that the next choice is made on.
-
-    Args:
-        scene: Surface and requirements.
-        projectors: As planned, with their rings.
-        candidates: They say what is reachable.
-        choose: Cameras for lit samples, of which the candidates measure these.
 
     Raises:
         NothingMeasuredError: If no candidate measures any lit sample.
@@ -169,12 +153,6 @@ def measured_samples(
 ) -> tuple[LitSamples, NDArray[np.bool_]]:
     """Return the samples that are lit, and which candidate measures which.
 
-    Args:
-        scene: Surface and requirements.
-        projectors: As planned, with their rings.
-        candidates: They say what is reachable.
-        target: Samples; None: those that every cover begins with.
-
     Raises:
         NothingMeasuredError: If no candidate measures any; it names the limits that
             stop most samples.
@@ -199,12 +177,7 @@ def _measured(
 
 
 def candidate_cover(scene: Scene, measured: NDArray[np.bool_]) -> CandidateCover:
-    """Return what candidates measure, with what is required of cameras.
-
-    Args:
-        scene: Requirements and seed.
-        measured: Which candidate measures which sample, shape (n, m).
-    """
+    """Return what candidates measure, with what is required of cameras."""
     required = scene.requirements
     return CandidateCover(
         measured,

@@ -87,12 +87,6 @@ def better_route(
 ) -> tuple[CameraCover, RouteCounts, tuple[PlannedCamera, ...]]:
     """Return the cover that needs fewest cameras, and what either route needs.
 
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As planned, ring axes as the cameras were chosen for.
-        cover: From `cover_for` or `cover_again`.
-        by: The route that the user wants.
-
     Returns:
         Also as many cameras of the paper's route, where the cover's stay.
     """
@@ -148,12 +142,8 @@ def widest_route(
 ) -> tuple[CameraStage, WidestBaselines]:
     """Maximise baselines, or take the paper's cameras where theirs are clearly larger.
 
-    Args:
-        scene: Surface and requirements.
-        projectors: As planned, with even rings.
-        stage: Cameras, and those of the paper's route if it needs as many.
-        spare_field: What is kept free of the half fields beyond seams [rad]; the
-            paper's cameras moved without, so they aren't taken where there is any.
+    `spare_field` [rad] of the half fields is kept free beyond seams. The paper's
+    cameras moved without, so they aren't taken where there is any.
     """
     samples = held_to_candidates(
         baseline_samples(scene.among(projectors), projectors),
@@ -241,14 +231,7 @@ def _at_limit(scene: Scene, cover: CameraCover) -> tuple[PlannedCamera, ...]:
 def _compared(
     scene: Scene, before: CameraCover, after: CameraCover, route: RouteCameras
 ) -> RouteCounts:
-    """Say what either route needs, and why one of them is taken.
-
-    Args:
-        scene: Surface and requirements.
-        before: Cover over its own candidates.
-        after: Cover as it is kept.
-        route: The paper's route.
-    """
+    """Say what either route needs, and why one of them is taken."""
     cover, kept, paper = before.selection.needed, after.selection.needed, route.needed
     required = f"{100.0 * scene.requirements.coverage:g} % is asked"
     taken, why = "cover", "as many, and the paper's don't stand clearly farther apart"

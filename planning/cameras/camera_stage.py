@@ -40,14 +40,7 @@ def place_cameras(
     candidates: CandidateViews,
     by: CamerasBy = "both",
 ) -> CameraSolution:
-    """Choose cameras, move the ring axes for them, and see which route is better.
-
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As planned.
-        candidates: From `camera_candidate_views`.
-        by: Route to the cameras.
-    """
+    """Choose cameras, move the ring axes for them, and see which route is better."""
     cover = cover_for(scene, projectors, candidates, by)
     moved, cover = move_axes(scene, projectors, cover, by)
     cover, routes, rival = better_route(scene, moved, cover, by)
@@ -66,12 +59,6 @@ def move_axes(
     The cameras stay, for which the axes were moved, unless others measure notably more;
     then the axes move for these. All stays as it was where more cameras would be needed
     or less is measured.
-
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As planned.
-        cover: Cameras chosen for these ring axes.
-        by: Route to the cameras.
     """
     kept = projectors
     for _ in range(_ROUNDS):
@@ -116,13 +103,6 @@ def follow_cameras(
     What was proved of the number of cameras holds for one set of ring axes, so it is
     proved again; axes under which it no longer is this number, or less is proved, are
     dropped.
-
-    Args:
-        scene: Surface and requirements.
-        projectors: As planned, with even rings.
-        cameras: As they stand.
-        stage: Of these projectors; as many cameras as these.
-        by: Route to the cameras.
     """
     among = scene.among((*projectors, *cameras))
     moved = move_ring_axes(among, projectors, cameras, stage.cover.samples)
@@ -136,13 +116,7 @@ def follow_cameras(
 
 
 def proves_as_much(new: Selection, old: Certificate, count: int) -> bool:
-    """Return whether a selection takes so many cameras, met and bounded no worse.
-
-    Args:
-        new: Selection under other ring axes.
-        old: Certificate under those before.
-        count: Cameras that stand.
-    """
+    """Return whether a selection takes so many cameras, met and bounded no worse."""
     taken = len(new.chosen)
     return (
         taken == count

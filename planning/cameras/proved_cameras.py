@@ -67,14 +67,7 @@ def camera_stage(
 def bound_stage(
     scene: Scene, stage: CameraStage, device: PinholeModel, effort: Effort
 ) -> CameraStage:
-    """Return the stage with the bound over all poses in its certificate.
-
-    Args:
-        scene: Surface and requirements.
-        stage: Cameras from the cover, for the projectors and ring axes of its samples.
-        device: Optics of the cameras.
-        effort: What to spend.
-    """
+    """Return the stage with the bound over all poses in its certificate."""
     proof, cover = stage.certificate, stage.cover
     samples, measured = cover.samples, cover.measured
     n_samples = len(samples.target)

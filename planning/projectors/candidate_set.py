@@ -64,10 +64,8 @@ class CandidateSource:
     ) -> tuple[PlannedProjector, ...]:
         """Return poses close around those chosen, existing ones excepted.
 
-        Args:
-            chosen: Projectors.
-            n_lattice: Poses of the lattice that they are from.
-            scale: How far out, as a share of the lattice's spacing.
+        `n_lattice` is the number of poses of the lattice that they are from; `scale`
+        says how far out, as a share of its spacing.
         """
         between = projectors_around(
             movable(chosen),

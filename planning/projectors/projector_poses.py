@@ -50,10 +50,6 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     way is tried, then half, then a quarter, and a move that lowers the margin at the
     share isn't taken, nor one that leaves too few samples lit, nor one that lights what
     no candidate does: what is required, and was proved, is a share of what they cover.
-
-    Args:
-        scene: Surface and requirements.
-        stage: Projectors from the cover, and its samples.
     """
     samples, reached = stage.candidates.samples, stage.candidates.reached
     state = _Lit(scene, samples, list(stage.projectors), reached)

@@ -65,13 +65,7 @@ class ProjectorStage:
         selection: Selection,
         most_area: NDArray[np.int64] | None = None,
     ) -> "ProjectorStage":
-        """Return the stage of a selection, with compatible bodies and the certificate.
-
-        Args:
-            candidates: The poses.
-            selection: Those that are taken.
-            most_area: As many that light most; None: those that are taken.
-        """
+        """Return the stage of a selection: compatible bodies and the certificate."""
         cover, samples = candidates.cover, candidates.samples
         crowd = ProjectorInterference(candidates.projectors, samples, cover.covers)
         as_before, selection = selection, resolve_conflicts(crowd, cover, selection)
@@ -113,13 +107,6 @@ def plan_projectors(
     is solved again over all. A minimal cover overfits its samples; so it is tested on
     fresh ones, and where it falls short there, they join the samples and the cover is
     solved once more.
-
-    Args:
-        scene: Surface and requirements.
-        template: Optics and rings of the projector.
-        n_candidates: Poses of the lattice.
-        ring_offset: Tilt and azimuth of the ring axis until the cameras are known.
-        rounds: Covers at most, each with more samples.
 
     Raises:
         NothingLitError: If no candidate lights any sample.

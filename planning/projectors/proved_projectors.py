@@ -38,13 +38,6 @@ def prove_fewest(
 
     Where the bound leaves room for fewer projectors, candidates are offered there, and
     the cover is solved again.
-
-    Args:
-        scene: Surface and requirements.
-        stage: Projectors from the cover.
-        template: A projector; its pose doesn't count.
-        effort: What to spend on a bound.
-        ring_offset: Of candidates, as `projector_candidates` takes it.
     """
     source = CandidateSource(scene, template, ring_offset)
     while stage.certificate.needed.count > stage.certificate.given:

@@ -55,13 +55,7 @@ def margin_at_share(margin: NDArray[np.float64], required: int) -> float:
 
 
 def enough_lit(margin: NDArray[np.float64], required: int, before: int) -> bool:
-    """Return whether so many are lit that fresh samples can be expected to confirm it.
-
-    Args:
-        margin: As for `margin_at_share`.
-        required: Samples that count.
-        before: Samples that were lit before the change that is judged.
-    """
+    """Return whether so many are lit that fresh samples should confirm it."""
     lit = int(np.isfinite(margin).any(axis=1).sum())
     return lit >= min(before, int(np.ceil((1.0 + _SPARE) * required)))
 
@@ -78,13 +72,6 @@ def widest_selection(
 
     By steps that grow, then bisection: each cover program asks for most samples within
     a tighter limit.
-
-    Args:
-        margin: Of each sample and candidate, -inf where unlit, shape (n, m).
-        chosen: Candidates that light what is required.
-        required: Samples that count.
-        seed: Of the search.
-        n_existing: First candidates that are taken whatever they light.
     """
     lit_before = int(np.isfinite(margin[:, chosen]).any(axis=1).sum())
     best, low = chosen, margin_at_share(margin[:, chosen], required)
@@ -111,15 +98,7 @@ def widest_between(
     required: int,
     n_lattice: int,
 ) -> tuple[PlannedProjector, ...]:
-    """Return as many projectors at poses of larger margin, where there are any.
-
-    Args:
-        scene: Surface and requirements.
-        projectors: As chosen, without bodies; existing ones come first.
-        margins: Margin of each sample and projector, -inf where unlit, (n, k).
-        required: Samples that count.
-        n_lattice: Poses of the lattice from which they were chosen.
-    """
+    """Return as many projectors at poses of larger margin, where there are any."""
     n_existing = len(projectors) - len(movable(projectors))
     margin, last = margins(projectors), projectors[-1]
     source = CandidateSource(scene, last)

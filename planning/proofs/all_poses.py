@@ -75,12 +75,8 @@ class BoundQuestion:
     ) -> "BoundQuestion":
         """Return the question that a certificate over candidates leaves open.
 
-        Args:
-            certificate: As it stands.
-            reached: Samples that some candidate covers, shape (n,).
-            free: Those of them that existing devices cover, shape (n,).
-            share: Required of those reached.
-            area_m2: For which all n samples stand.
+        The samples reached, and those of them that existing devices cover, are (n,);
+        all n stand for `area_m2`.
         """
         n_free = int(free.sum())
         return cls(
@@ -93,12 +89,7 @@ class BoundQuestion:
         )
 
     def searched(self, tree: CellTree, budget: float) -> CellBound:
-        """Return what a search over cells of poses proves.
-
-        Args:
-            tree: Cells, each with a superset of the samples that its poses cover.
-            budget: Counted work.
-        """
+        """Return what a search over cells of poses proves."""
         required = np.array([float(self.required)])
         problem = CellProblem(np.ones(tree.n_rows), required)
         return bound_count(problem, tree, self.count, budget=budget)
@@ -141,12 +132,7 @@ class ContinuousBound:
 
 
 def with_existing_alone(certificate: Certificate, n_reached: int) -> Certificate:
-    """Return a certificate where existing devices suffice: no cells are searched.
-
-    Args:
-        certificate: As it stands.
-        n_reached: How many of its samples some candidate covers.
-    """
+    """Return a certificate where existing devices suffice: no cells are searched."""
     proof = ContinuousProof(
         lower_bound=certificate.given,
         status="proved",

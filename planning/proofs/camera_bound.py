@@ -47,13 +47,7 @@ def bound_cameras(
 ) -> ContinuousBound:
     """Bound the cameras over every pose of the workspace, for given projectors.
 
-    Args:
-        scene: Surface and requirements.
-        device: Optics of the cameras.
-        samples: Those that some candidate measures and no existing camera does, with
-            light and rings on them.
-        question: How many of them must be measured.
-        effort: What to spend.
+    The samples are those that some candidate measures and no existing camera does.
     """
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
@@ -78,12 +72,6 @@ def camera_trees(
     """Yield the trees to search, and whether shadows are counted in each.
 
     Cells of positions; finer ones among shadows; the same by aim, if that is of use.
-
-    Args:
-        scene: Surface and requirements.
-        device: Optics of the cameras.
-        samples: With light and rings on them.
-        effort: How fine they are.
     """
     space, drawn = scene.requirements.workspace, samples.target.samples
     limits = MeasurableCells(

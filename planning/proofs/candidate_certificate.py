@@ -30,13 +30,6 @@ def certificate(
     """Return the plan's certificate: what was proved, and over what.
 
     With existing devices, its bounds count them, and speak of covers that hold them.
-
-    Args:
-        cover: What candidates cover.
-        selection: Candidates taken.
-        others: The best candidates of other counts.
-        sample_area_m2: Area that a sample stands for.
-        bodied: Whether bodies of chosen devices may be in the way.
     """
     n_samples, n_candidates = cover.covers.shape
     count, existing = len(selection.chosen), cover.n_existing
@@ -113,11 +106,6 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
 
     Only for a cover that met its own rows: one that is short of devices anyway has
     said so.
-
-    Args:
-        stage: Projector or camera stage, a dataclass.
-        present: Devices in it now.
-        allowed: Devices at most; None for no limit.
     """
     count, before = len(present) + 1, stage.certificate
     met = before.status != "infeasible"

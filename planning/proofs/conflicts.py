@@ -104,11 +104,6 @@ def resolve_conflicts(
 
     It is the selection as it was where it covers what is required with all bodies in
     place. Its lower bound stays: bodies only take away.
-
-    Args:
-        crowd: The candidates.
-        cover: What they cover, but for bodies of other candidates.
-        selection: Chosen without regard to bodies.
     """
     if not crowd.bodied:
         return selection
@@ -152,14 +147,7 @@ def resolve_conflicts(
 def resolve_others(
     crowd: Interference, cover: CandidateCover, others: Marginals, taken: int
 ) -> Marginals:
-    """Return the best candidates of every other count that are compatible.
-
-    Args:
-        crowd: The candidates.
-        cover: As for `resolve_conflicts`.
-        others: Chosen without regard to bodies.
-        taken: The count whose conflicts are resolved already.
-    """
+    """Return the best candidates of every other count that are compatible."""
     if not crowd.bodied:
         return others
     by_count, n_covered = dict(others.by_count), dict(others.n_covered)

@@ -47,12 +47,7 @@ def bound_projectors(
 
     Field of view, beam and rings are left out: the bound holds for any of them.
 
-    Args:
-        scene: Surface and requirements.
-        template: A projector; its optics and light count, not its pose.
-        samples: Those that some candidate lights, and no existing projector does.
-        question: How many of them must be lit.
-        effort: What to spend.
+    The samples are those that some candidate lights and no existing projector does.
     """
     reach = mesh_reach(scene)
     if question.count <= 1:

@@ -120,13 +120,7 @@ class CandidateCover:
         warm_start: NDArray[np.int64] | None,
         budget: float = DEFAULT_BUDGET,
     ) -> tuple[NDArray[np.int64], int]:
-        """Return the candidates that cover most, and the proven most of so many.
-
-        Args:
-            count: Candidates taken.
-            warm_start: Candidates to begin from.
-            budget: Counted work.
-        """
+        """Return the candidates that cover most, and the proven most of so many."""
         best = solve_max_coverage(
             self.problem,
             count,
@@ -148,10 +142,7 @@ def select_fewest(
 
     After the count is known, the selection that covers most at that count is taken.
 
-    Args:
-        cover: What candidates cover.
-        known: Candidates that may cover as much with fewer than the search finds.
-        budget: Counted work of the search for the fewest.
+    `known` candidates may cover as much with fewer than the search finds.
     """
     solution = solve_cover(
         cover.problem,
@@ -195,12 +186,7 @@ def required_samples(reached: NDArray[np.bool_], share: float) -> int:
 
 
 def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
-    """Return the best candidates for every other count, for the table in the plan.
-
-    Args:
-        cover: As the selection was made from.
-        selection: As it is kept.
-    """
+    """Return the best candidates for every other count, for the table in the plan."""
     taken = len(selection.chosen)
     by_count: dict[int, NDArray[np.int64]] = {}
     n_covered: dict[int, tuple[int, int]] = {}
@@ -229,10 +215,7 @@ def others_instead(
 ) -> Marginals:
     """Return marginals with other candidates for each count, and the same bounds.
 
-    Args:
-        others: The best for each count, as found.
-        by_count: Candidates to report instead; counts without any are left out.
-        cover: As for `marginals`.
+    Counts for which there are none are left out.
     """
     reported = {n: by_count[n] for n in others.by_count if n in by_count}
     covered = {

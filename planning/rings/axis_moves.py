@@ -53,12 +53,6 @@ def move_ring_axes(
     samples are measured, neither of these nor of fresh ones, all that is lit of the
     surface stays inside the largest ring, and more are measured or the rms of s_N of
     each sample's best pair falls.
-
-    Args:
-        scene: Surface and requirements.
-        projectors: As planned, with even rings.
-        cameras: As planned.
-        samples: Lit samples that the cameras were chosen on.
     """
     fresh = lit_samples(scene, projectors, scene.target_samples(DRAWS.axes))
     judges = [AxisJudge.of(scene, cameras, lit) for lit in (samples, fresh)]
@@ -182,15 +176,7 @@ def axis_program(
     samples: LitSamples,
     views: Sequence[ViewedSamples],
 ) -> AxisProgram:
-    """State the axis program of projector p.
-
-    Args:
-        scene: Surface and requirements.
-        projectors: As they stand, with even rings.
-        p: Whose axis moves.
-        samples: Samples that they light.
-        views: How each camera sees them.
-    """
+    """State the axis program of projector p."""
     limits, projector = scene.requirements.triangulation, projectors[p]
     pose, device = projector.world_from_device, projector.device
     middle = ring_frame(pose, device, 0.0, 0.0)

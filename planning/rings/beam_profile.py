@@ -57,11 +57,7 @@ def cast_beam(
 
     Only light that leaves the projector is cast: a ring may reach beyond the panel.
 
-    Args:
-        scene: Surface and limits.
-        projector: Pose, optics and rings.
-        coordinates: Ring coordinates of the rows, rising and positive, shape (n_c,).
-        n_azimuths: Number of columns.
+    Coordinates are rising and positive, shape (n_c,).
     """
     step = 2.0 * np.pi / n_azimuths
     azimuths = np.arange(0.5, n_azimuths, dtype=np.float64) * step

@@ -39,12 +39,7 @@ class Creases:
 
 
 def find_creases(mesh: TriangleMesh, step: float) -> Creases:
-    """Return points at most `step` [m] apart along all edges that turn by over 40 deg.
-
-    Args:
-        mesh: The surface.
-        step: Longest piece [m].
-    """
+    """Return points at most `step` [m] apart along edges that turn by over 40 deg."""
     pairs, edge = face_pairs(mesh.edges)
     one, other = mesh.face_normals[pairs[:, 0]], mesh.face_normals[pairs[:, 1]]
     sharp = np.einsum("ij,ij->i", one, other) < np.cos(_SHARPEST_FACET)
@@ -65,11 +60,6 @@ def crease_errors(
 
     Along the beam, radially: a face of normal n rises by -(n.m)/(n.L) a metre across
     the rings; J is the difference of both faces', h the gap of the rings there.
-
-    Args:
-        scene: Surface and limits.
-        projector: With its rings.
-        creases: Of the surface.
 
     Returns:
         Lit on both sides; J h / 4 in [m], (n,) each.

@@ -62,10 +62,8 @@ class RingBeam:
     ) -> GapLimits:
         """Return the limits of the gaps; where nothing is lit rings are few.
 
-        Args:
-            samples: Ring coordinates of samples and the pitch of each with even rings
-                in [px], shape (2, n).
-            least_px: Least pitch that they keep [px].
+        `samples` are ring coordinates of samples, and the pitch of each with even rings
+        in [px], (2, n); `least_px` is the least pitch that they keep [px].
         """
         even = self.even_gap
         floor = least_gaps(samples[0], samples[1], even, least_px, self.edges)

@@ -30,11 +30,7 @@ def best_pitch(
 ) -> NDArray[np.float64]:
     """Return each projector's largest pitch among the cameras that measure a sample.
 
-    Args:
-        scene: Surface and limits.
-        projectors: With their rings.
-        views: What each camera sees of the samples.
-        samples: Lit samples; their light is used, their rings are computed anew.
+    The light of the samples is used; their rings are computed anew.
 
     Returns:
         In [px], 0 where no pair of this projector measures, shape (n, n_projectors).
@@ -105,12 +101,7 @@ def cells_at(
 def projector_gaps(
     projector: PlannedProjector, coordinates: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the gap of rings that is 3 projector pixels wide or more all round, (n,).
-
-    Args:
-        projector: Optics and ring frame.
-        coordinates: Ring coordinates, shape (n,).
-    """
+    """Return the ring gap that is 3 projector pixels wide or more all round, (n,)."""
     device = projector.device
     if not isinstance(device, PinholeModel):
         return np.full(

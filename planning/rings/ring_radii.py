@@ -24,13 +24,7 @@ def ring_frame_of_axis(
     device: PinholeModel | ParallelModel,
     axis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return ``world_from_ring`` of an axis in the coordinates of `ring_axis`.
-
-    Args:
-        world_from_device: Pose of the projector, shape (4, 4).
-        device: Its optics.
-        axis: a, shape (2,).
-    """
+    """Return ``world_from_ring`` of an axis in the coordinates of `ring_axis`."""
     if isinstance(device, ParallelModel):
         return world_from_device @ shifted_frame(axis)
     middle = ring_frame(np.eye(4), device, 0.0, 0.0)[:3, :3]
@@ -113,9 +107,7 @@ def least_pitch_px(limits: TriangulationLimits) -> float:
 def uniform_radii(outer: float, gap: float) -> NDArray[np.float64]:
     """Return equally spaced radii up to the outermost, increasing, shape (n,).
 
-    Args:
-        outer: Largest radius (or tangent).
-        gap: Largest step; it is shrunk so that equal steps end at `outer`.
+    The gap is shrunk so that equal steps end there.
     """
     n = max(2, int(np.ceil(outer / gap)))
     return outer * np.arange(1, n + 1) / n

@@ -23,13 +23,7 @@ _INSIDE = 1.0 - 1e-9
 def ring_shares(
     scene: Scene, projector: PlannedProjector, cameras: Sequence[PlannedCamera]
 ) -> RingSharesRecord:
-    """Return what becomes of a projector's rings, to a ten thousandth of the turn.
-
-    Args:
-        scene: Surface and limits.
-        projector: With its final rings.
-        cameras: As planned.
-    """
+    """Return what becomes of a projector's rings, to a ten thousandth of the turn."""
     scene.check_cancelled()
     profile = cast_beam(scene, projector, _INSIDE * projector.ring_radii)
     landing = {

@@ -54,11 +54,8 @@ def spaced_radii(
     As many as wanted; more where h_max asks for them, fewer where h_min doesn't let
     that many in. What is left of a gap then goes to the free cells.
 
-    Args:
-        limits: Of the gaps.
-        n_rings: Wanted number of rings.
-        tolerance: e_tol, largest error of a chord along the beam [m]: no gap is wider
-            than sqrt(8 e_tol / kappa).
+    With e_tol the tolerance [m] of a chord along the beam, no gap is wider than sqrt(8
+    e_tol / kappa).
 
     Returns:
         Rising, at least 2, the last the outermost ring.

@@ -73,12 +73,8 @@ def space_rings(
 
     A projector keeps its even rings where others would lose a measured sample.
 
-    Args:
-        scene: Surface and requirements.
-        projectors: As placed, with evenly spaced rings.
-        cameras: As placed.
-        spacing: `curvature`, or `uniform`: leave the rings, but report on them.
-        proved: Samples for which fewer cameras were proved too few; None: none.
+    Where `spacing` is `uniform` rings stay, and are reported on. Fewer cameras were
+    proved too few for the samples `proved`.
     """
     even = tuple(projectors)
     creases = find_creases(scene.mesh, 0.5 * scene.mesh.mean_edge)
@@ -205,15 +201,7 @@ def rings_record(
     *,
     kept_even: bool,
 ) -> RingsRecord:
-    """Return what a plan says of a projector's rings.
-
-    Args:
-        scene: Surface and requirements.
-        beam: Of the projector with even rings.
-        final: With its final rings.
-        creases: Of the surface.
-        kept_even: Whether others would have lost measured samples.
-    """
+    """Return what a plan says of a projector's rings."""
     lit, error = crease_errors(scene, final, creases)
     # Rounding decides whether the last row lies inside the last ring.
     shone = beam.profile.points[:-1][beam.profile.lit[:-1]]

@@ -68,13 +68,6 @@ def best_rings(
     changes as the camera moves; so the limits become m.r >= q t |v| and
     -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f).
 
-    Args:
-        camera: As it stands.
-        samples: Which of them, shape (q,).
-        surface: All samples.
-        rings: On all samples.
-        limits: What binds.
-
     Returns:
         Ring normals with m.r > 0, (q, 3); q and p in [1/m], 0 where the limit doesn't
         bind; what the tightest of these limits leaves, in units of a cosine; (q,) each.

@@ -64,13 +64,6 @@ def baseline_rows(
 ) -> list[BaselineRow]:
     """Return one row for each order of each neighbouring pair of cameras.
 
-    Args:
-        cameras: As planned.
-        surface: Samples of the target.
-        measured_by: Whether camera c measures sample i with some projector,
-            shape (n, n_cameras).
-        camera_max_incidence: theta, incidence that cameras accept [rad].
-
     Returns:
         The plan's `baselines`; `docs/method/baselines.md` defines every key.
     """
@@ -111,12 +104,8 @@ def angles_and_fields(
 ) -> tuple[SeamAngles, _Array, _Array]:
     """Return the signed angles at seam points, and b_1 and b_2 there [rad].
 
-    Args:
-        one: Camera 1.
-        two: Camera 2.
-        points: E in [m], shape (n, 3).
-        onward: From camera 1's stretch into camera 2's, shape (3,) or (n, 3).
-        normals: Unit normals on camera 1's and camera 2's side, (n, 3) each.
+    E and the unit normals on camera 1's and camera 2's side are (n, 3); `onward` leads
+    from camera 1's stretch into camera 2's, (3,) or (n, 3).
     """
     angles = seam_angles(
         points,

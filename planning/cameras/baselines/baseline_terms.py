@@ -54,17 +54,9 @@ def state_baselines(
 ) -> BaselineProblem:
     """Return the program for cameras as they stand.
 
-    Args:
-        cameras: As they stand.
-        aims: Points that they look at in [m], shape (k, 3).
-        measured_by: Which camera measures which sample now, shape (n, k).
-        pairs: Neighbours.
-        surface: The samples.
-        rings: What each projector draws on them; None: no rings.
-        limits: What binds.
-        demanded: (camera, sample) pairs that must be kept besides the drawn ones,
-            shape (q, 2).
-        max_step: Farthest that a centre may move in [m].
+    `aims` are the points that they look at in [m], (k, 3). `demanded` are (camera,
+    sample) pairs that must be kept besides the drawn ones, (q, 2). No centre moves
+    farther than `max_step` [m].
     """
     space = limits.workspace
     drawn = _sole_samples(cameras, measured_by, surface, rings, limits)
@@ -178,12 +170,6 @@ def lost_samples(
     surface: SampledSurface,
 ) -> NDArray[np.int64]:
     """Return (camera, sample) pairs that would hold some of what a proposal lost.
-
-    Args:
-        lost: Samples.
-        centres: Of the proposal in [m], shape (k, 3).
-        measured_by: Which camera measures which sample now, shape (n, k).
-        surface: The samples.
 
     Returns:
         Each with the camera that it faces most, shape (q, 2).

@@ -34,12 +34,6 @@ def aims_and_rolls(
 ) -> tuple[_Array, _Array]:
     """Return where cameras look, and their turns about it against `look_at`.
 
-    Args:
-        cameras: As they stand.
-        measured: Which measures which sample, shape (n, k).
-        points: The samples in [m], shape (n, 3).
-        workspace: Its centre stands in where a camera measures nothing.
-
     Returns:
         Points on the axes at the mean depth of what each camera measures in [m],
         (k, 3); rolls in [rad], (k,).
@@ -62,11 +56,7 @@ def centres_between(
 ) -> _Array:
     """Return centres part of the way, on arcs about the centre or straight on a plane.
 
-    Args:
-        start: Centres in [m], shape (k, 3).
-        end: Likewise.
-        share: Of the way, each in [0, 1], shape (k,).
-        workspace: Its centre, and whether cameras are mounted on planes.
+    Centres are (k, 3) in [m]; `share` of the way is in [0, 1] for each, (k,).
     """
     if workspace.mounting:
         # An arc would leave the plane.

@@ -48,14 +48,8 @@ def limit_poses(
     A camera keeps the point that it looks at, and its roll. Existing ones stay;
     positions that aren't admissible are left out.
 
-    Args:
-        cameras: As they stand.
-        surface: The samples.
-        measured_by: Which camera measures which sample, shape (n, k).
-        limits: What binds.
-        only: The camera to move; None: every one.
-        shares_past: Shares of the seam that may be past the limit, a pose for each.
-        bisections: Halvings of the angle between the cameras.
+    `only` is the camera to move, None: every one. Each pose leaves one of `shares_past`
+    of the seam past the limit.
     """
     space = limits.workspace
     aims, rolls = aims_and_rolls(cameras, measured_by, surface.points, space)

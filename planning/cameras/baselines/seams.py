@@ -94,13 +94,7 @@ class Seam:
 def find_seam(
     pair: tuple[int, int], surface: SampledSurface, measured_by: NDArray[np.bool_]
 ) -> Seam:
-    """Return the seam of a pair in one order; it may be empty.
-
-    Args:
-        pair: Indices of cameras 1 and 2.
-        surface: The samples.
-        measured_by: Which camera measures which sample, shape (n, n_cameras).
-    """
+    """Return the seam of a pair in one order; it may be empty."""
     points, (here, there) = surface.points, surface.adjacent
     part1, part2 = measured_by[:, pair[0]], measured_by[:, pair[1]]
     out = part1[here] & (part2 & ~part1)[there]
@@ -152,10 +146,6 @@ def neighbouring_pairs(
     as the side of a square of that area: on samples, at least sqrt(MIN_OVERLAP_SHARE n)
     of either part have a near one in the other only.
 
-    Args:
-        measured_by: Which camera measures which sample, shape (n, n_cameras).
-        surface: The samples.
-
     Returns:
         Pairs (a, b) with a < b, in increasing order.
     """
@@ -184,9 +174,6 @@ def overlap_components(measured_by: NDArray[np.bool_]) -> list[list[int]]:
 
     Two parts can be registered if both measure at least `MIN_OVERLAP_SHARE` of the
     samples; to touch is not enough.
-
-    Args:
-        measured_by: Which camera measures which sample, shape (n, n_cameras).
 
     Returns:
         Groups of camera indices, each increasing, ordered by their first camera.

@@ -73,18 +73,10 @@ def maximise_baselines(
     the overlap graph falls into no more groups, and the smallest baseline of neighbours
     rises, or their mean does while the smallest stays.
 
-    Args:
-        cameras: As chosen; each keeps the point that it looks at, and its roll.
-        measure: Maps poses (k, 4, 4) to which camera measures which sample, (n, k), by
-            rays and every limit of the plan.
-        surface: The samples.
-        limits: What binds a camera.
-        rings: Rings of each projector on the samples; None: no rings.
-        confirm: Whether at poses no fewer of more samples are measured than at the
-            start, on which no proposal rests: of many moves, those pass that samples
-            happen to favour.
-        max_evaluations: Calls of `measure` at most.
-        max_programs: Programs solved at most.
+    `measure` maps poses (k, 4, 4) to which camera measures which sample, (n, k), by
+    rays and every limit of the plan. `confirm` says whether at poses no fewer of more
+    samples are measured than at the start, on which no proposal rests: of many moves,
+    those pass that samples happen to favour.
     """
     search = _Search(cameras, measure, surface, limits, rings, confirm)
     return search.run(max_evaluations, max_programs)

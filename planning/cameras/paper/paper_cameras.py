@@ -90,12 +90,6 @@ def cover_by_paper(
 ) -> CameraCover:
     """Choose the cameras by the paper's route alone, confirmed on fresh samples.
 
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As planned, with their rings.
-        candidates: They say what is reachable; what is proved is proved over them and
-            the cameras of the route.
-
     Raises:
         InfeasibleLimitsError: If no candidate, or no camera of the route, measures any
             lit sample.
@@ -111,13 +105,7 @@ def cover_by_paper(
 def again_by_paper(
     scene: Scene, projectors: tuple[PlannedProjector, ...], cover: CameraCover
 ) -> CameraCover:
-    """Return the cameras of a route under other ring axes: kept, and measured anew.
-
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: With other ring axes than those of the cover.
-        cover: By the route.
-    """
+    """Return the cameras of a route under other ring axes: kept, and measured anew."""
     samples, measured = measured_samples(scene, projectors, cover.candidates)
     route = _judged(
         scene, cover.candidates, measured, cover.by_count or {}, least=1, without=0.0
@@ -133,13 +121,6 @@ def route_among(
     measured: NDArray[np.bool_],
 ) -> RouteCameras:
     """Take the paper's route, and judge it on all the samples.
-
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As planned, with their rings.
-        candidates: Existing cameras first.
-        samples: Lit samples.
-        measured: Which candidate measures which, shape (n, m).
 
     Raises:
         InfeasibleLimitsError: If the route comes by no camera.
@@ -246,14 +227,7 @@ def cover_of(
     samples: LitSamples,
     route: RouteCameras,
 ) -> CameraCover:
-    """Return the route's cameras as a cover, bounded over candidates and themselves.
-
-    Args:
-        scene: With the bodies of the projectors.
-        projectors: As planned.
-        samples: Lit samples that the route was judged on.
-        route: The cameras.
-    """
+    """Return the route's cameras as a cover, bounded over candidates and themselves."""
     among = CameraInterference(
         scene, projectors, route.candidates.cameras, samples, route.measured
     )

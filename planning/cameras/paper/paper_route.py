@@ -40,9 +40,6 @@ class PaperRoute:
 def paper_route(problem: RouteProblem) -> PaperRoute:
     """Plan cameras by the largest baselines alone.
 
-    Args:
-        problem: Samples, rays and limits.
-
     Returns:
         Cameras that measure the required samples; as many as help where nothing more
         does.

@@ -68,11 +68,7 @@ class CameraSet:
         return int(self.measured.any(axis=1).sum())
 
     def least_missed(self, n_fixed: int) -> list[int]:
-        """Return the cameras that may go, the one that measures least alone first.
-
-        Args:
-            n_fixed: First cameras, which stay.
-        """
+        """Return the cameras that may go, the one that measures least alone first."""
         alone = self.measured.sum(axis=1) == 1
         sole = self.measured[alone].sum(axis=0)
         order = [int(i) for i in np.argsort(sole, kind="stable")]

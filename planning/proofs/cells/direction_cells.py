@@ -109,13 +109,6 @@ def open_samples(
 ) -> NDArray[np.uint64]:
     """Return for each cell the samples to which it is open, as bit rows.
 
-    Args:
-        scene: Surface.
-        limits: On the direction from a sample to a device.
-        samples: The samples.
-        cube: The map of directions from a sample to a device.
-        shadows: Whether occlusion closes cells.
-
     Returns:
         Shape (cube.size, n_words).
     """

@@ -12,12 +12,7 @@ from solvers.cells.cell_tree import CellBatch
 
 
 class GrownTree(ABC):
-    """Keeps the cells made so far, and the bit row of each.
-
-    Args:
-        roots: What says where the cells are that hold every pose, an array each.
-        n_rows: Number of samples.
-    """
+    """Keeps the cells made so far, and the bit row of each."""
 
     def __init__(self, roots: Sequence[NDArray[Any]], n_rows: int) -> None:
         self.n_rows, self._n_roots = n_rows, len(roots[0])

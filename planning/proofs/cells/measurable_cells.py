@@ -35,14 +35,7 @@ _Array = NDArray[np.float64]
 
 
 class MeasurableCells:
-    """Says which samples a camera in a cell may measure; the `limits` of its tree.
-
-    Args:
-        samples: Lit samples, with light and rings of every projector on them.
-        required: Limits of camera and triangulation.
-        device: Optics of the camera.
-        check_cancelled: Called between pieces of work.
-    """
+    """Says which samples a camera in a cell may measure; the `limits` of its tree."""
 
     def __init__(
         self,

@@ -113,13 +113,7 @@ class PositionTree(GrownTree):
     def seen_from(
         self, cells: ShellCells, at: NDArray[np.int64], samples: NDArray[np.int64]
     ) -> Seen:
-        """Return how samples see cells.
-
-        Args:
-            cells: The cells.
-            at: Position of each pair's cell among them, shape (k,).
-            samples: Number of each pair's sample, shape (k,).
-        """
+        """Return how samples see cells."""
         directions = directions_of(self._cubes, cells.level, cells.cell)
         return seen_from(cells, directions, at, self._points[samples])
 

@@ -81,10 +81,7 @@ def directions_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return unit middles of cells, and the angle about each that holds the cell.
 
-    Args:
-        cubes: Cube maps of 1, 2, 4, ... cells an edge.
-        level: Of each cell, shape (n,).
-        cell: Its number on that map, shape (n,).
+    `cubes` are cube maps of 1, 2, 4, ... cells an edge.
 
     Returns:
         Shapes (n, 3) and (n,), the latter in [rad].
@@ -105,11 +102,8 @@ def seen_from(
 ) -> Seen:
     """Return how points see cells.
 
-    Args:
-        cells: The cells.
-        directions: Theirs, as `directions_of` returns them.
-        at: Position of each pair's cell among them, shape (k,).
-        points: Of each pair, relative to the centre in [m], shape (k, 3).
+    `at` is the position of each pair's cell among the cells, (k,); points are relative
+    to the centre in [m], (k, 3).
     """
     half = 0.5 * (cells.high_m - cells.low_m)
     outwards, radii = directions
