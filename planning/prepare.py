@@ -24,6 +24,7 @@ from planning.rig.wishes import TargetName, Wishes
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
 from planning.scene.bodies.clearance import check_existing_clearance
 from planning.scene.interest import Select, Weight, interest_of
+from planning.scene.obstructions import Obstruction
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
 
@@ -121,6 +122,10 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         request.seed,
         request.threads,
         clock.check,
+        obstructions=tuple(
+            Obstruction(obstacle.name, obstacle.mesh)
+            for obstacle in rig.obstacles(requirements.workspace, mesh)
+        ),
     )
     template = PlannedProjector(
         "",

@@ -24,6 +24,19 @@ def box(size: tuple[float, float, float]) -> TriangleMesh:
     return TriangleMesh(np.array(plain.vertices), np.array(plain.faces))
 
 
+def cylinder(radius: float, height: float) -> TriangleMesh:
+    """Return a closed prism of 64 sides about the origin, its axis along z.
+
+    Args:
+        radius: To its edges, in [m].
+        height: In [m].
+    """
+    import trimesh.creation
+
+    plain = trimesh.creation.cylinder(radius=radius, height=height, sections=64)
+    return TriangleMesh(np.array(plain.vertices), np.array(plain.faces))
+
+
 def sphere(radius: float, *, subdivisions: int = 4) -> TriangleMesh:
     """Return a subdivided icosahedron about the origin, 20 * 4^subdivisions faces.
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import MeshError, TriangleMesh
 
 from .errors import PlanFileError
+from .obstacles import Obstacle
 
 # Kinds of numbers and the shape of each array; n faces, any number of poses.
 _ARRAYS: dict[str, tuple[str, tuple[int | None, ...]]] = {
@@ -27,6 +29,13 @@ _ARRAYS: dict[str, tuple[str, tuple[int | None, ...]]] = {
     "reference_projectors": ("f", (None, 4, 4)),
     "reference_rings": ("f", (None, 4, 4)),
     "reference_cameras": ("f", (None, 4, 4)),
+}
+# Of all obstacles, one after the other; no array where there are none.
+_OBSTACLES: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    "obstacle_names": ("U", (None,)),
+    "obstacle_vertices": ("f", (None, 3)),
+    "obstacle_faces": ("iu", (None, 3)),
+    "obstacle_of_face": ("iu", (None,)),
 }
 # What numpy and zipfile raise on damaged archives, beside OSError and ValueError.
 _DAMAGED = (
@@ -55,6 +64,7 @@ class Surface:
         reference_projectors: ``world_from_device`` of the reference set, (n, 4, 4).
         reference_rings: ``world_from_ring`` of the same poses, shape (n, 4, 4).
         reference_cameras: ``world_from_device`` of the reference set, (n, 4, 4).
+        obstacles: What stands about the object and isn't a device.
     """
 
     mesh: TriangleMesh
@@ -64,6 +74,7 @@ class Surface:
     reference_projectors: NDArray[np.float64]
     reference_rings: NDArray[np.float64]
     reference_cameras: NDArray[np.float64]
+    obstacles: tuple[Obstacle, ...] = ()
 
     @cached_property
     def in_dominant(self) -> NDArray[np.bool_]:
@@ -89,6 +100,7 @@ class Surface:
             vertices=self.mesh.vertices,
             faces=self.mesh.faces,
             **{name: getattr(self, name) for name in list(_ARRAYS)[2:]},
+            **_packed(self.obstacles),
         )
         return buffer.getvalue()
 
@@ -113,7 +125,10 @@ class Surface:
                     f"the two files must come from one run"
                 )
             with np.load(BytesIO(content), allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in _ARRAYS}
+                wanted = _ARRAYS | (
+                    _OBSTACLES if set(_OBSTACLES) & set(archive) else {}
+                )
+                arrays = {name: archive[name] for name in wanted}
         except PlanFileError:
             raise
         except FileNotFoundError:
@@ -127,6 +142,7 @@ class Surface:
             raise PlanFileError(f"{path}: not a readable .npz ({error})") from None
         _check_arrays(arrays, path)
         try:
+            obstacles = _unpacked(*(arrays.pop(name, None) for name in _OBSTACLES))
             mesh = TriangleMesh(arrays.pop("vertices"), arrays.pop("faces"))
         except MeshError as error:
             raise PlanFileError(f"{path}: {error}") from None
@@ -136,20 +152,60 @@ class Surface:
                 raise PlanFileError(
                     f"{path}: `{name}` has {len(arrays[name])} rows for {n} faces"
                 )
-        return cls(mesh, **arrays)
+        return cls(mesh, **arrays, obstacles=obstacles)
 
 
 def _check_arrays(arrays: dict[str, NDArray[Any]], path: Path) -> None:
     """Refuse arrays of other kinds of numbers, or of other shapes."""
-    for name, (kinds, shape) in _ARRAYS.items():
-        array = arrays[name]
+    for name, array in arrays.items():
+        kinds, shape = (_ARRAYS | _OBSTACLES)[name]
         fits = len(array.shape) == len(shape) and all(
             want in (None, has) for want, has in zip(shape, array.shape, strict=True)
         )
         if not fits or array.dtype.kind not in kinds:
             sizes = ", ".join("n" if size is None else str(size) for size in shape)
-            number = "floats" if kinds == "f" else "integers"
+            number = {"f": "floats", "iu": "integers", "U": "names"}[kinds]
             raise PlanFileError(
                 f"{path}: `{name}` must be ({sizes}) {number}, got {array.dtype} of "
                 f"shape {array.shape}; plan again"
             )
+
+
+def _packed(obstacles: Sequence[Obstacle]) -> dict[str, NDArray[Any]]:
+    """Return `_OBSTACLES` of obstacles; nothing of none."""
+    if not obstacles:
+        return {}
+    meshes = [obstacle.mesh for obstacle in obstacles]
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [
+        mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)
+    ]
+    values = (
+        np.array([obstacle.name for obstacle in obstacles]),
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate(faces),
+        np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes]),
+    )
+    return dict(zip(_OBSTACLES, values, strict=True))
+
+
+def _unpacked(
+    names: NDArray[np.str_] | None,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    of_face: NDArray[np.int64],
+) -> tuple[Obstacle, ...]:
+    """Return the obstacles that `_packed` took; None: there are none."""
+    if names is None:
+        return ()
+    if not (len(of_face) == len(faces) and np.all(np.isin(of_face, range(len(names))))):
+        raise MeshError("`obstacle_of_face` must name an obstacle for each face")
+    if not np.all((faces >= 0) & (faces < len(vertices))):
+        raise MeshError("`obstacle_faces` must name vertices that there are")
+    obstacles: list[Obstacle] = []
+    for index, name in enumerate(names.tolist()):
+        used, numbered = np.unique(faces[of_face == index], return_inverse=True)
+        obstacles.append(
+            Obstacle(name, TriangleMesh(vertices[used], numbered.reshape(-1, 3)))
+        )
+    return tuple(obstacles)

@@ -19,6 +19,8 @@ from planning.proofs.selection import Selection, marginals, select_fewest
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins
 from planning.scene.limits import projector_limits
+from planning.scene.obstructions import Obstruction
+from planning.scene.placed_bodies import PlacedBody
 from planning.scene.scene import Scene
 from solvers import solve_cover
 
@@ -33,6 +35,12 @@ _FINER = 4
 _SEEDS_BUDGET = 2e8
 # Counted work of the cover whose count is kept, where less left it unproved.
 _PROOF_BUDGET = 1e10
+
+# Limits that are told of only where something could violate them.
+_BY_BLOCKERS = {
+    projector_limits.BLOCKED: PlacedBody,
+    projector_limits.OBSTRUCTED: Obstruction,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +87,10 @@ class ProjectorStage:
             excluded_pairs={
                 cause: int((candidates.stages == index).sum())
                 for index, cause in enumerate(projector_limits.CAUSES)
-                if index != projector_limits.BLOCKED or candidates.scene.bodies
+                if index not in _BY_BLOCKERS
+                or any(
+                    isinstance(b, _BY_BLOCKERS[index]) for b in candidates.scene.bodies
+                )
             },
             n_regions=int(candidates.scene.region.max()) + 1,
         )

@@ -16,6 +16,7 @@ from planning.model.document.plan_document import (
     MemberRecord,
     PlanDocument,
 )
+from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
@@ -115,6 +116,7 @@ def _surface(partial: PartialPlan, devices: Devices) -> Surface:
         np.stack([p.world_from_device for p in reference]),
         np.stack([p.world_from_ring for p in reference]),
         np.stack([c.world_from_device for c in devices.reference_cameras]),
+        tuple(Obstacle(solid.name, solid.mesh) for solid in scene.obstructions),
     )
 
 

@@ -21,6 +21,7 @@ from planning.scene.measured import (
     lit_samples,
     measured_by,
 )
+from planning.scene.obstructions import Obstruction
 from planning.scene.placed_bodies import Device, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -63,6 +64,8 @@ class Claims:
         measured_by: Which camera measures which of those, (n, n_cameras).
         blocked_by_body_m2: Target area that isn't measured and from which the body of
             each device keeps light or a view.
+        blocked_by_obstacle_m2: The same of each obstacle, and what it alone keeps all
+            reference projectors from.
     """
 
     surface: Areas
@@ -78,6 +81,7 @@ class Claims:
     target_samples: Target
     measured_by: NDArray[np.bool_]
     blocked_by_body_m2: dict[str, float]
+    blocked_by_obstacle_m2: dict[str, float]
 
 
 def make_claims(scene: Scene, devices: Devices) -> Claims:
@@ -90,6 +94,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
     seen = _measured_by(planned, devices, target, lit)
     measured = _any(seen)
     reachable, furthest = _reachable_by_projectors(scene, devices, target, _any(lit))
+    obstructed = ~reachable & (furthest == projector_limits.OBSTRUCTED)
     areas = _areas(scene, devices, target, reachable, lit, measured)
     served = lighting.assigned_projectors(
         lit, margins_of(scene, devices.projectors, target)
@@ -109,7 +114,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
         _regions(scene, devices, target, lit, served),
         target,
         seen,
-        _blocked_by_body(planned, devices, target, stages, measured),
+        *_blocked(planned, devices, target, stages, measured, obstructed),
     )
 
 
@@ -251,16 +256,29 @@ def _uncovered(
     return causes + [pair_limits.CAUSES[stage] for stage in furthest]
 
 
-def _blocked_by_body(
+def _blocked(
     scene: Scene,
     devices: Devices,
     target: Target,
     stages: NDArray[np.int8],
     measured: NDArray[np.bool_],
-) -> dict[str, float]:
-    """Unmeasured area on which nothing but a body stops some device, by body."""
+    obstructed: NDArray[np.bool_],
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Unmeasured area that each body, and each obstacle, keeps light or a view from.
+
+    Of bodies and obstacles alike where nothing else stops a device of the plan; of
+    obstacles also where nothing else stops a reference projector, and none lights it.
+
+    Args:
+        scene: With the bodies of the plan.
+        devices: The plan's, and the reference sets.
+        target: Samples.
+        stages: First limit that fails of each projector, shape (n, n_projectors).
+        measured: Shape (n,).
+        obstructed: Samples at which an obstacle is what stops reference projectors.
+    """
     if not scene.bodies:
-        return {}
+        return {}, {}
     stopped = np.zeros((len(target), len(scene.bodies)), dtype=bool)
 
     def note(device: Device, samples: NDArray[np.int64]) -> None:
@@ -268,18 +286,33 @@ def _blocked_by_body(
         stopped[samples] |= blocked_by(scene.bodies, device, points)
 
     for p, projector in enumerate(devices.projectors):
-        dark = stages[:, p] == projector_limits.BLOCKED
-        note(projector, np.flatnonzero(~measured & dark))
+        dark = stages[:, p] >= projector_limits.BLOCKED
+        note(projector, np.flatnonzero(~measured & dark & (stages[:, p] < LIT)))
     pending = np.flatnonzero(~measured & _any(stages == LIT))
     for camera in devices.cameras:
         stage = view_of(scene, camera, target.take(pending)).first_violated
-        note(camera, pending[stage == camera_limits.BLOCKED])
-    areas = target.samples.weight * stopped.sum(axis=0)
+        between = camera_limits.BLOCKED, camera_limits.OBSTRUCTED
+        note(camera, pending[np.isin(stage, between)])
+    limits, dark = scene.requirements.projector, np.flatnonzero(obstructed)
+    for projector in devices.reference_projectors if len(dark) else ():
+        stage = lighting.first_failure(
+            projector,
+            target.take(dark),
+            limits,
+            scene.visibility,
+            bodies=scene.obstructions,
+        )
+        note(projector, dark[stage == projector_limits.OBSTRUCTED])
+    areas = (target.samples.weight * stopped.sum(axis=0)).tolist()
     every = (*devices.projectors, *devices.cameras)
-    return {
-        next(d.id for d in every if body.is_of(d)): float(area)
-        for body, area in zip(scene.bodies, areas, strict=True)
-    }
+    by_body: dict[str, float] = {}
+    by_obstacle: dict[str, float] = {}
+    for body, area in zip(scene.bodies, areas, strict=True):
+        if isinstance(body, Obstruction):
+            by_obstacle[body.name] = area
+        else:
+            by_body[next(d.id for d in every if body.is_of(d))] = area
+    return by_body, by_obstacle
 
 
 def _n_inside(scene: Scene, target: Target) -> int:
@@ -297,7 +330,7 @@ def _any(table: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _by_cause(causes: list[str], weight: float) -> dict[str, float]:
-    order = projector_limits.CAUSES + pair_limits.CAUSES
+    order = dict.fromkeys(projector_limits.CAUSES + pair_limits.CAUSES)
     return {c: weight * causes.count(c) for c in order if c in causes}
 
 

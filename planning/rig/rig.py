@@ -15,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
+from geometry.mesh.mesh import TriangleMesh
 from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError, RigError
-from planning.model.requirements import Requirements
+from planning.model.obstacles import Obstacle
+from planning.model.requirements import Requirements, Workspace
 
 from . import optics
 from .existing_tables import build_existing, check_existing
+from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
-from .rig_files import Figure, Preset, list_presets, read_rig
+from .rig_files import Figure, Preset, list_presets, read_rig, rig_folder
 from .rig_requirements import build_requirements
 from .rig_tables import ParallelTable, PinholeTable, RigTable
 from .wishes import Wishes
@@ -48,7 +51,7 @@ def load_rig(name: str | Path = "default", light: Light | None = None) -> "Rig":
     if light not in (None, "diverging", "parallel"):
         raise RigError(f"light = {light!r} must be 'diverging' or 'parallel'")
     table = read_rig(name)
-    rig = Rig(table, light or table.light)
+    rig = Rig(table, light or table.light, rig_folder(name))
     _check_devices(rig)
     return rig
 
@@ -60,10 +63,12 @@ class Rig:
     Attributes:
         table: The rig as written, in millimetres and degrees.
         light: `diverging` or `parallel`.
+        folder: Where files that the rig names are looked for.
     """
 
     table: RigTable
     light: Light
+    folder: Path = Path()
 
     @property
     def name(self) -> str:
@@ -236,13 +241,39 @@ class Rig:
         check_existing(required)
         return required
 
+    def obstacles(
+        self, workspace: Workspace, mesh: TriangleMesh
+    ) -> tuple[Obstacle, ...]:
+        """Return what stands about an object, and isn't a device.
+
+        Args:
+            workspace: Of the requirements for this object.
+            mesh: The object.
+
+        Raises:
+            RigError: If the file of an obstacle can't be read.
+            InfeasibleLimitsError: If a keep-out zone that blocks holds the object.
+        """
+        table = self.table
+        return obstacles_of(
+            table.obstacle, table.workspace, workspace, mesh, self.folder
+        )
+
     def to_document(self) -> dict[str, Any]:
         """Return the resolved rig for `plan.json`: plain values, metres, radians.
 
         Tables whose keys end in _mm or _deg are as written in the rig file.
         """
         table, parallel = self.table, self.light == "parallel"
-        existing = [device.to_document() for device in table.existing]
+        # No key where there are none.
+        listed = {
+            key: [entry.to_document() for entry in entries]
+            for key, entries in (
+                ("existing", table.existing),
+                ("obstacle", table.obstacle),
+            )
+            if entries
+        }
         return {
             "name": self.name,
             "description": table.description,
@@ -268,8 +299,7 @@ class Rig:
             "requirements": table.requirements.model_dump(mode="json"),
             "check": table.check.model_dump(mode="json"),
             "notes": list(self.notes()),
-            # No key where there are none.
-            **({"existing": existing} if existing else {}),
+            **listed,
         }
 
     @cached_property

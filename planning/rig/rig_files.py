@@ -100,6 +100,11 @@ def read_rig(name_or_path: str | Path) -> RigTable:
         raise RigError("\n".join(_faults(where, error))) from None
 
 
+def rig_folder(name_or_path: str | Path) -> Path:
+    """Return where files that a rig names are looked for: beside its own."""
+    return Path(name_or_path).parent if _is_path(name_or_path) else Path()
+
+
 def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
     """Return a preset's tables with a file's laid over them, key by key.
 

@@ -21,6 +21,7 @@ from planning.model.table_types import (
 )
 
 from .existing_tables import ExistingTable
+from .obstacle_tables import ObstacleTable
 from .workspace_tables import WorkspaceTable, check_names
 
 # Far beyond any device, and any table of poses and samples that memory holds.
@@ -248,8 +249,11 @@ class RigTable(Table):
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
     existing: list[ExistingTable] = Field(default=[])
+    obstacle: list[ObstacleTable] = Field(default=[])
 
     @model_validator(mode="after")
-    def _check_existing(self) -> Self:
+    def _check_names(self) -> Self:
         check_names("existing", [device.name for device in self.existing])
+        solid = [zone.name for zone in self.workspace.keep_out if zone.blocks]
+        check_names("obstacle", [table.name for table in self.obstacle] + solid)
         return self

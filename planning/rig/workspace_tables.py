@@ -24,17 +24,22 @@ _IDENTITY: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class KeepOutTable(Table):
     """A box in which no optical centre may stand, `[[workspace.keep_out]]`.
 
+    Something solid stands there, unless `blocks` says otherwise.
+
     Attributes:
         name: What messages call it.
         centre_mm: Its middle.
         size_mm: Its three sides.
         turn_deg: Turns about the x, then the y, then the z axis of the mesh file.
+        blocks: Whether it stands in the way of light and views; a zone that is only
+            forbidden ground doesn't.
     """
 
     name: Name
     centre_mm: Axis
     size_mm: Sides
     turn_deg: Axis = Field(default=[0.0, 0.0, 0.0])
+    blocks: bool = True
 
     def box(self) -> Box:
         """Return the box in metres."""

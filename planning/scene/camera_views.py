@@ -14,7 +14,7 @@ from planning.model.planned import PlannedCamera
 from planning.scene.limits.camera_limits import ViewedSamples
 
 from . import measurability
-from .placed_bodies import PlacedBody, blocked_by
+from .placed_bodies import Blocker, blocked_by
 from .samples import Target
 from .scene import Scene
 
@@ -81,7 +81,7 @@ def unblocked(
     sight: CameraView,
     camera: PlannedCamera,
     points: NDArray[np.float64],
-    bodies: Sequence[PlacedBody],
+    bodies: Sequence[Blocker],
 ) -> CameraView:
     """Return what is left of a sight of points (n, 3) with bodies in the way."""
     if not bodies:

@@ -15,13 +15,14 @@ from planning.scene.limits.limit import first_violated
 from planning.scene.limits.projector_limits import (
     BLOCKED,
     LIT,
+    OBSTRUCTED,
     OCCLUDED,
     PROJECTOR_LIMITS,
     ProjectorView,
 )
 
 from .lights import LightOnSamples, light_of, light_on
-from .placed_bodies import PlacedBody, blocked_by
+from .placed_bodies import Blocker, blocked_by, first_blocked
 from .samples import SampleColumns, Target
 from .scene import Scene
 
@@ -35,7 +36,7 @@ def first_failure(
     limits: ProjectorLimits,
     visibility: Visibility | None,
     *,
-    bodies: Sequence[PlacedBody] = (),
+    bodies: Sequence[Blocker] = (),
 ) -> NDArray[np.int8]:
     """Return the index in `CAUSES` of the first limit that fails; `LIT` if none does.
 
@@ -44,7 +45,7 @@ def first_failure(
         target: Samples.
         limits: Margins of eq. (2).
         visibility: Occlusion; None: it is left out.
-        bodies: Of devices, which stand in the way of light as well.
+        bodies: All else that stands in the way of light.
 
     Returns:
         Shape (n,).
@@ -135,14 +136,12 @@ def _mark_blocked(
     first: NDArray[np.int8],
     projector: PlannedProjector,
     points: NDArray[np.float64],
-    bodies: Sequence[PlacedBody],
+    bodies: Sequence[Blocker],
 ) -> None:
-    """Mark lit samples (n,) whose light meets a body."""
-    if not bodies:
-        return
+    """Mark lit samples (n,) whose light meets a body or an obstacle."""
     lit = np.flatnonzero(first == LIT)
-    blocked = blocked_by(bodies, projector, points[lit]).any(axis=1)
-    first[lit[blocked]] = BLOCKED
+    limits = BLOCKED, OBSTRUCTED
+    first[lit] = first_blocked(bodies, projector, points[lit], limits, LIT)
 
 
 def shows_back(projector: PlannedProjector, target: Target) -> NDArray[np.bool_]:

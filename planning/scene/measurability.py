@@ -21,6 +21,7 @@ from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene.limits.camera_limits import (
     BLOCKED,
     CAMERA_LIMITS,
+    OBSTRUCTED,
     OCCLUDED,
     SEEN,
     CameraRays,
@@ -31,7 +32,7 @@ from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality
 from planning.scene.patterns.code_surfaces import CodeSurfaces
 
 from .lights import LightOnSamples
-from .placed_bodies import PlacedBody, blocked_by
+from .placed_bodies import Blocker, first_blocked
 from .samples import Target
 
 
@@ -40,7 +41,7 @@ def view(
     target: Target,
     limits: CameraLimits,
     visibility: Visibility | None,
-    bodies: Sequence[PlacedBody] = (),
+    bodies: Sequence[Blocker] = (),
 ) -> ViewedSamples:
     """Return how a camera sees samples; without `visibility`, occlusion is left out.
 
@@ -49,7 +50,7 @@ def view(
         target: Samples.
         limits: Of incidence and sampling distance.
         visibility: Occlusion by the mesh.
-        bodies: Of devices, which stand in the way as well.
+        bodies: All else that stands in the way.
     """
     rays = CameraRays.of(camera, target)
     first = first_violated(CAMERA_LIMITS, rays, limits, len(target))
@@ -66,13 +67,11 @@ def first_between(
     camera: PlannedCamera,
     target: Target,
     visibility: Visibility | None,
-    bodies: Sequence[PlacedBody],
+    bodies: Sequence[Blocker],
 ) -> NDArray[np.int8]:
-    """Return what hides samples first, `OCCLUDED` or `BLOCKED`; `SEEN` if nothing."""
+    """Return the first limit that rays decide and samples violate; else `SEEN`."""
     points = target.samples.points
-    first = np.full(len(target), SEEN, dtype=np.int8)
-    if bodies:
-        first[blocked_by(bodies, camera, points).any(axis=1)] = BLOCKED
+    first = first_blocked(bodies, camera, points, (BLOCKED, OBSTRUCTED), SEEN)
     if visibility is not None:
         place, normals = camera.world_from_device[:3, 3], target.samples.normals
         first[visibility.blocked(place, points, normals)] = OCCLUDED

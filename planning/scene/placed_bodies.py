@@ -1,7 +1,8 @@
-"""Bodies of devices in the world: what they stand in the way of, and collide with.
+"""What light and views meet but the object: bodies of devices, and obstacles.
 
-A body blocks the beams and the views of every device but its own. Light leaves a point,
-or in parallel light the plane of the panel, and ends at the sample.
+A body blocks the beams and the views of every device but its own; an obstacle blocks
+all. Light leaves a point, or in parallel light the plane of the panel, and ends at the
+sample.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,6 +16,8 @@ from geometry.shapes.boxes import OrientedBox, boxes_overlap, lines_cross
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
+
+from .obstructions import Obstruction
 
 Device = PlannedProjector | PlannedCamera
 
@@ -38,11 +41,29 @@ class PlacedBody:
     box: OrientedBox
     name: str = ""
 
+    @property
+    def words(self) -> str:
+        """What messages call it."""
+        return f"the body of {self.name or 'another device'}"
+
     def is_of(self, device: Device) -> bool:
         """Return whether this is a device's own body."""
         return self.kind == kind_of(device) and np.array_equal(
             self.world_from_device, device.world_from_device
         )
+
+    def crossed(
+        self, starts: NDArray[np.float64], points: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Return which straight lines to points (n, 3) meet it, shape (n,)."""
+        return lines_cross(self.box, starts, points)
+
+    def touches(self, box: OrientedBox) -> bool:
+        """Return whether it shares a point with a box."""
+        return boxes_overlap(box, self.box)
+
+
+Blocker = PlacedBody | Obstruction
 
 
 def kind_of(device: Device) -> str:
@@ -87,12 +108,12 @@ def existing_bodies(required: Requirements) -> tuple[PlacedBody, ...]:
 
 
 def blocked_by(
-    bodies: Sequence[PlacedBody], device: Device, points: NDArray[np.float64]
+    bodies: Sequence[Blocker], device: Device, points: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return which bodies stand between a device and points; its own never does.
+    """Return what stands between a device and points; its own body never does.
 
     Args:
-        bodies: Bodies in the world.
+        bodies: Bodies and obstacles in the world.
         device: Where light leaves, or views end.
         points: Shape (n, 3) [m].
 
@@ -105,17 +126,38 @@ def blocked_by(
     blocked = np.zeros((len(points), len(bodies)), dtype=bool)
     for column, body in enumerate(bodies):
         if not body.is_of(device):
-            blocked[:, column] = lines_cross(body.box, starts, points)
+            blocked[:, column] = body.crossed(starts, points)
     return blocked
 
 
-def collide(device: Device, bodies: Sequence[PlacedBody]) -> list[PlacedBody]:
-    """Return the bodies of other devices that a device's own comes too near to."""
+def first_blocked(
+    bodies: Sequence[Blocker],
+    device: Device,
+    points: NDArray[np.float64],
+    limits: tuple[int, int],
+    none: int,
+) -> NDArray[np.int8]:
+    """Return which limit points between them and a device violate first, shape (n,).
+
+    Args:
+        bodies: Bodies and obstacles in the world.
+        device: Where light leaves, or views end.
+        points: Shape (n, 3) [m].
+        limits: Indices of the limits that bodies, and that obstacles decide.
+        none: Where nothing stands between.
+    """
+    first = np.full(len(points), none, dtype=np.int8)
+    if bodies:
+        blocked = blocked_by(bodies, device, points)
+        solid = np.array([isinstance(body, Obstruction) for body in bodies])
+        for limit, among in zip(reversed(limits), (solid, ~solid), strict=True):
+            first[blocked[:, among].any(axis=1)] = limit
+    return first
+
+
+def collide(device: Device, bodies: Sequence[Blocker]) -> list[Blocker]:
+    """Return the bodies and obstacles that a device's own body comes too near to."""
     if device.body is None:
         return []
     own = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
-    return [
-        body
-        for body in bodies
-        if not body.is_of(device) and boxes_overlap(own, body.box)
-    ]
+    return [body for body in bodies if not body.is_of(device) and body.touches(own)]

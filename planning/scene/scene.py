@@ -17,7 +17,8 @@ from planning.model.requirements import Requirements, Workspace
 from planning.scene.workspace.view_tiles import Site
 
 from .draws import DRAWS, Draw
-from .placed_bodies import Device, PlacedBody, bodies_of, existing_bodies
+from .obstructions import Obstruction
+from .placed_bodies import Blocker, Device, PlacedBody, bodies_of, existing_bodies
 from .samples import Target
 
 Kind = Literal["projector", "camera"]
@@ -39,6 +40,7 @@ class Scene:
         threads: Worker threads; no result depends on it.
         pulse: Called between pieces of work; raises when the run is to be cut.
         placed: Bodies of devices that were chosen, beside those that stand already.
+        obstructions: What stands about the object and isn't a device.
     """
 
     mesh: TriangleMesh
@@ -49,18 +51,24 @@ class Scene:
     threads: int
     check_cancelled: Callable[[], None] = lambda: None
     placed: tuple[PlacedBody, ...] = ()
+    obstructions: tuple[Obstruction, ...] = ()
 
     @cached_property
-    def bodies(self) -> tuple[PlacedBody, ...]:
-        """Every body that stands in the way of light and views."""
-        return existing_bodies(self.requirements) + self.placed
+    def bodies(self) -> tuple[Blocker, ...]:
+        """All that stands in the way of light and views, but the object."""
+        return self.obstructions + existing_bodies(self.requirements) + self.placed
 
     def among(self, devices: Iterable[Device]) -> "Scene":
         """Return the scene with the bodies of these devices, and no other planned."""
         placed = bodies_of(device for device in devices if not device.existing)
-        if not (placed or self.placed):
-            return self
-        other = replace(self, placed=placed)
+        return self._with(placed=placed) if placed or self.placed else self
+
+    def with_obstructions(self, obstructions: tuple[Obstruction, ...]) -> "Scene":
+        """Return the scene with these obstacles, and no other."""
+        return self._with(obstructions=obstructions)
+
+    def _with(self, **changes: tuple[object, ...]) -> "Scene":
+        other = replace(self, **changes)
         # What rays are cast against is the same mesh.
         other.__dict__["visibility"] = self.visibility
         return other

@@ -39,6 +39,8 @@ class Coverage(Part):
         unreachable_inside_m2: The part of it that lies inside the body.
         blocked_by_body_m2: Unmeasured target area that each device's body stands
             before; absent where no device has a body.
+        blocked_by_obstacle_m2: Unmeasured target area that each obstacle stands before;
+            absent where there are none.
         relaxations: What would let projectors reach enough.
         unmeasurable_by_cause: Lit target area that no reference camera measures.
         camera_relaxations: What would let cameras reach enough.
@@ -51,6 +53,7 @@ class Coverage(Part):
     unreachable_by_cause: dict[str, float]
     unreachable_inside_m2: float = 0.0
     blocked_by_body_m2: dict[str, float] = Field(default={})
+    blocked_by_obstacle_m2: dict[str, float] = Field(default={})
     relaxations: tuple[Relaxation, ...] = ()
     unmeasurable_by_cause: dict[str, float] = Field(default={})
     camera_relaxations: tuple[Relaxation, ...] = ()

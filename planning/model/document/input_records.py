@@ -134,6 +134,7 @@ class RigRecord(Part):
     check: dict[str, float] = Field(default={})
     notes: tuple[str, ...] = ()
     existing: tuple[dict[str, Any], ...] = ()
+    obstacle: tuple[dict[str, Any], ...] = ()
 
 
 class RangePoint(Part):

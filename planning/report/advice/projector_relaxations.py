@@ -45,6 +45,13 @@ def reachability_relaxations(
     n, dark = len(target), _unlit(scene, reference, target)
     share = Share(n, n - len(dark), scene.requirements.min_reachable)
     gained = _least(scene, reference, target.take(dark), share.wanted)
+    for moved in scene.obstructions:
+        rest = tuple(other for other in scene.obstructions if other is not moved)
+        still_dark = len(
+            _unlit(scene.with_obstructions(rest), reference, target.take(dark))
+        )
+        change = f"{moved.words} out of the way"
+        gained[change] = len(dark) - still_dark
     workspace = scene.requirements.workspace
     whole = workspace.whole_shell
     if whole != workspace:

@@ -11,6 +11,7 @@ from planning.model.surface import Surface
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import lit_samples, measured_by
+from planning.scene.obstructions import Obstruction
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -49,7 +50,16 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
         threads: Worker threads.
     """
     mesh, required = plan.surface.mesh, plan.requirements
-    scene = Scene(mesh, plan.surface.region, plan.surface.steep, required, 0, threads)
+    surface = plan.surface
+    scene = Scene(
+        mesh,
+        surface.region,
+        surface.steep,
+        required,
+        0,
+        threads,
+        obstructions=tuple(Obstruction(o.name, o.mesh) for o in surface.obstacles),
+    )
     scene = scene.among((*plan.projectors, *plan.cameras))
     faces = np.arange(len(mesh.faces))
     centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)

@@ -158,9 +158,11 @@ def coverage_record(claims: Claims) -> Coverage:
         unreachable_by_cause=claims.unreachable_by_cause,
         unreachable_inside_m2=claims.unreachable_inside_m2,
     )
-    if not claims.blocked_by_body_m2:
-        return coverage
-    return coverage.changed(blocked_by_body_m2=claims.blocked_by_body_m2)
+    blocked = {
+        "blocked_by_body_m2": claims.blocked_by_body_m2,
+        "blocked_by_obstacle_m2": claims.blocked_by_obstacle_m2,
+    }
+    return coverage.changed(**{key: areas for key, areas in blocked.items() if areas})
 
 
 def cost_record(

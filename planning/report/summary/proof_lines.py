@@ -12,6 +12,7 @@ _EXCLUDED = {
     "tangent_angle": "too near the steep direction",
     "projector_occlusion": "in shadow",
     "projector_body": "behind a device's body",
+    "blocked_by_obstacle": "behind an obstacle",
 }
 
 

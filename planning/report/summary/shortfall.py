@@ -150,11 +150,14 @@ def _why(kind: str, coverage: Coverage) -> str:
 
 
 def _bodies(coverage: Coverage, proof: Certificate) -> str:
-    """Whose bodies stand in the way of how much, the largest area first."""
-    ranked = sorted(coverage.blocked_by_body_m2.items(), key=lambda pair: -pair[1])
+    """Bodies and obstacles that stand in the way of how much, the largest first."""
+    blocked = {
+        **{f"the body of {k}": v for k, v in coverage.blocked_by_body_m2.items()},
+        **{f"obstacle {k!r}": v for k, v in coverage.blocked_by_obstacle_m2.items()},
+    }
     phrases = [
-        f"{1e6 * area:.0f} mm² blocked by the body of {name}"
-        for name, area in ranked
+        f"{1e6 * area:.0f} mm² blocked by {name}"
+        for name, area in sorted(blocked.items(), key=lambda pair: -pair[1])
         if area > 0.0
     ]
     if proof.but_for_bodies:

@@ -24,17 +24,19 @@ _TOLD = 1000
 def lacks_clearance(scene: Scene, device: Device) -> str:
     """Return what a device's body would touch or reach into; empty if nothing.
 
-    The object, the body of another device, a keep-out volume; below the floor; out of
-    the room. Floor and zones don't bind devices that stand already.
+    The object, a keep-out volume, the body of another device, an obstacle; below the
+    floor; out of the room. Floor and zones don't bind devices that stand already.
     """
     if device.body is None:
         return ""
     box = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
     if _touches_object(scene, box):
         return "the object"
-    if others := collide(device, scene.bodies):
-        return f"the body of {others[0].name or 'another device'}"
-    return "" if device.existing else broken_by_body(scene.requirements.workspace, box)
+    workspace = scene.requirements.workspace
+    if not device.existing and (broken := broken_by_body(workspace, box)):
+        return broken
+    others = collide(device, scene.bodies)
+    return others[0].words if others else ""
 
 
 def with_clearance(scene: Scene, devices: Sequence[_D]) -> tuple[_D, ...]:

@@ -15,6 +15,7 @@ from planning.model.requirements import CameraLimits
 from planning.scene.samples import SampleArrays, Target
 
 from .limit import (
+    BY_OBSTACLE,
     Array,
     InBetween,
     InRange,
@@ -240,9 +241,11 @@ CAMERA_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
     CameraIncidence(),
     InBetween("camera_occlusion", "hidden from every camera that faces it"),
     InBetween("camera_body", "hidden by a device's body"),
+    InBetween(BY_OBSTACLE, "behind an obstacle"),
     SampleDistance(),
 )
 SEEN_CAUSES = causes(CAMERA_LIMITS)
 SEEN = len(SEEN_CAUSES)
 OCCLUDED = SEEN_CAUSES.index("camera_occlusion")
 BLOCKED = SEEN_CAUSES.index("camera_body")
+OBSTRUCTED = SEEN_CAUSES.index(BY_OBSTACLE)

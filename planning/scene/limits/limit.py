@@ -20,6 +20,8 @@ Rules = TypeVar("Rules")
 
 # Beyond this no limit of incidence is worth relaxing.
 STEEPEST = float(np.radians(85.0))
+# Cause of what an obstacle keeps from light or view.
+BY_OBSTACLE = "blocked_by_obstacle"
 # A field so many times as wide is as much as is worth asking for.
 WIDEST = 3
 

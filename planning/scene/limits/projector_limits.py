@@ -15,6 +15,7 @@ from planning.scene.patterns.pattern import pattern_of
 from planning.scene.samples import SampleColumns
 
 from .limit import (
+    BY_OBSTACLE,
     Array,
     InBetween,
     InRange,
@@ -155,9 +156,11 @@ PROJECTOR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
     TangentAngle(),
     InBetween("projector_occlusion", "shadowed from every projector that faces it"),
     InBetween("projector_body", "kept from the light by a device's body"),
+    InBetween(BY_OBSTACLE, "behind an obstacle"),
 )
 CAUSES = causes(PROJECTOR_LIMITS)
 LIT = len(CAUSES)
 OCCLUDED = CAUSES.index("projector_occlusion")
 BLOCKED = CAUSES.index("projector_body")
+OBSTRUCTED = CAUSES.index(BY_OBSTACLE)
 INCIDENCE = CAUSES.index("projector_incidence")

@@ -1,0 +1,183 @@
+"""The schema of `[[obstacle]]`, and where obstacles stand in the world.
+
+Lengths are in millimetres and places are relative to the object's centre, in the axes
+of the mesh file.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
+
+from geometry.files.readers import UNITS, load_mesh
+from geometry.mesh.mesh import MeshError, TriangleMesh
+from geometry.shapes import primitives
+from planning.model.bodies import Box
+from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.obstacles import Obstacle
+from planning.model.requirements import Workspace
+from planning.model.table_types import Axis, Name, Positive, Sides, Table
+
+from .workspace_tables import WorkspaceTable
+
+# What each shape is told by, beside its place.
+_KEYS = {
+    "box": {"size_mm"},
+    "table": {"size_mm"},
+    "cylinder": {"radius_mm", "height_mm"},
+    "mesh": {"file"},
+}
+# An object of which this share lies in a zone that blocks can't be measured.
+_SWALLOWED = 0.5
+
+
+class ObstacleTable(Table):
+    """What stands in the way of light and views, `[[obstacle]]`.
+
+    Attributes:
+        name: What plan and messages call it.
+        shape: `box`; `cylinder`, along its own z; `table`, whose middle of the top is
+            its place; `mesh`, a file whose origin is its place.
+        centre_mm: Its place. A table's may be left out: the top then touches the
+            object's lowest point, under the object's centre.
+        turn_deg: Turns about the x, then the y, then the z axis of the mesh file.
+        size_mm: Sides of a box; width, depth and thickness of a table.
+        radius_mm: Of a cylinder.
+        height_mm: Of a cylinder.
+        file: Of a mesh, relative to the rig file.
+        unit: Of the file's numbers; absent: as the format states, or mm.
+    """
+
+    name: Name
+    shape: Literal["box", "cylinder", "table", "mesh"]
+    centre_mm: Axis | None = None
+    turn_deg: Axis = Field(default=[0.0, 0.0, 0.0])
+    size_mm: Sides | None = None
+    radius_mm: Positive | None = None
+    height_mm: Positive | None = None
+    file: Name | None = None
+    unit: Annotated[str, Field(pattern=f"^({'|'.join(UNITS)})$")] | None = None
+
+    @model_validator(mode="after")
+    def _check_shape(self) -> Self:
+        needed = _KEYS[self.shape]
+        given = {
+            key
+            for key in set().union(*_KEYS.values())
+            if getattr(self, key) is not None
+        }
+        if given != needed:
+            raise ValueError(
+                f"shape = {self.shape!r} takes {' and '.join(sorted(needed))}, "
+                f"has {' and '.join(sorted(given)) or 'none'}"
+            )
+        if self.unit is not None and self.file is None:
+            raise ValueError("unit is of a file; write it beside file, or remove it")
+        if self.centre_mm is None and self.shape != "table":
+            raise ValueError(
+                "centre_mm is missing; write its place from the object's centre"
+            )
+        return self
+
+    def to_document(self) -> dict[str, Any]:
+        """Return plain values as written."""
+        return self.model_dump(mode="json", exclude_none=True)
+
+    def placed(self, workspace: Workspace, lowest_m: float, folder: Path) -> Obstacle:
+        """Return where it stands.
+
+        Args:
+            workspace: Its centre is where places count from; tables lie square to up.
+            lowest_m: Height of the object's lowest point over the centre [m].
+            folder: Where relative files are looked for.
+
+        Raises:
+            RigError: If its file can't be read.
+        """
+        # Lower-case letters turn about the fixed axes, in this order.
+        turn = Rotation.from_euler("xyz", self.turn_deg, degrees=True).as_matrix()
+        up = np.array(workspace.up)
+        place = lowest_m * up
+        if self.centre_mm is not None:
+            place = 1e-3 * np.array(self.centre_mm)
+        local = self._local(folder)
+        if self.shape == "table":
+            turn = turn @ _upright(up)
+            place = place - 0.5e-3 * (self.size_mm or [0.0] * 3)[2] * (turn @ [0, 0, 1])
+        vertices = np.array(workspace.centre) + place + local.vertices @ turn.T
+        return Obstacle(self.name, TriangleMesh(vertices, local.faces))
+
+    def _local(self, folder: Path) -> TriangleMesh:
+        if self.file is not None:
+            try:
+                return load_mesh(folder / self.file, unit=self.unit)
+            except MeshError as error:
+                raise RigError(f"obstacle {self.name!r}: {error}") from None
+        if self.radius_mm is not None and self.height_mm is not None:
+            return primitives.cylinder(1e-3 * self.radius_mm, 1e-3 * self.height_mm)
+        x, y, z = (1e-3 * side for side in self.size_mm or ())
+        return primitives.box((x, y, z))
+
+
+def obstacles_of(
+    tables: Sequence[ObstacleTable],
+    zones: WorkspaceTable,
+    workspace: Workspace,
+    mesh: TriangleMesh,
+    folder: Path,
+) -> tuple[Obstacle, ...]:
+    """Return what stands about the object: obstacles, then keep-out zones that block.
+
+    Args:
+        tables: Obstacles as written.
+        zones: The workspace as written: which of its zones block.
+        workspace: The same in the world.
+        mesh: The object.
+        folder: Where relative files are looked for.
+
+    Raises:
+        RigError: If a file can't be read.
+        InfeasibleLimitsError: If a zone that blocks holds the object.
+    """
+    offsets = mesh.corners.reshape(-1, 3) - np.array(workspace.centre)
+    lowest = float((offsets @ np.array(workspace.up)).min())
+    solid = [
+        zone
+        for table, zone in zip(zones.keep_out, workspace.keep_out, strict=True)
+        if table.blocks
+    ]
+    for zone in solid:
+        _check_apart(zone, offsets)
+    return (
+        *(table.placed(workspace, lowest, folder) for table in tables),
+        *(_of_zone(zone, np.array(workspace.centre)) for zone in solid),
+    )
+
+
+def _of_zone(zone: Box, centre: NDArray[np.float64]) -> Obstacle:
+    x, y, z = (2.0 * half for half in zone.half_m)
+    plain = primitives.box((x, y, z))
+    vertices = centre + np.array(zone.centre_m) + plain.vertices @ np.array(zone.axes)
+    return Obstacle(zone.name, TriangleMesh(vertices, plain.faces))
+
+
+def _check_apart(zone: Box, offsets: NDArray[np.float64]) -> None:
+    local = (offsets - np.array(zone.centre_m)) @ np.array(zone.axes).T
+    share = float(np.all(np.abs(local) <= zone.half_m, axis=1).mean())
+    if share >= _SWALLOWED:
+        raise InfeasibleLimitsError(
+            f"workspace.keep_out {zone.name!r} holds {100.0 * share:.0f} % of the "
+            f"object and blocks all light there; write blocks = false in it if it is "
+            f"only ground where no device may stand"
+        )
+
+
+def _upright(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A rotation that takes z to up, one of the six directions of the axes."""
+    axis = int(np.argmax(np.abs(up)))
+    turn = np.roll(np.eye(3), axis - 2, axis=0)
+    return turn if up[axis] > 0.0 else turn @ np.diag([1.0, -1.0, -1.0])
