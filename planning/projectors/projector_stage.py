@@ -82,15 +82,13 @@ class ProjectorStage:
         others = marginals(cover, selection)
         others = resolve_others(crowd, cover, others, len(selection.chosen))
         area = samples.samples.weight
+        kinds = {type(body) for body in candidates.scene.bodies}
         proof = certificate(cover, selection, others, area, bodied=crowd.bodied)
         proof = proof.changed(
             excluded_pairs={
                 cause: int((candidates.stages == index).sum())
                 for index, cause in enumerate(projector_limits.CAUSES)
-                if index not in _BY_BLOCKERS
-                or any(
-                    isinstance(b, _BY_BLOCKERS[index]) for b in candidates.scene.bodies
-                )
+                if index not in _BY_BLOCKERS or _BY_BLOCKERS[index] in kinds
             },
             n_regions=int(candidates.scene.region.max()) + 1,
         )

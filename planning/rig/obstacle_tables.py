@@ -64,12 +64,8 @@ class ObstacleTable(Table):
 
     @model_validator(mode="after")
     def _check_shape(self) -> Self:
-        needed = _KEYS[self.shape]
-        given = {
-            key
-            for key in set().union(*_KEYS.values())
-            if getattr(self, key) is not None
-        }
+        needed, known = _KEYS[self.shape], set().union(*_KEYS.values())
+        given = {key for key in known if getattr(self, key) is not None}
         if given != needed:
             raise ValueError(
                 f"shape = {self.shape!r} takes {' and '.join(sorted(needed))}, "

@@ -47,11 +47,8 @@ def reachability_relaxations(
     gained = _least(scene, reference, target.take(dark), share.wanted)
     for moved in scene.obstructions:
         rest = tuple(other for other in scene.obstructions if other is not moved)
-        still_dark = len(
-            _unlit(scene.with_obstructions(rest), reference, target.take(dark))
-        )
-        change = f"{moved.words} out of the way"
-        gained[change] = len(dark) - still_dark
+        still = _unlit(scene.with_obstructions(rest), reference, target.take(dark))
+        gained[f"{moved.words} out of the way"] = len(dark) - len(still)
     workspace = scene.requirements.workspace
     whole = workspace.whole_shell
     if whole != workspace:

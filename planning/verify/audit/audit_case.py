@@ -142,7 +142,7 @@ def examine(plan: RigPlan, *, seed: int, n_samples: int, threads: int) -> AuditC
     """Recompute what a plan's devices and reference poses do to fresh samples."""
     target = plan.requirements.target
     samples = draw_samples(plan.surface, target, n_samples, seed)
-    shadow = Shadow(plan.surface.mesh, threads=threads)
+    shadow = Shadow.of(plan, threads=threads)
     actual = recompute(plan, samples, shadow)
     areas = plan.surface.mesh.face_areas
     inside = plan.surface.target_faces(target)

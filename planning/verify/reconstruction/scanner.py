@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.requirements import CheckLimits
 
@@ -117,6 +118,7 @@ class Scanner:
         camera_focus: Likewise of the cameras.
         groups: Ids of the projectors that shine at the same time.
         baselines: Of pairs of cameras that eq. (10) limits.
+        obstacles: What stands about the object and isn't a device.
     """
 
     projectors: tuple[ProjectorCalibration, ...]
@@ -129,6 +131,7 @@ class Scanner:
     camera_focus: Defocus | None = None
     groups: tuple[frozenset[str], ...] = ()
     baselines: tuple[BaselineLimit, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
 
     @classmethod
     def of(cls, plan: RigPlan) -> Self:
@@ -155,6 +158,7 @@ class Scanner:
                 for row in document.baselines
                 if row.d_max is not None
             ),
+            plan.surface.obstacles,
         )
 
     def pairs(self) -> Iterator[tuple[tuple[int, int], PairCalibration]]:

@@ -1,6 +1,6 @@
 """Claims about areas: coverage, causes, and what each device contributes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -9,14 +9,21 @@ from numpy.typing import NDArray
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import ROUNDING
-from planning.verify.audit.predicates.audit_devices import light_starts
+from planning.verify.audit.predicates.audit_devices import (
+    AuditProjector,
+    light_starts,
+    reference_projectors,
+)
 from planning.verify.audit.predicates.occlusion import block_of
 from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
     LIGHT_CAUSES,
+    LIGHT_OBSTACLE,
     PAIR_CAUSES,
     PROJECTOR_BODY,
     SIGHT_CAUSES,
+    SIGHT_OBSTACLE,
+    light_steps,
 )
 
 _CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
@@ -89,7 +96,13 @@ def _audit_causes(case: AuditCase, findings: AuditFindings) -> None:
         case,
         "uncovered_by_cause",
         claims.uncovered_by_cause,
-        {cause: actual.cause == index for index, cause in enumerate(_CAUSES)},
+        # An obstacle stands in the way of light or of a view, under one name.
+        {
+            cause: np.isin(
+                actual.cause, [k for k, c in enumerate(_CAUSES) if c == cause]
+            )
+            for cause in _CAUSES
+        },
         areas.area_m2 - areas.measured_m2,
         findings,
     )
@@ -153,30 +166,61 @@ def _audit_contributions(case: AuditCase, findings: AuditFindings) -> None:
 
 
 def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
-    """Check `blocked_by_body_m2`: what each body keeps from being measured.
+    """Check what each body and each obstacle keeps from being measured.
 
     The target area that isn't measured and where, for some projector or for some camera
-    that looks at it lit, the first limit that fails is a body, and this one in the way.
+    that looks at it lit, the first limit that fails is a body or an obstacle, and this
+    one in the way; for obstacles also what no reference projector lights, where that
+    limit is the last that fails for one of them.
     """
-    claims, actual = case.plan.coverage.blocked_by_body_m2, case.actual
+    claims, actual = case.plan.coverage, case.actual
     devices = (*case.plan.projectors, *case.plan.cameras)
     blocks = {d.id: block for d in devices if (block := block_of(d)) is not None}
-    key = "coverage.blocked_by_body_m2"
-    if not findings.holds(
-        set(claims) == set(blocks), key, f"must hold an area for each of {list(blocks)}"
-    ):
-        return
+    hindrances = {solid.name: solid for solid in case.shadow.hindrances}
     dark = actual.samples.in_target & ~actual.measured
     seen_lit = actual.pairs.max(axis=0, initial=-1)
-    stopped = [
-        *(dark & (actual.light == PROJECTOR_BODY)),
-        *(dark & actual.lit & (seen_lit == CAMERA_BODY)),
+    light = np.isin(actual.light, (PROJECTOR_BODY, LIGHT_OBSTACLE))
+    sight = np.isin(seen_lit, (CAMERA_BODY, SIGHT_OBSTACLE))
+    stopped = [*(dark & light), *(dark & actual.lit & sight)]
+    ways = [
+        (device.id, np.flatnonzero(flags), device)
+        for device, flags in zip(devices, stopped, strict=True)
     ]
-    for name, block in blocks.items():
-        behind = np.zeros(len(dark), dtype=bool)
-        for device, flags in zip(devices, stopped, strict=True):
-            if device.id != name:
-                chosen = np.flatnonzero(flags)
-                points = actual.samples.points[chosen]
-                behind[chosen] |= block.meets(light_starts(device, points), points)
-        case.estimator.audit(f"{key}.{name}", claims[name], behind, findings)
+    beyond = [*ways, *_stopped_of_reference(case, dark)] if hindrances else []
+    for key, areas, solids, lines in (
+        ("coverage.blocked_by_body_m2", claims.blocked_by_body_m2, blocks, ways),
+        (
+            "coverage.blocked_by_obstacle_m2",
+            claims.blocked_by_obstacle_m2,
+            hindrances,
+            beyond,
+        ),
+    ):
+        names = set(areas)
+        if not findings.holds(
+            names == set(solids), key, f"must hold an area for each of {list(solids)}"
+        ):
+            continue
+        for name, solid in solids.items():
+            behind = np.zeros(len(dark), dtype=bool)
+            for whose, chosen, device in lines:
+                if whose != name or solids is hindrances:
+                    points = actual.samples.points[chosen]
+                    behind[chosen] |= solid.meets(light_starts(device, points), points)
+            case.estimator.audit(f"{key}.{name}", areas[name], behind, findings)
+
+
+def _stopped_of_reference(
+    case: AuditCase, dark: _Flags
+) -> Iterator[tuple[str, NDArray[np.int64], AuditProjector]]:
+    """Yield each reference projector and the dark samples that obstacles keep it from.
+
+    Of those that no reference projector lights.
+    """
+    reachable = case.reachable
+    obstructed = dark & ~reachable.projectors & (reachable.furthest == LIGHT_OBSTACLE)
+    chosen = np.flatnonzero(obstructed)
+    samples, limits = case.actual.samples.take(chosen), case.plan.requirements.projector
+    for projector in reference_projectors(case.plan) if len(chosen) else ():
+        steps = light_steps(projector, samples, limits, case.shadow)
+        yield "", chosen[steps == LIGHT_OBSTACLE], projector

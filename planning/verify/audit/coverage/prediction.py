@@ -58,7 +58,7 @@ def predict_measured(
     """
     drawn = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     samples = drawn.take(drawn.in_target)
-    actual = recompute(plan, samples, Shadow(plan.surface.mesh, threads=threads))
+    actual = recompute(plan, samples, Shadow.of(plan, threads=threads))
     by_pair = np.mean(actual.pairs == MEASURED, axis=2)
     return PredictedTarget(samples, actual.measured, by_pair)
 
@@ -67,7 +67,7 @@ def possible_at_floors(
     plan: RigPlan, samples: AuditSamples, *, threads: int
 ) -> NDArray[np.bool_]:
     """Return whether each camera could measure each sample, shape (n_c, n)."""
-    shadow = Shadow(plan.surface.mesh, threads=threads)
+    shadow = Shadow.of(plan, threads=threads)
     pairs = recompute(plan, samples, shadow, _at_floors(plan.requirements)).pairs
     steepest = plan.requirements.camera.max_incidence - _SLANT_MARGIN
     most = np.sin(max(steepest, _SLANT))

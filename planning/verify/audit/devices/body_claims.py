@@ -89,6 +89,12 @@ def _audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
             f"{device.id}.body",
             "touches the object; it must stand off it",
         )
+        for solid in case.shadow.hindrances:
+            findings.holds(
+                not touches(block, solid.caster),
+                f"{device.id}.body",
+                f"touches the obstacle {solid.name!r}; it must stand off it",
+            )
         if not device.existing:
             _audit_zones(f"{device.id}.body", block, case.plan, findings)
 

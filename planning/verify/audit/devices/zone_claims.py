@@ -125,7 +125,7 @@ def _audit_volume(
     key: str, box: Box, table: Mapping[str, Any], findings: AuditFindings
 ) -> None:
     """Compare a keep-out volume with the centre, size and turns that are stated."""
-    turn = _turned(np.radians(table["turn_deg"]))
+    turn = turned(np.radians(table["turn_deg"]))
     centre, size = (1e-3 * np.array(table[name]) for name in ("centre_mm", "size_mm"))
     stated = Block.at(box.name, turn, centre, 0.5 * size)
     _audit_corners(key, box, stated, findings)
@@ -154,7 +154,7 @@ def _audit_plane(
         )
 
 
-def _turned(angles: _Array) -> _Array:
+def turned(angles: _Array) -> _Array:
     """Rz Ry Rx: turns about the fixed x, y and z axes, one after the other."""
     turn = np.eye(3)
     for axis, angle in enumerate(angles):

@@ -129,7 +129,9 @@ def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
     )
 
 
-def light_starts(device: PlannedProjector | PlannedCamera, points: _Array) -> _Array:
+def light_starts(
+    device: PlannedProjector | PlannedCamera | AuditProjector, points: _Array
+) -> _Array:
     """Return where light to points leaves a device, or views from them end, (n, 3)."""
     light = light_from(device.device, device.world_from_device)
     along, length = light.to_points(points)

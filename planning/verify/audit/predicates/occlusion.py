@@ -8,6 +8,7 @@ a point iff an edge of one meets the other.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 from planning.model.bodies import Box
+from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
@@ -136,10 +138,31 @@ def bodies_of_reference(
     ]
 
 
+class Hindrance:
+    """An obstacle: what no light and no view passes.
+
+    Args:
+        obstacle: The plan's.
+        threads: Worker threads of the ray caster.
+    """
+
+    def __init__(self, obstacle: Obstacle, *, threads: int) -> None:
+        self.name = obstacle.name
+        self.caster = RayCaster(obstacle.mesh, threads=threads)
+
+    def meets(self, starts: _Array, ends: _Array) -> NDArray[np.bool_]:
+        """Return which straight lines meet it more than 0.02 mm before their ends."""
+        way = ends - starts
+        length = np.linalg.norm(way, axis=1)
+        along = way / np.where(length > 0.0, length, 1.0)[:, None]
+        _, distance = self.caster.first_hits(starts, along)
+        return distance < length - _SLACK_M
+
+
 def free_of(
-    blocks: Sequence[Block], points: _Array, along: _Array, lengths: _Array
+    blocks: Sequence[Block | Hindrance], points: _Array, along: _Array, lengths: _Array
 ) -> NDArray[np.bool_]:
-    """Return which segments that end at points (n, 3) meet no body, shape (n,)."""
+    """Return which segments that end at points (n, 3) meet none of them, (n,)."""
     free = np.ones(len(points), dtype=bool)
     if len(points):
         for block in blocks:
@@ -185,13 +208,28 @@ class Shadow:
     Args:
         mesh: The occluder.
         threads: Worker threads of the ray caster.
+        hindrances: Obstacles, in the way of every device.
     """
 
-    def __init__(self, mesh: TriangleMesh, *, threads: int) -> None:
+    def __init__(
+        self,
+        mesh: TriangleMesh,
+        *,
+        threads: int,
+        hindrances: tuple[Hindrance, ...] = (),
+    ) -> None:
+        self.hindrances = hindrances
         self._caster = RayCaster(mesh, threads=threads)
         self._centre = mesh.centre
         self._radius = 1.05 * mesh.reach
         self._slack = _SLACK * mesh.radius
+
+    @classmethod
+    def of(cls, plan: RigPlan, *, threads: int) -> Self:
+        """Return what stands in the way about a plan's object, but devices."""
+        obstacles = plan.surface.obstacles
+        hindrances = tuple(Hindrance(each, threads=threads) for each in obstacles)
+        return cls(plan.surface.mesh, threads=threads, hindrances=hindrances)
 
     @property
     def caster(self) -> RayCaster:

@@ -25,6 +25,7 @@ LIGHT_CAUSES = (
     "tangent_angle",
     "projector_occlusion",
     "projector_body",
+    "blocked_by_obstacle",
 )
 SIGHT_CAUSES = (
     "camera_field",
@@ -32,6 +33,7 @@ SIGHT_CAUSES = (
     "camera_incidence",
     "camera_occlusion",
     "camera_body",
+    "blocked_by_obstacle",
     "sample_distance",
 )
 PAIR_CAUSES = ("conditioning", "sigma", "pitch")
@@ -43,6 +45,8 @@ LIT, SEEN, MEASURED = (
 OCCLUDED = LIGHT_CAUSES.index("projector_occlusion")
 PROJECTOR_BODY = LIGHT_CAUSES.index("projector_body")
 CAMERA_BODY = SIGHT_CAUSES.index("camera_body")
+LIGHT_OBSTACLE = LIGHT_CAUSES.index("blocked_by_obstacle")
+SIGHT_OBSTACLE = SIGHT_CAUSES.index("blocked_by_obstacle")
 
 
 def light_steps(
@@ -149,13 +153,15 @@ def _pass_free(
     way: tuple[NDArray[np.float64], NDArray[np.float64]],
     shadow: Shadow,
 ) -> None:
-    """Take samples that stand at `before` past the surface and the bodies, in place."""
+    """Take samples at `before` past surface, bodies and obstacles, in place."""
     chosen = np.flatnonzero(steps == before)
     points = samples.points[chosen]
     along, length = (of[chosen] for of in way)
     free = shadow.free(points, samples.faces[chosen], along, length)
-    clear = free & free_of(device.blocks, points, along, length)
-    steps[chosen] += free.astype(np.int8) + clear
+    steps[chosen] += free
+    for solids in (device.blocks, shadow.hindrances):
+        free &= free_of(solids, points, along, length)
+        steps[chosen] += free
 
 
 def _or(limit: float | None, otherwise: float) -> float:

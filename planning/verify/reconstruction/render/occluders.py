@@ -1,6 +1,7 @@
-"""Bodies of the devices that really stand there, as meshes that rays are cast against.
+"""Bodies and obstacles that really stand there, as a mesh that rays are cast against.
 
-A body is dark: light that meets it is lost, and a camera that looks at it sees nothing.
+They are dark: light that meets one is lost, and a camera that looks at one sees
+nothing.
 """
 
 from dataclasses import dataclass
@@ -45,7 +46,7 @@ class Both:
 
 
 def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
-    """Return the bodies of all devices but one; None where there are none.
+    """Return the bodies of all devices but one, and obstacles; None of nothing.
 
     Args:
         scanner: What really stands there.
@@ -55,12 +56,18 @@ def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
     corners = [
         _corners(device) for device in every if device.id != name and device.body
     ]
-    if not corners:
+    box = np.concatenate([_QUADS[:, [0, 1, 2]], _QUADS[:, [0, 2, 3]]])
+    parts = [(of_body, box) for of_body in corners]
+    parts += [(solid.mesh.vertices, solid.mesh.faces) for solid in scanner.obstacles]
+    if not parts:
         return None
-    faces = np.concatenate([_QUADS[:, [0, 1, 2]], _QUADS[:, [0, 2, 3]]])
-    parts = [faces + 8 * number for number in range(len(corners))]
-    mesh = TriangleMesh(np.concatenate(corners), np.concatenate(parts))
-    return RayCaster(mesh, threads=1)
+    ends = np.cumsum([len(vertices) for vertices, _ in parts])
+    faces = [
+        faces + end - len(vertices)
+        for (vertices, faces), end in zip(parts, ends, strict=True)
+    ]
+    vertices = np.concatenate([vertices for vertices, _ in parts])
+    return RayCaster(TriangleMesh(vertices, np.concatenate(faces)), threads=1)
 
 
 def _corners(device: ProjectorCalibration | CameraCalibration) -> Array:
