@@ -20,6 +20,7 @@ from planning.verify.audit.coverage.inside_claims import audit_inside
 from planning.verify.audit.coverage.region_claims import audit_margins, audit_regions
 from planning.verify.audit.devices.body_claims import audit_bodies
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
+from planning.verify.audit.devices.obstacle_claims import audit_obstacles
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
 from planning.verify.audit.rings.ring_claims import audit_rings
@@ -35,6 +36,7 @@ _CLAIMS = (
     audit_existing,
     audit_ranges,
     audit_bodies,
+    audit_obstacles,
     audit_areas,
     audit_inside,
     audit_margins,
