@@ -5,7 +5,6 @@ that a mistake in one shows against the other. Pixels follow OpenCV: the centre 
 top-left pixel is (0, 0).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from geometry.devices import ParallelModel
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.verify.reconstruction.patterns.pattern_images import PatternSequence
 from planning.verify.reconstruction.patterns.ring_patterns import (
     PATTERNS,
     DrawnRings,
@@ -155,11 +153,6 @@ class ProjectorCalibration:
     def pattern_for(self, camera: CameraCalibration) -> RingsForCamera:
         """Return what it draws as a camera's decoder reads it."""
         return self.pattern.seen_from(self.to_ring(camera.centre[None])[0])
-
-    def sequence(self, cameras: Sequence[CameraCalibration]) -> PatternSequence:
-        """Return all that it shows for the cameras of a rig, one or more."""
-        each = {camera.id: self.pattern_for(camera) for camera in cameras}
-        return PatternSequence(self, self.pattern, each)
 
     def aim(self, points: Array) -> tuple[Array, Array, Array]:
         """Return where the light of world points starts, its directions and lengths."""

@@ -8,8 +8,8 @@ from typing import Any, BinaryIO
 from PIL import Image
 
 from planning.model.files import write_together
-from planning.verify.reconstruction.patterns.pattern_frames import Frame
 from planning.verify.reconstruction.patterns.pattern_images import PatternCanvas, canvas
+from planning.verify.reconstruction.patterns.ring_patterns import Frame
 
 from .scanner import Scanner
 
@@ -52,11 +52,10 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
     before = _listed(place)
     files: dict[Path, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
-    for projector in scanner.projectors:
-        sequence = projector.sequence(scanner.cameras)
-        drawn = canvas(sequence)
+    for p, projector in enumerate(scanner.projectors):
+        frames, drawn = scanner.frames(p), canvas(projector, scanner.cameras)
         (place / projector.id).mkdir(parents=True, exist_ok=True)
-        for frame in sequence.frames:
+        for frame in frames:
             path = place / projector.id / f"{frame.name}.png"
             files[path] = _png_writer(drawn, frame)
         entries.append(
@@ -67,7 +66,7 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
                 **projector.pattern.entry(),
                 "frames": [
                     {"png": f"{projector.id}/{frame.name}.png", **vars(frame)}
-                    for frame in sequence.frames
+                    for frame in frames
                 ],
             }
         )

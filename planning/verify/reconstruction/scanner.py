@@ -10,6 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.requirements import CheckLimits
+from planning.verify.reconstruction.patterns.ring_patterns import Frame
 
 from .arrays import Array, Indices, Mask
 from .calibration import (
@@ -171,6 +172,15 @@ class Scanner:
         """Return what a pair is called."""
         p, c = pair
         return f"{self.projectors[p].id} with {self.cameras[c].id}"
+
+    def frames(self, p: int) -> tuple[Frame, ...]:
+        """Return what a projector shows for all cameras, in order."""
+        return self.projectors[p].pattern.frames(camera.id for camera in self.cameras)
+
+    def frame_names(self, p: int, c: int) -> tuple[str, ...]:
+        """Return the names of the frames that a camera's decoder reads, in order."""
+        seen = (None, self.cameras[c].id)
+        return tuple(frame.name for frame in self.frames(p) if frame.camera in seen)
 
     def shining_with(self, projector: str) -> frozenset[str]:
         """Return the other projectors that shine at the same time as one."""

@@ -452,7 +452,7 @@ def test_files_give_the_cloud_that_was_made_before_they_were_written(saved):
     assert before.failures == after.failures == ()
     assert np.array_equal(before.merged.cloud.points, after.merged.cloud.points)
     names = sorted(p.name for p in (folder.path / "C2" / "P1").iterdir())
-    assert names == [f"{name}.png" for name in sorted(folder.frame_names(0, 1))]
+    assert names == [f"{name}.png" for name in sorted(folder.plan.frame_names(0, 1))]
     assert names[-1] == "15-root-C2-inverse.png"
 
 

@@ -162,8 +162,7 @@ class _Inspection:
     def frames(self, pair: PairIndex, read: Callable[[], Images]) -> Frames | None:
         """Return what may be decoded of a pair's images; None: nothing."""
         p, c = pair
-        sequence = self._plan.projectors[p].sequence(self._plan.cameras)
-        names = sequence.frame_names(self._plan.cameras[c].id)
+        names = self._plan.frame_names(p, c)
         try:
             inspected = inspect(read(), self.patterns(pair), names)
         except DarkError as error:

@@ -15,7 +15,6 @@ from PIL import Image
 from planning.model.errors import CapturesError
 from planning.model.files import write_together
 from planning.verify.reconstruction.arrays import Images
-from planning.verify.reconstruction.patterns.pattern_images import PatternSequence
 from planning.verify.reconstruction.patterns.ring_patterns import Frames
 from planning.verify.reconstruction.scanner import Scanner
 
@@ -41,16 +40,6 @@ class CaptureFolder:
     def place(self, p: int, c: int) -> Path:
         """Return the folder of a pair."""
         return self.path / self.plan.cameras[c].id / self.plan.projectors[p].id
-
-    def frame_names(self, p: int, c: int) -> tuple[str, ...]:
-        """Return the names of a pair's frames, without ending, as decoders read them.
-
-        White, black, bits and their inverses, then the root disc of this camera.
-        """
-        return self._sequence(p).frame_names(self.plan.cameras[c].id)
-
-    def _sequence(self, p: int) -> PatternSequence:
-        return self.plan.projectors[p].sequence(self.plan.cameras)
 
     def require(self) -> None:
         """Refuse a folder that holds none of the cameras.
@@ -94,17 +83,18 @@ class CaptureFolder:
         place = self.place(p, c)
         place.mkdir(parents=True, exist_ok=True)
         pictures = [Image.fromarray(image) for image in stack]
+        names = self.plan.frame_names(p, c)
         write_together(
             {
                 place / f"{name}.png": lambda file, picture=picture: picture.save(
                     file, format="PNG", compress_level=1
                 )
-                for name, picture in zip(self.frame_names(p, c), pictures, strict=True)
+                for name, picture in zip(names, pictures, strict=True)
             }
         )
 
     def _files(self, p: int, c: int) -> list[Path]:
-        place, names = self.place(p, c), self.frame_names(p, c)
+        place, names = self.place(p, c), self.plan.frame_names(p, c)
         if not place.is_dir():
             near = _contents(place.parent) if place.parent.is_dir() else ()
             holds = f"; {place.parent} holds {_some(near)}" if near else ""
@@ -115,7 +105,7 @@ class CaptureFolder:
                 found.setdefault(file.stem, []).append(file)
         missing = [name for name in names if name not in found]
         if missing:
-            known = {frame.name for frame in self._sequence(p).frames}
+            known = {frame.name for frame in self.plan.frames(p)}
             others = [file.name for file in _entries(place) if file.stem not in known]
             also = f"; holds {_some(others)}, no frame's name" if others else ""
             raise CapturesError(f"{place}: lacks {_some(missing)}{also}")

@@ -14,7 +14,8 @@ from scipy.special import erfinv
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
-_MIN_CONTRAST = 10.0
+# A pixel is lit if white exceeds black by this many levels of 255.
+MIN_CONTRAST = 10.0
 SATURATED = 254.5
 # Least |I - I_inv| / (W - K) of every bit beside an edge, and of the root bit on it:
 # the level 1.5 px off an edge that is blurred by 6.6 px.
@@ -100,16 +101,12 @@ class _Reader:
         self.patterns = patterns
         white, black = stack[0].astype(np.float32), stack[1].astype(np.float32)
         contrast = white - black
-        self.valid = (contrast >= _MIN_CONTRAST) & (white < SATURATED)
+        self.valid = (contrast >= MIN_CONTRAST) & (white < SATURATED)
         self.contrast = np.maximum(contrast, np.float32(1.0))
-        code = np.zeros(contrast.shape, dtype=np.int16)
-        least = np.full(contrast.shape, np.inf, dtype=np.float32)
-        for bit in range(patterns.n_bits):
-            difference = self._difference(2 + 2 * bit)
-            code |= (difference > 0.0).astype(np.int16) << bit
-            np.minimum(least, np.abs(difference), out=least)
-        self.code = code
-        self.index = np.where(self.valid, patterns.index_of_code[code], np.int16(-1))
+        self.code, least = read_code(stack, patterns.n_bits)
+        self.index = np.where(
+            self.valid, patterns.index_of_code[self.code], np.int16(-1)
+        )
         self.sure = self.valid & (least >= _MIN_CERTAINTY * self.contrast)
         self.even = _even(contrast, self.grey_noise())
 
@@ -139,18 +136,35 @@ class _Reader:
         # Mean absolute values: a median of whole grey levels would be a whole one.
         return max(0.5 * np.sqrt(0.5 * np.pi) * float(np.mean(np.abs(rest))), 1e-3)
 
-    def _difference(self, frame: int) -> Grey:
-        return np.subtract(self._stack[frame], self._stack[frame + 1], dtype=np.float32)
+
+def read_code(stack: Images, n_bits: int) -> tuple[NDArray[np.int16], Grey]:
+    """Return the Gray code of pixels, and how far their least clear bit stands out.
+
+    Args:
+        stack: As in `Frames`, or some of its pixels, shape (n_frames, ...).
+        n_bits: Of the code.
+    """
+    code = np.zeros(stack.shape[1:], dtype=np.int16)
+    least = np.full(stack.shape[1:], np.inf, dtype=np.float32)
+    for bit in range(n_bits):
+        frame = 2 + 2 * bit
+        difference = np.subtract(stack[frame], stack[frame + 1], dtype=np.float32)
+        code |= (difference > 0.0).astype(np.int16) << bit
+        np.minimum(least, np.abs(difference), out=least)
+    return code, least
 
 
 def _even(contrast: Grey, noise: float) -> Mask:
     """Pixels whose 3 x 3 neighbours' contrast differs by little, noise allowed for."""
-    low, high = np.pad(contrast, 1, mode="edge"), np.pad(contrast, 1, mode="edge")
-    low = np.minimum(np.minimum(low[:-2], low[1:-1]), low[2:])
-    low = np.minimum(np.minimum(low[:, :-2], low[:, 1:-1]), low[:, 2:])
-    high = np.maximum(np.maximum(high[:-2], high[1:-1]), high[2:])
-    high = np.maximum(np.maximum(high[:, :-2], high[:, 1:-1]), high[:, 2:])
+    low, high = (_about(contrast, extreme) for extreme in (np.minimum, np.maximum))
     return low >= np.float32(_MIN_EVENNESS) * high - np.float32(4.0 * noise)
+
+
+def _about(image: Grey, extreme: np.ufunc) -> Grey:
+    """Extreme of each pixel and its eight neighbours; SciPy's filters take longer."""
+    padded = np.pad(image, 1, mode="edge")
+    padded = extreme(extreme(padded[:-2], padded[1:-1]), padded[2:])
+    return extreme(extreme(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
 
 
 def _crossings(reader: _Reader, noise: float) -> ImageEdges:

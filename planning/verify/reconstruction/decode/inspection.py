@@ -11,9 +11,8 @@ from planning.verify.reconstruction.arrays import Grey, Images, Mask
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 from .adding_up import broken_pixels
+from .edges import MIN_CONTRAST, read_code
 
-# A pixel is lit if white exceeds black by this many levels of 255, as in the decoder.
-_LIT = 10.0
 _LIT_BY_BITS = 20.0
 _FEWEST_LIT = 100
 # From this level of 255 on, or where levels pile up, a sensor is taken to be clipped.
@@ -93,7 +92,7 @@ def _lit(stack: Images) -> Mask:
     sums = [np.add(stack[k], stack[k + 1], dtype=np.float32) for k in (2, 4)]
     by_bits = np.minimum(*sums) - 2.0 * black >= _LIT_BY_BITS
     opened = np.asarray(binary_opening(by_bits, np.ones((3, 3))), dtype=bool)
-    return (_contrast(stack) >= _LIT) | opened
+    return (_contrast(stack) >= MIN_CONTRAST) | opened
 
 
 def _contrast(stack: Images) -> Grey:
@@ -112,8 +111,8 @@ def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
         DarkError: If there is no light.
     """
     contrast, lit = _contrast(stack), _lit(stack)
-    n_lit = int(np.count_nonzero(contrast >= _LIT))
-    n_below = int(np.count_nonzero(contrast <= -_LIT))
+    n_lit = int(np.count_nonzero(contrast >= MIN_CONTRAST))
+    n_below = int(np.count_nonzero(contrast <= -MIN_CONTRAST))
     if n_below > max(n_lit, _FEWEST_LIT):
         raise CapturesError(
             f"white is darker than black in {n_below} pixels, brighter in {n_lit}: "
@@ -122,8 +121,8 @@ def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
     if n_lit < _FEWEST_LIT:
         levels = [float(np.median(image)) for image in stack[:2]]
         raise DarkError(
-            f"no light: white exceeds black by {_LIT:.0f} of 255 in {n_lit} pixels "
-            f"(median levels {levels[0]:.0f} and {levels[1]:.0f}); light the object, "
+            f"no light: white exceeds black by {MIN_CONTRAST:.0f} of 255 in {n_lit} "
+            f"pixels (median levels {levels[0]:.0f} and {levels[1]:.0f}); light the object, "
             f"or expose longer; shorter if both are near 255"
         )
     rows, columns = (np.flatnonzero(lit.any(axis=axis)) for axis in (1, 0))
@@ -180,15 +179,10 @@ def _require_different(stack: Images, names: Sequence[str]) -> None:
 
 def _require_codes(stack: Images, good: Mask, patterns: RingsForCamera) -> None:
     """Refuse images whose pixels hold codes that the projector never drew."""
-    rows, columns = np.nonzero(good & (_contrast(stack) >= _LIT))
-    contrast = _contrast(stack)[rows, columns]
-    code = np.zeros(len(rows), dtype=np.int64)
-    sure = np.ones(len(rows), dtype=bool)
-    for bit in range(patterns.n_bits):
-        pair = stack[2 + 2 * bit : 4 + 2 * bit, rows, columns].astype(np.float32)
-        level = pair[0] - pair[1]
-        code |= (level > 0.0).astype(np.int64) << bit
-        sure &= np.abs(level) >= _SURE * contrast
+    contrast = _contrast(stack)
+    read = good & (contrast >= MIN_CONTRAST)
+    code, least = read_code(stack[:, read], patterns.n_bits)
+    sure = least >= _SURE * contrast[read]
     strange = patterns.index_of_code[code[sure]] < 0
     share = float(strange.mean()) if len(strange) else 0.0
     if share > _MOST_STRANGE:

@@ -6,6 +6,7 @@ its centre. Half way between, frame and inverse are equally bright, whatever the
 projector's gamma.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,36 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.verify.reconstruction.arrays import Array, Grey
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
 
-from .pattern_frames import Frame, Panel
-from .ring_patterns import DrawnRings, RingsForCamera
+from .ring_patterns import DrawnRings, Frame, RingsForCamera
 
 _WHITE = 255.0
 _NEIGHBOURS = (slice(None, -1), slice(1, None))
-
-
-@dataclass(frozen=True, eq=False)
-class PatternSequence:
-    """All that one projector shows.
-
-    Attributes:
-        panel: Of the projector, as the patterns are drawn for it.
-        pattern: What is drawn.
-        discs: The same with the root disc of each camera, by its id.
-    """
-
-    panel: Panel
-    pattern: DrawnRings
-    discs: dict[str, RingsForCamera]
-
-    @cached_property
-    def frames(self) -> tuple[Frame, ...]:
-        """What is shown, in order."""
-        return self.pattern.frames(self.discs)
-
-    def frame_names(self, camera: str) -> tuple[str, ...]:
-        """Return the names of the frames that a camera's decoder reads, in order."""
-        return tuple(f.name for f in self.frames if f.camera in (None, camera))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +30,8 @@ class PatternCanvas:
     """Where a projector's pixels lie among the rings, shape (h, w) each.
 
     Attributes:
-        sequence: What is shown.
+        pattern: What is drawn.
+        discs: The same with the root disc of each camera, by its id.
         x: Of pixel centres in the plane of the rings.
         y: Likewise.
         edge: Ring edge that is nearest in the ring coordinate.
@@ -58,7 +39,8 @@ class PatternCanvas:
         beyond: Of the part outside it; both together are the pixel in white.
     """
 
-    sequence: PatternSequence
+    pattern: DrawnRings
+    discs: dict[str, RingsForCamera]
     x: Array
     y: Array
     edge: NDArray[np.intp]
@@ -71,7 +53,7 @@ class PatternCanvas:
             assert frame.camera is not None
             outside = self._outside[frame.camera]
             return self.within + self.beyond - outside if frame.inverse else outside
-        bright = self.sequence.pattern.bright(frame).astype(np.uint8)
+        bright = self.pattern.bright(frame).astype(np.uint8)
         inside = self.within * bright[:-1].take(self.edge)
         return inside + self.beyond * bright[1:].take(self.edge)
 
@@ -79,32 +61,35 @@ class PatternCanvas:
     def _outside(self) -> dict[str, NDArray[np.uint8]]:
         """Where r.m > 0, by camera: outside its root disc."""
         white = self.within + self.beyond
-        found: dict[str, NDArray[np.uint8]] = {}
-        for camera, patterns in self.sequence.discs.items():
+        outside: dict[str, NDArray[np.uint8]] = {}
+        for camera, patterns in self.discs.items():
             share = _share_at_once(_root_level(patterns, self.x, self.y))
-            found[camera] = np.rint(white * share).astype(np.uint8)
-        return found
+            outside[camera] = np.rint(white * share).astype(np.uint8)
+        return outside
 
 
-def canvas(sequence: PatternSequence) -> PatternCanvas:
-    """Return where a projector's pixels lie among its rings."""
-    panel, patterns = sequence.panel, sequence.pattern
-    width, height = panel.resolution
+def canvas(
+    projector: ProjectorCalibration, cameras: Sequence[CameraCalibration]
+) -> PatternCanvas:
+    """Return where a projector's pixels lie among its rings, for a rig's cameras."""
+    patterns = projector.pattern
+    width, height = projector.resolution
     v, u = np.indices((height, width), dtype=np.float64)
     pixels = np.column_stack([u.ravel(), v.ravel()])
-    x, y = (part.reshape(height, width) for part in panel.ring_plane(pixels).T)
+    x, y = (axis.reshape(height, width) for axis in projector.ring_plane(pixels).T)
     rho = np.hypot(x, y)
     slope = _slope(rho)
     radii = patterns.radii
     edge = np.searchsorted(0.5 * (radii[1:] + radii[:-1]), rho)
     drawn = _share(patterns.outer_radius - rho, slope)
-    if panel.beam_radius is not None:
-        flat = panel.panel_coordinates(pixels)
+    if projector.beam_radius is not None:
+        flat = projector.panel_coordinates(pixels)
         away = np.hypot(flat[:, 0], flat[:, 1]).reshape(height, width)
-        drawn = drawn * _share(panel.beam_radius - away, _slope(away))
+        drawn = drawn * _share(projector.beam_radius - away, _slope(away))
     white = np.rint(_WHITE * drawn).astype(np.uint8)
     beyond = np.rint(white * _share(rho - radii[edge], slope)).astype(np.uint8)
-    return PatternCanvas(sequence, x, y, edge, white - beyond, beyond)
+    discs = {camera.id: projector.pattern_for(camera) for camera in cameras}
+    return PatternCanvas(patterns, discs, x, y, edge, white - beyond, beyond)
 
 
 def _root_level(patterns: RingsForCamera, x: Array, y: Array) -> Array:

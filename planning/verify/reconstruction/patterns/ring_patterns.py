@@ -8,7 +8,7 @@ camera the disc that tells the two roots of its rays apart, with its inverse: in
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,33 @@ from scipy.special import ndtr
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.light_laws import LightLaw
 
-from .pattern_frames import Frame
+Kind = Literal["white", "black", "bit", "root"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One image of the sequence.
+
+    Attributes:
+        number: Place in the sequence, from 0.
+        kind: `white`, `black`, a `bit` of the annulus index, or a camera's `root` disc.
+        bit: Which bit, from 0 for the one that flips most often; None for the others.
+        camera: Whose root disc; None for the others.
+        inverse: Bright and dark exchanged, within what is drawn at all.
+    """
+
+    number: int
+    kind: Kind
+    bit: int | None = None
+    camera: str | None = None
+    inverse: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of its files, without the ending."""
+        what = {"bit": f"bit{self.bit}", "root": f"root-{self.camera}"}
+        name = f"{self.number:02d}-{what.get(self.kind, self.kind)}"
+        return f"{name}-inverse" if self.inverse else name
 
 
 @dataclass(frozen=True, eq=False)
