@@ -122,8 +122,8 @@ def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
         levels = [float(np.median(image)) for image in stack[:2]]
         raise DarkError(
             f"no light: white exceeds black by {MIN_CONTRAST:.0f} of 255 in {n_lit} "
-            f"pixels (median levels {levels[0]:.0f} and {levels[1]:.0f}); light the object, "
-            f"or expose longer; shorter if both are near 255"
+            f"pixels (median levels {levels[0]:.0f} and {levels[1]:.0f}); light the "
+            f"object, or expose longer; shorter if both are near 255"
         )
     rows, columns = (np.flatnonzero(lit.any(axis=axis)) for axis in (1, 0))
     top, left = (max(0, int(place[0]) - _MARGIN_PX) for place in (rows, columns))
