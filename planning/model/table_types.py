@@ -1,9 +1,12 @@
-"""What every table of a rig file is made of: strict values in stated ranges."""
+"""What tables that people write are made of: strict values in stated ranges."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic_core import ErrorDetails
 
 Positive = Annotated[float, Field(gt=0.0)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -12,7 +15,12 @@ Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 PositivePair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 Axis = Annotated[list[float], Field(min_length=3, max_length=3)]
 Sides = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+_Row = Annotated[list[float], Field(min_length=4, max_length=4)]
+WrittenPose = Annotated[list[_Row], Field(min_length=4, max_length=4)]
 Name = Annotated[str, Field(min_length=1)]
+# How far a written rotation may be from one.
+_ROTATION = 1e-4
+_MOST_SHOWN = 60
 # No length in mm, angle or number of pixels or poses is as large; squares of what is
 # larger by far overflow.
 _LARGEST = 1e9
@@ -43,6 +51,50 @@ class Table(BaseModel):
                         f"{name}: {value:g} is out of range; at most {_LARGEST:g}"
                     )
         return self
+
+
+def read_pose(rows: list[list[float]], key: str) -> NDArray[np.float64]:
+    """Return a written pose with the rotation next to what was written, (4, 4).
+
+    Raises:
+        ValueError: If it isn't a rotation and a position.
+    """
+    pose = np.array(rows)
+    turn = pose[:3, :3]
+    off = float(np.abs(turn @ turn.T - np.eye(3)).max())
+    if not (off <= _ROTATION and np.linalg.det(turn) > 0.0):
+        raise ValueError(
+            f"{key}: its first three columns must be a rotation (R R^T differs "
+            f"from the identity by {off:.2g}); write more digits"
+        )
+    if rows[3] != [0.0, 0.0, 0.0, 1.0]:
+        raise ValueError(f"{key}: its last row {rows[3]} must be 0 0 0 1")
+    u, _, vt = np.linalg.svd(turn)
+    pose[:3, :3] = u @ vt
+    return pose
+
+
+def fault_words(fault: ErrorDetails, *, unknown: str, remedy: str) -> str:
+    """Return a fault of a file in words: where, what was written, the rule, the remedy.
+
+    Args:
+        fault: As pydantic tells it.
+        unknown: What to do about an unknown key.
+        remedy: What to do about a value that breaks a rule.
+    """
+    where = "".join(
+        f"[{key}]" if isinstance(key, int) else f".{key}" for key in fault["loc"]
+    ).removeprefix(".")
+    if fault["type"] == "missing":
+        return f"`{where}` is missing; write it"
+    if fault["type"] == "extra_forbidden":
+        return f"`{where}` is not a known key; {unknown}"
+    rule = fault["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    if fault["type"] == "value_error":
+        return f"[{where}] {rule}" if where else rule
+    value = repr(fault["input"])
+    value = value if len(value) <= _MOST_SHOWN else f"{value[: _MOST_SHOWN - 3]}..."
+    return f"`{where or 'the file'}` = {value}: {rule}; {remedy}"
 
 
 def _numbers(value: object) -> Iterator[float]:

@@ -1,24 +1,19 @@
 """Existing devices, `[[existing]]`: as a rig file writes them, and in the world."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from geometry.devices import DeviceModel
 from planning.model.bodies import Body, BodyTable
 from planning.model.device_poses import rounded_pose
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Existing, Requirements, Workspace
-from planning.model.table_types import Axis, Name, Table
+from planning.model.table_types import Axis, Name, Table, WrittenPose, read_pose
 from planning.scene.workspace.offered_poses import aimed_poses
-
-_Row = Annotated[list[float], Field(min_length=4, max_length=4)]
-_Rows = Annotated[list[_Row], Field(min_length=4, max_length=4)]
-# How far a typed rotation may be from one.
-_ROTATION = 1e-4
 
 
 class ExistingTable(Table):
@@ -42,7 +37,7 @@ class ExistingTable(Table):
     position_mm: Axis | None = None
     aim_mm: Axis | None = None
     roll_deg: float = 0.0
-    pose_mm: _Rows | None = None
+    pose_mm: WrittenPose | None = None
     body: BodyTable | None = None
 
     @model_validator(mode="after")
@@ -58,16 +53,7 @@ class ExistingTable(Table):
             raise ValueError(
                 "has pose_mm beside position_mm, aim_mm or roll_deg; keep one way"
             )
-        pose = np.array(self.pose_mm)
-        turn = pose[:3, :3]
-        off = float(np.abs(turn @ turn.T - np.eye(3)).max())
-        if not (off <= _ROTATION and np.linalg.det(turn) > 0.0):
-            raise ValueError(
-                f"pose_mm: its first three columns must be a rotation (R R^T differs "
-                f"from the identity by {off:.2g}); write more digits"
-            )
-        if self.pose_mm[3] != [0.0, 0.0, 0.0, 1.0]:
-            raise ValueError(f"pose_mm: its last row {self.pose_mm[3]} must be 0 0 0 1")
+        read_pose(self.pose_mm, "pose_mm")
         return self
 
     def to_document(self) -> dict[str, Any]:
@@ -82,10 +68,7 @@ class ExistingTable(Table):
         """
         centre = np.array(workspace.centre)
         if self.pose_mm is not None:
-            pose = np.array(self.pose_mm)
-            # The rotation next to what was typed.
-            u, _, vt = np.linalg.svd(pose[:3, :3])
-            pose[:3, :3] = u @ vt
+            pose = read_pose(self.pose_mm, "pose_mm")
             pose[:3, 3] = centre + 1e-3 * pose[:3, 3]
             return pose
         position = centre + 1e-3 * np.array(self.position_mm)

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from planning.model.errors import RigError
+from planning.model.table_types import fault_words
 
 from .rig_tables import RigTable
 
@@ -197,26 +198,9 @@ def _faults(where: str, error: ValidationError) -> list[str]:
 
 
 def _fault(entry: ErrorDetails) -> str:
-    kind, message, loc = entry["type"], entry["msg"], entry["loc"]
-    path = _dotted(loc)
-    if kind == "missing":
-        return f"`{path}` is missing; write it"
-    if kind == "extra_forbidden":
-        return f"`{path}` is not a known key; {_nearest_key(loc)}"
-    if kind == "value_error":
-        rule = message.removeprefix("Value error, ")
-        return f"[{path}] {rule}" if path else rule
-    value = repr(entry["input"])
-    value = value if len(value) <= 60 else f"{value[:57]}..."
-    rule = message.removeprefix("Input ")
-    return f"`{path}` = {value}: {rule}; write such a value, or remove the key"
-
-
-def _dotted(loc: tuple[int | str, ...]) -> str:
-    text = ""
-    for part in loc:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}"
-    return text.removeprefix(".")
+    unknown = _nearest_key(entry["loc"]) if entry["type"] == "extra_forbidden" else ""
+    remedy = "write such a value, or remove the key"
+    return fault_words(entry, unknown=unknown, remedy=remedy)
 
 
 def _nearest_key(loc: tuple[int | str, ...]) -> str:

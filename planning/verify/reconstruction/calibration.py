@@ -41,7 +41,7 @@ class CameraCalibration:
     id: str
     world_from_device: Array
     matrix: Array
-    distortion: tuple[float, float, float, float, float]
+    distortion: tuple[float, ...]
     resolution: tuple[int, int]
     body: Body | None = None
 

@@ -13,7 +13,13 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from planning.model.errors import CalibrationError
-from planning.model.table_types import Name, Table
+from planning.model.table_types import (
+    Name,
+    Table,
+    WrittenPose,
+    fault_words,
+    read_pose,
+)
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
@@ -22,12 +28,8 @@ from planning.verify.reconstruction.calibration import (
 from planning.verify.reconstruction.scanner import Scanner
 
 _Three = Annotated[list[float], Field(min_length=3, max_length=3)]
-_Four = Annotated[list[float], Field(min_length=4, max_length=4)]
 _Matrix = Annotated[list[_Three], Field(min_length=3, max_length=3)]
-_Pose = Annotated[list[_Four], Field(min_length=4, max_length=4)]
 _Lens = Annotated[list[float], Field(min_length=5, max_length=5)]
-# How far a written rotation may be from one.
-_ROTATION = 1e-4
 # Patterns and root discs are drawn for the planned poses; farther off another unit or
 # another device is meant: share of the distance to the object's centre, and radians.
 _FARTHEST = 0.3
@@ -38,14 +40,14 @@ _SAME_PX = 0.01
 
 class _Device(Table):
     id: Name
-    world_from_device: _Pose | None = None
+    world_from_device: WrittenPose | None = None
     K: _Matrix | None = None
     distortion: _Lens | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.world_from_device is not None:
-            _check_pose(np.array(self.world_from_device))
+            read_pose(self.world_from_device, "world_from_device")
         if self.K is not None:
             _check_matrix(np.array(self.K))
         if self.world_from_device is None and self.K is None and not self.distortion:
@@ -62,20 +64,6 @@ class _File(Table):
     devices: Annotated[list[_Device], Field(min_length=1)]
 
 
-def _check_pose(pose: Array) -> None:
-    turn = pose[:3, :3]
-    off = float(np.abs(turn @ turn.T - np.eye(3)).max())
-    if not (off <= _ROTATION and np.linalg.det(turn) > 0.0):
-        raise ValueError(
-            f"world_from_device: its first three columns must be a rotation (R R^T "
-            f"differs from the identity by {off:.2g}); write more digits"
-        )
-    if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
-        raise ValueError(
-            f"world_from_device: its last row {pose[3].tolist()} must be 0 0 0 1"
-        )
-
-
 def _check_matrix(matrix: Array) -> None:
     plain = matrix.copy()
     plain[[0, 1, 0, 1], [0, 1, 2, 2]] = 0.0
@@ -89,13 +77,6 @@ def _check_matrix(matrix: Array) -> None:
 
 def calibrated(plan: Scanner, path: Path) -> Scanner:
     """Return a plan with its devices as a calibration file says they are.
-
-    The rings of a projector move with it: ``world_from_ring`` keeps its place in the
-    device.
-
-    Args:
-        plan: For which the patterns were drawn.
-        path: Of the calibration file.
 
     Raises:
         CalibrationError: If the file can't be read, or doesn't fit the plan.
@@ -127,23 +108,18 @@ def calibrated(plan: Scanner, path: Path) -> Scanner:
 def _camera(
     device: _Device, camera: CameraCalibration, plan: Scanner
 ) -> CameraCalibration:
-    pose = _measured_pose(device, camera, plan)
-    matrix = camera.matrix if device.K is None else np.array(device.K)
-    lens = camera.distortion
-    if device.distortion is not None:
-        k1, k2, p1, p2, k3 = device.distortion
-        lens = k1, k2, p1, p2, k3
-    return replace(camera, world_from_device=pose, matrix=matrix, distortion=lens)
+    return replace(
+        camera,
+        world_from_device=_measured_pose(device, camera, plan),
+        matrix=camera.matrix if device.K is None else np.array(device.K),
+        distortion=tuple(device.distortion or camera.distortion),
+    )
 
 
 def _projector(
     device: _Device, projector: ProjectorCalibration, plan: Scanner
 ) -> ProjectorCalibration:
-    """Put a projector where it was measured, and its rings with it.
-
-    Raises:
-        ValueError: If its optics aren't those that its patterns are drawn for.
-    """
+    """Put a projector where it was measured, and its rings with it."""
     drawn = projector.matrix.tolist() if projector.light.name == "diverging" else None
     if device.K is not None and (
         drawn is None or not np.allclose(device.K, drawn, rtol=0.0, atol=_SAME_PX)
@@ -165,17 +141,10 @@ def _projector(
 def _measured_pose(
     device: _Device, planned: CameraCalibration | ProjectorCalibration, plan: Scanner
 ) -> Array:
-    """Return where a device was measured; where it should stand if it wasn't.
-
-    Raises:
-        ValueError: If that is too far from the plan to be meant.
-    """
+    """Return where a device was measured; where it should stand if it wasn't."""
     if device.world_from_device is None:
         return planned.world_from_device
-    measured = np.array(device.world_from_device)
-    # The rotation next to what was written.
-    u, _, vt = np.linalg.svd(measured[:3, :3])
-    measured[:3, :3] = u @ vt
+    measured = read_pose(device.world_from_device, "world_from_device")
     away = float(np.linalg.norm(measured[:3, 3] - planned.centre))
     reach = float(np.linalg.norm(planned.centre - plan.mesh.centre))
     if not away <= _FARTHEST * reach:
@@ -205,26 +174,13 @@ def _read(path: Path) -> _File:
             f"{path}: can't be read ({error.strerror}); check the path and its rights"
         ) from None
     except ValidationError as error:
-        raise CalibrationError(f"{path}: {_fault(error)}") from None
+        fault = fault_words(
+            error.errors(include_url=False)[0],
+            unknown="see docs/use/captures.md",
+            remedy="write such a value",
+        )
+        raise CalibrationError(f"{path}: {fault}") from None
     except (ValueError, RecursionError) as error:
         raise CalibrationError(
             f"{path}: not JSON ({error}); correct that place"
         ) from None
-
-
-def _fault(error: ValidationError) -> str:
-    """Return the first fault: where, what was written, the rule, what to do."""
-    first = error.errors(include_url=False)[0]
-    where = "".join(
-        f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]
-    ).removeprefix(".")
-    if first["type"] == "missing":
-        return f"`{where}` is missing; write it"
-    if first["type"] == "extra_forbidden":
-        return f"`{where}` is not a known key; see docs/use/captures.md"
-    rule = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    if first["type"] == "value_error":
-        return f"[{where}] {rule}"
-    value = repr(first["input"])
-    value = value if len(value) <= 60 else f"{value[:57]}..."
-    return f"`{where or 'the file'}` = {value}: {rule}; write such a value"
