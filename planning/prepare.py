@@ -122,9 +122,8 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         request.seed,
         request.threads,
         clock.check,
-        obstructions=tuple(
-            Obstruction(obstacle.name, obstacle.mesh)
-            for obstacle in rig.obstacles(requirements.workspace, mesh)
+        obstructions=Obstruction.about(
+            mesh, rig.obstacles(requirements.workspace, mesh)
         ),
     )
     template = PlannedProjector(

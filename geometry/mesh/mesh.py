@@ -1,5 +1,6 @@
 """A triangle mesh in metres, and where it came from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, TypeVar
@@ -97,6 +98,17 @@ class TriangleMesh:
         for name, values in (("vertices", vertices), ("faces", faces)):
             values.setflags(write=False)
             object.__setattr__(self, name, values)
+
+    @classmethod
+    def joined(cls, meshes: Sequence["TriangleMesh"]) -> "TriangleMesh":
+        """Return several meshes as one, their faces one after the other."""
+        ends = np.cumsum([len(mesh.vertices) for mesh in meshes])
+        faces = [
+            mesh.faces + end - len(mesh.vertices)
+            for mesh, end in zip(meshes, ends, strict=True)
+        ]
+        vertices = np.concatenate([mesh.vertices for mesh in meshes])
+        return cls(vertices, np.concatenate(faces))
 
     @cached_property
     def corners(self) -> Array:

@@ -176,14 +176,11 @@ def _packed(obstacles: Sequence[Obstacle]) -> dict[str, NDArray[Any]]:
     if not obstacles:
         return {}
     meshes = [obstacle.mesh for obstacle in obstacles]
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [
-        mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)
-    ]
+    together = TriangleMesh.joined(meshes)
     values = (
         np.array([obstacle.name for obstacle in obstacles]),
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate(faces),
+        together.vertices,
+        together.faces,
         np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes]),
     )
     return dict(zip(_OBSTACLES, values, strict=True))

@@ -108,4 +108,6 @@ def _shadow_maps(scene: Scene, samples: Target, finest: int) -> WidenedMaps:
     """Directions that are open to samples; incidence is cameras' only limit of them."""
     cube = CubeMap(1 << finest)
     limits = DirectionLimits(scene.requirements.camera.max_incidence, 0.0)
-    return WidenedMaps(open_samples(scene, limits, samples, cube, shadows=True), cube)
+    near = scene.requirements.workspace.camera_radius_m[0]
+    opened = open_samples(scene, limits, samples, cube, shadows=True, nearest_m=near)
+    return WidenedMaps(opened, cube)

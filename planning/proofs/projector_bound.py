@@ -63,14 +63,18 @@ def bound_projectors(
         # How far off a device's own axis what it lights may be.
         width = float(np.hypot(*device.half_panel))
         aside = reach + min(width, device.beam_radius or np.inf)
-        depth = np.sqrt(max(0.0, near**2 - aside**2))
+        depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
         shadows = shadows and bool(depth >= reach)
-        opened = open_samples(scene, limits, samples, cube, shadows=shadows)
+        opened = open_samples(
+            scene, limits, samples, cube, shadows=shadows, nearest_m=depth
+        )
         opened[~_within(cube, workspace, aside)] = 0
         tree = DirectionTree.over(opened, len(samples))
     else:
         shadows = shadows and bool(near >= reach)
-        opened = open_samples(scene, limits, samples, cube, shadows=shadows)
+        opened = open_samples(
+            scene, limits, samples, cube, shadows=shadows, nearest_m=near
+        )
         tree = PositionTree(
             workspace,
             workspace.projector_radius_m,

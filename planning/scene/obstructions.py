@@ -1,5 +1,6 @@
 """Obstacles in the scene: which light and views they stop, and what touches them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,9 +10,11 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 from geometry.shapes.boxes import OrientedBox, triangles_touch
+from planning.model.obstacles import Obstacle
 
-# Samples of a surface that lies on an obstacle's don't meet it there [m].
-_CONTACT_M = 1e-5
+# Samples of a surface that lies on an obstacle's don't meet it there: in half diagonals
+# of the object, as `geometry.rays.visibility` has it.
+_CONTACT = 2e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +24,21 @@ class Obstruction:
     Attributes:
         name: As in the rig file.
         mesh: Where it stands [m].
+        contact_m: What is nearer to a sample isn't met [m].
     """
 
     name: str
     mesh: TriangleMesh
+    contact_m: float
+
+    @classmethod
+    def about(
+        cls, mesh: TriangleMesh, obstacles: Iterable[Obstacle]
+    ) -> tuple["Obstruction", ...]:
+        """Return what stands about an object."""
+        low, high = mesh.bounds
+        contact = _CONTACT * 0.5 * float(np.linalg.norm(high - low))
+        return tuple(cls(each.name, each.mesh, contact) for each in obstacles)
 
     @property
     def words(self) -> str:
@@ -47,9 +61,9 @@ class Obstruction:
         ways = starts - points
         lengths = np.linalg.norm(ways, axis=1)
         along = ways / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-        return self._caster.occluded(
-            points + _CONTACT_M * along, along, np.maximum(lengths - _CONTACT_M, 0.0)
-        )
+        begin = points + self.contact_m * along
+        left = np.maximum(lengths - self.contact_m, 0.0)
+        return self._caster.occluded(begin, along, left)
 
     def touches(self, box: OrientedBox) -> bool:
         """Return whether a box shares a point with its surface."""

@@ -26,6 +26,8 @@ from planning.scene.scene import Scene
 from solvers.bit_rows import words_for
 from solvers.cells.cell_tree import CellBatch
 
+from .occluders_of_all import occluders_of_all
+
 # Cells of 2.8 degrees, 6,144 of them.
 _SPREAD = 5
 
@@ -106,13 +108,23 @@ def open_samples(
     cube: CubeMap,
     *,
     shadows: bool,
+    nearest_m: float,
 ) -> NDArray[np.uint64]:
     """Return for each cell the samples to which it is open, as bit rows.
+
+    Args:
+        scene: Surface, obstacles and requirements.
+        limits: On directions from a sample to a device.
+        samples: Of the surface.
+        cube: The map.
+        shadows: Whether what stands in the way counts.
+        nearest_m: Least distance of devices from the centre of the workspace [m].
 
     Returns:
         Shape (cube.size, n_words).
     """
-    maps = OpenDirections(scene.visibility, limits, cube, occlusion=shadows)
+    occluders = occluders_of_all(scene, nearest_m) if shadows else scene.visibility
+    maps = OpenDirections(occluders, limits, cube, occlusion=shadows)
     rows = np.zeros((cube.size, words_for(len(samples))), dtype=np.uint64)
     bytes_of = rows.view(np.uint8).reshape(cube.size, -1, 8)
     drawn = samples.samples

@@ -58,7 +58,7 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
         required,
         0,
         threads,
-        obstructions=tuple(Obstruction(o.name, o.mesh) for o in surface.obstacles),
+        obstructions=Obstruction.about(mesh, surface.obstacles),
     )
     scene = scene.among((*plan.projectors, *plan.cameras))
     faces = np.arange(len(mesh.faces))

@@ -57,17 +57,9 @@ def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
         _corners(device) for device in every if device.id != name and device.body
     ]
     box = np.concatenate([_QUADS[:, [0, 1, 2]], _QUADS[:, [0, 2, 3]]])
-    parts = [(of_body, box) for of_body in corners]
-    parts += [(solid.mesh.vertices, solid.mesh.faces) for solid in scanner.obstacles]
-    if not parts:
-        return None
-    ends = np.cumsum([len(vertices) for vertices, _ in parts])
-    faces = [
-        faces + end - len(vertices)
-        for (vertices, faces), end in zip(parts, ends, strict=True)
-    ]
-    vertices = np.concatenate([vertices for vertices, _ in parts])
-    return RayCaster(TriangleMesh(vertices, np.concatenate(faces)), threads=1)
+    parts = [TriangleMesh(of_body, box) for of_body in corners]
+    parts += [solid.mesh for solid in scanner.obstacles]
+    return RayCaster(TriangleMesh.joined(parts), threads=1) if parts else None
 
 
 def _corners(device: ProjectorCalibration | CameraCalibration) -> Array:
