@@ -171,8 +171,14 @@ def zone_figures(plan: RigPlan) -> list[ZoneFigure]:
     room = () if space.box is None else (space.box,)
     zones = zip(ZONES, (room, space.mounting, space.keep_out), strict=True)
     centre = np.array(space.centre)
-    reach = _REACH * max(*space.projector_radius_m, *space.camera_radius_m)
+    reach = zone_reach(plan)
     return [_zone(kind, box, centre, reach) for kind, boxes in zones for box in boxes]
+
+
+def zone_reach(plan: RigPlan) -> float:
+    """Return how far from the workspace's centre zones and obstacles are shown [m]."""
+    space = plan.requirements.workspace
+    return _REACH * max(*space.projector_radius_m, *space.camera_radius_m)
 
 
 def _zone(kind: str, box: Box, centre: NDArray[np.float64], reach: float) -> ZoneFigure:

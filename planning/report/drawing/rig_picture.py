@@ -25,7 +25,9 @@ from .figures import (
     close_directions,
     device_figures,
     zone_figures,
+    zone_reach,
 )
+from .obstacle_figures import OBSTACLE, draw_obstacles, obstacle_figures
 from .panel import INK, PALE, Panel, font
 from .picture_view import BACKGROUND, SUPERSAMPLING, Colour, fitted
 from .shader import Shader
@@ -126,11 +128,14 @@ def _devices_panel(
     vertices = shader.caster.mesh.corners.reshape(-1, 3)
     zones = zone_figures(plan)
     bodies = [line for figure in figures for line in figure.body]
-    everything = np.concatenate([vertices, *bodies, *(zone.near for zone in zones)])
+    solids = obstacle_figures(plan, zone_reach(plan))
+    near = [shown.near for shown in (*zones, *solids)]
+    everything = np.concatenate([vertices, *bodies, *near])
     view = fitted(everything, direction, up, size, margin_px=0.085 * min(size))
     panel = Panel(shader.shade(view), view)
     panel.keep_clear(vertices)
     draw_zones(panel, zones, shader.caster)
+    draw_obstacles(panel, solids, direction, shader.caster)
     panel.heading(heading)
     type_size = 14.0 if from_above else 17.0
     _mark_devices(
@@ -193,6 +198,8 @@ def _close_up(
     rows = [*legend, *((f"{kind}s", colour) for kind, colour in _DEVICES.items())]
     kinds = {figure.kind for figure in zone_figures(plan)}
     rows += [(kind, colour) for kind, colour in ZONES.items() if kind in kinds]
+    if plan.surface.obstacles:
+        rows.append(("obstacle", OBSTACLE))
     foot = (-(-len(rows) // 2) * 21 + 8) * SUPERSAMPLING
     half = (size[0] // 2, size[1] - foot)
     corners = shader.caster.mesh.corners.reshape(-1, 3)
@@ -241,10 +248,11 @@ def _draw_title(
     left = pad + draw.textlength(headline, font=font(24.0)) + 1.5 * pad
     draw.text((left, middle), detail, PALE, font=font(16.0), anchor="lm")
     areas = plan.coverage.target
+    # Pillow's own typeface has no superscripts.
     claim = (
         f"measured {1e4 * areas.measured_m2:.0f} of "
         f"{1e4 * areas.reachable_by_cameras_m2:.0f} reachable, "
-        f"{1e4 * areas.area_m2:.0f} cm² target"
+        f"{1e4 * areas.area_m2:.0f} square cm target"
     )
     draw.text((size[0] - pad, middle), claim, INK, font=font(16.0), anchor="rm")
 

@@ -9,7 +9,7 @@ from planning.model.document.coverage_records import (
 )
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.words import percent
+from planning.model.words import area_words, percent
 
 from .proof_lines import user_selection
 from .shortfall import causes_line
@@ -44,7 +44,20 @@ def coverage_lines(plan: RigPlan) -> list[str]:
     ]
     if causes := coverage.uncovered_by_cause:
         lines.append(f"         not measured: {causes_line(causes, target.area_m2)}")
+    if blocked := coverage.blocked_by_obstacle_m2:
+        lines.append(f"         {_behind(blocked)}")
     return [*lines, *_apart(document), *_idle(document), *schedule_lines(document)]
+
+
+def _behind(blocked: dict[str, float]) -> str:
+    """Say what each obstacle costs, the dearest first."""
+    ranked = sorted(blocked.items(), key=lambda pair: -pair[1])
+    phrases = [f"{name!r} {area_words(area)}" for name, area in ranked if area > 0.0]
+    if not phrases:
+        return (
+            f"obstacles ({', '.join(blocked)}) keep nothing of it from being measured"
+        )
+    return f"not measured and behind an obstacle: {', '.join(phrases)}"
 
 
 def _apart(document: PlanDocument) -> list[str]:
