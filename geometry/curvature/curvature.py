@@ -79,7 +79,7 @@ def principal_curvatures(
     The scale is a radius that is given; else it is 2 % of the mesh's size, or the size
     of the facets (`facet_size`) of a coarse mesh where those are larger, since the mesh
     knows nothing smaller of the shape. Edges should not be longer than it
-    (`refinement.refined` cuts them). Source of the fit: Panozzo, Puppo and Rocca,
+    (`refinement` cuts them). Source of the fit: Panozzo, Puppo and Rocca,
     "Efficient multi-scale curvature and crease estimation", 2010.
 
     Args:
@@ -91,11 +91,7 @@ def principal_curvatures(
     """
     if radius is None:
         radius = DEFAULT_RADIUS_SHARE * mesh.size
-        # Facets are no larger than the longest edge.
-        fine = mesh.longest_edge <= radius
-        return _curvatures(
-            mesh, radius, radius if fine else max(radius, facet_size(mesh))
-        )
+        return _curvatures(mesh, radius, max(radius, facet_size(mesh)))
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
     return _curvatures(mesh, radius, radius)

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Ints
+from geometry.mesh.halving import halved
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import MeshEdges, mesh_edges
+from geometry.mesh.topology import mesh_edges
 
 from .curvature import DEFAULT_RADIUS_SHARE, facet_size
 
@@ -18,19 +19,6 @@ _COARSE, _LONGEST_COARSE_SHARE = 1.5, 2.0
 _CUT_SHARE = 0.2
 _MAX_FACES, _MAX_GROWTH = 100_000, 2
 _LESS_FINE = 2.0**0.25
-
-# Corners 0..2 and middles 3..5 (of edges 01, 12, 20) of the faces that come of one
-# whose edges are cut by the bits of the key.
-_PATTERNS: dict[int, tuple[tuple[int, int, int], ...]] = {
-    1: ((0, 3, 2), (3, 1, 2)),
-    2: ((1, 4, 0), (4, 2, 0)),
-    4: ((2, 5, 1), (5, 0, 1)),
-    3: ((3, 1, 4), (0, 3, 4), (0, 4, 2)),
-    6: ((4, 2, 5), (1, 4, 5), (1, 5, 0)),
-    5: ((5, 0, 3), (2, 5, 3), (2, 3, 1)),
-    7: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
-}
-_GROWTH = np.array([0, 1, 1, 2, 1, 2, 2, 3])
 
 
 def cut_for_curvature(
@@ -52,21 +40,12 @@ def cut_for_curvature(
         The mesh, and of which face each of its faces is a part, as `cut_long_edges`.
     """
     radius = DEFAULT_RADIUS_SHARE * mesh.size if radius is None else radius
-    edges = np.linalg.norm(mesh.corners - np.roll(mesh.corners, 1, axis=1), axis=2)
-    largest = edges.max(axis=1)
-
-    def fine(longest: float) -> bool:
-        area = mesh.face_areas[largest > longest].sum()
-        return bool(area < _CUT_SHARE * mesh.area)
-
-    # The scale is no less than the radius: most meshes needn't be looked at closer.
-    if fine(_LONGEST_SHARE * radius):
-        return mesh, np.arange(len(mesh.faces))
     facet = facet_size(mesh)
     coarse = facet >= _COARSE * radius
     share = _LONGEST_COARSE_SHARE if coarse else _LONGEST_SHARE
     longest = share * max(radius, facet)
-    if fine(longest):
+    long = mesh.edge_lengths.max(axis=1) > longest
+    if mesh.face_areas[long].sum() < _CUT_SHARE * mesh.area:
         return mesh, np.arange(len(mesh.faces))
     return cut_long_edges(mesh, longest)
 
@@ -91,57 +70,22 @@ def cut_long_edges(mesh: TriangleMesh, longest: float) -> tuple[TriangleMesh, In
     """
     if not longest > 0:
         raise ValueError(f"longest must be a positive number of metres, got {longest}")
-    vertices, faces, parent = refined(
-        mesh.vertices,
-        mesh.faces,
-        longest,
-        max_faces=max(_MAX_FACES, _MAX_GROWTH * len(mesh.faces)),
-    )
-    if len(faces) == len(mesh.faces):
-        return mesh, parent
-    order = np.argsort(parent, kind="stable")
-    return TriangleMesh(vertices, faces[order], mesh.source), parent[order]
-
-
-def refined(
-    vertices: Array, faces: Ints, longest: float, *, max_faces: int
-) -> tuple[Array, Ints, Ints]:
-    """Halve edges longer than a length until there are none; the surface stays.
-
-    Args:
-        vertices: Shape (n, 3); they keep their numbers.
-        faces: Shape (m, 3).
-        longest: Length that an edge may have.
-        max_faces: Where there would be more, only the longer ones are halved.
-
-    Returns:
-        Vertices, faces, and of which face each is a part.
-    """
+    vertices, faces = mesh.vertices, mesh.faces
     parent = np.arange(len(faces))
+    most = max(_MAX_FACES, _MAX_GROWTH * len(faces))
     for _ in range(_MAX_ROUNDS):
         edges = mesh_edges(faces)
         ends = vertices[edges.ends]
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        long, key = _to_cut(edges, lengths, longest)
-        while len(faces) + _GROWTH[key].sum() > max_faces:
+        # Every edge that is cut in a face makes one face more of it.
+        while len(faces) + (lengths > longest)[edges.of_face].sum() > most:
             longest *= _LESS_FINE
-            long, key = _to_cut(edges, lengths, longest)
-        if not long.any():
+        cut = lengths > longest
+        if not cut.any():
             break
-        number = len(vertices) + np.cumsum(long) - 1
-        vertices = np.concatenate([vertices, ends[long].mean(axis=1)])
-        six = np.concatenate([faces, number[edges.of_face]], axis=1)
-        parts, parents = [faces[key == 0]], [parent[key == 0]]
-        for pattern, children in _PATTERNS.items():
-            chosen = np.flatnonzero(key == pattern)
-            for child in children:
-                parts.append(six[chosen][:, child])
-                parents.append(parent[chosen])
-        faces, parent = np.concatenate(parts), np.concatenate(parents)
-    return vertices, faces, parent
-
-
-def _to_cut(edges: MeshEdges, lengths: Array, longest: float) -> tuple[Mask, Ints]:
-    """Which edges are long, and for each face the key of its pattern."""
-    long = lengths > longest
-    return long, np.where(long[edges.of_face], [1, 2, 4], 0).sum(axis=1)
+        vertices, faces, part_of = halved(vertices, faces, edges, cut)
+        parent = parent[part_of]
+    if len(faces) == len(mesh.faces):
+        return mesh, parent
+    order = np.argsort(parent, kind="stable")
+    return TriangleMesh(vertices, faces[order], mesh.source), parent[order]

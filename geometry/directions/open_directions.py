@@ -79,8 +79,7 @@ class OpenDirections:
         self._edges = Silhouettes(mesh) if occlusion else None
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         self._near = [share * size for share in _NEAR]
-        sides = mesh.corners - mesh.corners[:, [1, 2, 0]]
-        longest = np.linalg.norm(sides, axis=2).max(axis=1)
+        longest = mesh.edge_lengths.max(axis=1)
         width = 2.0 * mesh.face_areas / np.where(longest > 0, longest, 1.0)
         self._narrow = width <= _SLACKS * visibility.slack
 

@@ -207,15 +207,11 @@ class TriangleMesh:
     @cached_property
     def mean_edge(self) -> float:
         """Mean edge length over the faces in [m]."""
-        return float(np.mean(self._edge_lengths))
+        return float(np.mean(self.edge_lengths))
 
     @cached_property
-    def longest_edge(self) -> float:
-        """Length of the longest edge in [m]."""
-        return float(np.max(self._edge_lengths))
-
-    @cached_property
-    def _edge_lengths(self) -> Array:
+    def edge_lengths(self) -> Array:
+        """Lengths of the three edges of each face in [m], shape (n_f, 3)."""
         edges = self.corners - self.corners[:, [2, 0, 1]]
         return np.sqrt(np.einsum("fki,fki->fk", edges, edges))
 

@@ -5,7 +5,9 @@ from itertools import combinations
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
+from geometry.mesh.halving import halved
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import mesh_edges
 
 _PHI = (1.0 + np.sqrt(5.0)) / 2.0
 # Squared edges of an icosahedron about this edge's are 4, its diagonals over 10.
@@ -64,7 +66,9 @@ def sphere(radius: float, *, subdivisions: int = 4) -> TriangleMesh:
     faces = np.where(outward[:, None], faces, faces[:, ::-1])
     vertices = corners / np.linalg.norm(corners[0])
     for _ in range(subdivisions):
-        vertices, faces = _quartered(vertices, faces)
+        edges = mesh_edges(faces)
+        every = np.ones(len(edges.ends), dtype=bool)
+        vertices, faces, _ = halved(vertices, faces, edges, every)
         vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
     return TriangleMesh(radius * vertices, faces)
 
@@ -80,17 +84,3 @@ def icosahedron_faces(corners: Array) -> tuple[Ints, Mask]:
     sides = corners[triples] - corners[np.roll(triples, -1, axis=1)]
     faces = triples[np.all(np.sum(sides**2, axis=2) < _LINKED, axis=1)]
     return faces, np.linalg.det(corners[faces]) > 0.0
-
-
-def _quartered(vertices: Array, faces: Ints) -> tuple[Array, Ints]:
-    """Cut each face in four at the middles of its edges."""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, where = np.unique(edges, axis=0, return_inverse=True)
-    middle = vertices[unique].mean(axis=1)
-    ab, bc, ca = (len(vertices) + where.reshape(-1, 3)).T
-    a, b, c = faces.T
-    corners = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return (
-        np.concatenate([vertices, middle]),
-        np.concatenate([np.column_stack(three) for three in corners]),
-    )
