@@ -41,8 +41,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         marginal = marginal_records(partial, devices, claims)
     among = scene.among((*devices.projectors, *devices.cameras))
     standing = replace(partial, ready=replace(partial.ready, scene=among))
-    coverage = entries.coverage_record(claims)
-    coverage = with_relaxations(coverage, partial, devices, claims, clock)
+    coverage = with_relaxations(partial, devices, claims, clock)
     regions = entries.region_records(partial.ready.regions, claims)
     overlaps, schedule = overlap_records(standing.scene, devices.projectors)
     surface, requirements = (

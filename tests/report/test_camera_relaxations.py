@@ -20,13 +20,13 @@ from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.advice import camera_relaxations
 from planning.report.advice.camera_relaxations import (
-    _SPARE,
-    _least_enough,
+    SPARE,
     for_so_many,
+    least_demands,
     out_of_reach,
 )
 from planning.report.advice.demands import Demands, demands
-from planning.report.advice.least_changes import Share
+from planning.report.advice.least_changes import Share, least_changes, least_enough
 from planning.report.advice.least_changes import relaxations_of_cameras as ways
 from planning.report.claims import Devices, make_claims
 from planning.report.summary.shortfall import shortfalls
@@ -279,25 +279,21 @@ def test_the_least_value_with_which_so_many_are_enough_is_that_of_every_choice(s
     asked[rng.random((12, 5)) < 0.2] = -np.inf
     knob = ways(load_rig("default"), _requirements())[0]
 
-    class Two(camera_relaxations._Covers):
-        def enough(self, value):
-            seen = self.demanded <= value
-            need = 0.9 * seen.any(axis=1).sum()
-            most = max(
-                seen[:, list(pair)].any(axis=1).sum()
-                for pair in combinations(range(5), 2)
-            )
-            return bool(most >= need)
+    def enough(seen):
+        need = 0.9 * seen.any(axis=1).sum()
+        most = max(
+            seen[:, list(pair)].any(axis=1).sum() for pair in combinations(range(5), 2)
+        )
+        return bool(most >= need)
 
-    covers = Two(asked, None, 2)
     values = np.unique(asked[np.isfinite(asked)])
-    found = _least_enough(knob, covers)
-    if found is None:
-        assert not covers.enough(values[-1])
+    least = least_enough(replace(knob, say=float), asked, enough)
+    if least is None:
+        assert not enough(asked <= values[-1])
     else:
-        assert covers.enough(found)
-        below = values[values < found]
-        assert not len(below) or not covers.enough(below[-1])
+        assert enough(asked <= least)
+        below = values[values < least]
+        assert not len(below) or not enough(asked <= below[-1])
 
 
 def _requirements():
@@ -310,10 +306,8 @@ def test_changes_that_gain_less_than_a_point_are_left_out():
     share = Share(1000, 500, 0.9)
     assert share.wanted == 400
     gained = share.gains({"a": 400, "b": 9, "c": 10})
-    assert gained == [
-        {"change": "c", "reachable_share": 0.51},
-        {"change": "a", "reachable_share": 0.9},
-    ]
+    told = [(entry.change, entry.reachable_share) for entry in gained]
+    assert told == [("c", 0.51), ("a", 0.9)]
 
 
 def test_a_change_reaches_what_it_says_and_a_step_less_reaches_too_little(rig, world):
@@ -329,32 +323,30 @@ def test_a_change_reaches_what_it_says_and_a_step_less_reaches_too_little(rig, w
     devices = Devices((projector,), reference[:1], (projector,), reference)
     scene = tightened(scene, camera={"max_incidence": np.radians(20.0)})
     claims = make_claims(scene, devices)
-    lit = claims.target.lit_m2
-    found = out_of_reach(scene, rig, devices, claims)
-    beyond = lit - claims.target.reachable_by_cameras_m2
-    assert sum(found.by_cause.values()) == pytest.approx(beyond)
+    areas = claims.coverage.target
+    by_cause, relaxations = out_of_reach(scene, rig, devices, claims)
+    beyond = areas.lit_m2 - areas.reachable_by_cameras_m2
+    assert sum(by_cause.values()) == pytest.approx(beyond)
     target = claims.target_samples
     missed = target.take(~claims.measured_by.any(axis=1))
     rows = lit_samples(scene, [projector], missed)
     furthest = furthest_failure(scene, reference, rows)
-    assert found.by_cause == {
+    assert by_cause == {
         cause: pytest.approx(target.samples.weight * np.sum(furthest == stage))
         for stage, cause in enumerate(CAUSES)
         if np.any(furthest == stage)
     }
-    assert len(found.by_cause) >= 2
+    assert len(by_cause) >= 2
     (told,) = (
-        entry
-        for entry in found.relaxations
-        if "camera_max_incidence_deg" in entry["change"]
+        entry for entry in relaxations if "camera_max_incidence_deg" in entry.change
     )
-    value = int(re.search(r"= (\d+) \(now 20\)", told["change"])[1])
+    value = int(re.search(r"= (\d+) \(now 20\)", told.change)[1])
     shares = []
     for degrees in (value, value - 1):
         other = tightened(scene, camera={"max_incidence": np.radians(degrees)})
-        areas = make_claims(other, devices).target
+        areas = make_claims(other, devices).coverage.target
         shares.append(areas.reachable_by_cameras_m2 / areas.lit_m2)
-    assert shares[0] == pytest.approx(told["reachable_share"])
+    assert shares[0] == pytest.approx(told.reachable_share)
     assert shares[1] < scene.requirements.min_reachable <= shares[0]
 
 
@@ -372,7 +364,7 @@ def test_one_camera_is_enough_at_what_is_told_and_not_below(rig, world):
     def enough(degrees):
         other = tightened(scene, camera={"max_incidence": np.radians(degrees)})
         seen = measured_by(other, cameras, rows)
-        need = (scene.requirements.coverage + _SPARE) * seen.any(axis=1).sum()
+        need = (scene.requirements.coverage + SPARE) * seen.any(axis=1).sum()
         return seen.sum(axis=0).max() >= need
 
     assert not enough(40)
@@ -391,10 +383,11 @@ def test_a_limit_gives_way_as_far_as_the_share_asks_or_as_it_helps(rig, monkeypa
     monkeypatch.setattr(camera_relaxations, "demands", lambda *_: found)
     monkeypatch.setattr(camera_relaxations, "taken", lambda rows, *_: rows)
     (knob,) = ways(rig, _requirements())[:1]
-    table = camera_relaxations._Least((knob,), 20)
-    table.add(scene=None, camera=None, samples=SimpleNamespace(lit=None))
+    samples = SimpleNamespace(lit=None, target=range(20))
+    table = least_demands(None, [None], samples, (knob,))
+    asks = table.demanded[:, table.furthest < MEASURED]
     for least, degrees, gained in ((0.35, 5, 5), (0.9, 10, 10), (0.1, None, None)):
-        changes = table.least_changes(Share(20, 2, least))
+        changes = least_changes((knob,), asks, Share(20, 2, least).wanted)
         want = {} if degrees is None else {knob.say(degrees): gained}
         assert changes == want
 

@@ -72,8 +72,11 @@ def test_claims_of_a_ball_follow_from_its_caps(stages):
     )
     claims = make_claims(made, devices)
     area = 4 * np.pi * RADIUS**2
-    assert claims.target.area_m2 == pytest.approx(area, rel=5e-3)
-    assert claims.target.reachable_by_projectors_m2 == claims.target.area_m2
+    assert claims.coverage.target.area_m2 == pytest.approx(area, rel=5e-3)
+    assert (
+        claims.coverage.target.reachable_by_projectors_m2
+        == claims.coverage.target.area_m2
+    )
     theta = np.radians(60.0)
     for projector, lit in zip(devices.projectors, claims.lit_area_m2, strict=True):
         cap = theta
@@ -81,14 +84,14 @@ def test_claims_of_a_ball_follow_from_its_caps(stages):
             distance = np.linalg.norm(projector.world_from_device[:3, 3])
             cap = theta - np.arcsin(RADIUS / distance * np.sin(theta))
         assert lit / area == pytest.approx((1 - np.cos(cap)) / 2, abs=0.01)
-    assert claims.unreachable_by_cause == {}
-    assert sum(claims.sole_area_m2) <= claims.target.measured_m2 + 1e-12
-    assert claims.target.measured_m2 <= sum(claims.seen_area_m2) + 1e-12
+    assert claims.coverage.unreachable_by_cause == {}
+    assert sum(claims.sole_area_m2) <= claims.coverage.target.measured_m2 + 1e-12
+    assert claims.coverage.target.measured_m2 <= sum(claims.seen_area_m2) + 1e-12
 
 
 def test_no_relaxation_is_offered_where_nothing_is_out_of_reach(stages):
     made, projectors, _, tilt = stages
-    assert reachability_relaxations(made, projectors.reference[::20], (tilt, 0.0)) == []
+    assert reachability_relaxations(made, projectors.reference[::20], (tilt, 0.0)) == ()
 
 
 def test_merged_samples_stand_for_the_same_area(stages):

@@ -13,7 +13,7 @@ from geometry.poses import transform
 from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
-from planning.report.claims import Devices, _reachable_by_projectors
+from planning.report.reach import furthest_lit
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
@@ -58,10 +58,7 @@ def test_candidates_together_light_what_each_lights_alone(light):
     assert away.mean() > 0.4
     # Of few poses, so that some samples stay dark for each reason.
     few = together[:, 20:26]
-    nothing = np.zeros(len(rows), dtype=bool)
-    devices = Devices((), (), tuple(offered[20:26]), ())
-    reachable, furthest = _reachable_by_projectors(scene, devices, rows, nothing)
-    np.testing.assert_array_equal(reachable, (few == projector_limits.LIT).any(axis=1))
+    furthest = furthest_lit(scene, offered[20:26], rows)
     np.testing.assert_array_equal(furthest, few.max(axis=1))
     assert len(np.unique(furthest)) >= 3
 

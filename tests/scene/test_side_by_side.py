@@ -24,7 +24,7 @@ from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.projectors.share_margin import margin_at_share
 from planning.proofs.all_poses import Effort
-from planning.report.advice.wider_field import wider_field
+from planning.report.advice.projector_relaxations import wider_field
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes

@@ -8,51 +8,45 @@ least that is enough. Light, rings and ring axes stay as they are planned.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import NothingMeasuredError, n_fixed
 from planning.cameras.proved_cameras import CameraStage
+from planning.model.document.coverage_records import Relaxation
 from planning.model.planned import PlannedCamera
 from planning.model.words import percent
 from planning.proofs.selection import required_samples
 from planning.report.claims import Claims, Devices
+from planning.report.reach import measured_by_any
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
-from planning.scene.limits import projector_limits
 from planning.scene.limits.limit import LimitRelaxation
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
-from planning.scene.measured import LitSamples, lit_samples, measured_by, taken
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.measured import LitSamples, lit_samples, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import camera_candidates
 
-from .demands import demands
-from .least_changes import Share, covers_enough, least_changes, relaxations_of_cameras
+from .demands import Demands, demands
+from .least_changes import (
+    ANYWHERE,
+    Allowed,
+    Share,
+    least_changes,
+    least_enough,
+    relaxations_of_cameras,
+)
 
 # What covers cover beyond the requirement, so that fresh samples confirm it.
-_SPARE = 0.003
-
-
-@dataclass(frozen=True, eq=False)
-class OutOfReach:
-    """What of the lit target no reference camera measures.
-
-    Attributes:
-        by_cause: Its area by the limit at which it comes furthest [m²].
-        relaxations: `change` and `reachable_share`, of what is lit, least gain first.
-    """
-
-    by_cause: dict[str, float]
-    relaxations: list[dict[str, Any]]
+SPARE = 0.003
 
 
 def out_of_reach(
     scene: Scene, rig: Rig, devices: Devices, claims: Claims
-) -> OutOfReach:
+) -> tuple[dict[str, float], tuple[Relaxation, ...]]:
     """Say why cameras reach too little of what is lit, and what would help.
 
     Args:
@@ -60,33 +54,41 @@ def out_of_reach(
         rig: As written.
         devices: The plan's and the reference sets.
         claims: Made for these devices; the same samples are looked at.
+
+    Returns:
+        The area by the limit at which samples come furthest [m²]; and relaxations with
+        their share of what is lit, least gain first.
     """
     among = scene.among(devices.projectors)
-    target = claims.target_samples
+    target, required = claims.target_samples, scene.requirements
     planned = scene.among((*devices.projectors, *devices.cameras))
-    lit = np.any(
-        lit_stages(planned, devices.projectors, target) == projector_limits.LIT, 1
-    )
+    lit = np.any(lit_stages(planned, devices.projectors, target) == LIT, axis=1)
     missed = target.take(lit & ~claims.measured_by.any(axis=1))
     samples = lit_samples(planned, devices.projectors, missed)
-    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(samples.target))
-    for camera in devices.reference_cameras:
-        table.add(scene=among, camera=camera, samples=samples)
-    out = table.furthest < MEASURED
-    n = int(lit.sum())
-    share = Share(n, n - int(out.sum()), scene.requirements.min_reachable)
-    changes = table.least_changes(share)
-    changes |= _whole_shell(among, devices.reference_cameras, samples, out, share)
-    weight = target.samples.weight
-    counts = np.bincount(table.furthest[out], minlength=MEASURED)
-    return OutOfReach(
-        {
-            cause: float(weight * count)
-            for cause, count in zip(CAUSES, counts, strict=True)
-            if count
-        },
-        share.gains(changes),
-    )
+    relaxations = relaxations_of_cameras(rig, required)
+    asked = least_demands(among, devices.reference_cameras, samples, relaxations)
+    out = asked.furthest < MEASURED
+    share = Share(int(lit.sum()), int(lit.sum() - out.sum()), required.min_reachable)
+    changes = least_changes(relaxations, asked.demanded[:, out], share.wanted)
+    whole = required.workspace.whole_shell
+    if whole != required.workspace and share.wanted > 0:
+        camera = devices.reference_cameras[0]
+        site = scene.site("camera", camera.device)
+        anywhere = camera_candidates(
+            camera,
+            whole,
+            required.workspace.n_reference_cameras,
+            None if site is None else replace(site, workspace=whole),
+        )
+        unmeasured = taken(samples, np.flatnonzero(out), samples.lit)
+        changes[ANYWHERE] = int(measured_by_any(among, anywhere, unmeasured).sum())
+    counts = np.bincount(asked.furthest[out], minlength=MEASURED)
+    by_cause = {
+        cause: float(target.samples.weight * count)
+        for cause, count in zip(CAUSES, counts, strict=True)
+        if count
+    }
+    return by_cause, share.gains(changes)
 
 
 def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str:
@@ -100,14 +102,15 @@ def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str
     samples = error.samples
     if not len(samples.target):
         return "no limit of a camera helps"
-    table = _Least(relaxations_of_cameras(rig, scene.requirements), len(samples.target))
-    for camera in error.cameras:
-        table.add(scene=scene, camera=camera, samples=samples)
+    relaxations = relaxations_of_cameras(rig, scene.requirements)
+    asked = least_demands(scene, error.cameras, samples, relaxations)
     share = Share(len(samples.target), 0, scene.requirements.min_reachable)
     steps = [
-        f"{step['change']} would make {percent(step['reachable_share'])} of what is "
-        f"lit measurable"
-        for step in share.gains(table.least_changes(share))
+        f"{step.change} would make {percent(step.reachable_share)} of what is lit "
+        f"measurable"
+        for step in share.gains(
+            least_changes(relaxations, asked.demanded, share.wanted)
+        )
     ]
     if not steps:
         return (
@@ -132,121 +135,36 @@ def for_so_many(
     samples = taken(lit, np.arange(min(len(lit.target), DRAWS.fewer_devices)), lit.lit)
     relaxations = relaxations_of_cameras(rig, scene.requirements)
     demanded = np.stack(
-        [
-            demands(scene, camera, samples, relaxations).demanded
-            for camera in stage.reference
-        ],
+        [demands(scene, c, samples, relaxations).demanded for c in stage.reference],
         axis=2,
     )
-    changes: list[str] = []
-    for relaxation, table in zip(relaxations, demanded, strict=True):
-        value = _least_enough(relaxation, _Covers(table, scene, count))
-        if value is not None:
-            changes.append(relaxation.say(value))
-    return tuple(changes)
+    share = min(scene.requirements.coverage + SPARE, 1.0)
+    allowed = Allowed(
+        count, n_fixed(scene), scene.seed, lambda any_: required_samples(any_, share)
+    )
+    least = (
+        least_enough(relaxation, table, allowed.enough)
+        for relaxation, table in zip(relaxations, demanded, strict=True)
+    )
+    return tuple(change for change in least if change is not None)
 
 
-class _Least:
-    """The least that samples ask of each limit, and how far they come, over cameras.
-
-    Args:
-        relaxations: Limits that may give way.
-        n: Samples.
-    """
-
-    def __init__(self, relaxations: Sequence[LimitRelaxation], n: int) -> None:
-        self._relaxations = relaxations
-        self._demanded = np.full((len(relaxations), n), np.inf)
-        self.furthest = np.zeros(n, dtype=np.int8)
-
-    def add(self, *, scene: Scene, camera: PlannedCamera, samples: LitSamples) -> None:
-        """Look at the samples from one camera more."""
-        pending = np.flatnonzero(self.furthest < MEASURED)
-        if not len(pending):
-            return
-        of_camera = demands(
-            scene, camera, taken(samples, pending, samples.lit), self._relaxations
-        )
-        self._demanded[:, pending] = np.minimum(
-            self._demanded[:, pending], of_camera.demanded
-        )
-        self.furthest[pending] = np.maximum(self.furthest[pending], of_camera.furthest)
-
-    def least_changes(self, share: Share) -> dict[str, int]:
-        """Return how far each limit alone must give way, and what that gains.
-
-        As far as the share asks, or where it can't be had, as far as it helps.
-        """
-        out = self.furthest < MEASURED
-        return least_changes(self._relaxations, self._demanded[:, out], share.wanted)
-
-
-@dataclass(frozen=True, eq=False)
-class _Covers:
-    """What so many candidates cover at the most, as one limit gives way.
-
-    Attributes:
-        demanded: What a sample asks of the limit at a candidate, (n, m).
-        scene: Requirements and seed.
-        count: Cameras.
-    """
-
-    demanded: NDArray[np.float64]
-    scene: Scene
-    count: int
-
-    def enough(self, value: float) -> bool:
-        """Whether they cover the required share of what is reachable then."""
-        measured = self.demanded <= value
-        share = min(self.scene.requirements.coverage + _SPARE, 1.0)
-        required = required_samples(np.any(measured, axis=1), share)
-        return covers_enough(
-            measured,
-            required,
-            self.count,
-            n_existing=n_fixed(self.scene),
-            seed=self.scene.seed,
-        )
-
-
-def _least_enough(relaxation: LimitRelaxation, covers: _Covers) -> float | None:
-    """Return the least value, rounded, at which a cover is enough."""
-    finite = covers.demanded[np.isfinite(covers.demanded)]
-    values = np.unique(relaxation.rounded(finite)).tolist()
-    if not values or not covers.enough(values[-1]):
-        return None
-    low, high = 0, len(values) - 1
-    while low < high:
-        middle = (low + high) // 2
-        low, high = (
-            (low, middle) if covers.enough(values[middle]) else (middle + 1, high)
-        )
-    return values[high]
-
-
-def _whole_shell(
+def least_demands(
     scene: Scene,
     cameras: Sequence[PlannedCamera],
     samples: LitSamples,
-    out: NDArray[np.bool_],
-    share: Share,
-) -> dict[str, int]:
-    """What cameras anywhere in the shell would measure, where they may not stand."""
-    workspace = scene.requirements.workspace
-    whole = workspace.whole_shell
-    if whole == workspace or share.wanted <= 0:
-        return {}
-    site = scene.site("camera", cameras[0].device)
-    anywhere = camera_candidates(
-        cameras[0],
-        whole,
-        workspace.n_reference_cameras,
-        None if site is None else replace(site, workspace=whole),
-    )
-    pending = np.flatnonzero(out)
-    for camera in anywhere:
+    relaxations: Sequence[LimitRelaxation],
+) -> Demands:
+    """Return the least that samples ask of each limit, and how far they come."""
+    n = len(samples.target)
+    furthest = np.zeros(n, dtype=np.int8)
+    demanded = np.full((len(relaxations), n), np.inf)
+    for camera in cameras:
+        pending = np.flatnonzero(furthest < MEASURED)
         if not len(pending):
             break
-        unmeasured = taken(samples, pending, samples.lit)
-        pending = pending[~measured_by(scene, [camera], unmeasured)[:, 0]]
-    return {"the whole shell as workspace": int(out.sum()) - len(pending)}
+        others = taken(samples, pending, samples.lit)
+        asked = demands(scene, camera, others, relaxations)
+        demanded[:, pending] = np.minimum(demanded[:, pending], asked.demanded)
+        furthest[pending] = np.maximum(furthest[pending], asked.furthest)
+    return Demands(furthest, demanded)

@@ -1,39 +1,37 @@
 """How limits of a rig may give way, and by how little, by what samples ask."""
 
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import DeviceModel, PinholeModel
+from planning.model.document.coverage_records import Relaxation
 from planning.model.requirements import Requirements
 from planning.proofs.selection import cover_problem
 from planning.rig import optics
 from planning.rig.rig import Rig
 from planning.rig.rig_tables import PinholeTable
 from planning.rings.ring_radii import ring_gap
-from planning.scene.limits.limit import Array, Focus, LimitRelaxation, RigFacts
+from planning.scene.limits.limit import Array, Focus, LimitRelaxation, Mask, RigFacts
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 from solvers import solve_max_coverage
 
+ANYWHERE = "the whole shell as workspace"
 # Less isn't worth telling.
 _GAIN = 0.01
 # Counted work of each cover, of which no proof is asked.
 _BUDGET = 1e8
+# Two ends of a range agree if they were computed from the same focus [m].
+_SAME_M = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Share:
-    """How much of n samples is reached now, and how much must be.
-
-    Attributes:
-        n: Samples.
-        reached: Those that some pose reaches.
-        least: Share that must be.
-    """
+    """Of n samples so many are `reached` by some pose; a `least` share must be."""
 
     n: int
     reached: int
@@ -44,14 +42,14 @@ class Share:
         """Samples to gain."""
         return int(np.ceil(self.least * self.n - 1e-9)) - self.reached
 
-    def gains(self, gained: dict[str, int]) -> list[dict[str, Any]]:
+    def gains(self, gained: dict[str, int]) -> tuple[Relaxation, ...]:
         """Return the changes that gain at least a percentage point, least first."""
-        entries = [
-            {"change": change, "reachable_share": (self.reached + gain) / self.n}
-            for change, gain in gained.items()
+        ranked = sorted(gained.items(), key=lambda pair: pair[1])
+        return tuple(
+            Relaxation(change=change, reachable_share=(self.reached + gain) / self.n)
+            for change, gain in ranked
             if gain >= _GAIN * self.n
-        ]
-        return sorted(entries, key=lambda entry: entry["reachable_share"])
+        )
 
 
 def least_changes(
@@ -76,30 +74,46 @@ def least_changes(
     return changes
 
 
-def covers_enough(
-    covered: NDArray[np.bool_],
-    required: int,
-    count: int,
-    *,
-    n_existing: int,
-    seed: int,
-) -> bool:
-    """Return whether so many candidates cover as many samples as are required.
+@dataclass(frozen=True, eq=False)
+class Allowed:
+    """So many devices, and what they must cover.
+
+    Attributes:
+        count: Candidates, with the existing ones.
+        n_existing: First candidates, which are taken whatever they cover.
+        seed: Of the search.
+        required: Samples, by what any candidate covers, shape (n,).
+    """
+
+    count: int
+    n_existing: int
+    seed: int
+    required: Callable[[Mask], int]
+
+    def enough(self, covered: Mask) -> bool:
+        """Whether they can, by what each candidate covers, shape (n, m)."""
+        required = self.required(np.any(covered, axis=1))
+        problem = cover_problem(covered, required, self.n_existing)
+        best = solve_max_coverage(problem, self.count, seed=self.seed, budget=_BUDGET)
+        return bool(covered[:, best.selected].any(axis=1).sum() >= required)
+
+
+def least_enough(
+    relaxation: LimitRelaxation,
+    demanded: NDArray[np.float64],
+    enough: Callable[[Mask], bool],
+) -> str | None:
+    """Return the least change of a limit with which candidates are enough.
 
     Args:
-        covered: Which candidate covers which sample, shape (n, m).
-        required: Samples.
-        count: Candidates.
-        n_existing: First ones, which are taken whatever they cover.
-        seed: Of the search.
+        relaxation: Of the limit.
+        demanded: What a sample asks of it at a candidate, shape (n, m).
+        enough: Whether what each candidate covers then is, shape (n, m).
     """
-    problem = cover_problem(covered, required, n_existing)
-    best = solve_max_coverage(problem, count, seed=seed, budget=_BUDGET).selected
-    return bool(covered[:, best].any(axis=1).sum() >= required)
-
-
-# Two ends of a range agree if they were computed from the same focus [m].
-_SAME_M = 1e-6
+    asked = relaxation.rounded(demanded[np.isfinite(demanded)])
+    values = np.unique(asked).tolist()
+    least = bisect_left(values, True, key=lambda value: enough(demanded <= value))
+    return relaxation.say(values[least]) if least < len(values) else None
 
 
 def relaxations_of_projectors(
@@ -113,12 +127,7 @@ def relaxations_of_projectors(
 def relaxations_of_cameras(
     rig: Rig, required: Requirements
 ) -> tuple[LimitRelaxation, ...]:
-    """Return every way in which a limit of the cameras or of pairs may give way.
-
-    Args:
-        rig: As written: how sharpness and rings came about.
-        required: The limits.
-    """
+    """Return every way in which a limit of the cameras or of pairs may give way."""
     device, limits = rig.camera_device(), required.triangulation
     gap = rig.ring_gap_m or ring_gap(
         rig.projector_device(), device, limits, rig.standoff_m

@@ -4,31 +4,46 @@ For every sample that nothing lights, the pose that asks least of a limit says w
 sample needs; sorted, these say how far the limit must give way for the required share.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
+from planning.model.document.coverage_records import Relaxation
 from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import NothingLitError
-from planning.scene import lighting
+from planning.projectors.projector_stage import ProjectorStage
+from planning.proofs.selection import required_samples
+from planning.report.reach import furthest_lit
 from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import projector_candidates
+from planning.scene.workspace.view_tiles import Site
 
 from .demands import light_demands
-from .least_changes import Share, least_changes, relaxations_of_projectors
+from .least_changes import (
+    ANYWHERE,
+    Allowed,
+    Share,
+    least_changes,
+    least_enough,
+    relaxations_of_projectors,
+)
+
+# Poses for larger tiles: so many times as wide and high, so many that look at the
+# centre.
+_TIMES = (2, 3)
+_OFFERED = 150
 
 
 def reachability_relaxations(
     scene: Scene,
     reference: Sequence[PlannedProjector],
     ring_offset: tuple[float, float],
-) -> list[dict[str, Any]]:
+) -> tuple[Relaxation, ...]:
     """Return the share of the target that each single relaxation would make reachable.
 
     Args:
@@ -37,19 +52,18 @@ def reachability_relaxations(
         ring_offset: Tilt and azimuth of its ring axes.
 
     Returns:
-        One entry for each relaxation that gains at least a percentage point, the
-        smallest gain first: `change`, `reachable_share`. A limit gives way as far as
-        `min_reachable` needs, or else as far as it helps.
+        The smallest gain first. A limit gives way as far as `min_reachable` needs, or
+        else as far as it helps.
     """
     target = scene.target_samples(DRAWS.relaxations)
-    n, dark = len(target), _unlit(scene, reference, target)
+    dark = target.take(furthest_lit(scene, reference, target) < LIT)
+    n, workspace = len(target), scene.requirements.workspace
     share = Share(n, n - len(dark), scene.requirements.min_reachable)
-    gained = _least(scene, reference, target.take(dark), share.wanted)
+    gained = _least(scene, reference, dark, share.wanted)
     for moved in scene.obstructions:
         rest = tuple(other for other in scene.obstructions if other is not moved)
-        still = _unlit(scene.with_obstructions(rest), reference, target.take(dark))
-        gained[f"{moved.words} out of the way"] = len(dark) - len(still)
-    workspace = scene.requirements.workspace
+        furthest = furthest_lit(scene.with_obstructions(rest), reference, dark)
+        gained[f"{moved.words} out of the way"] = int((furthest == LIT).sum())
     whole = workspace.whole_shell
     if whole != workspace:
         site = scene.site("projector", reference[0].device)
@@ -60,18 +74,13 @@ def reachability_relaxations(
             ring_offset=ring_offset,
             site=None if site is None else replace(site, workspace=whole),
         )
-        still_dark = len(_unlit(scene, anywhere, target))
-        gained["the whole shell as workspace"] = len(dark) - still_dark
+        still_dark = furthest_lit(scene, anywhere, target) < LIT
+        gained[ANYWHERE] = len(dark) - int(still_dark.sum())
     return share.gains(gained)
 
 
 def nothing_lit(scene: Scene, error: NothingLitError) -> str:
-    """Say the least by which a single limit must give way for any light at all.
-
-    Args:
-        scene: Surface and requirements.
-        error: What was offered, and which limits forbid it.
-    """
+    """Say the least by which a single limit must give way for any light at all."""
     offered = error.candidates
     dark = offered.samples.take(np.arange(min(len(offered.samples), DRAWS.dark)))
     if helps := _least(scene, offered.projectors, dark, 1):
@@ -86,26 +95,59 @@ def _least(
     scene: Scene, projectors: Sequence[PlannedProjector], dark: Target, wanted: int
 ) -> dict[str, int]:
     """How far each limit alone must give way, and how many dark samples that lights."""
-    device = projectors[0].device
-    relaxations = relaxations_of_projectors(scene.requirements, device)
-    least = np.full((len(relaxations), len(dark)), np.inf)
-    for projector in projectors:
-        demanded = light_demands(scene, projector, dark, relaxations)
-        least = np.minimum(least, demanded)
-    return least_changes(relaxations, least, wanted)
+    relaxations = relaxations_of_projectors(scene.requirements, projectors[0].device)
+    asked = (light_demands(scene, p, dark, relaxations) for p in projectors)
+    return least_changes(relaxations, reduce(np.minimum, asked), wanted)
 
 
-def _unlit(
-    scene: Scene, reference: Sequence[PlannedProjector], target: Target
-) -> NDArray[np.int64]:
-    """Return which samples no projector lights."""
-    dark = np.arange(len(target))
-    limits, bodies = scene.requirements.projector, scene.bodies
-    for projector in reference:
-        if not len(dark):
-            break
-        first = lighting.first_failure(
-            projector, target.take(dark), limits, scene.visibility, bodies=bodies
+def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
+    """Return the field with which so many projectors would be enough, as one phrase.
+
+    Poses for larger tiles join those that are offered, since what is looked at from
+    beside with one field is looked at whole with another.
+
+    Args:
+        scene: Surface and requirements.
+        stage: Poses offered, and the samples to light.
+        count: Projectors that are allowed.
+
+    Returns:
+        Up to a whole degree or millimetre; None where the object fits the field, or
+        where a field three times as wide isn't enough either.
+    """
+    template, required = stage.reference[0], scene.requirements
+    site = scene.site("projector", template.device)
+    if site is None:
+        return None
+    candidates = stage.candidates
+    n = min(len(candidates.samples), DRAWS.fewer_devices)
+    target = candidates.samples.take(np.arange(n))
+    (field,) = (
+        relaxation
+        for relaxation in relaxations_of_projectors(required, template.device)
+        if relaxation.cause == "projector_beam"
+    )
+    poses = (*stage.reference, *_over_larger_tiles(site, template))
+    demanded = np.stack(
+        [light_demands(scene, pose, target, [field])[0] for pose in poses], axis=1
+    )
+    least = required_samples(candidates.reached[:n], required.dominant_coverage)
+    n_existing = len(required.existing_of("projector"))
+    allowed = Allowed(count, n_existing, scene.seed, lambda _: least)
+    return least_enough(field, demanded, allowed.enough)
+
+
+def _over_larger_tiles(
+    site: Site, template: PlannedProjector
+) -> Iterator[PlannedProjector]:
+    for times in _TIMES:
+        device = template.device.widened(times)
+        offered = projector_candidates(
+            replace(template, device=device),
+            site.workspace,
+            _OFFERED,
+            ring_offset=(0.0, 0.0),
+            site=replace(site, device=device),
         )
-        dark = dark[first != LIT]
-    return dark
+        for projector in offered:
+            yield replace(projector, device=template.device)

@@ -9,27 +9,15 @@ from planning.report.claims import Claims, Devices
 from planning.report.partial_plan import PartialPlan
 
 from .camera_relaxations import for_so_many, out_of_reach
-from .projector_relaxations import reachability_relaxations
-from .wider_field import wider_field
+from .projector_relaxations import reachability_relaxations, wider_field
 
 
 def with_relaxations(
-    coverage: Coverage,
-    partial: PartialPlan,
-    devices: Devices,
-    claims: Claims,
-    clock: Stopwatch,
+    partial: PartialPlan, devices: Devices, claims: Claims, clock: Stopwatch
 ) -> Coverage:
-    """Return the coverage with what would let devices reach enough, where they don't.
-
-    Args:
-        coverage: Of the plan.
-        partial: What the plan is written from.
-        devices: As written, with the reference sets.
-        claims: Made for these devices.
-        clock: Times it.
-    """
-    areas, least = coverage.target, partial.scene.requirements.min_reachable
+    """Return the claims' coverage with what would let devices reach enough."""
+    coverage, least = claims.coverage, partial.scene.requirements.min_reachable
+    areas = coverage.target
     if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
             relaxations = reachability_relaxations(
@@ -38,9 +26,11 @@ def with_relaxations(
         coverage = coverage.changed(relaxations=relaxations)
     if falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least):
         with _timed(clock):
-            out = out_of_reach(partial.scene, partial.request.rig, devices, claims)
+            causes, relaxations = out_of_reach(
+                partial.scene, partial.request.rig, devices, claims
+            )
         coverage = coverage.changed(
-            unmeasurable_by_cause=out.by_cause, camera_relaxations=out.relaxations
+            unmeasurable_by_cause=causes, camera_relaxations=relaxations
         )
     return coverage
 
@@ -50,21 +40,22 @@ def with_fewer_needed(
 ) -> Certificates:
     """Return the certificates with what would let as many as are allowed be enough."""
     required = partial.scene.requirements
-    if _too_few(proofs.projectors, required.max_projectors):
+    projectors, cameras = proofs.projectors, proofs.cameras
+    if _too_few(projectors, required.max_projectors):
         with _timed(clock):
             field = wider_field(partial.scene, partial.stage, required.max_projectors)
         if field is not None:
-            needed = proofs.projectors.needed.changed(wider_field=field)
-            proofs = proofs.changed(projectors=proofs.projectors.changed(needed=needed))
-    if _too_few(proofs.cameras, required.max_cameras):
+            needed = projectors.needed.changed(wider_field=field)
+            proofs = proofs.changed(projectors=projectors.changed(needed=needed))
+    if _too_few(cameras, required.max_cameras):
         with _timed(clock):
             scene, count = partial.scene.among(partial.projectors), required.max_cameras
             changes = for_so_many(
                 scene, partial.request.rig, partial.camera_stage, count or 0
             )
         if changes:
-            needed = proofs.cameras.needed.changed(relaxations=changes)
-            proofs = proofs.changed(cameras=proofs.cameras.changed(needed=needed))
+            needed = cameras.needed.changed(relaxations=changes)
+            proofs = proofs.changed(cameras=cameras.changed(needed=needed))
     return proofs
 
 

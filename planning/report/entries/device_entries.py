@@ -10,7 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
 from geometry.repair.hollow import MeshShell
 from planning.model.device_poses import DECIMALS, rounded_pose
-from planning.model.document.coverage_records import Coverage, RegionRecord
+from planning.model.document.coverage_records import RegionRecord
 from planning.model.document.device_records import (
     CameraRecord,
     ProjectorRecord,
@@ -141,28 +141,11 @@ def region_records(
             mean_normal=region.mean_normal.tolist(),
             cone_angle=region.cone_angle,
             mean_curvedness=region.mean_curvedness,
-            lit_by=light.lit_by,
-            lit_fraction=light.lit_fraction,
+            lit_by=lit_by,
+            lit_fraction=lit_fraction,
         )
-        for region, light in zip(regions, claims.regions, strict=True)
+        for region, (lit_by, lit_fraction) in zip(regions, claims.regions, strict=True)
     )
-
-
-def coverage_record(claims: Claims) -> Coverage:
-    """Return the plan's `coverage`, without what would help."""
-    coverage = Coverage(
-        samples=len(claims.target_samples),
-        surface=claims.surface,
-        target=claims.target,
-        uncovered_by_cause=claims.uncovered_by_cause,
-        unreachable_by_cause=claims.unreachable_by_cause,
-        unreachable_inside_m2=claims.unreachable_inside_m2,
-    )
-    blocked = {
-        "blocked_by_body_m2": claims.blocked_by_body_m2,
-        "blocked_by_obstacle_m2": claims.blocked_by_obstacle_m2,
-    }
-    return coverage.changed(**{key: areas for key, areas in blocked.items() if areas})
 
 
 def cost_record(

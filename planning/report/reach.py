@@ -1,0 +1,52 @@
+"""What poses reach of samples, one pose after another on what is still missing."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.scene import lighting
+from planning.scene.limits.projector_limits import INCIDENCE, LIT
+from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.samples import Target
+from planning.scene.scene import Scene
+
+
+def furthest_lit(
+    scene: Scene, projectors: Iterable[PlannedProjector], target: Target
+) -> NDArray[np.int8]:
+    """Return how far samples come over all projectors: index in `CAUSES`, or `LIT`."""
+    furthest = np.zeros(len(target), dtype=np.int8)
+    for projector in projectors:
+        pending = np.flatnonzero(furthest < LIT)
+        if not len(pending):
+            break
+        dark = target.take(pending)
+        # What shows its back comes no further than it did before.
+        idle = furthest[pending] >= INCIDENCE
+        idle &= lighting.shows_back(projector, dark)
+        pending, dark = pending[~idle], dark.take(~idle)
+        stage = lighting.first_failure(
+            projector,
+            dark,
+            scene.requirements.projector,
+            scene.visibility,
+            bodies=scene.bodies,
+        )
+        furthest[pending] = np.maximum(furthest[pending], stage)
+    return furthest
+
+
+def measured_by_any(
+    scene: Scene, cameras: Iterable[PlannedCamera], samples: LitSamples
+) -> NDArray[np.bool_]:
+    """Return which lit samples any of the cameras measures, shape (n,)."""
+    measured = np.zeros(len(samples.target), dtype=bool)
+    for camera in cameras:
+        pending = np.flatnonzero(~measured)
+        if not len(pending):
+            break
+        others = taken(samples, pending, samples.lit)
+        measured[pending] = measured_by(scene, [camera], others)[:, 0]
+    return measured
