@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from support.reconstruction_rigs import single
 
 from geometry.files.readers import load_mesh
 from planning.experiments.ground_truth import (
@@ -30,7 +31,6 @@ from planning.experiments.setups import (
     FACE_RADII_M,
     box_experiment,
     face_experiment,
-    single,
 )
 from planning.experiments.table import setup_lines
 from planning.model.plan import RequirementError

@@ -23,7 +23,7 @@ from planning.experiments.paper_figures import (
 )
 from planning.experiments.point_panels import PanelStage
 from planning.experiments.run import DARK, Outcome, double_density, run_experiment
-from planning.experiments.setups import Experiment, box_experiment, face_experiment
+from planning.experiments.setups import Experiment, paper_experiment
 from planning.experiments.table import outcome_document, outcome_lines
 from planning.model.files import write_atomically
 from planning.verify.reconstruction.cloud_file import (
@@ -35,7 +35,6 @@ from planning.verify.reconstruction.cloud_file import (
 from .console import print_json, reporter, say, writable
 
 _MM = LengthUnit("mm", 1e-3)
-_EXPERIMENTS = {"box": box_experiment, "face": face_experiment}
 # How near to a prior the object is known to lie, where the user doesn't say.
 _PRIOR_MM = 6.0
 
@@ -83,8 +82,8 @@ def experiment_command(options: Mapping[str, Any]) -> int:
 
 def experiment_of(options: Mapping[str, Any]) -> Experiment:
     """Return the experiment that was asked for; the paper's own where nothing was."""
-    make = _EXPERIMENTS[options["experiment"]]
-    return make(
+    return paper_experiment(
+        options["experiment"],
         light=options["light"] or "parallel",
         variant=options["variant"] or "printed",
         distortion=options["distortion"] or 0.0,

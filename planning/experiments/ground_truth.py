@@ -1,5 +1,6 @@
 """Points and labels held to the truth: what the authors couldn't give."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -85,20 +86,12 @@ class MeasuredErrors:
 def measured(
     name: str, cloud: Cloud, mesh: TriangleMesh, samples: SurfaceSamples, gap_m: float
 ) -> MeasuredErrors:
-    """Hold a cloud to the truth.
-
-    Args:
-        name: Which viewpoints it is of.
-        cloud: The points.
-        mesh: The object.
-        samples: What could be measured.
-        gap_m: Ring gap that completeness is counted by [m].
-    """
+    """Hold a cloud to the object, and to the samples of it that could be measured."""
     if len(cloud) == 0:
         return MeasuredErrors(name, cloud, np.zeros(0), (0.0, 0.0))
     apart = nearest_distance(cloud, samples, 1.01 * gap_m)
     distances = measure_accuracy(cloud, mesh).distances
-    half, whole = (float(np.mean(apart <= part * gap_m)) for part in (0.5, 1.0))
+    half, whole = (float(np.mean(apart <= gaps * gap_m)) for gaps in (0.5, 1.0))
     return MeasuredErrors(name, cloud, distances, (half, whole))
 
 
@@ -115,12 +108,12 @@ class LabelCount:
         ambiguous: Left out: several do.
     """
 
-    n: int
-    right: int
-    wrong: int
-    stray: int
-    off_prior: int
-    ambiguous: int
+    n: int = 0
+    right: int = 0
+    wrong: int = 0
+    stray: int = 0
+    off_prior: int = 0
+    ambiguous: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,30 +136,22 @@ class Prior:
 
 
 def judged_labels(scanner: Scanner, shots: Sequence[Shot]) -> LabelCount:
-    """Hold the labels of single images to the truth.
-
-    Args:
-        scanner: Devices and the object that was rendered.
-        shots: What the images gave.
-    """
+    """Hold the labels of single images of a scanner's object to the truth."""
     caster = RayCaster(scanner.mesh, threads=1)
-    counts: list[tuple[int, ...]] = []
+    total: Counter[str] = Counter()
     for shot in shots:
         rings, roots = shot.labels.rings, shot.labels.roots
         ring, root = true_labels(shot.lines.pixels, shot.pair, caster, shot.width)
         labelled = rings >= 0
         right = labelled & (rings == ring) & (roots == root)
-        wrong, stray = labelled & ~right & (ring >= 0), labelled & (ring < 0)
-        rejected = shot.labels.rejected
-        counts.append(
-            (
-                len(rings),
-                *(int(np.count_nonzero(flags)) for flags in (right, wrong, stray)),
-                rejected["off_prior"],
-                rejected["ambiguous"],
-            )
+        total.update(
+            shot.labels.rejected,
+            n=len(rings),
+            right=int(right.sum()),
+            wrong=int(np.sum(labelled & ~right & (ring >= 0))),
+            stray=int(np.sum(labelled & (ring < 0))),
         )
-    return LabelCount(*(sum(column) for column in zip(*counts, strict=True)))
+    return LabelCount(**total)
 
 
 def true_labels(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_lines
 from planning.verify.reconstruction.render.rendered import RenderedScene
@@ -18,6 +19,7 @@ from .point_panels import (
     PROJECTORS,
     REMOVED,
     RINGS,
+    Legend,
     PanelStage,
     captioned,
     chosen_colours,
@@ -36,16 +38,11 @@ _MM = 1e3
 
 
 def camera_images(
-    experiment: Experiment, photometry: Photometry, *, seed: int = 0
+    experiment: Experiment, photometry: Photometry
 ) -> tuple[NDArray[np.uint8], ...]:
     """Return what each camera sees under bright rings of all projectors, (h, w) each.
 
     Where rings of both projectors cross, their light adds up: the paper's Fig. 3.
-
-    Args:
-        experiment: Object and devices.
-        photometry: Light and sensor.
-        seed: Of the pixel noise.
     """
     scanner = experiment.scanner
     scene = RenderedScene(scanner, scanner, photometry)
@@ -60,10 +57,10 @@ def camera_images(
             ]
             shown = [scene.shown(p, drawn) for p, drawn in enumerate(lines)]
             every = [one for one in shown if one is not None]
-            frames = render_lines(seen, every, photometry, (seed, 9, c))
-            part = np.clip(np.rint(frames.stack[0]), 0, 255).astype(np.uint8)
+            frames = render_lines(seen, every, photometry, (0, 9, c))
+            image = np.clip(np.rint(frames.stack[0]), 0, 255).astype(np.uint8)
             left, top = frames.corner
-            whole[top : top + part.shape[0], left : left + part.shape[1]] = part
+            whole[top : top + image.shape[0], left : left + image.shape[1]] = image
         images.append(whole)
     return tuple(images)
 
@@ -94,22 +91,14 @@ def draw_viewpoints(outcome: Outcome, stage: PanelStage) -> Image.Image:
         (f"{_MM * radius:.4g} mm", RINGS[k % len(RINGS)])
         for k, radius in enumerate(outcome.experiment.radii_m)
     ]
-    panels = [
-        stage.panel(
-            f"{one.name}: {len(one.cloud)} points",
-            one.cloud.points,
-            chosen_colours(RINGS, one.cloud.ring),
-            legend,
-        )
-        for one in clouds
-    ]
+    panels = [_ring_panel(stage, one.name, one.cloud, legend) for one in clouds]
     return side_by_side(panels, columns=3)
 
 
 def draw_redundancy(outcome: Outcome, stage: PanelStage) -> Image.Image:
     """Return what is removed and what stays, merged: the paper's Figs. 8 and 9."""
     everything, merged = outcome.union.cloud, outcome.merged.cloud
-    stays = outcome.stays
+    stays = outcome.reconstruction.merged.stays
     colours = np.where(stays[:, None], np.array(KEPT), np.array(REMOVED))
     ids = [projector.id for projector in outcome.experiment.scanner.projectors]
     panels = [
@@ -150,12 +139,14 @@ def draw_densities(
     first: MeasuredErrors, both: MeasuredErrors, stage: PanelStage
 ) -> Image.Image:
     """Return the points of one sequence beside those of two."""
-    panels = [
-        stage.panel(
-            f"{title}: {len(one.cloud)} points",
-            one.cloud.points,
-            chosen_colours(RINGS, one.cloud.ring),
-        )
-        for title, one in (("One sequence", first), ("Two, the second shifted", both))
-    ]
+    titled = (("One sequence", first), ("Two, the second shifted", both))
+    panels = [_ring_panel(stage, title, one.cloud) for title, one in titled]
     return side_by_side(panels, columns=2)
+
+
+def _ring_panel(
+    stage: PanelStage, title: str, cloud: Cloud, legend: Legend = ()
+) -> Image.Image:
+    """Return a panel of points, coloured by ring."""
+    colours = chosen_colours(RINGS, cloud.ring)
+    return stage.panel(f"{title}: {len(cloud)} points", cloud.points, colours, legend)

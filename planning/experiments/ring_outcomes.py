@@ -46,12 +46,7 @@ class RingOutcome:
 
 
 def ring_outcomes(scanner: Scanner, cloud: Cloud) -> tuple[RingOutcome, ...]:
-    """Return what became of every ring of every projector.
-
-    Args:
-        scanner: Devices and the object.
-        cloud: What was measured, with the scanner's indices.
-    """
+    """Return what became of every ring of every projector, by a cloud of theirs."""
     caster = RayCaster(scanner.mesh, threads=1)
     cameras = scanner.cameras
     outcomes: list[RingOutcome] = []
@@ -59,9 +54,9 @@ def ring_outcomes(scanner: Scanner, cloud: Cloud) -> tuple[RingOutcome, ...]:
         for k, radius in enumerate(projector.pattern.radii):
             points, normals = _landed(projector, float(radius), caster)
             seen = [_shows(camera, points, normals, caster) for camera in cameras]
-            own = [
-                _measured(cloud, (p, c, k), points) & seen[c]
-                for c in range(len(cameras))
+            got = [
+                _measured(cloud, (p, c, k), points) & shown
+                for c, shown in enumerate(seen)
             ]
             outcomes.append(
                 RingOutcome(
@@ -69,23 +64,18 @@ def ring_outcomes(scanner: Scanner, cloud: Cloud) -> tuple[RingOutcome, ...]:
                     k,
                     len(points) / _PLACES,
                     {one.id: _share(s) for one, s in zip(cameras, seen, strict=True)},
-                    {one.id: _share(m) for one, m in zip(cameras, own, strict=True)},
-                    _share(np.any(own, axis=0)),
+                    {one.id: _share(m) for one, m in zip(cameras, got, strict=True)},
+                    _share(np.any(got, axis=0)),
                 )
             )
     return tuple(outcomes)
 
 
 def lit_and_seen(scanner: Scanner, points: Array, normals: Array) -> Mask:
-    """Return which points some ring pattern lights and some camera shows, (n,).
+    """Return which points (n, 3) some ring pattern lights and some camera shows.
 
     What could be measured at all: inside the outermost ring of a projector, facing it
     and a camera, neither hidden.
-
-    Args:
-        scanner: Devices and the object.
-        points: On the surface [m], shape (n, 3).
-        normals: Outward, shape (n, 3).
     """
     caster = RayCaster(scanner.mesh, threads=1)
     lit, seen = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
@@ -145,13 +135,13 @@ def _blocked(points: Array, towards: Array, away: Array, caster: RayCaster) -> M
 def _measured(cloud: Cloud, which: tuple[int, int, int], points: Array) -> Mask:
     """Whether places of a ring have a point of that projector, camera and ring."""
     p, c, k = which
-    own = (cloud.projector == p) & (cloud.camera == c) & (cloud.ring == k)
-    if not own.any() or len(points) == 0:
+    of_ring = (cloud.projector == p) & (cloud.camera == c) & (cloud.ring == k)
+    if not of_ring.any() or len(points) == 0:
         return np.zeros(len(points), dtype=bool)
-    apart, _ = KDTree(cloud.points[own]).query(points, distance_upper_bound=_NEAR_M)
+    tree = KDTree(cloud.points[of_ring])
+    apart, _ = tree.query(points, distance_upper_bound=_NEAR_M)
     return np.isfinite(apart)
 
 
 def _share(values: Mask) -> float:
-    """Share of places; 0 without any."""
     return float(np.mean(values)) if len(values) else 0.0

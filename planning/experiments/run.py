@@ -3,10 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
-from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.reconstruct import conclude, reconstruct
@@ -75,11 +74,6 @@ class Outcome:
         ids = [projector.id for projector in self.experiment.scanner.projectors]
         of_ring = cloud.projector == ids.index(ring.projector)
         return Errors.of(self.union.distances[of_ring & (cloud.ring == ring.ring)])
-
-    @property
-    def stays(self) -> Mask:
-        """Which of all points stay where redundancy is removed, shape (n,)."""
-        return np.isin(_keys(self.union.cloud), _keys(self.merged.cloud))
 
 
 def run_experiment(
@@ -153,13 +147,6 @@ def run_experiment(
     )
 
 
-def _keys(cloud: Cloud) -> NDArray[np.void]:
-    """What tells a point from every other, as one value that compares exactly."""
-    devices = np.column_stack([cloud.projector, cloud.camera, cloud.ring])
-    rows = np.ascontiguousarray(np.column_stack([devices, cloud.pixels]))
-    return rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))).ravel()
-
-
 def midway(radii: Array) -> Array:
     """Return radii midway between the rings, the first between centre and ring."""
     return 0.5 * (np.concatenate([[0.0], radii[:-1]]) + radii)
@@ -172,16 +159,6 @@ def second_sequence(scanner: Scanner) -> Scanner:
         for one in scanner.projectors
     ]
     return replace(scanner, projectors=tuple(shifted))
-
-
-def joined_sequences(first: Cloud, second: Cloud) -> Cloud:
-    """Return both clouds with their rings numbered outwards, the second's before."""
-    return Cloud.join(
-        [
-            replace(first, ring=(2 * first.ring + 1).astype(np.int16)),
-            replace(second, ring=(2 * second.ring).astype(np.int16)),
-        ]
-    )
 
 
 def double_density(
@@ -199,7 +176,7 @@ def double_density(
         threads: Worker threads; the result doesn't depend on them.
 
     Returns:
-        All points of both; rings are numbered outwards through both.
+        All points of both; rings are numbered outwards through both sequences.
     """
     experiment = outcome.experiment
     second = reconstruct(
@@ -208,6 +185,15 @@ def double_density(
         threads=threads,
         photometry=outcome.photometry,
     )
-    cloud = joined_sequences(outcome.reconstruction.everything, second.everything)
-    samples = outcome.samples
-    return measured("both sequences", cloud, experiment.mesh, samples, experiment.gap_m)
+    first = outcome.union.cloud
+    cloud = Cloud.join(
+        [
+            replace(first, ring=(2 * first.ring + 1).astype(np.int16)),
+            replace(
+                second.everything, ring=(2 * second.everything.ring).astype(np.int16)
+            ),
+        ]
+    )
+    return measured(
+        "both sequences", cloud, experiment.mesh, outcome.samples, experiment.gap_m
+    )

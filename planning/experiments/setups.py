@@ -6,8 +6,9 @@ Everything else is ours, because the paper doesn't give it: directions of the de
 the size of the box, the box's radii, the head, the projectors' optics.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Literal
 
 import numpy as np
@@ -31,7 +32,6 @@ from .paper_devices import (
 )
 
 Variant = Literal["printed", "fits"]
-NAMES = ("box", "face")
 VARIANTS: dict[str, Optics] = {"printed": PRINTED, "fits": FITTING}
 
 INCH_M = 0.0254
@@ -43,8 +43,6 @@ CAMERAS_DEG = ((-25.0, 15.0), (25.0, 15.0))
 BOX_M = 0.120
 BOX_RADII_M = np.linspace(0.012, 0.084, 7)
 FACE_RADII_M = np.array([1.0, 2.0, 4.0]) * INCH_M
-# Between the tip of the nose and the eyes, on the surface of the head.
-_FACE_TARGET = np.array([0.0, -0.090, -0.020])
 _HEAD_FACES = 20_000
 _ANY_M = 1.0
 # More than this slants rings until they smear; the decoder's limit [rad].
@@ -83,78 +81,32 @@ class Experiment:
         return float(np.median(np.diff(self.radii_m, prepend=0.0)))
 
 
-def box_experiment(
+def paper_experiment(
+    name: str,
     *,
     light: LightName = "parallel",
     variant: Variant = "printed",
     distortion: float = 0.0,
+    radii_m: Array | None = None,
 ) -> Experiment:
-    """Return the box, an edge towards the rig, under 2 projectors of 7 circles.
+    """Return the box, an edge towards the rig, or the head, and the paper's devices.
 
     Args:
-        light: `parallel`, as the paper assumes, or `diverging`.
-        variant: Focal length and image centre.
-        distortion: k1 of the cameras' lenses; the decoder knows it.
-    """
-    plain = box((BOX_M, BOX_M, BOX_M))
-    turned = Rotation.from_euler("z", 45.0, degrees=True).as_matrix()
-    mesh = TriangleMesh(plain.vertices @ turned.T, plain.faces)
-    target = np.array([0.0, -BOX_M / np.sqrt(2.0), 0.0])
-    return _experiment("box", mesh, target, BOX_RADII_M, light, variant, distortion)
-
-
-def face_experiment(
-    *,
-    light: LightName = "parallel",
-    variant: Variant = "printed",
-    distortion: float = 0.0,
-    radii_m: Array = FACE_RADII_M,
-) -> Experiment:
-    """Return the head under 2 projectors of circles of 1, 2 and 4 inches.
-
-    Args:
+        name: `box` or `face`.
         light: `parallel`, as the paper assumes, or `diverging`.
         variant: Focal length and image centre.
         distortion: k1 of the cameras' lenses; the decoder knows it.
         radii_m: Other radii than the paper's [m], rising.
     """
-    mesh = _head()
-    return _experiment("face", mesh, _FACE_TARGET, radii_m, light, variant, distortion)
-
-
-def single(experiment: Experiment, *, projector: int = 0, camera: int = 0) -> Scanner:
-    """Return one projector and one camera of an experiment."""
-    scanner = experiment.scanner
-    return replace(
-        scanner,
-        projectors=scanner.projectors[projector : projector + 1],
-        cameras=scanner.cameras[camera : camera + 1],
-    )
-
-
-@cache
-def _head() -> TriangleMesh:
-    """Return the head of the sample."""
-    return sample_head(n_faces=_HEAD_FACES)
-
-
-def _experiment(
-    name: str,
-    mesh: TriangleMesh,
-    target: Array,
-    radii_m: Array,
-    light: LightName,
-    variant: Variant,
-    distortion: float,
-) -> Experiment:
-    """Place the devices of the paper about an object."""
-    printed = VARIANTS[variant]
-    optics = Optics(printed.focal_px, printed.centre_px, distortion)
-    gap_m = float(np.median(np.diff(radii_m, prepend=0.0)))
-    n = len(mesh.faces)
+    build, target, stated_m = _OBJECTS[name]
+    mesh, radii = build(), stated_m if radii_m is None else radii_m
+    optics = replace(VARIANTS[variant], distortion=distortion)
+    gap_m = float(np.median(np.diff(radii, prepend=0.0)))
+    # Nothing is asked but to look; the decoder reads some of the limits.
+    check = CheckLimits(_ANY_M, _ANY_M, _ANY_M, gap_m, 0.0, 1.0)
     scanner = Scanner(
         tuple(
-            placed_projector(f"P{number}", light, bearing(*at), target, radii_m)
+            placed_projector(f"P{number}", light, bearing(*at), target, radii)
             for number, at in enumerate(PROJECTORS_DEG, 1)
         ),
         tuple(
@@ -162,14 +114,31 @@ def _experiment(
             for number, at in enumerate(CAMERAS_DEG, 1)
         ),
         mesh,
-        np.zeros(n, dtype=np.int64),
-        np.ones(n, dtype=bool),
-        _limits(gap_m),
+        np.zeros(len(mesh.faces), dtype=np.int64),
+        np.ones(len(mesh.faces), dtype=bool),
+        ScanLimits(check, 0.1, _MAX_LIT, _MAX_SEEN),
     )
-    return Experiment(name, variant, light, optics, radii_m, scanner)
+    return Experiment(name, variant, light, optics, radii, scanner)
 
 
-def _limits(gap_m: float) -> ScanLimits:
-    """Nothing is asked but to look; the decoder reads some of the limits."""
-    check = CheckLimits(_ANY_M, _ANY_M, _ANY_M, gap_m, 0.0, 1.0)
-    return ScanLimits(check, 0.1, _MAX_LIT, _MAX_SEEN)
+box_experiment = partial(paper_experiment, "box")
+face_experiment = partial(paper_experiment, "face")
+
+
+def _box() -> TriangleMesh:
+    plain = box((BOX_M, BOX_M, BOX_M))
+    turned = Rotation.from_euler("z", 45.0, degrees=True).as_matrix()
+    return TriangleMesh(plain.vertices @ turned.T, plain.faces)
+
+
+@cache
+def _head() -> TriangleMesh:
+    return sample_head(n_faces=_HEAD_FACES)
+
+
+# The mesh, where the ring axes meet it, and the radii. The head's point lies between
+# the tip of the nose and the eyes.
+_OBJECTS: dict[str, tuple[Callable[[], TriangleMesh], Array, Array]] = {
+    "box": (_box, np.array([0.0, -BOX_M / np.sqrt(2.0), 0.0]), BOX_RADII_M),
+    "face": (_head, np.array([0.0, -0.090, -0.020]), FACE_RADII_M),
+}

@@ -12,6 +12,7 @@ from support.paper_equations import (
     projection_matrix,
 )
 from support.plain_shapes import box, grid, joined
+from support.reconstruction_rigs import single
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
@@ -43,7 +44,6 @@ from planning.experiments.setups import (
     FACE_RADII_M,
     box_experiment,
     face_experiment,
-    single,
 )
 from planning.experiments.table import outcome_document, outcome_lines
 from planning.verify.reconstruction.calibration import PairCalibration
@@ -134,7 +134,7 @@ def test_the_box_is_measured_to_a_fortieth_of_a_millimetre(of_box):
     assert shares[0] < min(shares[1:3])
     assert max(shares[1:3]) < shares[3] == max(shares)
     assert 0.3 < of_box.reconstruction.redundant_fraction < 0.7
-    kept = of_box.union.cloud.take(of_box.stays).points
+    kept = of_box.union.cloud.take(of_box.reconstruction.merged.stays).points
     assert {tuple(p) for p in kept} == {tuple(p) for p in of_box.merged.cloud.points}
     # Both sides of the box's edge, up to the outermost ring of either projector.
     assert by_name["all points"].complete[1] > 0.99

@@ -10,6 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
+from planning.experiments.setups import Experiment
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
 from planning.verify.reconstruction.calibration import ProjectorCalibration
@@ -232,6 +233,16 @@ def small_rig(mesh: TriangleMesh, light: str = "diverging", focal: float = 3478.
             camera("C2", 1.0 * direction(-60.0, 25.0), focal=focal),
             camera("C3", 1.0 * direction(60.0, 25.0), focal=focal),
         ],
+    )
+
+
+def single(experiment: Experiment, *, projector: int = 0, camera: int = 0) -> Scanner:
+    """One projector and one camera of an experiment."""
+    scanner = experiment.scanner
+    return replace(
+        scanner,
+        projectors=scanner.projectors[projector : projector + 1],
+        cameras=scanner.cameras[camera : camera + 1],
     )
 
 

@@ -29,12 +29,14 @@ class Merged:
 
     Attributes:
         cloud: The points that stay.
+        stays: Which of all points these are, shape (n_all,).
         normals: Estimated from the points around each, towards the camera; NaN where
             too few lie around, shape (n, 3).
         sigma: Standard deviation of each point along its normal [m]; NaN likewise.
     """
 
     cloud: Cloud
+    stays: Mask
     normals: Array
     sigma: Array
 
@@ -51,15 +53,17 @@ def merge(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Merged:
     normals = np.full((len(cloud), 3), np.nan)
     square = np.zeros(len(cloud), dtype=bool)
     for camera in np.unique(cloud.camera):
-        rows = np.flatnonzero(cloud.camera == camera)
-        part = cloud.take(rows)
-        tiles = _Tiles.of(part.pixels, side)
-        normals[rows] = _plane_normals(part, tiles)
-        square[rows] = _squarest_projector(part, tiles, normals[rows])
-    cloud, normals = cloud.take(square), normals[square]
-    sigma = cloud.sigma(normals)
-    best = _sharpest_camera(cloud, sigma, _side(normals), 0.5 * gap_m)
-    return Merged(cloud.take(best), normals[best], sigma[best])
+        seen = np.flatnonzero(cloud.camera == camera)
+        by_camera = cloud.take(seen)
+        tiles = _Tiles.of(by_camera.pixels, side)
+        normals[seen] = _plane_normals(by_camera, tiles)
+        square[seen] = _squarest_projector(by_camera, tiles, normals[seen])
+    squarest, normals = cloud.take(square), normals[square]
+    sigma = squarest.sigma(normals)
+    best = _sharpest_camera(squarest, sigma, _side(normals), 0.5 * gap_m)
+    stays = square.copy()
+    stays[square] = best
+    return Merged(squarest.take(best), stays, normals[best], sigma[best])
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +123,11 @@ def _squarest_projector(cloud: Cloud, tiles: _Tiles, normals: Array) -> Mask:
     known = np.isfinite(cosine)
     score, support = [], []
     for projector in projectors:
-        own = cloud.projector == projector
-        count = tiles.sum_around(own.astype(np.float64))
-        count[~tiles.occupied(own)] = 0.0
-        weighed = tiles.sum_around((own & known).astype(np.float64))
-        total = tiles.sum_around(np.where(own & known, cosine, 0.0))
+        lit = cloud.projector == projector
+        count = tiles.sum_around(lit.astype(np.float64))
+        count[~tiles.occupied(lit)] = 0.0
+        weighed = tiles.sum_around((lit & known).astype(np.float64))
+        total = tiles.sum_around(np.where(lit & known, cosine, 0.0))
         score.append(total / np.maximum(weighed, 1.0))
         support.append(count)
     scores, counts = np.array(score), np.array(support)
@@ -141,11 +145,7 @@ def _side(normals: Array) -> Indices:
 
 
 def _sharpest_camera(cloud: Cloud, sigma: Array, side: Indices, cell_m: float) -> Mask:
-    """Points of the camera with the least mean sigma in each cell of space, (n,).
-
-    Points whose surface faces another way aren't compared: on a thin part they are
-    of its other side.
-    """
+    """Points of the camera with the least mean sigma in each cell of space, (n,)."""
     if len(cloud) == 0:
         return np.zeros(0, dtype=bool)
     place = np.floor((cloud.points - cloud.points.min(axis=0)) / cell_m).astype(
@@ -153,6 +153,7 @@ def _sharpest_camera(cloud: Cloud, sigma: Array, side: Indices, cell_m: float) -
     )
     rows, columns = place[:, 1].max() + 1, place[:, 2].max() + 1
     key = (place[:, 0] * rows + place[:, 1]) * columns + place[:, 2]
+    # Surface that faces another way is the other side of something thin.
     key = key * _SIDES + side
     _, cell = np.unique(key, return_inverse=True)
     cameras = int(cloud.camera.max()) + 1
