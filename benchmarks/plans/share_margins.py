@@ -137,7 +137,9 @@ def _margins(
         own = lit_margins(scene, projectors, rows, lit)
         return float(np.degrees(margin_at_share(own, required)))
 
-    found = (margin(stage.most_area), margin(stage.projectors), margin(posed))
+    largest, _ = stage.candidates.cover.most_covering(len(stage.projectors), None)
+    most_area = stage.candidates.of(largest)
+    found = (margin(most_area), margin(stage.projectors), margin(posed))
     return stage, found, seconds
 
 

@@ -11,8 +11,8 @@ from planning.cameras.baselines.baseline_limits import BaselineLimits, RingsOnSu
 from planning.cameras.baselines.camera_moves import at_poses
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import (
+    BaselineSearch,
     WidestBaselines,
-    maximise_baselines,
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.bodies.clearance import lacks_clearance
@@ -135,7 +135,7 @@ def widen_baselines(
     more samples must agree to each move.
     """
     least_lit = samples.count_lit(cameras)
-    return maximise_baselines(
+    search = BaselineSearch(
         cameras,
         lambda poses: samples.measured(at_poses(cameras, poses), least_lit),
         samples.surface,
@@ -145,6 +145,7 @@ def widen_baselines(
         max_evaluations=max_evaluations,
         max_programs=max_programs,
     )
+    return search.run()
 
 
 def _confirming(

@@ -13,69 +13,64 @@ from numpy.typing import NDArray
 
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.proofs.conflicts import resolve_conflicts
+from planning.proofs.conflicts import Interference, resolve_conflicts
 from planning.scene.measured import LitSamples, measured_by, taken
-from planning.scene.placed_bodies import blocked_by, bodies_of, collide, moves_bodies
+from planning.scene.placed_bodies import blocked_by, bodies_of
 from planning.scene.scene import Scene
 
 from .camera_cover import CameraCover, candidate_cover
 
 
 @dataclass(frozen=True, eq=False)
-class CameraInterference:
+class CameraInterference(Interference):
     """Cameras, and the lit samples that they measure.
 
     Attributes:
         scene: With the bodies of the projectors.
         projectors: As planned.
-        devices: The candidates.
         samples: Samples that the projectors light, were there no cameras.
-        measured: Which candidate measures which, but for bodies of others, (n, m).
     """
 
+    devices: Sequence[PlannedCamera]
     scene: Scene
     projectors: tuple[PlannedProjector, ...]
-    devices: Sequence[PlannedCamera]
     samples: LitSamples
-    measured: NDArray[np.bool_]
 
-    @property
-    def bodied(self) -> bool:
-        """Whether any candidate that doesn't exist yet has a body."""
-        return moves_bodies(self.devices)
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        projectors: tuple[PlannedProjector, ...],
+        cameras: Sequence[PlannedCamera],
+        samples: LitSamples,
+        measured: NDArray[np.bool_],
+    ) -> "CameraInterference":
+        """Return cameras that measure samples (n, m), but for each other's bodies."""
+        points = samples.target.samples.points
+        return cls(cameras, points, measured, scene, projectors, samples)
 
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]
     ) -> NDArray[np.bool_]:
         """Return which samples candidates measure among the bodies of others."""
+        measured = super().covers(standing, columns)
         chosen = [self.devices[i] for i in standing]
-        bodies = bodies_of(device for device in chosen if not device.existing)
         scene = self.scene.among((*self.projectors, *chosen))
         lit = lit_among(self.projectors, self.samples, chosen)
         changed = np.flatnonzero((lit != self.samples.lit).any(axis=1))
         dimmed = taken(self.samples, changed, lit)
-        points = self.samples.target.samples.points
-        measured = self.measured[:, columns]
         for k, column in enumerate(columns):
-            device = self.devices[column]
-            others = column not in standing
-            if collide(device, bodies) or (others and self._shades[column]):
+            if column not in standing and self._shades[column]:
                 measured[:, k] = False
-                continue
-            seen = np.flatnonzero(measured[:, k])
-            blocked = blocked_by(bodies, device, points[seen]).any(axis=1)
-            measured[seen[blocked], k] = False
-            if len(changed):
+            elif len(changed) and measured[:, k].any():
+                device = self.devices[column]
                 measured[changed, k] = measured_by(scene, [device], dimmed)[:, 0]
         return measured
 
     def stand_together(self, chosen: Sequence[int]) -> bool:
         """Return whether no bodies collide and all that is lit stays lit."""
         devices = [self.devices[i] for i in chosen]
-        bodies = bodies_of(devices)
-        if any(collide(device, bodies) for device in devices):
-            return False
-        return not self._darkens(devices)
+        return super().stand_together(chosen) and not self._darkens(devices)
 
     @cached_property
     def _shades(self) -> NDArray[np.bool_]:
@@ -123,7 +118,7 @@ def resolved_cover(
     Raises:
         InfeasibleLimitsError: If the body of every camera is in the way.
     """
-    interference = CameraInterference(
+    interference = CameraInterference.of(
         scene, projectors, cover.candidates.cameras, cover.samples, cover.measured
     )
     selection = resolve_conflicts(

@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geometry.devices import PinholeModel
-from planning.model.document.certificates import Certificate, RouteCounts
+from planning.model.document.certificates import RouteCounts
 from planning.model.planned import PlannedCamera
 from planning.proofs.all_poses import BoundQuestion, Effort, joined, with_existing_alone
 from planning.proofs.camera_bound import bound_cameras
-from planning.proofs.candidate_certificate import certificate
-from planning.proofs.conflicts import resolve_others
-from planning.proofs.selection import marginals, others_instead
+from planning.proofs.candidate_certificate import PlannedStage, certified
 from planning.scene.measured import taken
 from planning.scene.scene import Scene
 
@@ -19,14 +17,12 @@ from .camera_cover import CameraCover, candidate_cover
 
 
 @dataclass(frozen=True, eq=False)
-class CameraStage:
+class CameraStage(PlannedStage):
     """Cameras with what was proved of their number.
 
     Attributes:
         cameras: As they stand.
         cover: Candidates and samples, to prove the count again under other ring axes.
-        by_count: Best cameras found for each number of them.
-        certificate: What was proved, as the plan says it.
         routes: What either route needs; None where none was compared.
         rival: As many cameras of the paper's route, at their largest baselines, as the
             cover has.
@@ -34,8 +30,6 @@ class CameraStage:
 
     cameras: tuple[PlannedCamera, ...]
     cover: CameraCover
-    by_count: dict[int, tuple[PlannedCamera, ...]]
-    certificate: Certificate
     routes: RouteCounts | None = None
     rival: tuple[PlannedCamera, ...] = ()
 
@@ -50,18 +44,15 @@ def camera_stage(
 ) -> CameraStage:
     """Return the cameras of a cover, with the best ones for every other count."""
     candidates = candidate_cover(scene, cover.measured)
-    others = marginals(candidates, cover.selection)
-    if cover.by_count is not None:
-        others = others_instead(others, cover.by_count, candidates)
-    if cover.interference is not None:
-        n = len(cover.selection.chosen)
-        others = resolve_others(cover.interference, candidates, others, n)
-    area = cover.samples.target.samples.weight
-    proof = certificate(
-        candidates, cover.selection, others, area, bodied=cover.has_bodies
+    others, proof = certified(
+        candidates,
+        cover.selection,
+        cover.samples.target.samples.weight,
+        cover.interference,
+        cover.by_count,
     )
-    by_count = {n: cover.among_candidates(of) for n, of in others.by_count.items()}
-    return CameraStage(cover.cameras, cover, by_count, proof, routes)
+    by_count = {n: cover.among_candidates(of) for n, of in others.items()}
+    return CameraStage(by_count, proof, cover.cameras, cover, routes)
 
 
 def bound_stage(

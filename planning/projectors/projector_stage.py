@@ -5,17 +5,11 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.model.document.certificates import Certificate
 from planning.model.planned import PlannedProjector
-from planning.proofs.candidate_certificate import certificate
-from planning.proofs.conflicts import (
-    ProjectorInterference,
-    resolve_conflicts,
-    resolve_others,
-)
-from planning.proofs.selection import Selection, marginals, select_fewest
+from planning.proofs.candidate_certificate import PlannedStage, certified
+from planning.proofs.conflicts import Interference, resolve_conflicts
+from planning.proofs.selection import Selection, select_fewest
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins
 from planning.scene.limits import projector_limits
@@ -44,22 +38,16 @@ _BY_BLOCKERS = {
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectorStage:
+class ProjectorStage(PlannedStage):
     """The projectors of section III, and what was proved of their number.
 
     Attributes:
         projectors: The fewest, or the best that are allowed.
         candidates: The reference set, and what it lights of the cover's samples.
-        by_count: Best candidates for each number of devices, for the marginal table.
-        certificate: As in the plan file.
-        most_area: As many projectors as taken, those that light most.
     """
 
     projectors: tuple[PlannedProjector, ...]
     candidates: CandidateSet
-    by_count: dict[int, tuple[PlannedProjector, ...]]
-    certificate: Certificate
-    most_area: tuple[PlannedProjector, ...]
 
     @property
     def reference(self) -> tuple[PlannedProjector, ...]:
@@ -67,23 +55,13 @@ class ProjectorStage:
         return self.candidates.projectors
 
     @classmethod
-    def over(
-        cls,
-        candidates: CandidateSet,
-        selection: Selection,
-        most_area: NDArray[np.int64] | None = None,
-    ) -> "ProjectorStage":
+    def over(cls, candidates: CandidateSet, selection: Selection) -> "ProjectorStage":
         """Return the stage of a selection: compatible bodies and the certificate."""
-        cover, samples = candidates.cover, candidates.samples
-        crowd = ProjectorInterference(candidates.projectors, samples, cover.covers)
-        as_before, selection = selection, resolve_conflicts(crowd, cover, selection)
-        if most_area is None or selection is not as_before:
-            most_area = selection.chosen
-        others = marginals(cover, selection)
-        others = resolve_others(crowd, cover, others, len(selection.chosen))
-        area = samples.samples.weight
+        cover, samples = candidates.cover, candidates.samples.samples
+        among = Interference(candidates.projectors, samples.points, cover.covers)
+        selection = resolve_conflicts(among, cover, selection)
+        others, proof = certified(cover, selection, samples.weight, among)
         kinds = {type(body) for body in candidates.scene.bodies}
-        proof = certificate(cover, selection, others, area, bodied=crowd.bodied)
         proof = proof.changed(
             excluded_pairs={
                 cause: int((candidates.stages == index).sum())
@@ -92,14 +70,8 @@ class ProjectorStage:
             },
             n_regions=int(candidates.scene.region.max()) + 1,
         )
-        by_count = {n: candidates.of(chosen) for n, chosen in others.by_count.items()}
-        return cls(
-            candidates.of(selection.chosen),
-            candidates,
-            by_count,
-            proof,
-            candidates.of(most_area),
-        )
+        by_count = {n: candidates.of(chosen) for n, chosen in others.items()}
+        return cls(by_count, proof, candidates.of(selection.chosen), candidates)
 
 
 def plan_projectors(
@@ -148,11 +120,10 @@ def plan_projectors(
         if confirmed or selection.status == "infeasible" or attempt == rounds:
             break
         candidates = candidates.with_samples(fresh)
-    most_area = selection.chosen
     if confirmed and selection.status != "infeasible":
         wider = _with_widest_margin(candidates, selection)
         selection = wider if fresh.cover.confirms(wider.chosen) else selection
-    return ProjectorStage.over(candidates, selection, most_area)
+    return ProjectorStage.over(candidates, selection)
 
 
 def _fewest(

@@ -1,8 +1,11 @@
 """The certificate of a cover over candidates, and of one device more."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from planning.model.document.certificates import (
     BestArea,
@@ -13,10 +16,39 @@ from planning.model.document.certificates import (
     OneFewer,
 )
 
-from .selection import CandidateCover, Marginals, Selection
+from .conflicts import Interference, resolve_others
+from .selection import (
+    CandidateCover,
+    Marginals,
+    Selection,
+    marginals,
+    others_instead,
+)
 
+_ByCount = Mapping[int, NDArray[np.int64]]
 # What a certificate says where chosen devices have bodies.
 _BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
+
+
+def certified(
+    cover: CandidateCover,
+    selection: Selection,
+    sample_area_m2: float,
+    among: Interference | None = None,
+    by_count: _ByCount | None = None,
+) -> tuple[_ByCount, Certificate]:
+    """Return the best candidates for each count, and the certificate of a selection.
+
+    They are those of `by_count`, where there are any, whose bodies are compatible.
+    """
+    others = marginals(cover, selection)
+    if by_count is not None:
+        others = others_instead(others, by_count, cover)
+    bodied = among is not None and among.bodied
+    if among is not None:
+        others = resolve_others(among, cover, others, len(selection.chosen))
+    proof = certificate(cover, selection, others, sample_area_m2, bodied=bodied)
+    return others.by_count, proof
 
 
 def certificate(
@@ -84,18 +116,17 @@ def _one_fewer(
     return OneFewer(upper_bound_m2=next(most, 0.0), scope="candidates")
 
 
-class PlannedStage(Protocol):
-    """What projector and camera stages have in common."""
+@dataclass(frozen=True, eq=False)
+class PlannedStage:
+    """What projector and camera stages have in common.
 
-    @property
-    def certificate(self) -> Certificate:
-        """What was proved."""
-        ...
+    Attributes:
+        by_count: Best devices found for each number of them, for the marginal table.
+        certificate: What was proved, as the plan says it.
+    """
 
-    @property
-    def by_count(self) -> Mapping[int, Sequence[Any]]:
-        """Best devices for each number of them."""
-        ...
+    by_count: Mapping[int, tuple[Any, ...]]
+    certificate: Certificate
 
 
 _S = TypeVar("_S", bound=PlannedStage)
@@ -124,4 +155,4 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
         # It bounded one fewer than before.
         unknown = before.continuous.changed(one_fewer_upper_bound_m2=None)
         proof = proof.changed(continuous=unknown)
-    return replace(stage, certificate=proof)  # type: ignore[type-var]
+    return replace(stage, certificate=proof)

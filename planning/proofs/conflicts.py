@@ -9,14 +9,17 @@ end every member was chosen, or judged, with all other bodies in place.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedProjector
-from planning.scene.placed_bodies import blocked_by, bodies_of, collide, moves_bodies
-from planning.scene.samples import Target
+from planning.scene.placed_bodies import (
+    Device,
+    blocked_by,
+    bodies_of,
+    collide,
+    moves_bodies,
+)
 from solvers.covers.cover import solve_max_coverage
 
 from .selection import MORE, CandidateCover, Marginals, Selection, cover_problem
@@ -27,47 +30,19 @@ _BUDGET = 1e8
 _HELD = 0.99
 
 
-class Interference(Protocol):
-    """Candidates, and what each covers with the bodies of some in the way."""
-
-    @property
-    def bodied(self) -> bool:
-        """Whether any candidate that isn't existing has a body."""
-        ...
-
-    def covers(
-        self, standing: Sequence[int], columns: Sequence[int]
-    ) -> NDArray[np.bool_]:
-        """Return which samples candidates cover among the bodies of others.
-
-        Args:
-            standing: Candidates whose bodies stand.
-            columns: Candidates asked about; one whose body would collide with those
-                covers nothing.
-
-        Returns:
-            Shape (n, len(columns)).
-        """
-        ...
-
-    def stand_together(self, chosen: Sequence[int]) -> bool:
-        """Return whether no bodies collide, and none takes what can't be spared."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
-class ProjectorInterference:
-    """Projectors, and the samples that they light.
+class Interference:
+    """Candidates, and what each covers with the bodies of some in the way.
 
     Attributes:
         devices: The candidates.
-        samples: What they light.
-        lit: Which candidate lights which, but for bodies of others, shape (n, m).
+        points: Samples in [m], shape (n, 3).
+        covered: Which candidate covers which, but for bodies of others, shape (n, m).
     """
 
-    devices: Sequence[PlannedProjector]
-    samples: Target
-    lit: NDArray[np.bool_]
+    devices: Sequence[Device]
+    points: NDArray[np.float64]
+    covered: NDArray[np.bool_]
 
     @property
     def bodied(self) -> bool:
@@ -77,42 +52,45 @@ class ProjectorInterference:
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]
     ) -> NDArray[np.bool_]:
-        """Return which samples candidates light among the bodies of others."""
+        """Return which samples candidates cover among the bodies of those that stand.
+
+        One whose body would collide with theirs covers nothing. Shape (n, k).
+        """
         chosen = [self.devices[i] for i in standing]
         bodies = bodies_of(device for device in chosen if not device.existing)
-        lit = self.lit[:, columns]
+        covered = self.covered[:, columns]
         for k, column in enumerate(columns):
-            device, at = self.devices[column], np.flatnonzero(lit[:, k])
+            device, at = self.devices[column], np.flatnonzero(covered[:, k])
             if collide(device, bodies):
-                lit[:, k] = False
+                covered[:, k] = False
                 continue
-            points = self.samples.samples.points[at]
-            lit[at[blocked_by(bodies, device, points).any(axis=1)], k] = False
-        return lit
+            blocked = blocked_by(bodies, device, self.points[at]).any(axis=1)
+            covered[at[blocked], k] = False
+        return covered
 
     def stand_together(self, chosen: Sequence[int]) -> bool:
-        """Return whether no bodies collide."""
+        """Return whether no bodies collide, and none takes what can't be spared."""
         devices = [self.devices[i] for i in chosen]
         bodies = bodies_of(devices)
         return not any(collide(device, bodies) for device in devices)
 
 
 def resolve_conflicts(
-    crowd: Interference, cover: CandidateCover, selection: Selection
+    among: Interference, cover: CandidateCover, selection: Selection
 ) -> Selection:
     """Return a selection of compatible candidates.
 
     It is the selection as it was where it covers what is required with all bodies in
     place. Its lower bound stays: bodies only take away.
     """
-    if not crowd.bodied:
+    if not among.bodied:
         return selection
     chosen, required = selection.chosen, min(selection.required, selection.n_covered)
     most = cover.max_count
     more = max(len(chosen), selection.needed) + MORE
     spare = max(selection.n_covered - required, int((1.0 - _HELD) * required))
     demand = _Demand(required, spare, more if most is None else most)
-    resolved, covered = _compatible(crowd, cover, chosen, demand)
+    resolved, covered = _compatible(among, cover, chosen, demand)
     if np.array_equal(resolved, np.sort(chosen)) and covered == selection.n_covered:
         return selection
     smallest, met = resolved, covered >= selection.required
@@ -122,7 +100,7 @@ def resolve_conflicts(
     if not met:
         # How many would do it, were more allowed.
         demand = replace(demand, required=selection.required, most=more)
-        enough, there = _compatible(crowd, cover, selection.smallest, demand)
+        enough, there = _compatible(among, cover, selection.smallest, demand)
         cover_found = there >= selection.required
         fewest = enough if cover_found else selection.smallest
         smallest = max((fewest, resolved), key=len)
@@ -145,10 +123,10 @@ def resolve_conflicts(
 
 
 def resolve_others(
-    crowd: Interference, cover: CandidateCover, others: Marginals, taken: int
+    among: Interference, cover: CandidateCover, others: Marginals, taken: int
 ) -> Marginals:
     """Return the best candidates of every other count that are compatible."""
-    if not crowd.bodied:
+    if not among.bodied:
         return others
     by_count, n_covered = dict(others.by_count), dict(others.n_covered)
     for count, chosen in others.by_count.items():
@@ -156,19 +134,16 @@ def resolve_others(
             before = cover.n_covered(chosen)
             held = int(_HELD * before)
             demand = _Demand(held, before - held, count)
-            by_count[count], after = _compatible(crowd, cover, chosen, demand)
+            by_count[count], after = _compatible(among, cover, chosen, demand)
             n_covered[count] = after, n_covered[count][1]
     return replace(others, by_count=by_count, n_covered=n_covered)
 
 
 @dataclass(frozen=True)
 class _Demand:
-    """What compatible candidates must do.
+    """What compatible candidates must do, in samples, and how many are allowed.
 
-    Attributes:
-        required: Samples to be covered.
-        spare: Samples that one of them may take from those that stood before it.
-        most: Candidates allowed.
+    One of them may take `spare` from those that stood before it.
     """
 
     required: int
@@ -177,7 +152,7 @@ class _Demand:
 
 
 def _compatible(
-    crowd: Interference,
+    among: Interference,
     cover: CandidateCover,
     chosen: NDArray[np.int64],
     demand: _Demand,
@@ -188,43 +163,43 @@ def _compatible(
     tried = [int(i) for i in chosen]
     best, n_best = standing, -1
     while True:
-        n_covered = int(crowd.covers(tried, tried).any(axis=1).sum())
-        if crowd.stand_together(tried):
+        n_covered = int(among.covers(tried, tried).any(axis=1).sum())
+        if among.stand_together(tried):
             if n_covered > n_best:
                 best, n_best = tried, n_covered
             if n_covered >= demand.required:
                 break
         waiting = [i for i in tried if i not in standing]
         if waiting:
-            alone = crowd.covers(standing, waiting).sum(axis=0)
+            alone = among.covers(standing, waiting).sum(axis=0)
             standing = [*standing, waiting[int(np.argmax(alone))]]
         elif len(tried) >= demand.most:
             break
-        covers = _harmless(crowd, standing, every, demand.spare)
+        covers = _harmless(among, standing, every, demand.spare)
         completed = _completed(covers, standing, tried, demand, cover.seed)
         if not waiting and completed == tried:
             break
         tried = completed
     if n_best < 0:
-        n_best = int(crowd.covers(best, best).any(axis=1).sum())
+        n_best = int(among.covers(best, best).any(axis=1).sum())
     return np.array(sorted(best), dtype=np.int64), n_best
 
 
 def _harmless(
-    crowd: Interference, standing: list[int], every: list[int], spare: int
+    among: Interference, standing: list[int], every: list[int], spare: int
 ) -> NDArray[np.bool_]:
     """What candidates cover; nothing where they cost those that stand more than spare.
 
     A cover can't count samples that a member takes away, so who takes many isn't
     offered.
     """
-    covers = crowd.covers(standing, every)
+    covers = among.covers(standing, every)
     before = int(covers[:, standing].any(axis=1).sum())
     if before <= spare:
         return covers
     for column in np.flatnonzero(covers.any(axis=0)):
         if column not in standing:
-            after = crowd.covers([*standing, int(column)], standing)
+            after = among.covers([*standing, int(column)], standing)
             if before - int(after.any(axis=1).sum()) > spare:
                 covers[:, column] = False
     return covers

@@ -12,7 +12,7 @@ from geometry.poses import look_at
 from planning.cameras.baselines.baseline_limits import BaselineLimits
 from planning.cameras.baselines.limit_poses import limit_poses
 from planning.cameras.baselines.seams import SampledSurface
-from planning.cameras.baselines.widest_baselines import maximise_baselines
+from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.cameras.paper.camera_rings import camera_rings
 from planning.cameras.paper.paper_route import paper_route
 from planning.cameras.paper.route_problem import CameraSet, RouteProblem
@@ -67,7 +67,7 @@ class Body:
         limits = BaselineLimits(THETA, 0.0, space or workspace())
 
         def widen(cameras):
-            return maximise_baselines(
+            return BaselineSearch(
                 cameras,
                 lambda poses: self.measure(
                     [
@@ -79,7 +79,7 @@ class Body:
                 limits,
                 max_evaluations=12,
                 max_programs=3,
-            )
+            ).run()
 
         values = {
             "surface": self.surface,

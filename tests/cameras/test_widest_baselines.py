@@ -15,9 +15,9 @@ from planning.cameras.baselines.baseline_limits import (
     RingsOnSurface,
     best_rings,
 )
-from planning.cameras.baselines.baseline_terms import state_baselines
+from planning.cameras.baselines.baseline_terms import BaselineTerms
 from planning.cameras.baselines.seams import SampledSurface
-from planning.cameras.baselines.widest_baselines import maximise_baselines
+from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.model.bodies import Box
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import TriangulationLimits
@@ -76,7 +76,7 @@ class _Ball:
             "max_evaluations": 16,
             **changes,
         }
-        return maximise_baselines(cameras, self.measure, **values)
+        return BaselineSearch(cameras, self.measure, **values).run()
 
 
 def _front(half_angle, n=800):
@@ -255,17 +255,14 @@ def test_seams_keep_free_what_is_asked_of_the_half_fields(pair):
     poses = np.stack([camera.world_from_device for camera in cameras])
     surface = SampledSurface(ball.points, ball.normals)
     plain, spared = (
-        state_baselines(
+        BaselineTerms(
             cameras,
-            np.zeros((2, 3)),
             ball.measure(poses),
-            [(0, 1)],
             surface,
-            None,
             BaselineLimits(THETA, 0.1, _workspace(), spare_field=spare),
-            demanded=np.zeros((0, 2), dtype=np.int64),
-            max_step=0.1,
-        ).seams.half_fields
+        )
+        .problem(np.zeros((2, 3)), [(0, 1)], np.zeros((0, 2), dtype=np.int64), 0.1)
+        .seams.half_fields
         for spare in (0.0, 0.02)
     )
     assert len(plain)

@@ -58,7 +58,7 @@ def shaded():
     )
     rows = scene.target_samples(Draw(800, 1))
     candidates = CandidateSet.over(scene, rows, (start,))
-    return scene, ProjectorStage((start,), candidates, {}, {}, (start,))
+    return scene, ProjectorStage({}, {}, (start,), candidates)
 
 
 def margins(scene, stage, projectors):

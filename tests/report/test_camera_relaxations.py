@@ -357,7 +357,7 @@ def test_one_camera_is_enough_at_what_is_told_and_not_below(rig, world):
     offered = CandidateViews(scene, cameras)
     measured = measured_by(scene, cameras, rows)
     cover = CameraCover(offered, rows, measured, None)
-    stage = CameraStage(tuple(cameras[:1]), cover, {}, {})
+    stage = CameraStage({}, {}, tuple(cameras[:1]), cover)
     told = " ".join(for_so_many(scene, rig, stage, 1))
     value = int(re.search(r"camera_max_incidence_deg = (\d+) \(now 40\)", told)[1])
 

@@ -29,7 +29,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing
 from planning.projectors.projector_poses import _Lit
 from planning.proofs.conflicts import (
-    ProjectorInterference,
+    Interference,
     resolve_conflicts,
     resolve_others,
 )
@@ -343,11 +343,10 @@ def test_existing_bodies_that_overlap_are_refused(scene):
 # ---- chosen devices among each other
 
 
-def crowd_of(devices, lit):
+def interference_of(devices, lit):
     n = len(lit)
     points = np.column_stack([np.linspace(-0.2, 0.2, n), np.zeros((n, 2))])
-    rows = SimpleNamespace(samples=SimpleNamespace(points=points))
-    return ProjectorInterference(devices, rows, lit)  # type: ignore[arg-type]
+    return Interference(devices, points, lit)
 
 
 def shares(*parts):
@@ -360,9 +359,9 @@ def shares(*parts):
 def settled(devices, lit, share, max_count=None):
     cover = CandidateCover(lit, share, max_count=max_count)
     found = select_fewest(cover)
-    crowd = crowd_of(devices, lit)
-    selection = resolve_conflicts(crowd, cover, found)
-    return found, selection, crowd
+    bodied = interference_of(devices, lit)
+    selection = resolve_conflicts(bodied, cover, found)
+    return found, selection, bodied
 
 
 SIDE_BY_SIDE = [
@@ -375,15 +374,15 @@ PARTS = shares((0, 50), (50, 100), (50, 96), (96, 100))
 
 
 def test_two_that_would_collide_are_kept_apart(scene):
-    found, kept, crowd = settled(SIDE_BY_SIDE, PARTS, 0.95)
+    found, kept, bodied = settled(SIDE_BY_SIDE, PARTS, 0.95)
     assert found.chosen.tolist() == [0, 1]
     assert kept.chosen.tolist() == [0, 2]
     assert (kept.n_covered, kept.status, kept.but_for_bodies) == (96, "optimal", None)
-    assert not crowd.stand_together([0, 1])
+    assert not bodied.stand_together([0, 1])
     cover = CandidateCover(PARTS, 0.95)
-    others = resolve_others(crowd, cover, marginals(cover, kept), 2)
-    assert all(crowd.stand_together(c) for c in others.by_count.values())
-    assert crowd.covers([0], [0, 1, 2]).sum(axis=0).tolist() == [50, 0, 46]
+    others = resolve_others(bodied, cover, marginals(cover, kept), 2)
+    assert all(bodied.stand_together(c) for c in others.by_count.values())
+    assert bodied.covers([0], [0, 1, 2]).sum(axis=0).tolist() == [50, 0, 46]
 
 
 def test_bodies_may_cost_a_device_more_than_is_proved_or_the_requirement():
@@ -411,9 +410,9 @@ def test_one_that_stands_in_anothers_light_is_replaced():
         projector(1.0, 0.0, 1.0, body=HOUSING),
     ]
     lit = shares((0, 60), (60, 100), (58, 96))
-    found, kept, crowd = settled(devices, lit, 0.95)
+    found, kept, bodied = settled(devices, lit, 0.95)
     assert found.chosen.tolist() == [0, 1]
-    assert crowd.covers([0, 1], [0, 1]).sum(axis=0).tolist() == [0, 40]
+    assert bodied.covers([0, 1], [0, 1]).sum(axis=0).tolist() == [0, 40]
     assert kept.chosen.tolist() == [0, 2]
     assert kept.n_covered == 96
 
@@ -434,21 +433,21 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
     dark = np.all((points > low) & (points < high), axis=1)
     among = scene.among([lamp])
 
-    crowd = CameraInterference(among, (lamp,), eyes, rows, measured)
-    assert not crowd.stand_together([0, 1])
-    assert crowd.stand_together([1, 3])
-    assert crowd.covers([1], [0, 1]).sum(axis=0).tolist() == [0, len(dark)]
-    covers = crowd.covers([0], [0, 1])
+    bodied = CameraInterference.of(among, (lamp,), eyes, rows, measured)
+    assert not bodied.stand_together([0, 1])
+    assert bodied.stand_together([1, 3])
+    assert bodied.covers([1], [0, 1]).sum(axis=0).tolist() == [0, len(dark)]
+    covers = bodied.covers([0], [0, 1])
     assert not covers[dark].any()
     # What stays lit is measured anew where the light on it changed, else as before.
     assert covers[~dark].all()
     # The third is too near to the second; the first stands in the view of the fourth.
-    assert not crowd.stand_together([1, 2])
-    assert crowd.covers([1], [1, 2]).sum(axis=0).tolist() == [len(dark), 0]
+    assert not bodied.stand_together([1, 2])
+    assert bodied.covers([1], [1, 2]).sum(axis=0).tolist() == [len(dark), 0]
     body, aside = bodies_of(eyes[:1])[0].box, np.array(places[3])
     hidden = lines_cross(body, aside, rows.target.samples.points)
     assert 0 < (hidden & ~dark).sum() < len(dark)
-    assert np.array_equal(crowd.covers([0], [3])[:, 0], ~hidden & ~dark)
+    assert np.array_equal(bodied.covers([0], [3])[:, 0], ~hidden & ~dark)
 
 
 def test_moves_into_anothers_body_or_beam_are_refused(scene):

@@ -83,11 +83,8 @@ def best_rings(
     jacobian = pose[:3, :3] @ camera.device.ray_jacobian(ray @ pose[:3, :3])
     g = np.linalg.norm(np.einsum("ijk,pij->pik", jacobian, v), axis=2)
     per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
-    sigma, pitch = np.zeros(along.shape), np.zeros(along.shape)
-    if limits.max_sigma_m is not None:
-        sigma = rings.noise_px[:, samples] * per_length / limits.max_sigma_m
-    if limits.min_ring_pitch_px is not None:
-        pitch = limits.min_ring_pitch_px * per_length / rings.spacing[:, samples]
+    sigma = rings.noise_px[:, samples] * per_length / (limits.max_sigma_m or np.inf)
+    pitch = (limits.min_ring_pitch_px or 0.0) * per_length / rings.spacing[:, samples]
     reach = distance * np.linalg.norm(v, axis=2)
     spare = np.minimum(
         np.abs(along) - np.maximum(limits.min_conditioning, sigma * reach),

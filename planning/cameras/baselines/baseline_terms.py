@@ -5,6 +5,7 @@ come back as kept ones, so that the next one knows of them.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,48 +41,135 @@ _COMFORT = np.radians(5.0)
 _EASE = 0.03
 
 
-def state_baselines(
-    cameras: Sequence[PlannedCamera],
-    aims: _Array,
-    measured_by: NDArray[np.bool_],
-    pairs: Sequence[tuple[int, int]],
-    surface: SampledSurface,
-    rings: RingsOnSurface | None,
-    limits: BaselineLimits,
-    *,
-    demanded: NDArray[np.int64],
-    max_step: float,
-) -> BaselineProblem:
-    """Return the program for cameras as they stand.
+@dataclass(frozen=True, eq=False)
+class BaselineTerms:
+    """Cameras as they stand, and what binds them on the samples.
 
-    `aims` are the points that they look at in [m], (k, 3). `demanded` are (camera,
-    sample) pairs that must be kept besides the drawn ones, (q, 2). No centre moves
-    farther than `max_step` [m].
+    Attributes:
+        cameras: As they stand.
+        measured_by: Which camera measures which sample now, shape (n, k).
+        surface: The samples.
+        limits: What binds.
+        rings: What each projector draws on them; None: no rings.
     """
-    space = limits.workspace
-    drawn = _sole_samples(cameras, measured_by, surface, rings, limits)
-    kept = np.unique(np.concatenate([drawn, demanded]), axis=0)
-    return BaselineProblem(
-        centres=np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
-        aims=aims,
-        pairs=np.array(pairs, dtype=np.int64),
-        shell=PositionShell(
-            np.array(space.centre),
-            space.camera_radius_m,
-            np.array(space.axis),
-            space.half_angle,
-            np.array(space.up),
-            space.floor_m,
-        ),
-        seams=_seam_points(cameras, measured_by, pairs, surface, limits),
-        kept=_kept_points(cameras, kept, surface, rings, limits),
-        max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
-        range_m=cameras[0].device.range_m,
-        min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
-        max_step=max_step,
-        half_spaces=_held_in(space, cameras),
-        fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
-    )
+
+    cameras: Sequence[PlannedCamera]
+    measured_by: NDArray[np.bool_]
+    surface: SampledSurface
+    limits: BaselineLimits
+    rings: RingsOnSurface | None = None
+
+    def problem(
+        self,
+        aims: _Array,
+        pairs: Sequence[tuple[int, int]],
+        demanded: NDArray[np.int64],
+        max_step: float,
+    ) -> BaselineProblem:
+        """Return the program for neighbours that look at `aims` in [m], (k, 3).
+
+        `demanded` are (camera, sample) pairs that must be kept besides the drawn ones,
+        (q, 2). No centre moves farther than `max_step` [m].
+        """
+        limits, cameras = self.limits, self.cameras
+        space = limits.workspace
+        kept = np.unique(np.concatenate([self._sole_samples(), demanded]), axis=0)
+        return BaselineProblem(
+            centres=np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
+            aims=aims,
+            pairs=np.array(pairs, dtype=np.int64),
+            shell=PositionShell(
+                np.array(space.centre),
+                space.camera_radius_m,
+                np.array(space.axis),
+                space.half_angle,
+                np.array(space.up),
+                space.floor_m,
+            ),
+            seams=self._seam_points(pairs),
+            kept=self._kept_points(kept),
+            max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
+            range_m=cameras[0].device.range_m,
+            min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
+            max_step=max_step,
+            half_spaces=_held_in(space, cameras),
+            fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
+        )
+
+    def holders(self, lost: NDArray[np.int64], centres: _Array) -> NDArray[np.int64]:
+        """Return (camera, sample) pairs that would hold some of what a proposal lost.
+
+        Each sample with the camera that it faces most at centres (k, 3), shape (q, 2).
+        """
+        if len(lost) > _LOST:
+            lost = lost[np.linspace(0, len(lost) - 1, _LOST).astype(np.int64)]
+        ray = self.surface.points[lost][:, None] - centres[None]
+        facing = -np.einsum("ikj,ij->ik", ray, self.surface.normals[lost])
+        facing = facing / np.linalg.norm(ray, axis=2)
+        holder = np.argmax(np.where(self.measured_by[lost], facing, -2.0), axis=1)
+        return np.column_stack([holder, lost]).astype(np.int64)
+
+    def _seam_points(self, pairs: Sequence[tuple[int, int]]) -> SeamPoints:
+        spare, none = max(_SPARE_FIELD, self.limits.spare_field), np.zeros((0, 3))
+        fields = np.zeros((0, 2))
+        seams = [(fields.astype(np.int64), none, none, none, np.zeros(0), fields)]
+        for seam in find_seams(both_orders(pairs), self.surface, self.measured_by):
+            if not seam.shares_border:
+                continue
+            pair = [self.cameras[index] for index in seam.cameras]
+            test = check_seam(pair, self.surface, seam, self.limits.max_incidence)
+            some = _tight_and_apart(test.slack, test.points, _SEAM_POINTS)
+            fields = np.column_stack([test.half_field1, test.half_field2])
+            seams.append(
+                (
+                    np.tile(np.array(seam.cameras), (len(some), 1)),
+                    test.points[some],
+                    test.angles.outward[some],
+                    test.angles.onward[some],
+                    test.angles.delta_surface[some],
+                    fields[some] - spare,
+                )
+            )
+        return SeamPoints(*(np.concatenate(x) for x in zip(*seams, strict=True)))
+
+    def _sole_samples(self) -> NDArray[np.int64]:
+        """Some of what each camera alone measures, the most oblique and well apart.
+
+        Samples right at the limit are left out: on a noisy surface they lie everywhere
+        and would hold the cameras where they are. What a move really loses is demanded
+        later.
+        """
+        surface, measured_by = self.surface, self.measured_by
+        sole = measured_by.sum(axis=1) == 1
+        least = np.cos(self.limits.max_incidence - _COMFORT)
+        pairs = [np.zeros((0, 2), dtype=np.int64)]
+        for c, camera in enumerate(self.cameras):
+            alone = np.flatnonzero(sole & measured_by[:, c])
+            ray = surface.points[alone] - camera.world_from_device[:3, 3]
+            facing = -np.einsum("ij,ij->i", ray, surface.normals[alone])
+            facing /= np.linalg.norm(ray, axis=1)
+            eased = facing >= least
+            if self.rings is not None and len(alone):
+                best = best_rings(camera, alone, surface, self.rings, self.limits)
+                eased &= best[3] >= _EASE
+            alone, facing = alone[eased], facing[eased]
+            some = alone[_tight_and_apart(facing, surface.points[alone], _KEPT_POINTS)]
+            pairs.append(np.column_stack([np.full(len(some), c), some]))
+        return np.concatenate(pairs)
+
+    def _kept_points(self, kept: NDArray[np.int64]) -> KeptPoints:
+        index, samples = kept[:, 0], kept[:, 1]
+        points, normals = self.surface.points[samples], self.surface.normals[samples]
+        cosine, sigma, pitch = (np.zeros(len(kept)) for _ in range(3))
+        across = np.zeros((len(kept), 3))
+        for c in np.unique(index):
+            mine, camera = np.flatnonzero(index == c), self.cameras[c]
+            cosine[mine] = _field_cosines(camera, points[mine])
+            if self.rings is not None:
+                across[mine], sigma[mine], pitch[mine], _ = best_rings(
+                    camera, samples[mine], self.surface, self.rings, self.limits
+                )
+        return KeptPoints(index, points, normals, cosine, across, sigma, pitch)
 
 
 def _held_in(
@@ -99,109 +187,6 @@ def _held_in(
         np.concatenate([normals for normals, _ in parts]),
         np.concatenate([least for _, least in parts]),
     )
-
-
-def _seam_points(
-    cameras: Sequence[PlannedCamera],
-    measured_by: NDArray[np.bool_],
-    pairs: Sequence[tuple[int, int]],
-    surface: SampledSurface,
-    limits: BaselineLimits,
-) -> SeamPoints:
-    spare, none = max(_SPARE_FIELD, limits.spare_field), np.zeros((0, 3))
-    fields = np.zeros((0, 2))
-    seams = [(fields.astype(np.int64), none, none, none, np.zeros(0), fields)]
-    for seam in find_seams(both_orders(pairs), surface, measured_by):
-        if not seam.shares_border:
-            continue
-        pair = [cameras[index] for index in seam.cameras]
-        test = check_seam(pair, surface, seam, limits.max_incidence)
-        some = _tight_and_apart(test.slack, test.points, _SEAM_POINTS)
-        fields = np.column_stack([test.half_field1, test.half_field2])
-        seams.append(
-            (
-                np.tile(np.array(seam.cameras), (len(some), 1)),
-                test.points[some],
-                test.angles.outward[some],
-                test.angles.onward[some],
-                test.angles.delta_surface[some],
-                fields[some] - spare,
-            )
-        )
-    return SeamPoints(*(np.concatenate(column) for column in zip(*seams, strict=True)))
-
-
-def _sole_samples(
-    cameras: Sequence[PlannedCamera],
-    measured_by: NDArray[np.bool_],
-    surface: SampledSurface,
-    rings: RingsOnSurface | None,
-    limits: BaselineLimits,
-) -> NDArray[np.int64]:
-    """Some of what each camera alone measures, the most oblique and well apart.
-
-    Samples right at the limit are left out: on a noisy surface they lie everywhere and
-    would hold the cameras where they are. What a move really loses is demanded later.
-
-    Returns:
-        (camera, sample) pairs, shape (q, 2).
-    """
-    sole = measured_by.sum(axis=1) == 1
-    least = np.cos(limits.max_incidence - _COMFORT)
-    pairs = [np.zeros((0, 2), dtype=np.int64)]
-    for c, camera in enumerate(cameras):
-        alone = np.flatnonzero(sole & measured_by[:, c])
-        ray = surface.points[alone] - camera.world_from_device[:3, 3]
-        facing = -np.einsum("ij,ij->i", ray, surface.normals[alone])
-        facing /= np.linalg.norm(ray, axis=1)
-        eased = facing >= least
-        if rings is not None and len(alone):
-            eased &= best_rings(camera, alone, surface, rings, limits)[3] >= _EASE
-        alone, facing = alone[eased], facing[eased]
-        some = alone[_tight_and_apart(facing, surface.points[alone], _KEPT_POINTS)]
-        pairs.append(np.column_stack([np.full(len(some), c), some]))
-    return np.concatenate(pairs)
-
-
-def lost_samples(
-    lost: NDArray[np.int64],
-    centres: _Array,
-    measured_by: NDArray[np.bool_],
-    surface: SampledSurface,
-) -> NDArray[np.int64]:
-    """Return (camera, sample) pairs that would hold some of what a proposal lost.
-
-    Returns:
-        Each with the camera that it faces most, shape (q, 2).
-    """
-    if len(lost) > _LOST:
-        lost = lost[np.linspace(0, len(lost) - 1, _LOST).astype(np.int64)]
-    ray = surface.points[lost][:, None] - centres[None]
-    facing = -np.einsum("ikj,ij->ik", ray, surface.normals[lost])
-    facing = facing / np.linalg.norm(ray, axis=2)
-    holder = np.argmax(np.where(measured_by[lost], facing, -2.0), axis=1)
-    return np.column_stack([holder, lost]).astype(np.int64)
-
-
-def _kept_points(
-    cameras: Sequence[PlannedCamera],
-    kept: NDArray[np.int64],
-    surface: SampledSurface,
-    rings: RingsOnSurface | None,
-    limits: BaselineLimits,
-) -> KeptPoints:
-    index, samples = kept[:, 0], kept[:, 1]
-    points, normals = surface.points[samples], surface.normals[samples]
-    cosine, sigma, pitch = (np.zeros(len(kept)) for _ in range(3))
-    across = np.zeros((len(kept), 3))
-    for c in np.unique(index):
-        mine = np.flatnonzero(index == c)
-        cosine[mine] = _field_cosines(cameras[c], points[mine])
-        if rings is not None:
-            across[mine], sigma[mine], pitch[mine], _ = best_rings(
-                cameras[c], samples[mine], surface, rings, limits
-            )
-    return KeptPoints(index, points, normals, cosine, across, sigma, pitch)
 
 
 def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:

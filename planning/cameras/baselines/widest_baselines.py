@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
 from planning.scene.workspace.admissible import admissible
-from solvers.poses.baseline_problem import BaselineProblem, smallest_baseline
+from solvers.poses.baseline_problem import smallest_baseline
 
 from .baseline_limits import BaselineLimits, RingsOnSurface
-from .baseline_terms import lost_samples, state_baselines
+from .baseline_terms import BaselineTerms
 from .camera_moves import aims_and_rolls, at_poses, centres_between, poses_of
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
@@ -56,76 +56,68 @@ class WidestBaselines:
     smallest_after_m: float | None
 
 
-def maximise_baselines(
-    cameras: Sequence[PlannedCamera],
-    measure: Measure,
-    surface: SampledSurface,
-    limits: BaselineLimits,
-    *,
-    rings: RingsOnSurface | None = None,
-    confirm: Confirm | None = None,
-    max_evaluations: int = 48,
-    max_programs: float = np.inf,
-) -> WidestBaselines:
-    """Raise the smallest baseline of neighbouring cameras without losing coverage.
+@dataclass(eq=False)
+class BaselineSearch:
+    """Raises the smallest baseline of neighbouring cameras without losing coverage.
 
     A move is taken iff as many samples are measured as at the start, `confirm` agrees,
     the overlap graph falls into no more groups, and the smallest baseline of neighbours
     rises, or their mean does while the smallest stays.
 
-    `measure` maps poses (k, 4, 4) to which camera measures which sample, (n, k), by
-    rays and every limit of the plan. `confirm` says whether at poses no fewer of more
-    samples are measured than at the start, on which no proposal rests: of many moves,
-    those pass that samples happen to favour.
+    Attributes:
+        cameras: As chosen; each keeps the point that it looks at, and its roll.
+        measure: Maps poses (k, 4, 4) to which camera measures which sample, (n, k), by
+            rays and every limit of the plan.
+        surface: The samples.
+        limits: What binds a camera.
+        rings: Rings of each projector on the samples; None: no rings.
+        confirm: Whether at poses no fewer of more samples are measured than at the
+            start, on which no proposal rests: of many moves, those pass that samples
+            happen to favour.
+        max_evaluations: Calls of `measure` at most.
+        max_programs: Programs solved at most.
     """
-    search = _Search(cameras, measure, surface, limits, rings, confirm)
-    return search.run(max_evaluations, max_programs)
 
+    cameras: Sequence[PlannedCamera]
+    measure: Measure
+    surface: SampledSurface
+    limits: BaselineLimits
+    rings: RingsOnSurface | None = None
+    confirm: Confirm | None = None
+    max_evaluations: int = 48
+    max_programs: float = np.inf
 
-class _Search:
-    """The state of one search: poses, what they measure, and the budget."""
-
-    def __init__(
-        self,
-        cameras: Sequence[PlannedCamera],
-        measure: Measure,
-        surface: SampledSurface,
-        limits: BaselineLimits,
-        rings: RingsOnSurface | None,
-        confirm: Confirm | None,
-    ) -> None:
-        self.cameras, self.surface, self.limits = cameras, surface, limits
-        self._measure, self._rings, self._confirm = measure, rings, confirm
-        self.spent = self.solved = 0
-        self.poses = poses_of(cameras)
-        self.measured = self._evaluate(self.poses)
-        self._floor = _count(self.measured)
-        self.aims, self.rolls = aims_and_rolls(
-            cameras, self.measured, surface.points, limits.workspace
+    def __post_init__(self) -> None:
+        self._spent = self._solved = 0
+        self._poses = poses_of(self.cameras)
+        self._measured = self._evaluate(self._poses)
+        self._floor = _count(self._measured)
+        self._aims, self._rolls = aims_and_rolls(
+            self.cameras, self._measured, self.surface.points, self.limits.workspace
         )
-        self.pairs = neighbouring_pairs(self.measured, surface)
-        self._groups = len(overlap_components(self.measured))
-        self._free = np.array([not camera.existing for camera in cameras])
+        self._pairs = neighbouring_pairs(self._measured, self.surface)
+        self._groups = len(overlap_components(self._measured))
+        self._free = np.array([not camera.existing for camera in self.cameras])
 
-    def run(self, max_evaluations: int, max_programs: float) -> WidestBaselines:
-        self._evaluations, self._programs = max_evaluations, max_programs
+    def run(self) -> WidestBaselines:
+        """Return the cameras where no further move is taken, or the budget is spent."""
         before = self._smallest()
         radius = self.limits.workspace.camera_radius_m[1]
         reach = _REACH * radius
-        movable = bool(self.pairs) and bool(self._free.any())
+        movable = bool(self._pairs) and bool(self._free.any())
         while movable and self._affords() and reach >= _MIN_REACH * radius:
             taken, proposed = self._improve(reach)
             if not taken:
                 reach = _SHRINK * min(reach, proposed)
         return WidestBaselines(
-            tuple(at_poses(self.cameras, self.poses)),
-            self.measured,
+            tuple(at_poses(self.cameras, self._poses)),
+            self._measured,
             before,
             self._smallest(),
         )
 
     def _affords(self) -> bool:
-        return self.spent < self._evaluations and self.solved < self._programs
+        return self._spent < self.max_evaluations and self._solved < self.max_programs
 
     def _improve(self, reach: float) -> tuple[bool, float]:
         """Whether a proposal within reach was taken, whole or in part; its reach."""
@@ -137,8 +129,17 @@ class _Search:
         for _ in range(_REPEATS):
             if not self._affords():
                 break
-            self.solved += 1
-            solution = solve_baseline(self._stated(demanded, reach))
+            self._solved += 1
+            terms = BaselineTerms(
+                at_poses(self.cameras, self._poses),
+                self._measured,
+                self.surface,
+                self.limits,
+                self.rings,
+            )
+            solution = solve_baseline(
+                terms.problem(self._aims, self._pairs, demanded, reach)
+            )
             if not (solution.status.has_point and self._gains(solution.centres)):
                 break
             proposals.append(solution.centres)
@@ -146,16 +147,13 @@ class _Search:
             taken, lost = self._attempt(whole)
             if taken:
                 return True, reach
-            lost = lost_samples(lost, solution.centres, self.measured, self.surface)
-            known, demanded = (
-                demanded,
-                np.unique(np.concatenate([demanded, lost]), axis=0),
-            )
-            if len(demanded) == len(known):
+            n_known, lost = len(demanded), terms.holders(lost, solution.centres)
+            demanded = np.unique(np.concatenate([demanded, lost]), axis=0)
+            if len(demanded) == n_known:
                 break
         # The first is the boldest, the last loses least: part of either may do.
         ends = proposals[-1:] + proposals[:-1][:1]
-        moves = [np.linalg.norm(c - self.poses[:, :3, 3], axis=1).max() for c in ends]
+        moves = [np.linalg.norm(c - self._poses[:, :3, 3], axis=1).max() for c in ends]
         taken = any(self._step_back(centres) for centres in ends)
         return taken, float(max(moves, default=0.0))
 
@@ -174,58 +172,39 @@ class _Search:
     def _attempt(self, centres: _Array) -> tuple[bool, NDArray[np.int64]]:
         """Take a move if rays allow it; else which samples it loses."""
         none = np.zeros(0, dtype=np.int64)
-        if self.spent >= self._evaluations or not self._admissible(centres):
+        if self._spent >= self.max_evaluations or not self._admissible(centres):
             return False, none
         up = np.array(self.limits.workspace.up)
-        poses = np.stack(
-            [
-                look_at(centre, aim, up, roll=float(roll))
-                for centre, aim, roll in zip(
-                    centres, self.aims, self.rolls, strict=True
-                )
-            ]
-        )
-        poses[~self._free] = self.poses[~self._free]
+        looks = zip(centres, self._aims, self._rolls, strict=True)
+        poses = np.stack([look_at(c, aim, up, roll=float(r)) for c, aim, r in looks])
+        poses[~self._free] = self._poses[~self._free]
         measured = self._evaluate(poses)
-        lost = np.flatnonzero(self.measured.any(axis=1) & ~measured.any(axis=1))
+        lost = np.flatnonzero(self._measured.any(axis=1) & ~measured.any(axis=1))
         if _count(measured) < self._floor:
             return False, lost
-        pairs = sorted({*self.pairs, *neighbouring_pairs(measured, self.surface)})
+        pairs = sorted({*self._pairs, *neighbouring_pairs(measured, self.surface)})
         index = np.array(pairs, dtype=np.int64)
         held = smallest_baseline(centres, index) >= smallest_baseline(
-            self.poses[:, :3, 3], index
+            self._poses[:, :3, 3], index
         )
         if not held or len(overlap_components(measured)) > self._groups:
             return False, none
-        if self._confirm is not None and not self._confirm(poses):
+        if self.confirm is not None and not self.confirm(poses):
             return False, none
-        self.poses, self.measured, self.pairs = poses, measured, pairs
+        self._poses, self._measured, self._pairs = poses, measured, pairs
         return True, none
 
-    def _stated(self, demanded: NDArray[np.int64], reach: float) -> BaselineProblem:
-        return state_baselines(
-            at_poses(self.cameras, self.poses),
-            self.aims,
-            self.measured,
-            self.pairs,
-            self.surface,
-            self._rings,
-            self.limits,
-            demanded=demanded,
-            max_step=reach,
-        )
-
     def _between(self, centres: _Array, share: _Array) -> _Array:
-        start = self.poses[:, :3, 3]
+        start = self._poses[:, :3, 3]
         return centres_between(start, centres, share, self.limits.workspace)
 
     def _lengths(self, centres: _Array) -> _Array:
         """Baselines of neighbours at other centres in [m], one for each pair."""
-        index = np.array(self.pairs, dtype=np.int64)
+        index = np.array(self._pairs, dtype=np.int64)
         return np.linalg.norm(centres[index[:, 0]] - centres[index[:, 1]], axis=1)
 
     def _gains(self, centres: _Array) -> bool:
-        old, new = (self._lengths(c) for c in (self.poses[:, :3, 3], centres))
+        old, new = (self._lengths(c) for c in (self._poses[:, :3, 3], centres))
         if new.min() >= old.min() * (1.0 + _GAIN):
             return True
         return bool(new.min() >= old.min() and new.mean() >= old.mean() * (1.0 + _GAIN))
@@ -238,17 +217,17 @@ class _Search:
 
     def _by_baseline(self) -> list[int]:
         """Cameras, those of the shortest baselines first."""
-        order = np.argsort(self._lengths(self.poses[:, :3, 3]), kind="stable")
-        return list(dict.fromkeys(c for i in order for c in self.pairs[i]))
+        order = np.argsort(self._lengths(self._poses[:, :3, 3]), kind="stable")
+        return list(dict.fromkeys(c for i in order for c in self._pairs[i]))
 
     def _evaluate(self, poses: _Array) -> NDArray[np.bool_]:
-        self.spent += 1
-        return self._measure(poses)
+        self._spent += 1
+        return self.measure(poses)
 
     def _smallest(self) -> float | None:
-        if not self.pairs:
+        if not self._pairs:
             return None
-        return float(self._lengths(self.poses[:, :3, 3]).min())
+        return float(self._lengths(self._poses[:, :3, 3]).min())
 
 
 def _count(measured: NDArray[np.bool_]) -> int:

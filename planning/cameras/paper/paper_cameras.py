@@ -228,7 +228,7 @@ def cover_of(
     route: RouteCameras,
 ) -> CameraCover:
     """Return the route's cameras as a cover, bounded over candidates and themselves."""
-    among = CameraInterference(
+    among = CameraInterference.of(
         scene, projectors, route.candidates.cameras, samples, route.measured
     )
     return CameraCover(
