@@ -45,10 +45,10 @@ def main() -> int:
     )
     print(
         "| mesh, faces | raw [Mray/s] | raw, sorted [Mray/s] "
-        "| matrix / raw | matrix / raw sorted | prepared set / raw "
-        "| prepared set / raw sorted | float64 arrays / raw | build 1000 x 20k [s] |"
+        "| matrix / raw | matrix / raw sorted | device by device / raw "
+        "| build 1000 x 20k [s] |"
     )
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("|---|---|---|---|---|---|---|")
     for name, mesh in _meshes(data):
         print(f"| {name}, {len(mesh.faces):,} " + _row(mesh, rounds), flush=True)
     return 0
@@ -75,27 +75,20 @@ def _row(mesh: TriangleMesh, rounds: int) -> str:
     origins = middle + 3.0 * radius * fibonacci_cap(DEVICES, np.eye(3)[2], np.pi)
     sort = morton_order(visibility.caster.local(points))
     facing = [np.einsum("ij,ij->i", normals, o - points) > 0 for o in origins]
-    ready = [visibility.samples(points[f], normals[f]) for f in facing]
     n = int(np.sum(facing))
     pool = ThreadPoolExecutor(2)
     plain = _raw(visibility, pool, points, facing, origins, np.arange(SAMPLES))
     ordered = _raw(visibility, pool, points, facing, origins, sort)
 
-    def prepared() -> None:
-        for origin, own in zip(origins, ready, strict=True):
-            visibility.blocked(origin, own)
+    def one_by_one() -> None:
+        for origin, front in zip(origins, facing, strict=True):
+            visibility.blocked(origin, points[front], normals[front])
 
-    def arrays() -> None:
-        for origin, own in zip(origins, facing, strict=True):
-            visibility.blocked(origin, points[own], normals[own])
-
-    full = visibility.samples(points, normals)
     jobs: list[Callable[[], object]] = [
         plain,
         ordered,
-        lambda: visibility_matrix(visibility, origins, full),
-        prepared,
-        arrays,
+        lambda: visibility_matrix(visibility, origins, points, normals),
+        one_by_one,
     ]
     seconds = np.array([[_seconds(job) for job in jobs] for _ in range(rounds + 1)])[1:]
     # Ratio of times: axes are job, wall or processor.
@@ -107,8 +100,6 @@ def _row(mesh: TriangleMesh, rounds: int) -> str:
         (against_plain, 2),
         (against_sorted, 2),
         (against_plain, 3),
-        (against_sorted, 3),
-        (against_plain, 4),
     ):
         cells.append(f"{ratio[job, 0]:.2f} ({ratio[job, 1]:.2f})")
     many = middle + 3.0 * radius * fibonacci_cap(1000, np.eye(3)[2], np.pi)

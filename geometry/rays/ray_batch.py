@@ -38,15 +38,14 @@ class SampleSet:
     """Samples made ready for many queries: checked, sorted in space, in float32.
 
     Attributes:
-        order: Place of each sorted sample in the caller's order, shape (n,); None if
-            the caller's order is kept.
+        order: Place of each sample in the caller's order, shape (n,).
         points: Positions in the caster's own frame and a zero, shape (n, 4).
         normals: Unit normals, shape (3, n).
         heights: N . P, shape (n,).
         back: Diameter of a ball about the middle that holds the mesh and all samples.
     """
 
-    order: Ints | None
+    order: Ints
     points: Single
     normals: Single
     heights: Single
@@ -84,22 +83,29 @@ class RayBatch:
         """Rays that still fit."""
         return len(self._start) - self.filled
 
-    def add_facing(
-        self, samples: SampleSet, part: slice, source: Source, wanted: Mask | None
+    def add(
+        self,
+        samples: SampleSet,
+        part: slice,
+        source: Source,
+        wanted: Mask | None = None,
+        *,
+        facing: bool = True,
     ) -> Ints:
-        """Add the rays of some samples that face a device.
+        """Add rays to some samples, and return the index in the part of each.
 
         Args:
             samples: All of them.
             part: Which are offered: at most a block, and as many as there is room for.
             source: The device.
             wanted: Whether each sample of the part is worth a ray; default all.
-
-        Returns:
-            Index in the part of each ray's sample.
+            facing: Whether only those are that face the device.
         """
         climb = self._climbs(samples, part, source)
         worth = np.less(climb, 0, out=self._worth[: len(climb)])
+        if not facing:
+            np.negative(np.abs(climb, out=climb), out=climb)
+            worth[:] = True
         if wanted is not None:
             worth &= wanted
         rays = np.flatnonzero(worth)
@@ -112,22 +118,8 @@ class RayBatch:
         self._aim(start, rise, fresh, source, samples.back)
         return rays
 
-    def add_all(self, samples: SampleSet, part: slice, source: Source) -> None:
-        """Add the rays of some samples, whether they face the device or not."""
-        climb = self._climbs(samples, part, source)
-        fresh = slice(self.filled, self.filled + len(climb))
-        start, rise = self._start[fresh], self._reach[fresh]
-        np.copyto(start, samples.points[part])
-        np.abs(climb, out=rise)
-        np.negative(rise, out=rise)
-        self._aim(start, rise, fresh, source, samples.back)
-
     def clear(self) -> Mask:
-        """Trace all rays in the order in which they were added, and forget them.
-
-        Returns:
-            Whether nothing blocks each, shape (filled,).
-        """
+        """Trace all rays, forget them, and return which are free, shape (filled,)."""
         rays = slice(0, self.filled)
         self.filled = 0
         return ~self._caster.blocked_local(

@@ -62,7 +62,7 @@ class Visibility:
         self._slack = local
         self._own = threading.local()
 
-    def samples(self, points: Array, normals: Array, *, sort: bool = True) -> SampleSet:
+    def samples(self, points: Array, normals: Array, *, sort: bool) -> SampleSet:
         """Return samples made ready for queries.
 
         Args:
@@ -82,9 +82,8 @@ class Visibility:
                 f"{points.shape} and {normals.shape}"
             )
         local = self.caster.local(points)
-        order = None
+        order = morton_order(local) if sort else np.arange(len(local))
         if sort:
-            order = morton_order(local)
             local, normals = local.take(order, axis=0), normals.take(order, axis=0)
         across, facing = _columns(local), _columns(normals)
         farthest = float(np.sqrt(_dot(across, across).max(initial=0.0)))
@@ -93,54 +92,37 @@ class Visibility:
         back = 1.001 * 2.0 * max(self.caster.reach, farthest)
         return SampleSet(order, padded, facing, _dot(facing, across), back)
 
-    def prepared(
-        self, points: Array | SampleSet, normals: Array | None, *, sort: bool
-    ) -> SampleSet:
-        """Return `samples` of points, unless they are ready already."""
-        if isinstance(points, SampleSet):
-            return points
-        if normals is None:
-            raise ValueError("points need the normals of their faces")
-        return self.samples(points, normals, sort=sort)
-
     def blocked(
         self,
         origin: Array,
-        points: Array | SampleSet,
-        normals: Array | None = None,
+        points: Array,
+        normals: Array,
         *,
         along: Array | None = None,
     ) -> Mask:
-        """Return whether something stands between a device and points.
+        """Return whether something stands between a device and points, shape (n,).
 
         Args:
             origin: Optical centre in [m], shape (3,); or any point of the plane that
                 parallel light leaves.
-            points: Samples on the mesh in [m], shape (n, 3), or a prepared set.
-            normals: Unit normals of the samples' faces, (n, 3); None with a set.
+            points: Samples on the mesh in [m], shape (n, 3).
+            normals: Unit normals of the samples' faces, (n, 3).
             along: Unit direction of parallel light, shape (3,).
-
-        Returns:
-            Shape (n,).
 
         Raises:
             ValueError: If shapes disagree or a number isn't finite.
         """
-        samples = self.prepared(points, normals, sort=False)
+        samples = self.samples(points, normals, sort=False)
         source = self.source(origin, along)
         blocked = np.empty(len(samples), dtype=bool)
 
         def trace(part: slice) -> None:
             batch = self.batch()
-            batch.add_all(samples, part, source)
+            batch.add(samples, part, source, facing=False)
             blocked[part] = ~batch.clear()
 
         self.caster.share(trace, self.caster.chunks(len(samples)))
-        if samples.order is None:
-            return blocked
-        unsorted = np.empty_like(blocked)
-        unsorted[samples.order] = blocked
-        return unsorted
+        return blocked
 
     def batch(self) -> RayBatch:
         """Return the calling thread's own buffers, empty."""

@@ -15,8 +15,8 @@ _GROUP = 1 << 19
 def visibility_matrix(
     visibility: Visibility,
     origins: Array,
-    points: Array | SampleSet,
-    normals: Array | None = None,
+    points: Array,
+    normals: Array,
     *,
     along: Array | None = None,
     candidates: Mask | None = None,
@@ -34,15 +34,15 @@ def visibility_matrix(
         visibility: The occluder.
         origins: Optical centres in [m], shape (m, 3); in parallel light, a point of the
             plane that each beam leaves.
-        points: Samples on the mesh in [m], shape (n, 3), or a prepared set.
-        normals: Unit normals of the samples' faces, (n, 3); None with a set.
+        points: Samples on the mesh in [m], shape (n, 3).
+        normals: Unit normals of the samples' faces, (n, 3).
         along: Unit directions of parallel light, shape (m, 3); None for centres.
         candidates: Pairs worth a ray, shape (m, n); default all.
 
     Raises:
         ValueError: If shapes disagree or a number isn't finite.
     """
-    samples = visibility.prepared(points, normals, sort=True)
+    samples = visibility.samples(points, normals, sort=True)
     origins = np.asarray(origins, dtype=np.float64)
     shape = (len(origins), len(samples))
     if origins.ndim != 2 or (along is not None and np.shape(along) != origins.shape):
@@ -84,17 +84,13 @@ def _trace(
             begin += len(places)
         waiting.clear()
 
-    order = samples.order
     parts = equal_parts(len(samples), BLOCK)
     for row, source in enumerate(sources):
         for part in parts:
             if batch.room < part.stop - part.start:
                 flush()
-            wanted = None
-            if candidates is not None:
-                of_row = candidates[row]
-                wanted = of_row[part] if order is None else of_row.take(order[part])
-            rays = batch.add_facing(samples, part, source, wanted)
-            places = rays + part.start if order is None else order[part].take(rays)
-            waiting.append((row, places))
+            order = samples.order[part]
+            wanted = None if candidates is None else candidates[row].take(order)
+            rays = batch.add(samples, part, source, wanted)
+            waiting.append((row, order.take(rays)))
     flush()
