@@ -46,7 +46,7 @@ def main() -> int:
         for focal in FOCAL:
             for name, lens in (("ideal", CLEAN), ("realistic", Photometry())):
                 frames, patterns, pair = PLANE.shot(RIGS, light, focal, lens)
-                edges, _ = find_edges(frames, patterns)
+                edges, *_ = find_edges(frames, patterns)
                 error = PLANE.edge_error_px(edges, patterns, pair)
                 print(
                     f"| {light} | {focal:g} | {name} | {len(error)} | "

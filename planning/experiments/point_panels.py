@@ -18,6 +18,7 @@ from planning.report.drawing.picture_view import (
 )
 from planning.report.drawing.shader import Shader
 from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.cloud_file import ramp
 
 from .paper_devices import UP, bearing
 
@@ -36,15 +37,7 @@ PROJECTORS: tuple[Colour, ...] = ((255, 176, 60), (110, 200, 255))
 KEPT: Colour = (120, 214, 255)
 REMOVED: Colour = (240, 70, 60)
 # Inside to outside, told apart by lightness at both ends.
-_SIGNED = np.array(
-    [
-        [60.0, 90.0, 230.0],
-        [150.0, 200.0, 250.0],
-        [250.0, 250.0, 215.0],
-        [250.0, 170.0, 80.0],
-        [220.0, 40.0, 30.0],
-    ]
-)
+_SIGNED = "3c5ae6 96c8fa fafad7 faaa50 dc281e"
 _HEAD_PX = 30
 _RADIUS_PX = 2
 Legend = Sequence[tuple[str, Colour]]
@@ -109,9 +102,7 @@ class PanelStage:
 
 def signed_colours(values: Array, limit: float) -> Array:
     """Return colours (n, 3) of signed values, saturated at plus and minus a limit."""
-    place = np.clip(0.5 + 0.5 * values / limit, 0.0, 1.0) * (len(_SIGNED) - 1)
-    at = np.arange(len(_SIGNED))
-    return np.stack([np.interp(place, at, channel) for channel in _SIGNED.T], axis=1)
+    return ramp(_SIGNED, 0.5 + 0.5 * values / limit)
 
 
 def chosen_colours(palette: Sequence[Colour], index: NDArray[np.integer]) -> Array:

@@ -13,7 +13,6 @@ from geometry.devices import ParallelModel
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.verify.reconstruction.patterns.ring_patterns import (
-    PATTERNS,
     DrawnRings,
     RingsForCamera,
 )
@@ -152,7 +151,8 @@ class ProjectorCalibration:
 
     def pattern_for(self, camera: CameraCalibration) -> RingsForCamera:
         """Return what it draws as a camera's decoder reads it."""
-        return self.pattern.seen_from(self.to_ring(camera.centre[None])[0])
+        seen_from = self.to_ring(camera.centre[None])[0]
+        return RingsForCamera(self.light, self.pattern.radii, seen_from)
 
     def aim(self, points: Array) -> tuple[Array, Array, Array]:
         """Return where the light of world points starts, its directions and lengths."""
@@ -263,6 +263,6 @@ def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
         matrix,
         device.resolution,
         beam_radius,
-        PATTERNS["rings"](LIGHTS[projector.light], projector.ring_radii),
+        DrawnRings(LIGHTS[projector.light], projector.ring_radii),
         projector.body,
     )

@@ -28,26 +28,9 @@ _PLY_TYPES = {"<f8": "double", "<f4": "float", "u1": "uchar"}
 
 # Every seventeenth of the 256 colours of viridis (S. van der Walt, N. Smith, CC0);
 # lightness rises evenly, so that colour blindness loses nothing.
-_VIRIDIS = np.array(
-    [
-        [68, 1, 84],
-        [72, 26, 108],
-        [71, 47, 125],
-        [65, 68, 135],
-        [57, 86, 140],
-        [49, 104, 142],
-        [42, 120, 142],
-        [35, 136, 142],
-        [31, 152, 139],
-        [34, 168, 132],
-        [53, 183, 121],
-        [84, 197, 104],
-        [122, 209, 81],
-        [165, 219, 54],
-        [210, 226, 27],
-        [253, 231, 37],
-    ],
-    dtype=np.float64,
+_VIRIDIS = (
+    "440154 481a6c 472f7d 414487 39568c 31688e 2a788e 23888e "
+    "1f988b 22a884 35b779 54c568 7ad151 a5db36 d2e21b fde725"
 )
 _NAMES = ((0.0, "violet"), (0.5, "teal"), (1.0, "yellow"))
 # Values beyond these quantiles take the colours of the ends.
@@ -99,22 +82,26 @@ class CloudFile:
         known = np.isfinite(merged.normals[:, 0])
         largest = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
         sigma = np.where(known, merged.sigma, largest) / unit.in_m
-        limits = _colour_range(sigma)
+        low, high = np.quantile(sigma, _ENDS).tolist() if len(cloud) else (0.0, 1.0)
         rows = np.empty(len(cloud), dtype=_ROW)
         normals = np.where(known[:, None], merged.normals, 0.0)
         for axis, name in enumerate("xyz"):
             rows[name] = cloud.points[:, axis] / unit.in_m
             rows[f"n{name}"] = normals[:, axis]
         rows["sigma"] = sigma
-        shades = _colours(sigma, limits)
+        shades = np.rint(ramp(_VIRIDIS, (sigma - low) / max(high - low, 1e-300)))
         for channel, name in enumerate(("red", "green", "blue")):
             rows[name] = shades[:, channel]
-        return cls(rows, unit, limits)
+        return cls(rows, unit, (low, high))
 
     @property
     def legend(self) -> str:
         """What the colours mean, in one line."""
-        return _legend(self.limits, self.unit.name)
+        low, high = self.limits
+        return ", ".join(
+            f"{name} {low + share * (high - low):.4g} {self.unit.name}"
+            for share, name in _NAMES
+        )
 
     def save(self, path: Path) -> None:
         """Write the file; its old content stays whole until the new one is complete.
@@ -153,25 +140,14 @@ def remove_cloud(path: Path) -> bool:
     return ours
 
 
-def _colour_range(values: Array) -> tuple[float, float]:
-    """Return what the ends of the scale stand for: the 2nd and 98th percentile."""
-    low, high = np.quantile(values, _ENDS).tolist() if len(values) else (0.0, 1.0)
-    return low, high
+def ramp(palette: str, shares: Array) -> Array:
+    """Return colours of 0 to 255 at shares of the way along a palette, shape (n, 3).
 
-
-def _colours(values: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return the colour of each value, red, green and blue of 255, shape (n, 3)."""
-    low, high = limits
-    share = np.clip((values - low) / max(high - low, 1e-300), 0.0, 1.0)
-    place = share * (len(_VIRIDIS) - 1)
-    steps = np.arange(len(_VIRIDIS))
-    mixed = [np.interp(place, steps, channel) for channel in _VIRIDIS.T]
-    return np.rint(np.column_stack(mixed)).astype(np.uint8)
-
-
-def _legend(limits: tuple[float, float], unit: str) -> str:
-    """Return what the colours mean, in one line."""
-    low, high = limits
-    return ", ".join(
-        f"{name} {low + share * (high - low):.4g} {unit}" for share, name in _NAMES
-    )
+    Args:
+        palette: Colours from end to end, as RRGGBB apart by spaces.
+        shares: Held within 0 and 1, shape (n,).
+    """
+    colours = np.array(list(bytes.fromhex(palette))).reshape(-1, 3)
+    places = np.clip(shares, 0.0, 1.0) * (len(colours) - 1)
+    steps = np.arange(len(colours))
+    return np.column_stack([np.interp(places, steps, channel) for channel in colours.T])

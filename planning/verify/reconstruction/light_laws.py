@@ -65,16 +65,12 @@ class LightLaw:
         """Return the slope of ring surfaces against their axis: 0, or R, shape (n,)."""
         return np.zeros_like(rho)
 
-    def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
+    def across_m(self, step: Array | float, rho: Array, depth: Array) -> Array | float:
         """Return steps of |p| at rho and depth z as lengths across the beam [m].
 
         In diverging light a step is ``z / sqrt(1 + rho^2)`` times as long.
         """
         return step
-
-    def per_metre(self, rho: Array, depth: Array) -> Array:
-        """Return the change of |p| in a metre across the beam, shape (n,)."""
-        return np.ones_like(rho)
 
     def quadric(self, radii: Array) -> tuple[Array | float, Array | float]:
         """Return k and c of the ring surfaces ``x^2 + y^2 = k z^2 + c``."""
@@ -139,11 +135,8 @@ class _Diverging(LightLaw):
     def tilt(self, rho: Array) -> Array:
         return rho
 
-    def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
+    def across_m(self, step: Array | float, rho: Array, depth: Array) -> Array | float:
         return step * depth / np.sqrt(1.0 + rho * rho)
-
-    def per_metre(self, rho: Array, depth: Array) -> Array:
-        return np.sqrt(1.0 + rho * rho) / depth
 
     def quadric(self, radii: Array) -> tuple[Array | float, Array | float]:
         return radii * radii, 0.0

@@ -70,7 +70,7 @@ def reconstruct(
         seed=seed,
         expected=expected,
         photometry=light,
-        seconds=spent.seconds,
+        spent=spent,
     )
 
 
@@ -81,7 +81,7 @@ def conclude(
     seed: int,
     expected: Expected | None = None,
     photometry: Photometry | None = None,
-    seconds: dict[str, float] | None = None,
+    spent: Spent | None = None,
 ) -> Reconstruction:
     """Merge what the pairs of a rig measured, and judge it.
 
@@ -91,14 +91,14 @@ def conclude(
         seed: Of the samples, where none are given.
         expected: Likewise.
         photometry: Of the simulation; None: the images were taken.
-        seconds: Processor time spent so far by stage [s]; that of `merge` is added.
+        spent: Processor time so far; that of `merge` is added.
     """
     if expected is None:
         mesh, target = plan.mesh, plan.target
         fresh = sample_surface(mesh, _DEFAULT_SAMPLES, seed=seed, within=target)
         expected = Expected(fresh)
     expected = expected.within(plan.target)
-    spent = Spent(seconds)
+    spent = spent or Spent()
     parts = [pair.cloud.of_devices(p, c) for (p, c), pair in decoded]
     everything = Cloud.join(parts)
     gap_m, pitch_px = _ring_gap(plan, everything)

@@ -89,7 +89,7 @@ def edge_error_px(edges, patterns, calibration) -> np.ndarray:
 @pytest.mark.parametrize("focal", [1400.0, 3478.0])
 def test_edges_on_a_plane_are_where_the_rings_are(rigs, light, focal):
     frames, patterns, calibration = shot(rigs, light, focal, CLEAN)
-    edges, _ = find_edges(frames, patterns)
+    edges, *_ = find_edges(frames, patterns)
     error = edge_error_px(edges, patterns, calibration)
     assert len(edges) > 3000
     assert len(np.unique(edges.rings)) > 25
@@ -121,7 +121,7 @@ def test_noise_of_edges_is_what_the_decoder_says_it_is(rigs):
     frames, patterns, calibration = shot(
         rigs, "diverging", 3478.0, Photometry(albedo_variation=0.0)
     )
-    edges, lit = find_edges(frames, patterns)
+    edges, lit, _ = find_edges(frames, patterns)
     error = edge_error_px(edges, patterns, calibration)
     assert frames.stack.dtype == np.uint8
     assert lit > 0.5 * frames.stack[0].size
@@ -131,7 +131,7 @@ def test_noise_of_edges_is_what_the_decoder_says_it_is(rigs):
 
 def test_every_label_is_the_ring_that_is_there(rigs):
     frames, patterns, calibration = shot(rigs, "parallel", 3478.0, Photometry())
-    edges, _ = find_edges(frames, patterns)
+    edges, *_ = find_edges(frames, patterns)
     there = ring_coordinate(calibration, edges.pixels)
     nearest = np.abs(there[:, None] - patterns.radii[None]).argmin(axis=1)
     assert np.array_equal(nearest, edges.rings)

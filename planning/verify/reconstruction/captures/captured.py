@@ -259,7 +259,7 @@ def _concluded(
         seed=0,
         expected=expected,
         photometry=photometry,
-        seconds=spent.seconds,
+        spent=spent,
     )
     sentences = inspection.sentences(pairs, confirmed, expected)
     return replace(found, failures=sentences + found.failures)

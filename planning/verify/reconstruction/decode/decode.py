@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
@@ -112,7 +112,7 @@ def decode(
             f"in {patterns.n_frames}: white, black, {patterns.n_bits} bits and the "
             f"root disc, each with its inverse"
         )
-    edges, lit_pixels = find_edges(frames, patterns)
+    edges, lit_pixels, changes = find_edges(frames, patterns)
     saturated = np.argwhere(frames.stack[0] >= SATURATED)[:, ::-1] + np.array(
         frames.corner, dtype=np.float64
     )
@@ -125,7 +125,7 @@ def decode(
         saturated,
         min_conditioning=min_conditioning,
         max_slant=max_slant,
-        believed=not _out_of_order(edges),
+        believed=not _out_of_order(*changes),
     )
 
 
@@ -154,7 +154,7 @@ def measure_edges(
     """
     camera, projector = calibration.camera, calibration.projector
     rays = camera.rays(edges.pixels)
-    radii = patterns.coordinate(edges.rings)
+    radii = patterns.radii[edges.rings]
     hits = intersect_rings(camera.centre, rays, radii, edges.roots, projector)
     length, across = chains(edges, hits, camera.focal_px, max_slant)
     causes = {
@@ -203,7 +203,7 @@ def _doubtful_root(
         return np.zeros(len(edges), dtype=bool)
 
     def fits(roots: NDArray[np.int8]) -> Mask:
-        radii = patterns.coordinate(edges.rings)
+        radii = patterns.radii[edges.rings]
         points = intersect_rings(camera.centre, rays, radii, roots, projector).points
         local = projector.to_ring(points)
         inside = projector.in_panel(projector.panel(points)[0], 1.0)
@@ -213,16 +213,14 @@ def _doubtful_root(
     return fits(edges.roots) == fits(-edges.roots)
 
 
-def _out_of_order(edges: ImageEdges) -> bool:
+def _out_of_order(flips: Indices, named: Indices) -> bool:
     """Whether some frame isn't the bit that it is taken for.
 
     In a Gray code any change of one bit alone between neighbouring annuli is a ring;
     with bits exchanged, those of some frames lead to annuli far apart, or to none.
     """
-    unnamed = edges.flips - edges.named
-    least = max(_UNNAMED_LEAST, _UNNAMED_SHARE * int(edges.flips.sum()))
-    contradicted = (unnamed > least) & (edges.named < _MIN_NAMED * edges.flips)
-    return bool(np.any(contradicted))
+    least = max(_UNNAMED_LEAST, _UNNAMED_SHARE * int(flips.sum()))
+    return bool(np.any((flips - named > least) & (named < _MIN_NAMED * flips)))
 
 
 def _cloud(

@@ -5,13 +5,20 @@ pixels; which bit flipped says which frame holds the edge, and the zero level of
 frame's normalised difference between the two pixels is the sub-pixel position.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfinv
 
-from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
+from planning.verify.reconstruction.arrays import (
+    Array,
+    Columns,
+    Grey,
+    Images,
+    Indices,
+    Mask,
+)
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 # A pixel is lit if white exceeds black by this many levels of 255.
@@ -28,7 +35,7 @@ _MAX_LEVEL = 0.98
 
 
 @dataclass(frozen=True, eq=False)
-class ImageEdges:
+class ImageEdges(Columns):
     """Ring edges in one camera's image.
 
     Attributes:
@@ -37,8 +44,6 @@ class ImageEdges:
         roots: Sign of r.m, from the root disc, shape (n,).
         across: Unit direction in the image across the edge, shape (n, 2).
         noise_px: Standard deviation of the position along `across` [px], shape (n,).
-        flips: Changes of one bit alone between lit pixels, by bit, shape (n_bits,).
-        named: Those of them that name a ring, shape (n_bits,).
     """
 
     pixels: Array
@@ -46,8 +51,6 @@ class ImageEdges:
     roots: NDArray[np.int8]
     across: Array
     noise_px: Array
-    flips: Indices
-    named: Indices
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -55,33 +58,35 @@ class ImageEdges:
     @classmethod
     def nothing(cls) -> "ImageEdges":
         """Return no edges."""
-        none, places = np.zeros(0), np.zeros((0, 2))
-        count = np.zeros(0, dtype=np.int64)
-        return cls(
-            places, count, np.zeros(0, np.int8), places, none, count, count.copy()
+        places, ring, root = (
+            np.zeros((0, 2)),
+            np.zeros(0, np.int64),
+            np.zeros(0, np.int8),
         )
+        return cls(places, ring, root, places, np.zeros(0))
 
 
-def find_edges(frames: Frames, patterns: RingsForCamera) -> tuple[ImageEdges, int]:
-    """Return the labelled ring edges of a stack of images, and its lit pixels."""
+def find_edges(
+    frames: Frames, patterns: RingsForCamera
+) -> tuple[ImageEdges, int, Indices]:
+    """Return the labelled ring edges of a stack of images.
+
+    Returns:
+        The edges; how many pixels are lit; and, shape (2, n_bits), the changes of one
+        bit alone between lit pixels, and those of them that name a ring.
+    """
     reader = _Reader(frames.stack, patterns)
     noise = reader.grey_noise()
-    along_rows = _crossings(reader, noise)
-    along_columns = _crossings(reader.transposed(), noise)
-    swapped = along_columns.pixels[:, ::-1], along_columns.across[:, ::-1]
+    by_rows, changes = _crossings(reader, noise)
+    by_columns, more = _crossings(reader.transposed(), noise)
+    pixels, across = by_columns.pixels[:, ::-1], by_columns.across[:, ::-1]
+    by_columns = replace(by_columns, pixels=pixels, across=across)
     # A crossing is kept in the one direction that runs more squarely into the edge.
-    a = np.abs(along_rows.across[:, 0]) >= np.abs(along_rows.across[:, 1])
-    b = np.abs(swapped[1][:, 1]) > np.abs(swapped[1][:, 0])
-    edges = ImageEdges(
-        np.concatenate([along_rows.pixels[a], swapped[0][b]]) + np.array(frames.corner),
-        np.concatenate([along_rows.rings[a], along_columns.rings[b]]),
-        np.concatenate([along_rows.roots[a], along_columns.roots[b]]),
-        np.concatenate([along_rows.across[a], swapped[1][b]]),
-        np.concatenate([along_rows.noise_px[a], along_columns.noise_px[b]]),
-        along_rows.flips + along_columns.flips,
-        along_rows.named + along_columns.named,
-    )
-    return edges, int(np.count_nonzero(reader.valid))
+    flat = np.abs(by_rows.across[:, 0]) >= np.abs(by_rows.across[:, 1])
+    steep = np.abs(across[:, 1]) > np.abs(across[:, 0])
+    edges = ImageEdges.join([by_rows.take(flat), by_columns.take(steep)])
+    edges = replace(edges, pixels=edges.pixels + np.array(frames.corner))
+    return edges, int(np.count_nonzero(reader.valid)), changes + more
 
 
 class _Reader:
@@ -167,43 +172,42 @@ def _about(image: Grey, extreme: np.ufunc) -> Grey:
     return extreme(extreme(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
 
 
-def _crossings(reader: _Reader, noise: float) -> ImageEdges:
-    """Edges between pixels of one row, in pixels (column, row) of the reader."""
+def _crossings(reader: _Reader, noise: float) -> tuple[ImageEdges, Indices]:
+    """Edges between pixels of one row, in pixels (column, row), and changes of bits."""
     index, sure = reader.index, reader.sure
     before, after = index[:, 1:-2], index[:, 2:-1]
     code, usable = reader.code, reader.valid & reader.even
-    found = (code[:, 1:-2] != code[:, 2:-1]) & sure[:, :-3] & sure[:, 3:]
-    found &= usable[:, 1:-2] & usable[:, 2:-1]
-    found[:1] = found[-1:] = False
+    edge = (code[:, 1:-2] != code[:, 2:-1]) & sure[:, :-3] & sure[:, 3:]
+    edge &= usable[:, 1:-2] & usable[:, 2:-1]
+    edge[:1] = edge[-1:] = False
     flipped = code[:, 1:-2] ^ code[:, 2:-1]
-    flips = _count_single(flipped[found], reader.patterns.n_bits)
-    found &= (np.abs(after - before) == 1) & (before >= 0) & (after >= 0)
-    named = _count_single(flipped[found], reader.patterns.n_bits)
-    found &= (index[:, :-3] == before) & (index[:, 3:] == after)
-    i, j = np.nonzero(found)
+    flips = _count_single(flipped[edge], reader.patterns.n_bits)
+    edge &= (np.abs(after - before) == 1) & (before >= 0) & (after >= 0)
+    named = _count_single(flipped[edge], reader.patterns.n_bits)
+    edge &= (index[:, :-3] == before) & (index[:, 3:] == after)
+    i, j = np.nonzero(edge)
     j = j + 1
     rings = np.minimum(index[i, j], index[i, j + 1]).astype(np.int64)
     frame = 2 + 2 * reader.patterns.flipping_bit[rings]
-    left, right = reader.level(frame, i, j), reader.level(frame, i, j + 1)
-    along = right - left
+    first, second = reader.level(frame, i, j), reader.level(frame, i, j + 1)
+    along = second - first
     cross = _row_slope(reader, frame, i, j)
     root_frame = 2 + 2 * reader.patterns.n_bits
     root = 0.5 * (reader.level(root_frame, i, j) + reader.level(root_frame, i, j + 1))
-    good = ((left > 0.0) != (right > 0.0)) & (np.abs(root) >= _MIN_CERTAINTY)
-    i, j, left, right = i[good], j[good], left[good], right[good]
-    part, spread = _zero_between(left, right)
+    good = ((first > 0.0) != (second > 0.0)) & (np.abs(root) >= _MIN_CERTAINTY)
+    i, j, first, second = i[good], j[good], first[good], second[good]
+    zero, spread = _zero_between(first, second)
     along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
     slope = np.hypot(along, cross)
     contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
-    return ImageEdges(
-        np.column_stack([j + part, i.astype(np.float64)]),
+    edges = ImageEdges(
+        np.column_stack([j + zero, i.astype(np.float64)]),
         rings[good],
         np.where(root[good] > 0.0, 1, -1).astype(np.int8),
         np.column_stack([along, cross]) / slope[:, None],
         np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope,
-        flips,
-        named,
     )
+    return edges, np.array([flips, named])
 
 
 def _count_single(flipped: NDArray[np.int16], n_bits: int) -> Indices:
@@ -212,22 +216,16 @@ def _count_single(flipped: NDArray[np.int16], n_bits: int) -> Indices:
     return count[1 << np.arange(n_bits)].astype(np.int64)
 
 
-def _zero_between(left: Grey, right: Grey) -> tuple[Array, Array]:
-    """Return where between two pixels a blurred step crosses zero, and how surely.
+def _zero_between(first: Grey, second: Grey) -> tuple[Array, Array]:
+    """Where between levels of two pixels a blurred step crosses zero, and how surely.
 
     A blurred step is an error function, whose inverse makes it a straight line: with
-    a, b = erfinv(left), erfinv(right) the crossing is at a / (a - b).
-
-    Args:
-        left: Level at 0, of the other sign than `right`, shape (n,).
-        right: Level at 1, shape (n,).
-
-    Returns:
-        Position in [0, 1], and its standard deviation for levels that have one of 1.
+    a, b = erfinv(first), erfinv(second) the crossing is at a / (a - b). Its standard
+    deviation is for levels that have one of 1.
     """
     a, b = (
         erfinv(np.clip(level, -_MAX_LEVEL, _MAX_LEVEL).astype(np.float64))
-        for level in (left, right)
+        for level in (first, second)
     )
     rise = np.square(a - b)
     spread = np.hypot(b * np.exp(a * a), a * np.exp(b * b)) / rise

@@ -147,7 +147,7 @@ def wrong_roots(plan: Scanner, decoded: Pairs) -> tuple[tuple[str, str, float], 
         cloud = pair.cloud.thinned(_POINTS_A_PAIR)
         if len(cloud) == 0:
             continue
-        radii = plan.projectors[p].pattern.coordinate(cloud.ring)
+        radii = plan.projectors[p].pattern.radii[cloud.ring]
         evidence = replace(Evidence.at(plan, cloud.pixels, p, c), radii=radii)
         at = places(evidence, supposed)
         off = np.abs(mismatches(evidence, supposed, at))

@@ -131,7 +131,7 @@ class Evidence(Columns):
                 continue
             rows = np.linspace(0, len(edges) - 1, min(EDGES_A_PAIR, len(edges)))
             rows = rows.astype(np.int64)
-            radii = plan.projectors[p].pattern.coordinate(edges.rings[rows])
+            radii = plan.projectors[p].pattern.radii[edges.rings[rows]]
             some_edges = cls.at(plan, edges.pixels[rows], p, c)
             noise = edges.noise_px[rows]
             parts.append(replace(some_edges, radii=radii, noise_px=noise))

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.verify.reconstruction.arrays import Array, Grey
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
@@ -22,7 +22,6 @@ from planning.verify.reconstruction.calibration import (
 from .ring_patterns import DrawnRings, Frame, RingsForCamera
 
 _WHITE = 255.0
-_NEIGHBOURS = (slice(None, -1), slice(1, None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,8 @@ class PatternCanvas:
         white = self.within + self.beyond
         outside: dict[str, NDArray[np.uint8]] = {}
         for camera, patterns in self.discs.items():
-            share = _share_at_once(_root_level(patterns, self.x, self.y))
+            level = patterns.root_level(self.x, self.y)
+            share = _share(level, _slope(level)).astype(np.float32)
             outside[camera] = np.rint(white * share).astype(np.uint8)
         return outside
 
@@ -90,38 +90,6 @@ def canvas(
     beyond = np.rint(white * _share(rho - radii[edge], slope)).astype(np.uint8)
     discs = {camera.id: projector.pattern_for(camera) for camera in cameras}
     return PatternCanvas(patterns, discs, x, y, edge, white - beyond, beyond)
-
-
-def _root_level(patterns: RingsForCamera, x: Array, y: Array) -> Array:
-    """Return what is zero on the border of a root disc, with the sign of r.m.
-
-    |p|^2 o_z - o_x p_x - o_y p_y, with o_z = 1 in parallel light.
-    """
-    across, down, away = patterns.camera_in_ring
-    depth = patterns.light.root_weight(away)
-    return x * (depth * x - across) + y * (depth * y - down)
-
-
-def _share_at_once(level: Array) -> Grey:
-    """Return `_share` of a quantity with a single border: slopes matter there alone."""
-    positive = level > 0.0
-    border = np.zeros_like(positive)
-    for axis in (0, 1):
-        one, other = (positive.swapaxes(0, axis)[part] for part in _NEIGHBOURS)
-        marked = border.swapaxes(0, axis)
-        for part in _NEIGHBOURS:
-            marked[part] |= one != other
-    share = positive.astype(np.float32)
-    v, u = np.nonzero(border)
-    height, width = level.shape
-    down, up = np.minimum(v + 1, height - 1), np.maximum(v - 1, 0)
-    right, left = np.minimum(u + 1, width - 1), np.maximum(u - 1, 0)
-    steep = np.hypot(
-        (level[v, right] - level[v, left]) / (right - left),
-        (level[down, u] - level[up, u]) / (down - up),
-    )
-    share[v, u] = _share(level[v, u], np.maximum(steep, np.finfo(float).tiny))
-    return share
 
 
 def _slope(values: Array) -> Array:

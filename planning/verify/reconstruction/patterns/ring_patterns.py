@@ -5,7 +5,7 @@ camera the disc that tells the two roots of its rays apart, with its inverse: in
 ``2 ceil(log2 N) + 2 + 2 n_cameras`` frames for N annuli, one more than rings.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, Self
@@ -126,10 +126,6 @@ class DrawnRings:
         steps = np.diff(self.radii, prepend=first)
         return self.light.across_m(steps[rings], self.radii[rings], depth)
 
-    def coordinate(self, rings: NDArray[np.integer]) -> Array:
-        """Return |p| on some of its ring edges, shape (n,)."""
-        return self.radii[rings]
-
     def blurred(self, rho: Array, spread: Array) -> tuple[Indices, Array, Array, Array]:
         """Return how blurred light falls where |p| is rho, shape (n,) each.
 
@@ -171,10 +167,6 @@ class DrawnRings:
         """Least distance of a ring from the next one, or from the centre."""
         return float(np.diff(self.radii, prepend=0.0).min())
 
-    def seen_from(self, camera_in_ring: Array) -> "RingsForCamera":
-        """Return it with the root disc of a camera, which stands there [m], (3,)."""
-        return RingsForCamera(self.light, self.radii, camera_in_ring)
-
 
 @dataclass(frozen=True, eq=False)
 class RingsForCamera(DrawnRings):
@@ -191,26 +183,28 @@ class RingsForCamera(DrawnRings):
         """Frames that the decoder reads."""
         return 2 * self.n_bits + 4
 
+    def root_level(self, x: Array, y: Array) -> Array:
+        """Return what is zero on the border of the disc, with the sign of r.m.
+
+        With o the camera in ring coordinates, at p = (x, y) of the plane of the rings::
+
+            diverging  |p|^2 o_z - o_x p_x - o_y p_y        parallel  p.(p - o)
+        """
+        across, down, away = self.camera_in_ring
+        square = self.light.root_weight(away)
+        return x * (square * x - across) + y * (square * y - down)
+
     def root_side(self, p: Array) -> Array:
         """Return the signed distance of ring-plane points from the border of the disc.
 
-        With o the camera in ring coordinates, the sign is that of r.m::
-
-            diverging  |p|^2 o_z - o_x p_x - o_y p_y        parallel  p.(p - o)
-
-        to first order in units of p, positive outside the disc.
+        To first order in units of p, positive outside the disc, shape (n,).
 
         Args:
             p: Normalised (x/z, y/z) or, in parallel light, (x, y) in [m], shape (n, 2).
-
-        Returns:
-            Shape (n,).
         """
         square = self.light.root_weight(self.camera_in_ring[2])
-        flat = self.camera_in_ring[:2]
-        level = square * np.sum(p * p, axis=1) - p @ flat
-        slope = np.linalg.norm(2.0 * square * p - flat, axis=1)
-        return level / np.maximum(slope, 1e-12)
+        slope = np.linalg.norm(2.0 * square * p - self.camera_in_ring[:2], axis=1)
+        return self.root_level(*p.T) / np.maximum(slope, 1e-12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +219,3 @@ class Frames:
 
     stack: Images
     corner: tuple[int, int]
-
-
-# What a plan may have its projectors draw, by name: from their light and their radii.
-PATTERNS: dict[str, Callable[[LightLaw, Array], DrawnRings]] = {"rings": DrawnRings}

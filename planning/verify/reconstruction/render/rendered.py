@@ -169,8 +169,8 @@ def _on_at_once(plan: Scanner, truth: Scanner) -> list[list[int]]:
 class Spent:
     """Processor time by stage, over all threads: what eq. (8) calls t1, t2 and t3."""
 
-    def __init__(self, before: dict[str, float] | None = None) -> None:
-        self.seconds = {"render": 0.0, "decode": 0.0, "merge": 0.0} | (before or {})
+    def __init__(self) -> None:
+        self.seconds = {"render": 0.0, "decode": 0.0, "merge": 0.0}
         self._lock = Lock()
 
     @contextmanager

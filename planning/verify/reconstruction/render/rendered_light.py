@@ -100,7 +100,7 @@ class Shown:
         if self.defocus is not None:
             square = square + self.defocus.blur_m(depth) ** 2
         blur = np.sqrt(square + pixel**2 * np.maximum(stretch, 0.0))
-        spread = law.per_metre(rho, depth) * blur
+        spread = blur / law.across_m(1.0, rho, depth)
         annulus, inner, outer, drawn = patterns.blurred(rho, spread)
         light = RenderedLight(
             lit,

@@ -3,7 +3,6 @@
 Rings are told apart by a mesh that the object is known to lie near, not by a sequence.
 """
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -27,7 +26,11 @@ from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsF
 from planning.verify.reconstruction.reconstruct import conclude
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_lines
-from planning.verify.reconstruction.render.rendered import Progress, RenderedScene
+from planning.verify.reconstruction.render.rendered import (
+    Progress,
+    RenderedScene,
+    Spent,
+)
 from planning.verify.reconstruction.scanner import Scanner
 
 from .prior_labels import PriorLabels, label_by_prior
@@ -82,22 +85,23 @@ def reconstruct_single_shot(
         progress: Called with the pairs done and their total.
     """
     light = photometry or Photometry()
-    begin = time.thread_time()
-    shots = shoot_rig(
-        plan,
-        plan.mesh,
-        tolerance_m=tolerance_m,
-        photometry=light,
-        seed=seed,
-        progress=progress,
-    )
+    spent = Spent()
+    with spent.on("decode"):
+        shots = shoot_rig(
+            plan,
+            plan.mesh,
+            tolerance_m=tolerance_m,
+            photometry=light,
+            seed=seed,
+            progress=progress,
+        )
     return conclude(
         plan,
         decoded_pairs(shots),
         seed=seed,
         expected=expected,
         photometry=light,
-        seconds={"render": 0.0, "decode": time.thread_time() - begin, "merge": 0.0},
+        spent=spent,
     )
 
 
@@ -196,15 +200,12 @@ def decode_single_shot(
         lines.pixels, patterns.radii, calibration, prior, tolerance_m=tolerance_m
     )
     sure = labels.rings >= 0
-    none = np.zeros(0, dtype=np.int64)
     edges = ImageEdges(
         lines.pixels[sure],
         labels.rings[sure],
         labels.roots[sure],
         lines.across[sure],
         lines.noise_px[sure],
-        none,
-        none,
     )
     found = measure_edges(
         edges,
