@@ -108,11 +108,12 @@ def ranges(job: Job) -> Image.Image:
     views = 1e-3 * np.array([row[1:4] for row in rows], dtype=float)
     rays = np.array([row[4:7] for row in rows], dtype=float)
     view = _view(np.concatenate([body.vertices, 0.25 * views]), ABOVE, (640, 480))
-    panel = Panel(_shaded(RayCaster(body), CLAY).shade(view), view)
+    caster = RayCaster(body)
+    panel = Panel(_shaded(caster, CLAY).shade(view), view, caster)
     for origin, ray in zip(views, rays, strict=True):
         hit = origin + ray * (np.linalg.norm(origin) - 0.09)
         ends = np.stack([hit - 0.2 * ray, hit])
-        panel.polyline(ends, ORANGE, width=1.0, caster=RayCaster(body))
+        panel.polyline(ends, ORANGE, width=1.0)
         panel.dot(hit, BLUE, radius=3.0)
     panel.scale_bar(size=13.0)
     return _finished(panel)
@@ -193,13 +194,13 @@ def candidates(job: Job) -> Image.Image:
     surface, plan = job.plan.surface, job.plan
     places = surface.reference_projectors[:, :3, 3]
     view = _view(places, ABOVE, (640, 560))
-    panel = Panel(_shaded(job.caster, CLAY).shade(view), view)
+    panel = Panel(_shaded(job.caster, CLAY).shade(view), view, job.caster)
     for place in places:
         panel.dot(place, (185, 185, 190), radius=2.0)
     for projector in plan.projectors:
         place = projector.world_from_device[:3, 3]
         ends = np.stack([place, job.mesh.centre])
-        panel.polyline(ends, ORANGE, width=1.5, caster=job.caster)
+        panel.polyline(ends, ORANGE, width=1.5)
         panel.dot(place, ORANGE, radius=5.0)
         panel.label(place, projector.id, ORANGE, size=15.0)
     panel.scale_bar(size=13.0)

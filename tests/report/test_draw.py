@@ -293,9 +293,9 @@ def test_lines_behind_the_object_are_faint():
     view = PictureView(np.zeros(3), *facing((0, -1, 0), (0, 0, 1)), (200, 200), 0.002)
     ink = {}
     for y in (-0.5, 0.5):
-        panel = Panel(Image.new("RGB", (200, 200), "white"), view)
+        panel = Panel(Image.new("RGB", (200, 200), "white"), view, RayCaster(ball))
         line = np.array([[-0.19, y, 0.0], [0.19, y, 0.0]])
-        panel.polyline(line, (0, 0, 0), width=2, caster=RayCaster(ball))
+        panel.polyline(line, (0, 0, 0), width=2)
         ink[y] = 255 - pixels(panel.image)[100, :, 0]
     assert np.all(ink[-0.5][10:190] > 200), "in front: all of it"
     assert np.all(ink[0.5][60:140] < 80), "behind: faint"
@@ -305,20 +305,21 @@ def test_lines_behind_the_object_are_faint():
 
 def test_a_diverging_beam_ends_at_the_corners_of_the_image(mesh, plan):
     figures = device_figures(plan, body_m=0.1)
-    assert [f.id for f in figures] == ["P1", "P2", "C1", "C2", "C3"]
+    assert [f.device.id for f in figures] == ["P1", "P2", "C1", "C2", "C3"]
     for device, figure in zip((*plan.projectors, *plan.cameras), figures, strict=True):
-        if figure.id == "P2":
+        if device.id == "P2":
             continue
         inverse = np.linalg.inv(device.world_from_device)
-        for outline in (figure.beam[4], figure.body[0]):
+        assert figure.beam[0][1] == pytest.approx(mesh.centre, abs=1e-9)
+        assert len(figure.beam) == (6 if device.id == "P1" else 1)
+        for outline in (figure.body[0], *figure.beam[5:]):
             drawn = device.device.project(transform(inverse, outline))
             width, height = np.array(device.device.resolution) - 0.5
             expected = [[-0.5, -0.5], [width, -0.5], [width, height], [-0.5, height]]
             assert drawn[:4] == pytest.approx(np.array(expected), abs=1e-6)
-        depth = transform(inverse, figure.beam[4])[:, 2]
-        assert depth == pytest.approx(transform(inverse, mesh.centre[None])[0, 2])
-        assert figure.distance_m == pytest.approx(1.15 if figure.id == "P1" else 1.1)
-        assert figure.axis[1] == pytest.approx(mesh.centre, abs=1e-9)
+        for end in figure.beam[5:]:
+            depth = transform(inverse, end)[:, 2]
+            assert depth == pytest.approx(transform(inverse, mesh.centre[None])[0, 2])
 
 
 def test_a_parallel_beam_is_as_wide_as_its_rings_all_along(plan):
@@ -328,10 +329,10 @@ def test_a_parallel_beam_is_as_wide_as_its_rings_all_along(plan):
     panel = transform(inverse, figure.body[0])
     half = 0.5 * 3.2e-4 * np.array([1280, 800])
     assert np.abs(panel[:, :2]) == pytest.approx(np.tile(half, (5, 1)))
-    for line in (transform(inverse, line) for line in figure.beam):
+    for line in (transform(inverse, line) for line in figure.beam[1:]):
         radius = np.hypot(line[:, 0], line[:, 1])
         assert radius == pytest.approx(np.full(len(line), 0.12))
-    for edge in (transform(inverse, line) for line in figure.beam[:4]):
+    for edge in (transform(inverse, line) for line in figure.beam[1:5]):
         assert edge[1] - edge[0] == pytest.approx([0.0, 0.0, 1.15], abs=1e-9)
 
 
@@ -404,7 +405,7 @@ def test_axes_point_where_the_file_has_them(towards, up, rightwards, upwards):
 
 
 def test_the_picture_has_its_size_and_shows_both_kinds_of_device(plan):
-    picture = draw_rig(plan, size=(1000, 640))
+    picture = draw_rig(plan, size=(1000, 640), face_status=status_of(plan))
     assert picture.size == (1000, 640)
     assert len(like(picture, ORANGE)[0]) > 200
     assert len(like(picture, BLUE)[0]) > 200
@@ -465,7 +466,10 @@ def test_the_file_is_the_same_every_time(tmp_path, plan):
 def test_other_ups_and_device_counts_are_drawn(mesh):
     turned = TriangleMesh(mesh.vertices[:, [1, 2, 0]], mesh.faces)
     alone = plan_of(turned, [], [camera(turned, "C1", 20, 5)], up=(0.0, 1.0, 0.0))
-    assert draw_rig(alone, size=(800, 500)).size == (800, 500)
+    assert draw_rig(alone, size=(800, 500), face_status=status_of(alone)).size == (
+        800,
+        500,
+    )
     # Devices that surround the object evenly stand on no side.
     around = plan_of(
         mesh,
@@ -475,13 +479,16 @@ def test_other_ups_and_device_counts_are_drawn(mesh):
         ],
         [camera(mesh, "C1", 90, 0), camera(mesh, "C2", -90, 0)],
     )
-    assert draw_rig(around, size=(800, 500)).size == (800, 500)
+    assert draw_rig(around, size=(800, 500), face_status=status_of(around)).size == (
+        800,
+        500,
+    )
 
 
 def test_what_cannot_be_drawn_is_refused(plan):
     n = len(plan.surface.mesh.faces)
     with pytest.raises(ValueError, match="at least 800 x 500"):
-        draw_rig(plan, size=(300, 200))
+        draw_rig(plan, size=(300, 200), face_status=status_of(plan))
     with pytest.raises(ValueError, match="face_status must be"):
         draw_rig(plan, face_status=np.zeros(n - 1, dtype=np.int8))
     with pytest.raises(ValueError, match="must hold 0 to 3"):
@@ -492,7 +499,8 @@ def test_a_large_mesh_is_drawn_in_seconds(plan):
     large = sample_head(n_faces=40_000)
     begin = time.process_time()
     document = plan.to_document()
-    draw_rig(plan_of(large, document["projectors"], document["cameras"]))
+    fine = plan_of(large, document["projectors"], document["cameras"])
+    draw_rig(fine, face_status=status_of(fine))
     assert time.process_time() - begin < 4.0, "about 0.5 s on an idle core"
 
 
@@ -516,11 +524,11 @@ CEILING = zone("ceiling", [0.0, 0.0, 0.9], [0.8, 0.5, 0.005])
 def test_zones_are_boxes_about_the_centre_of_the_object(plan):
     ceiling, press = zone_figures(zoned(plan, keep_out=[PRESS], mounting=[CEILING]))
     assert [ceiling.kind, press.kind] == ["mounting plane", "keep out"]
-    assert press.name == "press"
-    offset = press.corners - plan.surface.mesh.centre - PRESS["centre_m"]
+    corners = np.unique(press.edges.reshape(-1, 3).round(12), axis=0)
+    offset = corners - plan.surface.mesh.centre - PRESS["centre_m"]
     along = np.abs(offset @ np.array(PRESS["axes"]).T)
     assert along == pytest.approx(np.tile(PRESS["half_m"], (8, 1)))
-    assert len(np.unique(press.corners.round(9), axis=0)) == 8
+    assert len(corners) == 8
     lengths = np.linalg.norm(np.diff(press.edges, axis=1)[:, 0], axis=1)
     sides = np.repeat(2.0 * np.array(PRESS["half_m"]), 4)
     assert np.sort(lengths) == pytest.approx(np.sort(sides))
@@ -528,10 +536,12 @@ def test_zones_are_boxes_about_the_centre_of_the_object(plan):
 
 def test_a_zone_is_drawn_along_its_edges_and_nowhere_else(plan):
     (press,) = zone_figures(zoned(plan, keep_out=[PRESS]))
-    middle = press.corners.mean(axis=0)
+    middle = press.edges.mean(axis=(0, 1))
     view = PictureView(middle, np.eye(3)[0], np.eye(3)[1], (400, 400), 2.5e-3)
-    panel = Panel(Image.new("RGB", view.size, BACKGROUND), view)
-    draw_zones(panel, [press], RayCaster(plan.surface.mesh))
+    panel = Panel(
+        Image.new("RGB", view.size, BACKGROUND), view, RayCaster(plan.surface.mesh)
+    )
+    draw_zones(panel, [press])
     drawn = pixels(panel.image)
     rows, columns = np.nonzero(drawn.sum(axis=2) < 3 * 255)
     local = (np.stack([columns, rows], axis=1) + 0.5 - 200.0) * 2.5e-3 * [1, -1]
@@ -547,10 +557,12 @@ def test_a_zone_is_drawn_along_its_edges_and_nowhere_else(plan):
 
 def test_a_slab_seen_edge_on_is_a_line(plan):
     (ceiling,) = zone_figures(zoned(plan, mounting=[CEILING]))
-    middle = ceiling.corners.mean(axis=0)
+    middle = ceiling.edges.mean(axis=(0, 1))
     view = PictureView(middle, np.eye(3)[0], np.eye(3)[2], (400, 400), 0.1)
-    panel = Panel(Image.new("RGB", view.size, BACKGROUND), view)
-    draw_zones(panel, [ceiling], RayCaster(plan.surface.mesh))
+    panel = Panel(
+        Image.new("RGB", view.size, BACKGROUND), view, RayCaster(plan.surface.mesh)
+    )
+    draw_zones(panel, [ceiling])
     rows, _ = np.nonzero(pixels(panel.image).sum(axis=2) < 3 * 255)
     assert 0 < np.ptp(rows) + 1 <= 4
 
@@ -558,8 +570,10 @@ def test_a_slab_seen_edge_on_is_a_line(plan):
 def test_the_picture_holds_the_zones_and_names_them(plan):
     small = (800, 500)
     room = zone("box", [0.0, 0.0, 0.0], [1.0, 1.0, 1.0])
-    picture = draw_rig(zoned(plan, box=room, keep_out=[PRESS]), size=small)
-    plain = draw_rig(plan, size=small)
+    status = status_of(plan)
+    crowded = zoned(plan, box=room, keep_out=[PRESS])
+    picture = draw_rig(crowded, size=small, face_status=status)
+    plain = draw_rig(plan, size=small, face_status=status)
     # In the legend, below the object: there is no such colour without zones.
     for kind, count in (("room", 1), ("keep out", 1), ("mounting plane", 0)):
         rows, columns = like(picture, ZONES[kind], tolerance=0)
@@ -571,13 +585,15 @@ def test_a_device_that_stands_already_is_framed_and_named(plan):
     first, *rest = plan.to_document()["cameras"]
     old = [first | {"existing": True, "name": "old camera"}, *rest]
     known = RigPlan.from_document(plan.to_document() | {"cameras": old}, plan.surface)
-    assert [figure.existing for figure in device_figures(known, body_m=0.1)] == [
+    assert [f.device.existing for f in device_figures(known, body_m=0.1)] == [
         "",
         "",
         "old camera",
         "",
         "",
     ]
-    blue = [len(like(draw_rig(p), BLUE, tolerance=30)[0]) for p in (plan, known)]
+    status = status_of(plan)
+    pictures = [draw_rig(shown, face_status=status) for shown in (plan, known)]
+    blue = [len(like(picture, BLUE, tolerance=30)[0]) for picture in pictures]
     # Two square frames of 16 px a side and 2 px wide, and the letters of the name.
     assert blue[1] - blue[0] > 2 * 4 * 14 * 2

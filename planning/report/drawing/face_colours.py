@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.plan import RigPlan
-from planning.model.surface import Surface
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import lit_samples, measured_by
@@ -79,25 +78,6 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
     return status
 
 
-def face_colours(
-    surface: Surface, face_status: NDArray[np.int8] | None
-) -> tuple[NDArray[np.float64], Sequence[tuple[str, Colour]]]:
-    """Return a colour for each face, by status or else by region, and their legend.
-
-    Raises:
-        ValueError: If the status doesn't fit the faces.
-    """
-    if face_status is None:
-        legend = [("dominant regions", _REGIONS[0]), ("rest of the surface", CLAY)]
-        return region_colours(surface.region), legend
-    expected = (len(surface.mesh.faces),)
-    if np.shape(face_status) != expected:
-        raise ValueError(f"face_status must be {expected}, got {np.shape(face_status)}")
-    colours = status_colours(face_status)
-    order = (MEASURED, NOT_MEASURED, NOT_LIT, OUTSIDE_TARGET)
-    return colours, [_STATUS[k] for k in order if np.any(face_status == k)]
-
-
 def region_colours(region: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return a colour for each face by its dominant region, clay for none; (n_f, 3).
 
@@ -108,13 +88,19 @@ def region_colours(region: NDArray[np.int64]) -> NDArray[np.float64]:
     return palette[np.where(region >= 0, region % len(_REGIONS), len(_REGIONS))]
 
 
-def status_colours(face_status: NDArray[np.int8]) -> NDArray[np.float64]:
-    """Return a colour for each face by its status, as in `draw_rig`; (n_f, 3).
+def status_colours(
+    face_status: NDArray[np.int8], n_faces: int
+) -> tuple[NDArray[np.float64], Sequence[tuple[str, Colour]]]:
+    """Return a colour for each face by its status, (n_f, 3), and their legend.
 
     Raises:
-        ValueError: If a value isn't one of 0 to 3.
+        ValueError: If the status doesn't fit the faces.
     """
     status = np.asarray(face_status)
+    if status.shape != (n_faces,):
+        raise ValueError(f"face_status must be ({n_faces},), got {status.shape}")
     if not np.all((status >= 0) & (status < len(_STATUS))):
         raise ValueError(f"face_status must hold 0 to 3, got {np.unique(status)}")
-    return np.array([colour for _, colour in _STATUS], dtype=np.float64)[status]
+    order = (MEASURED, NOT_MEASURED, NOT_LIT, OUTSIDE_TARGET)
+    legend = [_STATUS[k] for k in order if np.any(status == k)]
+    return np.array([colour for _, colour in _STATUS], dtype=np.float64)[status], legend

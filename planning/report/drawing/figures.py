@@ -1,18 +1,19 @@
 """Devices and zones as polylines in the world, ready to be drawn."""
 
 from dataclasses import dataclass
-from itertools import combinations, product
-from typing import Literal
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import transform
+from geometry.shapes.boxes import OrientedBox
 from planning.model.bodies import Box
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedProjector
 from planning.scene.patterns.ring_pattern import RingPattern
+from planning.scene.placed_bodies import Device, placed_box
 
 from .picture_view import Colour, facing
 
@@ -29,31 +30,24 @@ _CIRCLE = 48
 # Turns of a three-quarter view in degrees: none runs along a world axis.
 _TURNS = (30, 45, 60, 120, 135, 150, 210, 225, 240, 300, 315, 330)
 
+_Lines = list[NDArray[np.float64]]
+
 
 @dataclass(frozen=True, eq=False)
 class DeviceFigure:
     """What is drawn of one device; polylines are points in the world [m], (n, 3).
 
     Attributes:
-        id: Its name in the plan.
-        kind: What it is.
-        position: Its origin in the world [m], shape (3,).
+        device: As it stands.
         body: Outline of a small frustum, or of a parallel projector's panel; and the
             edges of its housing, where the plan has one.
-        beam: Edges of the light or the field of view as far as the object.
-        axis: From the origin along the optical axis to the object's depth, (2, 3).
-        distance_m: From the origin to the centre of the object [m].
-        existing: Name of the device that stands already; empty: it is planned.
+        beam: The optical axis as far as the object, and the edges of a projector's
+            light.
     """
 
-    id: str
-    kind: Literal["projector", "camera"]
-    position: NDArray[np.float64]
-    body: tuple[NDArray[np.float64], ...]
-    beam: tuple[NDArray[np.float64], ...]
-    axis: NDArray[np.float64]
-    distance_m: float
-    existing: str
+    device: Device
+    body: _Lines
+    beam: _Lines
 
 
 def device_figures(plan: RigPlan, *, body_m: float) -> list[DeviceFigure]:
@@ -69,77 +63,63 @@ def device_figures(plan: RigPlan, *, body_m: float) -> list[DeviceFigure]:
     ]
 
 
-def _figure(
-    device: PlannedProjector | PlannedCamera, centre: NDArray[np.float64], body_m: float
-) -> DeviceFigure:
-    pose = device.world_from_device
-    position = pose[:3, 3]
-    depth = max(float((centre - position) @ pose[:3, 2]), body_m)
-    model = device.device
-    if isinstance(model, ParallelModel):
-        radius = _beam_radius(device, model)
-        local_body, local_beam = _parallel(model, radius, depth)
+def _figure(device: Device, centre: NDArray[np.float64], body_m: float) -> DeviceFigure:
+    pose, model = device.world_from_device, device.device
+    depth = max(float((centre - pose[:3, 3]) @ pose[:3, 2]), body_m)
+    if isinstance(model, PinholeModel):
+        body, beam = _pinhole(model, body_m, depth)
     else:
-        local_body, local_beam = _pinhole(model, body_m, depth)
+        radius = model.beam_reach
+        if isinstance(device, PlannedProjector):
+            radius = min(radius, RingPattern(device).outermost)
+        body, beam = _parallel(model, radius, depth)
+    if not isinstance(device, PlannedProjector):
+        beam = []
+    axis = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, depth]])
+    placed = [transform(pose, line) for line in body]
     if device.body is not None:
-        corners = _corners(np.array(device.body.centre_m), device.body.half_m)
-        local_body = [*local_body, *_edges(corners)]
+        placed.extend(box_edges(placed_box(device.body, pose)))
     return DeviceFigure(
-        device.id,
-        "projector" if isinstance(device, PlannedProjector) else "camera",
-        position,
-        tuple(transform(pose, line) for line in local_body),
-        tuple(transform(pose, line) for line in local_beam),
-        transform(pose, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, depth]])),
-        float(np.linalg.norm(position - centre)),
-        device.existing,
+        device, placed, [transform(pose, line) for line in (axis, *beam)]
     )
 
 
-def _beam_radius(
-    device: PlannedProjector | PlannedCamera, model: ParallelModel
-) -> float:
-    """Radius that a parallel projector lights, inf where only its panel limits it."""
-    projects = isinstance(device, PlannedProjector)
-    return min(model.beam_reach, RingPattern(device).outermost if projects else np.inf)
-
-
-def _pinhole(
-    model: PinholeModel, body_m: float, depth: float
-) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+def _pinhole(model: PinholeModel, body_m: float, depth: float) -> tuple[_Lines, _Lines]:
+    """A frustum with a tick on the image's upper side; and the light from it on."""
     width, height = model.resolution
     pixels = np.array([[0, 0], [width, 0], [width, height], [0, height]]) - 0.5
     rays = model.rays(pixels)
     # Depth one, so that the four corners lie in a plane across the axis.
-    rays = rays / rays[:, 2:]
-    near, far, apex = rays * body_m, rays * depth, np.zeros(3)
-    body = [_closed(near), *(np.array([apex, corner]) for corner in near)]
-    # A tick on the image's upper side shows which way up the device is.
-    top = 0.5 * (near[0] + near[1])
-    tick = top + np.array([0.0, -0.35 * (near[2, 1] - near[1, 1]), 0.0])
-    body += [np.array([near[0] * 0.6 + near[1] * 0.4, tick])]
-    body += [np.array([tick, near[0] * 0.4 + near[1] * 0.6])]
-    return body, [np.array([a, b]) for a, b in zip(near, far, strict=True)] + [
-        _closed(far)
-    ]
+    near = body_m * rays / rays[:, 2:]
+    left, right, below = near[:3]
+    rise = np.array([0.0, 0.35 * (right[1] - below[1]), 0.0])
+    thirds = [0.6 * left + 0.4 * right, 0.4 * left + 0.6 * right]
+    tick = np.array([thirds[0], 0.5 * (left + right) + rise, thirds[1]])
+    edges = [np.array([np.zeros(3), corner]) for corner in near]
+    return [_closed(near), *edges, tick], _tube(near, near * depth / body_m)
 
 
 def _parallel(
     model: ParallelModel, radius: float, depth: float
-) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+) -> tuple[_Lines, _Lines]:
+    """The panel with a tick on its upper side; and the light that leaves it."""
     x, y = model.half_panel
     panel = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
     tick = np.array([[-0.2 * x, -y, 0.0], [0.0, -1.25 * y, 0.0], [0.2 * x, -y, 0.0]])
     outline = panel
     if radius < float(np.hypot(x, y)):
         turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE, endpoint=False)
-        outline = radius * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
-        outline[:, 0] = np.clip(outline[:, 0], -x, x)
-        outline[:, 1] = np.clip(outline[:, 1], -y, y)
-    end = outline + np.array([0.0, 0.0, depth])
-    edges = range(0, len(outline), max(len(outline) // 4, 1))
-    beam = [np.array([outline[k], end[k]]) for k in edges]
-    return [_closed(panel), tick], [*beam, _closed(outline), _closed(end)]
+        circle = radius * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+        outline = np.clip(circle, [-x, -y, 0.0], [x, y, 0.0])
+    beam = _tube(outline, outline + np.array([0.0, 0.0, depth]))
+    return [_closed(panel), tick], [*beam, _closed(outline)]
+
+
+def _tube(near: NDArray[np.float64], far: NDArray[np.float64]) -> _Lines:
+    """Four edges from one outline to another, and the other."""
+    step = len(near) // 4
+    edges = zip(near[::step], far[::step], strict=True)
+    return [*(np.stack(edge) for edge in edges), _closed(far)]
 
 
 def _closed(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -152,15 +132,11 @@ class ZoneFigure:
 
     Attributes:
         kind: A key of `ZONES`.
-        name: As in the rig file.
-        corners: In the world [m], shape (8, 3).
-        edges: Pairs of corners, shape (12, 2, 3).
+        edges: Pairs of corners [m], shape (12, 2, 3).
         near: Corners drawn in to where devices may stand [m], shape (8, 3).
     """
 
     kind: str
-    name: str
-    corners: NDArray[np.float64]
     edges: NDArray[np.float64]
     near: NDArray[np.float64]
 
@@ -170,8 +146,7 @@ def zone_figures(plan: RigPlan) -> list[ZoneFigure]:
     space = plan.requirements.workspace
     room = () if space.box is None else (space.box,)
     zones = zip(ZONES, (room, space.mounting, space.keep_out), strict=True)
-    centre = np.array(space.centre)
-    reach = zone_reach(plan)
+    centre, reach = np.array(space.centre), zone_reach(plan)
     return [_zone(kind, box, centre, reach) for kind, boxes in zones for box in boxes]
 
 
@@ -182,42 +157,31 @@ def zone_reach(plan: RigPlan) -> float:
 
 
 def _zone(kind: str, box: Box, centre: NDArray[np.float64], reach: float) -> ZoneFigure:
-    offsets = box.centre_m + _corners(np.zeros(3), box.half_m) @ np.array(box.axes)
-    corners = centre + offsets
-    near = centre + np.clip(offsets, -reach, reach)
-    return ZoneFigure(kind, box.name, corners, _edges(corners), near)
+    middle, axes, half = (np.array(v) for v in (box.centre_m, box.axes, box.half_m))
+    placed = OrientedBox(centre + middle, axes, half)
+    near = centre + np.clip(placed.corners - centre, -reach, reach)
+    return ZoneFigure(kind, box_edges(placed), near)
 
 
-def _corners(
-    centre: NDArray[np.float64], half: tuple[float, float, float]
-) -> NDArray[np.float64]:
-    """The eight corners of a box, (8, 3), the last axis changing first."""
-    return centre + np.array(list(product((-1.0, 1.0), repeat=3))) * half
-
-
-def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The twelve edges of a box: pairs of `_corners` that differ in one sign."""
+def box_edges(box: OrientedBox) -> NDArray[np.float64]:
+    """Return the twelve edges of a box, (12, 2, 3): corners that differ in one sign."""
     pairs = [(a, b) for a, b in combinations(range(8), 2) if a ^ b in (1, 2, 4)]
-    return corners[np.array(pairs)]
+    return box.corners[np.array(pairs)]
 
 
 def best_direction(
     positions: NDArray[np.float64], centre: NDArray[np.float64], up: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the three-quarter direction from which devices overlap least.
+    """Return the three-quarter direction from which devices overlap least, unit.
 
-    Tried are 12 turns about `up`, none along a world axis, at heights of 20 to 40
-    degrees; the score is the least distance in the picture between two devices or a
-    device and the object, relative to the picture, plus a preference for the side that
-    the devices stand on.
+    Tried are 12 turns about `up` at heights of 20 to 40 degrees; the score is the least
+    distance in the picture between two devices or a device and the object, relative to
+    the picture, plus a preference for the side that the devices stand on.
 
     Args:
         positions: Of the devices [m], shape (n, 3).
         centre: Of the object [m], shape (3,).
         up: World direction that is up, unit, shape (3,).
-
-    Returns:
-        Unit vector from the object to the viewer.
     """
     right, ahead = facing(up, up)
     spots = np.concatenate([positions, centre[None]]) - centre
@@ -243,16 +207,7 @@ def best_direction(
 def close_directions(
     positions: NDArray[np.float64], centre: NDArray[np.float64], up: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """Return two views from the side that the devices stand on, to its left and right.
-
-    Args:
-        positions: Of the devices [m], shape (n, 3).
-        centre: Of the object [m], shape (3,).
-        up: World direction that is up, unit, shape (3,).
-
-    Returns:
-        Vectors from the object to the viewer.
-    """
+    """Return two views from the side that devices stand on, to its left and right."""
     away = positions - centre
     side = away.sum(axis=0)
     side -= (side @ up) * up

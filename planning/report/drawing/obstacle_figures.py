@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs, mesh_edges
-from geometry.rays.rays import RayCaster
 from planning.model.plan import RigPlan
 
 from .panel import Panel
@@ -67,13 +66,10 @@ def obstacle_figures(plan: RigPlan, reach_m: float) -> list[ObstacleFigure]:
 
 
 def draw_obstacles(
-    panel: Panel,
-    figures: Sequence[ObstacleFigure],
-    towards: NDArray[np.float64],
-    caster: RayCaster,
+    panel: Panel, figures: Sequence[ObstacleFigure], towards: NDArray[np.float64]
 ) -> None:
     """Draw and name obstacles; lines are faint where the object hides them."""
     for figure in figures:
         for line in figure.lines(towards):
-            panel.polyline(line, OBSTACLE, width=1.5, caster=caster, alpha=190)
+            panel.polyline(line, OBSTACLE, width=1.5, alpha=190)
         panel.label(figure.near.mean(axis=0), figure.name, OBSTACLE, size=13.0)

@@ -1,6 +1,6 @@
 """Lines, labels, a scale bar and axes on top of a picture."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -33,11 +33,13 @@ class Panel:
     Attributes:
         image: What is drawn so far.
         view: How the world falls into it.
+        caster: Over the mesh that hides lines; None: nothing does.
         taken: Boxes that no label may cover.
     """
 
     image: Image.Image
     view: PictureView
+    caster: RayCaster | None = None
     taken: list[_Box] = field(default_factory=list[_Box])
 
     @property
@@ -50,23 +52,21 @@ class Panel:
         colour: Colour,
         *,
         width: float,
-        caster: RayCaster | None = None,
         alpha: int = 255,
     ) -> None:
-        """Draw a polyline of the world; what a mesh hides is nearly left out.
+        """Draw a polyline of the world; what the mesh hides is nearly left out.
 
         Args:
             points: In [m], shape (n, 3).
             colour: Of the line.
             width: Of the line in final pixels.
-            caster: Over the mesh that can hide it.
             alpha: Opacity, 0 to 255.
         """
         draw, thick = self._draw, max(1, round(width * SUPERSAMPLING))
         for start, end in pairwise(points):
             t = np.linspace(0.0, 1.0, _PIECES + 1)[:, None]
             line = start + t * (end - start)
-            hidden = _hidden(line, self.view, caster)
+            hidden = self._hidden(line)
             pixels = self.view.project(line)
             # Pieces of one opacity are one line: drawn apart they would overlap.
             faint = hidden[:-1] | hidden[1:]
@@ -102,33 +102,39 @@ class Panel:
         self, point: NDArray[np.float64], text: str, colour: Colour, *, size: float
     ) -> None:
         """Write a label near a point of the world, where it covers least."""
-        x, y = self.view.project(point)
         left, top, right, bottom = font(size).getbbox(text)
         pad = 3.0 * SUPERSAMPLING
-        boxes = self._places(x, y, right - left + 2 * pad, bottom - top + 2 * pad)
-        box = min(boxes, key=self._covered)
+        extent = np.array([right - left, bottom - top]) + 2.0 * pad
+        box = self._clearest(self.view.project(point), extent)
         self._draw.rounded_rectangle(box, radius=pad, fill=(255, 255, 255, 215))
         spot = (box[0] + pad - left, box[1] + pad - top)
         self._draw.text(spot, text, colour, font=font(size))
         self.taken.append(box)
 
-    def _places(
-        self, x: float, y: float, width: float, height: float
-    ) -> Iterator[_Box]:
-        """Yield boxes about a point: the nearest and the most outward first."""
-        outward = np.arctan2(y - 0.5 * self.view.size[1], x - 0.5 * self.view.size[0])
-        for reach in 9.0 * SUPERSAMPLING * np.arange(1, 9):
-            for step in range(12):
-                turn = outward + (step + 1) // 2 * (-1) ** step * np.pi / 6
-                left = x + np.cos(turn) * (reach + 0.5 * width) - 0.5 * width
-                top = y + np.sin(turn) * (reach + 0.5 * height) - 0.5 * height
-                yield left, top, left + width, top + height
+    def _clearest(self, spot: NDArray[np.float64], extent: NDArray[np.float64]) -> _Box:
+        """The box about a spot that covers least: nearest and most outward first."""
+        x, y = spot - 0.5 * np.array(self.view.size)
+        steps = np.arange(12)
+        turns = np.arctan2(y, x) + (steps + 1) // 2 * (-1) ** steps * np.pi / 6
+        along = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        reach = 9.0 * SUPERSAMPLING * np.arange(1, 9)[:, None, None]
+        low = (spot + along * (reach + 0.5 * extent) - 0.5 * extent).reshape(-1, 2)
+        boxes = np.concatenate([low, low + extent], axis=1)
+        inside = _overlaps(boxes, [(0, 0, *self.view.size)])
+        outside = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) - inside
+        covered = 4.0 * outside + _overlaps(boxes, self.taken)
+        left, top, right, bottom = boxes[np.argmin(covered)].tolist()
+        return left, top, right, bottom
 
-    def _covered(self, box: _Box) -> float:
-        """Area of a box that is taken or outside the panel."""
-        area = (box[2] - box[0]) * (box[3] - box[1])
-        outside = area - _overlap(box, (0, 0, *self.view.size))
-        return 4.0 * outside + sum(_overlap(box, other) for other in self.taken)
+    def _hidden(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether the mesh lies between points of the world and the viewer, (n,)."""
+        if self.caster is None:
+            return np.zeros(len(points), dtype=bool)
+        mesh = self.caster.mesh
+        away = np.linalg.norm(points - mesh.centre, axis=1).max() + 2.0 * mesh.reach
+        rays = np.broadcast_to(self.view.to_viewer, points.shape)
+        starts = points + 1e-4 * mesh.radius * rays
+        return self.caster.occluded(starts, rays, np.full(len(points), away))
 
     def heading(self, text: str) -> None:
         """Name the panel in its upper left corner; labels keep off the name."""
@@ -200,20 +206,11 @@ def round_length(room: float) -> float:
     )
 
 
-def _hidden(
-    points: NDArray[np.float64], view: PictureView, caster: RayCaster | None
-) -> NDArray[np.bool_]:
-    """Whether the mesh lies between points of the world and the viewer, (n,)."""
-    if caster is None:
-        return np.zeros(len(points), dtype=bool)
-    mesh = caster.mesh
-    away = np.linalg.norm(points - mesh.centre, axis=1).max() + 2.0 * mesh.reach
-    rays = np.broadcast_to(view.to_viewer, points.shape)
-    slack = 1e-4 * mesh.radius
-    return caster.occluded(points + slack * rays, rays, np.full(len(points), away))
-
-
-def _overlap(a: _Box, b: _Box) -> float:
-    width = min(a[2], b[2]) - max(a[0], b[0])
-    height = min(a[3], b[3]) - max(a[1], b[1])
-    return max(width, 0.0) * max(height, 0.0)
+def _overlaps(
+    boxes: NDArray[np.float64], others: Sequence[_Box]
+) -> NDArray[np.float64]:
+    """The area that each box, (n, 4), shares with all others, (n,)."""
+    other = np.reshape(others, (-1, 4))
+    ends = np.minimum(boxes[:, None, 2:], other[:, 2:])
+    sides = ends - np.maximum(boxes[:, None, :2], other[:, :2])
+    return np.prod(np.maximum(sides, 0.0), axis=2).sum(axis=1)

@@ -15,8 +15,9 @@ from geometry.rays.rays import RayCaster
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
+from planning.scene.placed_bodies import kind_of
 
-from .face_colours import face_colours
+from .face_colours import status_colours
 from .figures import (
     ZONES,
     DeviceFigure,
@@ -41,16 +42,10 @@ def save_rig_picture(
     plan: RigPlan,
     path: str | Path,
     *,
+    face_status: NDArray[np.int8],
     size: tuple[int, int] = (1600, 1000),
-    face_status: NDArray[np.int8] | None = None,
 ) -> None:
-    """Write the picture of a rig as a PNG, the same bytes for the same plan.
-
-    Args:
-        plan: The plan.
-        path: Where the file goes; its folder must exist.
-        size: Width and height in [px].
-        face_status: As for `draw_rig`.
+    """Write what `draw_rig` returns as a PNG, the same bytes for the same plan.
 
     Raises:
         ValueError: If the size or the status can't be drawn.
@@ -63,8 +58,8 @@ def save_rig_picture(
 def draw_rig(
     plan: RigPlan,
     *,
+    face_status: NDArray[np.int8],
     size: tuple[int, int] = (1600, 1000),
-    face_status: NDArray[np.int8] | None = None,
 ) -> Image.Image:
     """Return a picture of a rig: devices, their distances, and what they measure.
 
@@ -74,139 +69,129 @@ def draw_rig(
 
     Args:
         plan: The plan; only its devices, workspace and surface are drawn.
+        face_status: What becomes of each face, from `face_status`, shape (n_f,).
         size: Width and height in [px], at least 800 x 500.
-        face_status: What becomes of each face, shape (n_f,): 0 outside the target,
-            1 measured, 2 target, lit but not measured, 3 target, not lit. Default:
-            faces are coloured by dominant region instead.
 
     Raises:
         ValueError: If the picture is too small or the status doesn't fit the faces.
     """
     if not (size[0] >= _MIN_SIZE[0] and size[1] >= _MIN_SIZE[1]):
         raise ValueError(f"a picture of a rig needs at least 800 x 500 px, got {size}")
-    colours, legend = face_colours(plan.surface, face_status)
     mesh = plan.surface.mesh
+    colours, legend = status_colours(face_status, len(mesh.faces))
     shader = Shader(RayCaster(mesh), colours)
-    up = np.array(plan.requirements.workspace.up)
+    figures = device_figures(
+        plan, body_m=0.09 * max(plan.requirements.workspace.projector_radius_m)
+    )
     fine = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     split, head, foot = round(0.57 * fine[0]), round(0.065 * fine[1]), fine[1]
     middle = head + round(0.53 * (foot - head))
-    width = fine[0] - split
-    whole = _devices_panel(plan, shader, up, (split, foot - head), from_above=False)
-    above = _devices_panel(plan, shader, up, (width, middle - head), from_above=True)
-    close = _close_up(plan, shader, up, (width, foot - middle), legend)
     picture = Image.new("RGB", fine, BACKGROUND)
-    picture.paste(whole, (0, head))
-    picture.paste(above, (split, head))
-    picture.paste(close, (split, middle))
-    draw = ImageDraw.Draw(picture)
-    for ends in (
-        [(0, head), (fine[0], head)],
-        [(split, head), (split, foot)],
-        [(split, middle), (fine[0], middle)],
+    for left, top, right, bottom in (
+        (0, head, split, foot),
+        (split, head, fine[0], middle),
+        (split, middle, fine[0], foot),
     ):
-        draw.line(ends, fill=(205, 205, 210), width=SUPERSAMPLING)
-    _draw_title(draw, plan, (fine[0], head))
+        extent = (right - left, bottom - top)
+        panel = (
+            _close_up(plan, figures, shader, extent, legend)
+            if top == middle
+            else _devices_panel(plan, figures, shader, extent, from_above=left > 0)
+        )
+        picture.paste(panel, (left, top))
+        ends = [(left, bottom), (left, top), (right, top)][left == 0 :]
+        ImageDraw.Draw(picture).line(ends, fill=(205, 205, 210), width=SUPERSAMPLING)
+    _draw_title(ImageDraw.Draw(picture), plan, (fine[0], head))
     return picture.resize(size, Image.Resampling.BOX)
 
 
 def _devices_panel(
     plan: RigPlan,
+    figures: Sequence[DeviceFigure],
     shader: Shader,
-    up: NDArray[np.float64],
     size: tuple[int, int],
     *,
     from_above: bool,
 ) -> Image.Image:
     """The object, zones and devices, in a view that holds all; above with distances."""
-    figures, centre = _figures(plan), plan.surface.mesh.centre
+    centre, up = plan.surface.mesh.centre, np.array(plan.requirements.workspace.up)
     direction, heading = up, "From above; distances to the object's centre"
     if not from_above:
-        positions = np.array([figure.position for figure in figures])
-        direction = best_direction(positions, centre, up)
+        direction = best_direction(_positions(figures), centre, up)
         heading = "All devices, to scale; x, y, z are the axes of the mesh file"
     vertices = shader.caster.mesh.corners.reshape(-1, 3)
-    zones = zone_figures(plan)
+    zones, solids = zone_figures(plan), obstacle_figures(plan, zone_reach(plan))
     bodies = [line for figure in figures for line in figure.body]
-    solids = obstacle_figures(plan, zone_reach(plan))
     near = [shown.near for shown in (*zones, *solids)]
     everything = np.concatenate([vertices, *bodies, *near])
     view = fitted(everything, direction, up, size, margin_px=0.085 * min(size))
-    panel = Panel(shader.shade(view), view)
+    panel = Panel(shader.shade(view), view, shader.caster)
     panel.keep_clear(vertices)
-    draw_zones(panel, zones, shader.caster)
-    draw_obstacles(panel, solids, direction, shader.caster)
+    draw_zones(panel, zones)
+    draw_obstacles(panel, solids, direction)
     panel.heading(heading)
-    type_size = 14.0 if from_above else 17.0
-    _mark_devices(
-        panel, figures, shader.caster, type_size=type_size, distances=from_above
-    )
-    return panel.image
-
-
-def _figures(plan: RigPlan) -> list[DeviceFigure]:
-    reach = 0.09 * max(plan.requirements.workspace.projector_radius_m)
-    return device_figures(plan, body_m=reach)
-
-
-def draw_zones(panel: Panel, zones: Sequence[ZoneFigure], caster: RayCaster) -> None:
-    """Draw the edges of zones, faint where the object hides them."""
-    for zone in zones:
-        for edge in zone.edges:
-            panel.polyline(edge, ZONES[zone.kind], width=1.0, caster=caster, alpha=150)
-
-
-def _mark_devices(
-    panel: Panel,
-    figures: Sequence[DeviceFigure],
-    caster: RayCaster,
-    *,
-    type_size: float,
-    distances: bool,
-) -> None:
     for figure in figures:
-        colour = _DEVICES[figure.kind]
-        panel.polyline(figure.axis, colour, width=1.0, caster=caster, alpha=110)
-        if figure.kind == "projector":
-            for line in figure.beam:
-                panel.polyline(line, colour, width=1.0, caster=caster, alpha=90)
-        for line in figure.body:
-            panel.polyline(line, colour, width=2.0, caster=caster)
-        panel.dot(figure.position, colour, radius=3.0)
-        if figure.existing:
-            panel.frame(figure.position, colour, radius=8.0)
-        panel.keep_clear(np.concatenate(figure.body))
+        _mark_device(panel, figure)
     panel.scale_bar(size=14.0)
     panel.axes(size=15.0)
     for figure in figures:
-        text = figure.id
-        if figure.existing:
-            text += f"  {_shortened(figure.existing)}"
-        if distances:
-            text += f"  {1e3 * figure.distance_m:.0f} mm"
-        panel.label(figure.position, text, _DEVICES[figure.kind], size=type_size)
+        device, text = figure.device, figure.device.id
+        position = device.world_from_device[:3, 3]
+        if device.existing:
+            text += f"  {_shortened(device.existing)}"
+        if from_above:
+            text += f"  {1e3 * np.linalg.norm(position - centre):.0f} mm"
+        colour = _DEVICES[kind_of(device)]
+        panel.label(position, text, colour, size=14.0 if from_above else 17.0)
+    return panel.image
+
+
+def _positions(figures: Sequence[DeviceFigure]) -> NDArray[np.float64]:
+    return np.array([figure.device.world_from_device[:3, 3] for figure in figures])
+
+
+def draw_zones(panel: Panel, zones: Sequence[ZoneFigure]) -> None:
+    """Draw the edges of zones, faint where the object hides them."""
+    for zone in zones:
+        for edge in zone.edges:
+            panel.polyline(edge, ZONES[zone.kind], width=1.0, alpha=150)
+
+
+def _mark_device(panel: Panel, figure: DeviceFigure) -> None:
+    device, colour = figure.device, _DEVICES[kind_of(figure.device)]
+    for line in figure.beam:
+        panel.polyline(line, colour, width=1.0, alpha=100)
+    for line in figure.body:
+        panel.polyline(line, colour, width=2.0)
+    position = device.world_from_device[:3, 3]
+    panel.dot(position, colour, radius=3.0)
+    if device.existing:
+        panel.frame(position, colour, radius=8.0)
+    panel.keep_clear(np.concatenate(figure.body))
 
 
 def _close_up(
     plan: RigPlan,
+    figures: Sequence[DeviceFigure],
     shader: Shader,
-    up: NDArray[np.float64],
     size: tuple[int, int],
     legend: Sequence[tuple[str, Colour]],
 ) -> Image.Image:
     picture = Image.new("RGB", size, BACKGROUND)
-    rows = [*legend, *((f"{kind}s", colour) for kind, colour in _DEVICES.items())]
-    kinds = {figure.kind for figure in zone_figures(plan)}
-    rows += [(kind, colour) for kind, colour in ZONES.items() if kind in kinds]
-    if plan.surface.obstacles:
+    shown = {figure.kind for figure in zone_figures(plan)}
+    rows = [
+        *legend,
+        *((f"{kind}s", colour) for kind, colour in _DEVICES.items()),
+        *((kind, colour) for kind, colour in ZONES.items() if kind in shown),
+    ]
+    if obstacle_figures(plan, zone_reach(plan)):
         rows.append(("obstacle", OBSTACLE))
     foot = (-(-len(rows) // 2) * 21 + 8) * SUPERSAMPLING
     half = (size[0] // 2, size[1] - foot)
-    corners = shader.caster.mesh.corners.reshape(-1, 3)
-    positions = np.array([figure.position for figure in _figures(plan)])
-    for k, direction in enumerate(
-        close_directions(positions, plan.surface.mesh.centre, up)
-    ):
+    mesh, up = plan.surface.mesh, np.array(plan.requirements.workspace.up)
+    directions = close_directions(_positions(figures), mesh.centre, up)
+    for k, direction in enumerate(directions):
+        corners = mesh.corners.reshape(-1, 3)
         view = fitted(corners, direction, up, half, margin_px=0.11 * min(half))
         panel = Panel(shader.shade(view), view)
         panel.axes(size=12.0)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.tensors import summed, unit
 from geometry.rays.rays import RayCaster
 
 from .picture_view import BACKGROUND, CLAY, SUPERSAMPLING, PictureView, fitted
@@ -82,7 +83,7 @@ class Shader:
             crease = np.einsum("ij,ij->i", normal, flat) < _CREASE
             normal[crease] = flat[crease]
             smooth += weight[:, None] * normal
-        return _unit(smooth)
+        return unit(smooth)
 
     @cached_property
     def _slopes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -97,16 +98,13 @@ class Shader:
     def _vertex_normals(self) -> NDArray[np.float64]:
         """Mean normals weighted by angle, so that how a face is cut doesn't count."""
         mesh = self.caster.mesh
-        total = np.zeros_like(mesh.vertices)
-        for k, corner in enumerate(mesh.faces.T):
-            here = mesh.corners[:, k]
-            to_next = _unit(mesh.corners[:, (k + 1) % 3] - here)
-            to_last = _unit(mesh.corners[:, (k + 2) % 3] - here)
-            cosine = np.einsum("ij,ij->i", to_next, to_last)
-            weighted = mesh.face_normals * np.arccos(np.clip(cosine, -1, 1))[:, None]
-            for axis in range(3):
-                total[:, axis] += np.bincount(corner, weighted[:, axis], len(total))
-        return _unit(total)
+        edges = np.roll(mesh.corners, -1, axis=1) - mesh.corners
+        to_next = unit(edges.reshape(-1, 3)).reshape(edges.shape)
+        cosine = -np.einsum("nkj,nkj->nk", to_next, np.roll(to_next, 1, axis=1))
+        angles = np.arccos(np.clip(cosine, -1.0, 1.0))
+        weighted = angles[:, :, None] * mesh.face_normals[:, None]
+        corners = mesh.faces.ravel()
+        return unit(summed(weighted.reshape(-1, 3), corners, len(mesh.vertices)))
 
 
 def draw_mesh(
@@ -130,30 +128,16 @@ def draw_mesh(
     Raises:
         ValueError: If the colours don't fit the faces or a direction has no length.
     """
-    shader = Shader(RayCaster(mesh), checked_colours(mesh, face_colours))
+    if face_colours is None:
+        face_colours = np.tile(np.array(CLAY, dtype=np.float64), (len(mesh.faces), 1))
+    colours, expected = np.asarray(face_colours, dtype=float), (len(mesh.faces), 3)
+    if colours.shape != expected or not np.all((colours >= 0) & (colours <= 255)):
+        raise ValueError(f"face_colours must be {expected} in 0..255: {colours.shape}")
     fine = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     points = mesh.corners.reshape(-1, 3)
     view = fitted(points, direction, up, fine, margin_px=0.05 * min(fine))
-    return shader.shade(view).resize(size, Image.Resampling.BOX)
-
-
-def checked_colours(
-    mesh: TriangleMesh, face_colours: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
-    """Return one colour a face, clay where none are given."""
-    if face_colours is None:
-        return np.tile(np.array(CLAY, dtype=np.float64), (len(mesh.faces), 1))
-    colours = np.asarray(face_colours, dtype=np.float64)
-    expected = (len(mesh.faces), 3)
-    if colours.shape != expected or not np.all((colours >= 0) & (colours <= 255)):
-        raise ValueError(f"face_colours must be {expected} in 0..255: {colours.shape}")
-    return colours
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vectors over their length, zero where they have none; (n, 3)."""
-    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    picture = Shader(RayCaster(mesh), colours).shade(view)
+    return picture.resize(size, Image.Resampling.BOX)
 
 
 def _brightness(normals: NDArray[np.float64], view: PictureView) -> NDArray[np.float64]:
