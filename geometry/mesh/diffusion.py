@@ -7,7 +7,7 @@ from geometry.arrays import Array, Ints
 from geometry.parallel import mapped
 
 from .tensors import cross
-from .topology import MeshEdges, mesh_edges
+from .topology import MeshEdges
 
 # Share of the change that may be missing. A solve that has come this far moves nothing
 # that is larger than rounding in what is made of it, and takes tens of steps.
@@ -20,21 +20,13 @@ _BLOCK = 1 << 17
 _LARGEST_WEIGHT = 3.0
 
 
-def surface_laplacian(
-    vertices: Array, faces: Ints, edges: MeshEdges | None = None
-) -> csr_array:
+def surface_laplacian(vertices: Array, faces: Ints, edges: MeshEdges) -> csr_array:
     """Return the stiffness L of linear elements, (n, n), positive semi-definite.
 
     w_ij = (cot a + cot b) / 2 over the angles opposite the edge, no less than zero (an
     average must not leave the range of its values); L_ij = -w_ij, and rows sum to zero.
     Source: Pinkall and Polthier, "Computing discrete minimal surfaces", 1993.
-
-    Args:
-        vertices: Shape (n, 3).
-        faces: Shape (n_f, 3).
-        edges: Those of the faces, if they are known.
     """
-    edges = mesh_edges(faces) if edges is None else edges
     corners = vertices[faces]
     # The side opposite to corner k runs from corner k + 1 to k + 2.
     sides = [corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3] for k in range(3)]

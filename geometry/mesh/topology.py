@@ -44,17 +44,12 @@ def mesh_edges(faces: Ints) -> MeshEdges:
     )
 
 
-def adjacent_faces(edges: MeshEdges, *, manifold_only: bool = True) -> Ints:
-    """Return pairs of faces that share an edge, shape (m, 2).
+def face_pairs(edges: MeshEdges, *, manifold_only: bool = True) -> tuple[Ints, Ints]:
+    """Return pairs of faces that share an edge, shape (m, 2), and the edge of each.
 
     Around an edge of more than two faces, consecutive faces are paired, unless
     ``manifold_only`` leaves such edges out.
     """
-    return face_pairs(edges, manifold_only=manifold_only)[0]
-
-
-def face_pairs(edges: MeshEdges, *, manifold_only: bool = True) -> tuple[Ints, Ints]:
-    """Return `adjacent_faces`, shape (m, 2), and the edge that each pair shares."""
     flat = edges.of_face.ravel()
     if manifold_only or not np.any(edges.n_faces > 2):
         # Two faces at most: the first and the last one at each edge, without sorting.

@@ -9,7 +9,7 @@ from geometry.arrays import Array, Ints, Mask
 from geometry.curvature.curvature import CurvatureField
 from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import adjacent_faces
+from geometry.mesh.topology import face_pairs
 
 from .cones import check_cone_options, cone_pieces, normal_cone
 from .dominance import dominant_faces, face_curvedness
@@ -100,7 +100,7 @@ def dominant_regions(
         raise ValueError(f"area_share must lie in (0, 1], got {area_share}")
     check_cone_options(min_region_share, cone_half_angle)
     curvedness, trusted = face_curvedness(mesh, field)
-    pairs = adjacent_faces(mesh.edges, manifold_only=False)
+    pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     least = min_region_share * mesh.area
     dominant = dominant_faces(mesh, curvedness, trusted, pairs, area_share, least)
     whole = bool(dominant.all())

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.arrays import Array, Mask
+from geometry.arrays import Mask
 from geometry.curvature.curvature import CurvatureField
 from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import adjacent_faces
+from geometry.mesh.topology import face_pairs
 
 from .cones import check_cone_options, cone_pieces
 from .dominance import face_curvedness
@@ -50,61 +50,48 @@ def regions_of_faces(
         raise ValueError("chosen must hold at least one face, holds none")
     check_cone_options(min_region_share, cone_half_angle)
     curvedness, trusted = face_curvedness(mesh, field)
-    pairs = adjacent_faces(mesh.edges, manifold_only=False)
+    pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     least = min_region_share * float(mesh.face_areas[faces].sum())
     pieces = cone_pieces(mesh, faces, pairs, least, cone_half_angle, keep_all=True)
     steep = steep_directions(mesh, field)
     return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
 
 
-def lightest_corner(weight: ArrayLike, corners: NDArray[np.integer]) -> Array:
-    """Return for each face the least weight of its corners, shape (n_f,).
-
-    Args:
-        weight: Of each vertex, at least 0, shape (n,).
-        corners: Vertices of each face, in the numbering of `weight`, shape (n_f, 3).
-
-    Raises:
-        ValueError: If the weight of a corner is negative or not finite.
-    """
-    values = np.asarray(weight, dtype=np.float64)[corners]
-    good = (values >= 0) & np.isfinite(values)
-    if not np.all(good):
-        face, corner = np.argwhere(~good)[0]
-        raise ValueError(
-            f"the weight of vertex {corners[face, corner]} is {values[face, corner]}, "
-            "must be a finite number, at least 0"
-        )
-    return values.min(axis=1)
-
-
 def heaviest_faces(
-    mesh: TriangleMesh, weight: ArrayLike, *, area_share: float = 0.2
+    mesh: TriangleMesh,
+    weight: ArrayLike,
+    corners: NDArray[np.integer],
+    *,
+    area_share: float = 0.2,
 ) -> Mask:
     """Return the faces of highest weight, a share of the area, shape (n_f,).
 
-    The weight takes the place of the curvedness in `dominant_regions`. Faces of equal
-    weight are taken all or none, so that the share may be exceeded; a face of weight 0
-    is never taken, so that it may be missed: weights of 1 and 0 choose what has 1.
+    A face has the least weight of its corners, which takes the place of the curvedness
+    in `dominant_regions`. Faces of equal weight are taken all or none, so that the
+    share may be exceeded; a face of weight 0 is never taken, so that it may be missed:
+    weights of 1 and 0 choose what has 1.
 
     Args:
         mesh: The surface.
-        weight: Of each face, at least 0, shape (n_f,).
+        weight: Of each vertex, at least 0, shape (n,).
+        corners: Vertices of each face, in the numbering of `weight`, shape (n_f, 3).
         area_share: Share of the mesh's area, in (0, 1].
 
     Raises:
-        ValueError: If a weight is negative or not finite, all are zero, or the number
-            of weights or the share is out of range.
+        ValueError: If the weight of a corner is negative or not finite, no face has one
+            above zero, or the share is out of range.
     """
     if not 0 < area_share <= 1:
         raise ValueError(f"area_share must lie in (0, 1], got {area_share}")
-    values = np.asarray(weight, dtype=np.float64)
-    if values.shape != (len(mesh.faces),):
+    of_corners = np.asarray(weight, dtype=np.float64)[corners]
+    good = (of_corners >= 0) & np.isfinite(of_corners)
+    if not np.all(good):
+        face, corner = np.argwhere(~good)[0]
         raise ValueError(
-            f"weight must be ({len(mesh.faces)},), one a face, got {values.shape}"
+            f"the weight of vertex {corners[face, corner]} is "
+            f"{of_corners[face, corner]}, must be a finite number, at least 0"
         )
-    if not np.all((values >= 0) & np.isfinite(values)):
-        raise ValueError("a face's weight must be a finite number, at least 0")
+    values = of_corners.min(axis=1)
     if not values.max() > 0:
         raise ValueError("no face has a weight above 0 at all its corners")
     order = np.argsort(-values, kind="stable")

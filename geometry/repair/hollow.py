@@ -11,7 +11,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import adjacent_faces, components
+from geometry.mesh.topology import components, face_pairs
 from geometry.rays.rays import RayCaster
 
 from .openness import Spots, look_out, spots_at, spots_on
@@ -143,7 +143,7 @@ def _sight(caster: RayCaster, spots: Spots) -> _Sight:
 
 def _bodies(mesh: TriangleMesh) -> Ints | None:
     """The body of each face, connected over edges; None where there are too many."""
-    pairs = adjacent_faces(mesh.edges, manifold_only=False)
+    pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     count, body = components(pairs, len(mesh.faces))
     return body if count <= _MAX_BODIES else None
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import Repair, TriangleMesh
-from geometry.mesh.topology import MeshEdges, adjacent_faces, components
+from geometry.mesh.topology import MeshEdges, components, face_pairs
 from geometry.rays.rays import RayCaster
 
 from .nesting import containers
@@ -87,7 +87,7 @@ def orient(mesh: TriangleMesh) -> tuple[Ints, tuple[Repair, ...]]:
 def _consistent(mesh: TriangleMesh) -> tuple[Ints, Ints]:
     """Faces wound alike within each patch, and the patch of each face."""
     if not _alike(mesh.faces, mesh.edges).any():
-        pairs = adjacent_faces(mesh.edges)
+        pairs = face_pairs(mesh.edges)[0]
         return mesh.faces, components(pairs, len(mesh.faces))[1]
     wound, patch = igl.bfs_orient(mesh.faces)
     wound, patch = np.array(wound, np.int64), np.array(patch, np.int64)

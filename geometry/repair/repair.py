@@ -75,29 +75,24 @@ def _drop_non_finite(vertices: Array, faces: Ints) -> _Step:
 
 
 def _weld(vertices: Array, faces: Ints) -> _Step:
-    first, where = _identical(vertices)
+    first, where = _equal_rows(vertices)
     repair = Repair("vertices welded", len(vertices) - len(first))
     return vertices[first], where[faces], None, (repair,)
 
 
-def _identical(vertices: Array) -> tuple[Ints, Ints]:
+def _equal_rows(rows: Array | Ints) -> tuple[Ints, Ints]:
     """Return the first of each group of equal rows, in order, and each row's group."""
-    # Adding zero turns -0.0 into 0.0, which has other bits but is the same place.
-    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)
-    mix = np.array(
-        [0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64
-    )
-    key = np.bitwise_xor.reduce((bits ^ (bits >> np.uint64(29))) * mix, axis=1)
-    _, first, where = np.unique(key, return_index=True, return_inverse=True)
-    if not np.array_equal(vertices[first][where], vertices):
-        # Two places share a key: compare the rows themselves.
-        _, first, where = np.unique(
-            vertices + 0.0, axis=0, return_index=True, return_inverse=True
-        )
-    order = np.argsort(first)
+    order = np.lexsort(rows.T)
+    in_order = rows[order]
+    leads = np.ones(len(rows), dtype=bool)
+    leads[1:] = np.any(in_order[1:] != in_order[:-1], axis=1)
+    # lexsort is stable, so the first of a group is the one that was stored first.
+    first = order[leads]
     rank = np.empty(len(first), dtype=np.int64)
-    rank[order] = np.arange(len(first))
-    return first[order], rank[where.reshape(-1)]
+    rank[np.argsort(first)] = np.arange(len(first))
+    group = np.empty(len(rows), dtype=np.int64)
+    group[order] = rank[np.cumsum(leads) - 1]
+    return np.sort(first), group
 
 
 def _drop_flat(vertices: Array, faces: Ints) -> _Step:
@@ -111,17 +106,9 @@ def _drop_flat(vertices: Array, faces: Ints) -> _Step:
 
 
 def _drop_doubled(vertices: Array, faces: Ints) -> _Step:
-    low, middle, high = np.sort(faces, axis=1).T
-    n = len(vertices)
-    # The pair key fits 64 bits up to three thousand million vertices.
-    order = np.lexsort((high, low * n + middle))
-    rows = np.stack([low, middle, high], axis=1)[order]
-    same = np.zeros(len(faces), dtype=bool)
-    same[1:] = np.all(rows[1:] == rows[:-1], axis=1)
-    keep = np.ones(len(faces), dtype=bool)
-    # lexsort is stable, so the first of equal faces is the one that was stored first.
-    keep[order[same]] = False
-    repair = Repair("duplicate faces removed", int(same.sum()))
+    keep = np.zeros(len(faces), dtype=bool)
+    keep[_equal_rows(np.sort(faces, axis=1))[0]] = True
+    repair = Repair("duplicate faces removed", len(faces) - int(keep.sum()))
     return vertices, faces[keep], keep, (repair,)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh.file_origin import FileOrigin
 from geometry.mesh.mesh import TriangleMesh
-from geometry.regions.selected_regions import heaviest_faces, lightest_corner
+from geometry.regions.selected_regions import heaviest_faces
 from planning.model.errors import InputError
 
 _PROPERTY = "ply:"
@@ -212,7 +212,7 @@ def _weighted(
     if values.dtype.kind not in "biuf":
         raise InputError(f"{name}: holds {values.dtype}, must hold numbers")
     try:
-        return heaviest_faces(mesh, lightest_corner(values, corners))
+        return heaviest_faces(mesh, values, corners)
     except ValueError as error:
         raise InputError(f"{name}: {error}") from None
 

@@ -15,6 +15,8 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.mesh.mesh import MeshError, TriangleMesh
+from geometry.mesh.tensors import area_normals, lengths
+from geometry.mesh.topology import mesh_edges, numbered
 
 from .geodesic import GeodesicGrid, geodesic_grid
 from .head_field import head_field, neck_base
@@ -79,12 +81,11 @@ def _collar(shape: HeadShape) -> float:
 def _cut_off(mesh: TriangleMesh, height: float) -> TriangleMesh:
     """Leave out what lies below a height, and level the border that is left."""
     kept = mesh.faces[mesh.face_centroids[:, 2] >= height]
-    edges = np.sort(kept[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    each, times = np.unique(edges, axis=0, return_counts=True)
+    edges = mesh_edges(kept)
     vertices = mesh.vertices.copy()
-    vertices[np.unique(each[times == 1]), 2] = height
-    used, faces = np.unique(kept, return_inverse=True)
-    return TriangleMesh(vertices[used], faces.reshape(-1, 3))
+    vertices[edges.ends[edges.border], 2] = height
+    used, faces = numbered(kept, len(vertices))
+    return TriangleMesh(vertices[used], faces)
 
 
 def head_as_obj(mesh: TriangleMesh, ending: str) -> str:
@@ -110,27 +111,27 @@ def _even_directions(shape: HeadShape, grid: GeodesicGrid) -> tuple[Array, Array
     if coarse is grid:
         return directions, radii
     points = coarse.interpolate(directions * radii[:, None], grid)
-    radii = _length(points)
+    radii = lengths(points)
     return points / radii[:, None], radii
 
 
 def _relax(shape: HeadShape, grid: GeodesicGrid) -> tuple[Array, Array]:
     """Move vertices to where their faces' area is, then back to the surface."""
     directions = grid.directions + _CROWDING
-    directions = directions / _length(directions)[:, None]
+    directions = directions / lengths(directions)[:, None]
     radii = _surface_radii(shape, directions, None)
     for _ in range(_RELAXATIONS):
         points = directions * radii[:, None]
         corners = points[grid.faces]
-        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-        cross = np.cross(b - a, c - a)
-        weight = _length(cross)
+        cross = area_normals(corners)
+        weight = lengths(cross)
         normals = _gather(grid, cross)
+        a, b, c = np.moveaxis(corners, 1, 0)
         moved = _gather(grid, (a + b + c) / 3.0 * weight[:, None])
         moved /= _gather(grid, weight[:, None])
-        radii = _length(moved)
+        radii = lengths(moved)
         directions = moved / radii[:, None]
-        slope = np.sum(normals * directions, axis=1) / _length(normals)
+        slope = np.sum(normals * directions, axis=1) / lengths(normals)
         miss = _field_along(shape, directions, radii)
         radii = radii - np.clip(miss / np.maximum(slope, 0.3), -8.0, 8.0)
     return directions, radii
@@ -190,7 +191,3 @@ def _field_along(shape: HeadShape, directions: Array, radii: Array) -> Array:
         part = slice(start, start + _CHUNK)
         field[part] = head_field(shape, _HEART + directions[part] * radii[part, None])
     return field
-
-
-def _length(vectors: Array) -> Array:
-    return np.sqrt(np.sum(vectors * vectors, axis=1))

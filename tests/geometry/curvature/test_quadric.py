@@ -8,6 +8,7 @@ from geometry.curvature.curvature import principal_curvatures
 from geometry.curvature.quadric import fit_quadrics
 from geometry.mesh.diffusion import diffused, surface_laplacian
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import mesh_edges
 from geometry.shapes.primitives import sphere
 
 
@@ -46,7 +47,7 @@ def test_cores_change_no_digit(cores: int, monkeypatch: pytest.MonkeyPatch) -> N
     ball = sphere(1.0, subdivisions=5)
     vertices, faces = np.array(ball.vertices), np.array(ball.faces)
     mass = ball.vertex_areas / ball.mean_edge**2
-    laplacian = surface_laplacian(vertices, faces)
+    laplacian = surface_laplacian(vertices, faces, mesh_edges(faces))
     values = np.random.default_rng(0).normal(size=(len(vertices), 30))
 
     def made() -> list[np.ndarray]:

@@ -10,7 +10,7 @@ from geometry.curvature.face_curvature import steep_directions
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import adjacent_faces, components, mesh_edges
+from geometry.mesh.topology import components, face_pairs, mesh_edges
 from geometry.regions.cones import averaged_normals, normal_cone
 from geometry.regions.dominance import dominant_faces, face_curvedness
 from geometry.regions.regions import DominantRegions, dominant_regions
@@ -124,7 +124,7 @@ def test_regions_are_connected_disjoint_and_fit_the_cone(
 ) -> None:
     found = regions_of(mesh, cone_half_angle=np.deg2rad(limit))
     assert len(found) >= 2
-    pairs = adjacent_faces(mesh_edges(mesh.faces))
+    pairs = face_pairs(mesh_edges(mesh.faces))[0]
     averaged = averaged_normals(mesh, pairs)
     for number, region in enumerate(found):
         assert region.id == number
@@ -163,7 +163,7 @@ def test_a_fragment_is_left_alone_only_if_it_fits_no_neighbour() -> None:
     least, limit = 0.01, np.deg2rad(50.0)
     found = regions_of(mesh, area_share=1.0, min_region_share=least)
     assert np.all(found.face_region >= 0)
-    met = found.face_region[adjacent_faces(mesh_edges(mesh.faces))]
+    met = found.face_region[face_pairs(mesh_edges(mesh.faces))[0]]
     met = np.unique(np.sort(met[met[:, 0] != met[:, 1]], axis=1), axis=0)
     assert min(region.area_m2 for region in found) < least * mesh.area
     for a, b in met:
@@ -177,7 +177,7 @@ def test_no_more_than_a_tenth_of_what_is_dominant_is_dropped() -> None:
     mesh = crumpled()
     field = principal_curvatures(mesh)
     curvedness, trusted = face_curvedness(mesh, field)
-    pairs = adjacent_faces(mesh.edges, manifold_only=False)
+    pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     least = 0.01
     dominant = dominant_faces(mesh, curvedness, trusted, pairs, 0.3, least * mesh.area)
     # Held to the least area, more would be dropped here.
@@ -214,7 +214,7 @@ def test_small_islands_vanish_and_pinholes_are_filled() -> None:
     # Around each bump, the ring where its slope has no curvature is a hole.
     filled = regions_of(mesh, area_share=0.1, min_region_share=0.01)
     inside = filled.face_region >= 0
-    pairs = adjacent_faces(mesh_edges(mesh.faces))
+    pairs = face_pairs(mesh_edges(mesh.faces))[0]
     outer = pairs[~inside[pairs].any(axis=1)]
     count, label = components(outer, len(mesh.faces))
     area = np.bincount(label, mesh.face_areas * ~inside, count)
@@ -362,14 +362,14 @@ def test_averaged_normals_lose_noise_and_keep_large_faces() -> None:
     true = ball.face_centroids / np.linalg.norm(
         ball.face_centroids, axis=1, keepdims=True
     )
-    pairs = adjacent_faces(mesh_edges(ball.faces))
+    pairs = face_pairs(mesh_edges(ball.faces))[0]
     errors = [
         overlap_angle(normals, true)
         for normals in (rough.face_normals, averaged_normals(rough, pairs))
     ]
     assert errors[1] < 0.5 * errors[0]
     cube = box((0.1, 0.1, 0.1))
-    pairs = adjacent_faces(mesh_edges(cube.faces))
+    pairs = face_pairs(mesh_edges(cube.faces))[0]
     kept = np.einsum("ij,ij->i", averaged_normals(cube, pairs), cube.face_normals)
     assert kept.min() > 0.999
 

@@ -6,12 +6,11 @@ from support.plain_shapes import box, cylinder, grid
 
 from geometry.curvature.curvature import principal_curvatures
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import adjacent_faces, components, mesh_edges
+from geometry.mesh.topology import components, face_pairs, mesh_edges
 from geometry.regions.cones import averaged_normals
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import (
     heaviest_faces,
-    lightest_corner,
     regions_of_faces,
 )
 from geometry.shapes.primitives import sphere
@@ -22,7 +21,7 @@ def regions_of(mesh: TriangleMesh, chosen: np.ndarray, **options) -> DominantReg
 
 
 def is_connected(mesh: TriangleMesh, faces: np.ndarray) -> bool:
-    pairs = adjacent_faces(mesh_edges(mesh.faces[faces]), manifold_only=False)
+    pairs = face_pairs(mesh_edges(mesh.faces[faces]), manifold_only=False)[0]
     return components(pairs, len(faces))[0] == 1
 
 
@@ -48,7 +47,7 @@ def test_exactly_the_chosen_faces_are_the_target(share: float) -> None:
     np.testing.assert_array_equal(found.face_region >= 0, chosen)
     areas = [region.area_m2 for region in found]
     assert np.all(np.diff(areas) <= 1e-9 * ball.area)
-    normals = averaged_normals(ball, adjacent_faces(mesh_edges(ball.faces)))
+    normals = averaged_normals(ball, face_pairs(mesh_edges(ball.faces))[0])
     for region in found:
         np.testing.assert_array_equal(
             np.flatnonzero(found.face_region == region.id), region.faces
@@ -110,22 +109,28 @@ def test_a_painted_one_chooses_exactly_the_painted_faces() -> None:
         # From most of the ball, far above a fifth, down to a small cap.
         paint = (ball.vertices[:, 2] >= low * 0.1).astype(float)
         painted = np.all(paint[ball.faces] == 1.0, axis=1)
-        chosen = heaviest_faces(ball, lightest_corner(paint, ball.faces))
+        chosen = heaviest_faces(ball, paint, ball.faces)
         np.testing.assert_array_equal(chosen, painted)
+
+
+def by_face(mesh: TriangleMesh, weight: np.ndarray, share: float = 0.2) -> np.ndarray:
+    """The heaviest faces where each has a weight of its own."""
+    corners = np.arange(3 * len(mesh.faces)).reshape(-1, 3)
+    return heaviest_faces(mesh, np.repeat(weight, 3), corners, area_share=share)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.6, 1.0])
 def test_the_heaviest_share_of_the_area_is_taken(share: float) -> None:
     mesh = box((0.08, 0.06, 0.04), divisions=9)
     weight = np.random.default_rng(1).random(len(mesh.faces)) + 0.1
-    chosen = heaviest_faces(mesh, weight, area_share=share)
+    chosen = by_face(mesh, weight, share)
     taken = mesh.face_areas[chosen].sum() / mesh.area
     # No more than the one face that crosses the share.
     assert share - 1e-12 <= taken <= share + mesh.face_areas.max() / mesh.area
     if share < 1:
         assert weight[chosen].min() > weight[~chosen].max()
     # Only the order of the weights counts.
-    other = heaviest_faces(mesh, 7e-4 * weight**3, area_share=share)
+    other = by_face(mesh, 7e-4 * weight**3, share)
     np.testing.assert_array_equal(chosen, other)
 
 
@@ -133,19 +138,20 @@ def test_equal_weights_are_taken_all_or_none_and_zero_never() -> None:
     plate = grid(0.2, 0.1, divisions=(20, 10))
     n = len(plate.faces)
     steps = np.floor(np.arange(n) * 4 / n)
-    np.testing.assert_array_equal(heaviest_faces(plate, steps), steps == 3)
-    share = heaviest_faces(plate, steps, area_share=0.3)
+    np.testing.assert_array_equal(by_face(plate, steps), steps == 3)
+    share = by_face(plate, steps, 0.3)
     np.testing.assert_array_equal(share, steps >= 2)
-    everything = heaviest_faces(plate, steps, area_share=1.0)
+    everything = by_face(plate, steps, 1.0)
     np.testing.assert_array_equal(everything, steps >= 1)
-    assert heaviest_faces(plate, np.ones(n)).all()
+    assert by_face(plate, np.ones(n)).all()
 
 
 def test_a_face_weighs_as_much_as_its_lightest_corner() -> None:
-    corners = np.array([[0, 1, 2], [3, 2, 1]])
-    np.testing.assert_array_equal(
-        lightest_corner([0.5, 2.0, 3.0, 9.0, np.nan], corners), [0.5, 2.0]
-    )
+    square = TriangleMesh(np.eye(4)[:, :3], np.array([[0, 1, 2], [3, 2, 1]]))
+    weight = [0.5, 2.0, 3.0, 9.0, np.nan]
+    for share, chosen in ((0.3, [False, True]), (1.0, [True, True])):
+        heaviest = heaviest_faces(square, weight, square.faces, area_share=share)
+        np.testing.assert_array_equal(heaviest, chosen)
 
 
 def test_what_cannot_be_a_selection_or_a_weight_is_refused() -> None:
@@ -166,23 +172,20 @@ def test_what_cannot_be_a_selection_or_a_weight_is_refused() -> None:
             regions_of_faces(ball, field, whole, cone_half_angle=angle)
     for share in (0.0, 1.1, np.nan):
         with pytest.raises(ValueError, match="area_share must lie in"):
-            heaviest_faces(ball, np.ones(n), area_share=share)
-    with pytest.raises(ValueError, match=rf"weight must be \({n},\)"):
-        heaviest_faces(ball, np.ones(n + 1))
+            by_face(ball, np.ones(n), share)
     for value in (-1.0, np.nan, np.inf):
-        weight = np.ones(n)
-        weight[5] = value
-        with pytest.raises(ValueError, match="finite number, at least 0"):
-            heaviest_faces(ball, weight)
-        with pytest.raises(ValueError, match=f"weight of vertex 2 is {value}"):
-            lightest_corner([1.0, 1.0, value], np.array([[0, 1, 2]]))
+        weight = np.ones(len(ball.vertices))
+        weight[2] = value
+        refusal = f"weight of vertex 2 is {value}, must be a finite number, at least 0"
+        with pytest.raises(ValueError, match=refusal):
+            heaviest_faces(ball, weight, ball.faces)
     with pytest.raises(ValueError, match="no face has a weight above 0"):
-        heaviest_faces(ball, np.zeros(n))
+        by_face(ball, np.zeros(n))
 
 
 def test_thousands_of_scattered_faces_are_as_many_regions() -> None:
     ball = sphere(0.1, subdivisions=6)
-    pairs = adjacent_faces(mesh_edges(ball.faces))
+    pairs = face_pairs(mesh_edges(ball.faces))[0]
     order = np.random.default_rng(5).permutation(len(ball.faces))[:6000]
     chosen = np.zeros(len(ball.faces), dtype=bool)
     chosen[order] = True

@@ -6,7 +6,7 @@ from support.plain_shapes import box, cylinder, grid, joined
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import MeshError, TriangleMesh
-from geometry.mesh.topology import adjacent_faces, components, mesh_edges
+from geometry.mesh.topology import components, face_pairs, mesh_edges
 from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
 from geometry.shapes.primitives import sphere
@@ -145,7 +145,7 @@ def test_edges_borders_and_components_of_known_shapes() -> None:
     assert set(np.unique(edges.n_faces)) == {1, 2}
     ends = np.sort(two.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     np.testing.assert_array_equal(edges.ends[edges.of_face], ends)
-    pairs = adjacent_faces(edges)
+    pairs = face_pairs(edges)[0]
     assert len(pairs) == (edges.n_faces == 2).sum()
     count, label = components(pairs, len(two.faces))
     assert count == 2
@@ -155,8 +155,8 @@ def test_edges_borders_and_components_of_known_shapes() -> None:
 def test_faces_about_a_branching_edge_are_paired_only_on_request() -> None:
     faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     edges = mesh_edges(faces)
-    assert len(adjacent_faces(edges)) == 0
-    count, _ = components(adjacent_faces(edges, manifold_only=False), 3)
+    assert len(face_pairs(edges)[0]) == 0
+    count, _ = components(face_pairs(edges, manifold_only=False)[0], 3)
     assert count == 1
 
 
