@@ -270,7 +270,7 @@ def _two_faults(document: Document) -> None:
 
 
 def _fire_together(document: Document, first: str, second: str) -> None:
-    document["firing_schedule"] = {"groups": [[first, second]]}
+    document["firing_schedule"]["groups"] = [[first, second]]
 
 
 def _ring_axis_through(document: Document, index: int, mesh: TriangleMesh) -> None:

@@ -11,7 +11,7 @@ from support.reconstruction_rigs import single
 from planning.cli.experiment_command import experiment_of
 from planning.cli.main import commands
 from planning.experiments.setups import box_experiment
-from planning.verify.reconstruction.faults.causes import rejection
+from planning.verify.reconstruction.faults.measured_clouds import rejection
 from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
 )

@@ -12,9 +12,9 @@ from planning.verify.reconstruction.check.accuracy import (
 from planning.verify.reconstruction.check.merge import merge
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import Pairs
-from planning.verify.reconstruction.faults.causes import (
+from planning.verify.reconstruction.faults.causes import explained
+from planning.verify.reconstruction.faults.measured_clouds import (
     MeasuredClouds,
-    explained,
     rejection,
 )
 from planning.verify.reconstruction.render.photometry import Photometry

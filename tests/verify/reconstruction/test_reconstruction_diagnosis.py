@@ -22,7 +22,7 @@ from planning.verify.reconstruction.calibration import (
     calibrate_projector,
 )
 from planning.verify.reconstruction.faults.cause_words import _two_digits, in_words
-from planning.verify.reconstruction.faults.diagnosis import diagnose_edges
+from planning.verify.reconstruction.faults.diagnosis import diagnose
 from planning.verify.reconstruction.faults.supposed import Evidence
 from planning.verify.reconstruction.scanner import BaselineLimit, Scanner
 
@@ -72,15 +72,13 @@ def edges(plan: RigPlan, truth: RigPlan, *, outliers: float = 0.03) -> Evidence:
             where = camera.project(samples.points[rows])
             where += NOISE_PX * rng.normal(size=where.shape)
             noise = np.full(len(rows), NOISE_PX)
-            part = Evidence.at(Scanner.of(plan), where, p, c)
+            part = Evidence.at(where, p, c)
             parts.append(replace(part, radii=radii, noise_px=noise))
-    names = ("pixels", "radii", "camera", "projector", "noise_px")
-    joined = (np.concatenate([getattr(part, n) for part in parts]) for n in names)
-    return Evidence(*joined, parts[0].designs)
+    return Evidence.join(parts)
 
 
 def said(plan: RigPlan, truth: RigPlan) -> list[str]:
-    causes = diagnose_edges(Scanner.of(plan), edges(plan, truth))
+    causes = diagnose(Scanner.of(plan), edges(plan, truth))
     return [in_words(cause, Scanner.of(plan)) for cause in causes]
 
 
@@ -113,10 +111,8 @@ def swap(document: dict[str, Any], key: str) -> None:
 
 
 def test_edges_of_a_rig_that_stands_as_planned_ask_for_nothing(plan):
-    assert diagnose_edges(Scanner.of(plan), edges(plan, plan)) == ()
-    assert (
-        diagnose_edges(Scanner.of(plan), edges(plan, plan).take(np.zeros(0, int))) == ()
-    )
+    assert diagnose(Scanner.of(plan), edges(plan, plan)) == ()
+    assert diagnose(Scanner.of(plan), edges(plan, plan).take(np.zeros(0, int))) == ()
 
 
 @pytest.mark.parametrize(
@@ -231,7 +227,7 @@ def test_a_baseline_that_becomes_too_wide_is_named(diverging):
 
     def sentences(metres: float) -> list[str]:
         truth = changed(diverging, lambda document: apart(document, metres))
-        causes = diagnose_edges(scanner, edges(diverging, truth))
+        causes = diagnose(scanner, edges(diverging, truth))
         return [in_words(cause, scanner) for cause in causes]
 
     (sentence,) = sentences(2e-3)

@@ -57,7 +57,7 @@ def test_mismatch_is_the_distance_from_the_cone_or_cylinder(rigs, light):
     supposed = Supposed.of(Scanner.of(plan))
     middle = np.array(camera.device.resolution) / 2.0
     pixels = middle + RNG.uniform(-80.0, 80.0, (200, 2))
-    evidence = Evidence.at(Scanner.of(plan), pixels, 0, 0)
+    evidence = Evidence.at(pixels, 0, 0)
     at = places(evidence, supposed)
     design = supposed.projectors[0]
     rho = np.hypot(*design.ring_plane(design.panel(at[0])[0]).T)

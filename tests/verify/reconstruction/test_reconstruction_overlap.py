@@ -18,6 +18,7 @@ from planning.verify.reconstruction.calibration import (
     calibrate_projector,
 )
 from planning.verify.reconstruction.faults.missing import light_falls, lit_twice
+from planning.verify.reconstruction.faults.supposed import Supposed
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
@@ -131,12 +132,13 @@ def test_light_falls_where_a_sphere_faces_it(plan):
 
 def test_pixels_in_both_beams_are_said_to_be(plan):
     camera = calibrate_camera(plan.cameras[0])
+    supposed = Supposed.of(Scanner.of(plan))
     middle = camera.project(np.array([[0.0, -0.04, -0.005]]))
-    assert lit_twice(Scanner.of(plan), np.repeat(middle, 3, axis=0), 0, 0) == ("P2",)
+    assert lit_twice(supposed, np.repeat(middle, 3, axis=0), 0, 0) == ("P2",)
     side = camera.project(np.array([[-0.0385, -0.010, 0.0]]))
-    assert lit_twice(Scanner.of(plan), side, 0, 0) == ()
+    assert lit_twice(supposed, side, 0, 0) == ()
     nowhere = np.array([[0.0, 0.0]])
-    assert lit_twice(Scanner.of(plan), nowhere, 0, 0) == ()
+    assert lit_twice(supposed, nowhere, 0, 0) == ()
 
 
 def test_light_does_not_fall_behind_a_sphere(rigs):

@@ -20,7 +20,7 @@ from planning.verify.reconstruction.decode.decode import (
     decode,
 )
 from planning.verify.reconstruction.decode.inspection import DarkError, inspect
-from planning.verify.reconstruction.faults.causes import rejection
+from planning.verify.reconstruction.faults.measured_clouds import rejection
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.reconstruct import conclude
 from planning.verify.reconstruction.render.photometry import Photometry

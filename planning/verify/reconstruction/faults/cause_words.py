@@ -19,76 +19,67 @@ _MOST_ASIDE = 0.5
 
 
 def in_words(cause: Cause, plan: Scanner) -> str:
-    """Return what a cause looks like, and how far the edges were off their rings.
-
-    Args:
-        cause: The equally good explanations.
-        plan: Whose devices it names.
-    """
-    looks = [_looks(explanation, plan) for explanation in cause.explanations]
-    remaining = cause.explanations[0].remaining_m
+    """Return what a cause looks like, and how far the edges were off their rings."""
+    before, remaining = cause[0].before.misfit(), cause[0].remaining_m
     return (
-        f"{' or '.join(looks)} (that takes the edges' mean distance from their rings "
-        f"from {_MM * cause.before_m:.3f} to {_MM * remaining:.3f} mm)"
+        f"{' or '.join(_looks(one, plan) for one in cause)} (that takes the edges' "
+        f"mean distance from their rings from {_MM * before:.3f} to "
+        f"{_MM * remaining:.3f} mm)"
     )
 
 
 def _looks(explanation: Explanation, plan: Scanner) -> str:
     correction = explanation.correction
-    if correction.role is None:
+    states = explanation.before.supposed, explanation.after.supposed
+    if correction.role == "objects":
         return _object_looks(explanation)
     devices = plan.cameras if correction.role == "cameras" else plan.projectors
     names = [devices[index].id for index in correction.devices]
-    if correction.kind == "swap":
+    if "swap" in correction.moves:
         return f"{' and '.join(names)} look swapped"
-    index = correction.devices[0]
-    before: Device = getattr(explanation.before, correction.role)[index]
-    after: Device = getattr(explanation.after, correction.role)[index]
-    if correction.kind == "focal":
-        return f"{names[0]} looks as if {_focal(before, after)}"
-    away = float(np.linalg.norm(explanation.before.body.centre - before.centre))
+    before, after = (getattr(s, correction.role)[correction.devices[0]] for s in states)
+    if "zoom" in correction.moves:
+        change = float(after.matrix[0, 0] / before.matrix[0, 0]) - 1.0
+        longer = "longer" if change > 0.0 else "shorter"
+        return (
+            f"{names[0]} looks as if its focal length were {_per_cent(change)} {longer}"
+        )
+    away = float(np.linalg.norm(states[0].objects[0].centre - before.centre))
     looks = f"{names[0]} looks as if it {_displaced(before, after, away)}"
-    if isinstance(before, ProjectorCalibration):
-        assert isinstance(after, ProjectorCalibration)
-        looks += _grazing(before, after, plan)
     if correction.role == "cameras":
-        looks += _too_wide(names[0], after, plan)
-    return looks
+        return looks + _too_wide(names[0], after, plan)
+    return looks + _grazing(before, after, plan)
 
 
 def _object_looks(explanation: Explanation) -> str:
-    before, after = explanation.before.body, explanation.after.body
-    change = after.scale / before.scale - 1.0
-    turn = _angle(after.turn @ before.turn.T)
-    shift = float(np.linalg.norm(after.shift - before.shift))
+    before, after = (
+        state.supposed.objects[0] for state in (explanation.before, explanation.after)
+    )
     words: list[str] = []
-    if explanation.correction.kind != "moved":
+    if "zoom" in explanation.correction.moves:
+        change = after.scale / before.scale - 1.0
         words.append(f"{_per_cent(change)} {'larger' if change > 0 else 'smaller'}")
-    if explanation.correction.kind != "scale":
-        words.append(f"moved by {_two_digits(_MM * shift)} mm")
+    if "shift" in explanation.correction.moves:
+        shift = float(np.linalg.norm(after.centre - before.centre))
+        words.append(f"moved by {_millimetres(shift)}")
+        turn = _angle(before.world_from_device, after.world_from_device)
         if turn > _NO_TURN:
             words.append(f"turned by {_two_digits(np.rad2deg(turn))} degrees")
     return f"the object looks {', '.join(words)} against the mesh"
 
 
-def _focal(before: Device, after: Device) -> str:
-    change = float(after.matrix[0, 0] / before.matrix[0, 0]) - 1.0
-    longer = "longer" if change > 0.0 else "shorter"
-    return f"its focal length were {_per_cent(change)} {longer}"
-
-
 def _displaced(before: Device, after: Device, away: float) -> str:
-    moved = float(np.linalg.norm(after.centre - before.centre))
-    turns = after.world_from_device[:3, :3], before.world_from_device[:3, :3]
-    angle = _angle(turns[0] @ turns[1].T)
+    poses = before.world_from_device, after.world_from_device
+    moved, angle = float(np.linalg.norm(after.centre - before.centre)), _angle(*poses)
     words: list[str] = []
     if angle > _NO_TURN:
-        axes = (after.world_from_device[:3, 2], before.world_from_device[:3, 2])
-        aside = away * _aside(*axes)
+        one, other = (pose[:3, 2] for pose in poses)
+        cosine = max(float(one @ other), 1e-3)
+        tangent = float(np.linalg.norm(np.cross(one, other))) / cosine
         least = "at least " * isinstance(before, ProjectorCalibration)
         turned = f"were turned by {least}{_two_digits(np.rad2deg(angle))} degrees"
-        if aside < _MOST_ASIDE * away:
-            turned += f" (aimed {_millimetres(aside)} off at the object)"
+        if tangent < _MOST_ASIDE:
+            turned += f" (aimed {_millimetres(away * tangent)} off at the object)"
         words.append(turned)
     if moved > 0.0:
         words.append(f"stood {_millimetres(moved)} from its place")
@@ -104,7 +95,6 @@ def _grazing(
     """
     mesh, target = plan.mesh, plan.target
     middles, normals = mesh.face_centroids[target], mesh.face_normals[target]
-    areas = mesh.face_areas[target]
     each = [one.incidence_cosine(middles, normals) for one in plan.projectors]
     planned = before.incidence_cosine(middles, normals)
     limit = np.cos(plan.limits.max_lit)
@@ -113,25 +103,15 @@ def _grazing(
         return ""
     lit = after.incidence_cosine(middles[assigned], normals[assigned])
     order = np.argsort(lit)
-    share = np.cumsum(areas[assigned][order])
-    half = np.searchsorted(share, 0.5 * share[-1])
-    angle = float(np.arccos(np.clip(lit[order[half]], -1.0, 1.0)))
+    area = np.cumsum(mesh.face_areas[target][assigned][order])
+    median = lit[order[np.searchsorted(area, 0.5 * area[-1])]]
+    angle = float(np.arccos(np.clip(median, -1.0, 1.0)))
     if angle < GRAZING:
         return ""
     return (
         f", so that it meets the surface that it should serve at "
         f"{np.rad2deg(angle):.0f} degrees (median): grazing"
     )
-
-
-def _millimetres(length: float) -> str:
-    """Return a length in [m] in words."""
-    return f"{_two_digits(_MM * length)} mm"
-
-
-def _two_digits(value: float) -> str:
-    """Return a number in words: two digits, whole from 10 on, never an exponent."""
-    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
 
 
 def _too_wide(name: str, after: Device, plan: Scanner) -> str:
@@ -150,14 +130,20 @@ def _too_wide(name: str, after: Device, plan: Scanner) -> str:
     return ""
 
 
-def _angle(turn: Array) -> float:
+def _angle(before: Array, after: Array) -> float:
+    """Angle between two poses [rad]."""
+    turn = after[:3, :3] @ before[:3, :3].T
     return float(Rotation.from_matrix(turn).magnitude())
 
 
-def _aside(one: Array, other: Array) -> float:
-    """Tangent of the angle between two unit vectors."""
-    return float(np.linalg.norm(np.cross(one, other)) / max(float(one @ other), 1e-3))
+def _millimetres(length: float) -> str:
+    return f"{_two_digits(_MM * length)} mm"
 
 
 def _per_cent(change: float) -> str:
     return f"{_two_digits(100.0 * abs(change))} %"
+
+
+def _two_digits(value: float) -> str:
+    """Return a number in words: two digits, whole from 10 on, never an exponent."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"

@@ -1,11 +1,10 @@
-"""One change of one thing: a device's pose or optics, two devices swapped, the object.
+"""One change of one thing: pose or optics of a device, two devices swapped, the object.
 
 Parameters are lengths at the object in [m], so that one step size suits them all.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,19 +15,17 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 
-from .supposed import Evidence, Role, Supposed
+from .supposed import Evidence, Object, Role, Supposed
 
 Device = CameraCalibration | ProjectorCalibration
-Kind = Literal[
-    "swap", "focal", "aim", "place", "pose", "far pose", "scale", "moved", "similar"
-]
-# What a change can do that another can, too: the fuller one explains no less.
-_CONTAINS: dict[Kind, frozenset[Kind]] = {
-    "pose": frozenset(("aim", "place")),
-    "far pose": frozenset(("aim", "place", "pose")),
-    "similar": frozenset(("scale", "moved")),
+Move = Literal["swap", "afar", "turn", "shift", "zoom"]
+_N_PARAMETERS: dict[Move, int] = {
+    "swap": 0,
+    "afar": 0,
+    "turn": 3,
+    "shift": 3,
+    "zoom": 1,
 }
-
 # Tangents at the object's distance by which a device may have been turned aside [m].
 _ASIDE_M = np.linspace(-0.06, 0.06, 7)
 _PLACES = 120
@@ -40,126 +37,85 @@ class Correction:
     """A change with free parameters, none of which is no change.
 
     Attributes:
-        kind: What is changed.
-        role: Of the devices; None: the object.
-        devices: Indices of the devices that it changes.
-        n_parameters: Free parameters; what can't be told from edges counts, too.
-        apply: What stands there for given parameters, shape (n_parameters,).
+        role: Of the devices.
+        devices: Indices of the one that it changes, or of the two that it swaps.
+        moves: What it changes; parameters stand in their order.
+        reach_m: Length that turns are measured at [m].
+        size_m: Likewise zooms.
+        pose: Where a device that is taken `afar` begins, shape (4, 4).
     """
 
-    kind: Kind
-    role: Role | None
+    role: Role
     devices: tuple[int, ...]
-    n_parameters: int
-    apply: Callable[[Supposed, Array], Supposed]
+    moves: tuple[Move, ...]
+    reach_m: float = 1.0
+    size_m: float = 1.0
+    pose: Array | None = None
+
+    @classmethod
+    def of(
+        cls,
+        supposed: Supposed,
+        role: Role,
+        index: int,
+        moves: tuple[Move, ...],
+        pose: Array | None = None,
+    ) -> Self:
+        """Return a change of one device, or of the object."""
+        body = supposed.objects[0]
+        size = reach = body.mesh.radius
+        if role != "objects":
+            device: Device = getattr(supposed, role)[index]
+            reach = float(np.linalg.norm(device.centre - body.centre))
+        return cls(role, (index,), moves, reach, size, pose)
+
+    @property
+    def n_parameters(self) -> int:
+        """Free parameters; what can't be told from edges counts, too."""
+        return sum(_N_PARAMETERS[move] for move in self.moves)
 
     def concerns(self, evidence: Evidence) -> Mask:
         """Return which edges it bears on."""
-        if self.role is None:
-            return np.ones(len(evidence), dtype=bool)
         return np.isin(evidence.index(self.role), self.devices)
 
     def repeats(self, other: "Correction") -> bool:
         """Return whether it is the other one again, or with more freedom."""
-        if self.role != other.role or self.devices != other.devices:
-            return False
-        fuller = _CONTAINS.get(self.kind, frozenset())
-        return other.kind == self.kind or other.kind in fuller
+        same = self.role == other.role and self.devices == other.devices
+        return same and {*self.moves} >= {*other.moves}
 
+    def apply(self, supposed: Supposed, x: Array) -> Supposed:
+        """Return what stands there for given parameters, shape (n_parameters,)."""
+        devices = list(getattr(supposed, self.role))
+        first, last = self.devices[0], self.devices[-1]
+        if "swap" in self.moves:
+            devices[first], devices[last] = devices[last], devices[first]
+        else:
+            devices[first] = self._changed(devices[first], x)
+        return replace(supposed, **{self.role: tuple(devices)})
 
-def of_device(role: Role, index: int, kind: Kind, reach_m: float) -> Correction:
-    """Return a change of a device's pose or focal length.
-
-    Args:
-        role: Which list the device is in.
-        index: Where.
-        kind: `focal`, `aim` (turned about its centre), `place` or `pose` (both).
-        reach_m: Distance of the object, for turning lengths into angles [m].
-    """
-
-    def apply(supposed: Supposed, x: Array) -> Supposed:
-        device = getattr(supposed, role)[index]
-        if kind == "focal":
-            size = supposed.body.mesh.radius
-            return _with(supposed, role, {index: _zoomed(device, 1.0 + x[0] / size)})
-        turn = x[:3] / reach_m if kind != "place" else np.zeros(3)
-        shift = x[-3:] if kind != "aim" else np.zeros(3)
-        return _with(supposed, role, {index: _moved(device, turn, shift)})
-
-    count = {"focal": 1, "aim": 3, "place": 3, "pose": 6}[kind]
-    return Correction(kind, role, (index,), count, apply)
-
-
-def standing_at(role: Role, index: int, pose: Array, reach_m: float) -> Correction:
-    """Return a change of pose that begins at quite another one, shape (4, 4)."""
-    near = of_device(role, index, "pose", reach_m)
-
-    def apply(supposed: Supposed, x: Array) -> Supposed:
-        there = replace(getattr(supposed, role)[index], world_from_device=pose)
-        return near.apply(_with(supposed, role, {index: there}), x)
-
-    return replace(near, kind="far pose", apply=apply)
-
-
-def swapped(role: Role, one: int, other: int) -> Correction:
-    """Return the exchange of two devices: each stands where the other should."""
-
-    def apply(supposed: Supposed, x: Array) -> Supposed:
-        del x
-        devices = getattr(supposed, role)
-        return _with(supposed, role, {one: devices[other], other: devices[one]})
-
-    return Correction("swap", role, (one, other), 0, apply)
-
-
-def of_object(kind: Kind) -> Correction:
-    """Return a change of the object: `scale` about its centre, `moved`, `similar`."""
-    counts = {"scale": 1, "moved": 6, "similar": 7}
-
-    def apply(supposed: Supposed, x: Array) -> Supposed:
-        body = supposed.body
-        size = body.mesh.radius
-        scale = 1.0 + float(x[-1]) / size if kind != "moved" else 1.0
-        turn, shift = np.eye(3), np.zeros(3)
-        if kind != "scale":
-            turn = Rotation.from_rotvec(x[:3] / size).as_matrix()
-            shift = x[3:6]
-        changed = replace(
-            body,
-            turn=turn @ body.turn,
-            scale=scale * body.scale,
-            shift=body.shift + shift,
-        )
-        return replace(supposed, body=changed)
-
-    return Correction(kind, None, (), counts[kind], apply)
-
-
-def _with(supposed: Supposed, role: Role, changed: dict[int, Device]) -> Supposed:
-    devices = enumerate(getattr(supposed, role))
-    return replace(supposed, **{role: tuple(changed.get(k, one) for k, one in devices)})
-
-
-def _moved(device: Device, turn: Array, shift: Array) -> Device:
-    pose = device.world_from_device.copy()
-    pose[:3, :3] = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
-    pose[:3, 3] += shift
-    return replace(device, world_from_device=pose)
-
-
-def _zoomed(device: Device, factor: float) -> Device:
-    matrix = device.matrix.copy()
-    matrix[0, 0] *= factor
-    matrix[1, 1] *= factor
-    return replace(device, matrix=matrix)
+    def _changed(self, device: Device | Object, x: Array) -> Device | Object:
+        ends = np.cumsum([_N_PARAMETERS[move] for move in self.moves])
+        steps = dict(zip(self.moves, np.split(x, ends[:-1]), strict=True))
+        begin = device.world_from_device if self.pose is None else self.pose
+        pose = begin.copy()
+        if "turn" in steps:
+            turn = Rotation.from_rotvec(steps["turn"] / self.reach_m).as_matrix()
+            pose[:3, :3] = turn @ pose[:3, :3]
+        if "shift" in steps:
+            pose[:3, 3] += steps["shift"]
+        device = replace(device, world_from_device=pose)
+        if "zoom" not in steps:
+            return device
+        factor = 1.0 + float(steps["zoom"][0]) / self.size_m
+        if isinstance(device, Object):
+            return replace(device, scale=factor * device.scale)
+        matrix = device.matrix.copy()
+        matrix[[0, 1], [0, 1]] *= factor
+        return replace(device, matrix=matrix)
 
 
 def turns_aside(pose: Array) -> list[Array]:
-    """Return turns about a device's x and y axes, as lengths at the object [m].
-
-    Args:
-        pose: ``world_from_device``, shape (4, 4).
-    """
+    """Return turns about the x and y axes of a pose, as lengths at the object [m]."""
     x, y = pose[:3, 0], pose[:3, 1]
     return [a * x + b * y for a in _ASIDE_M for b in _ASIDE_M]
 
@@ -179,12 +135,11 @@ def far_poses(pose: Array, middle: Array) -> list[Array]:
     flat = np.sqrt(1.0 - z * z)
     sphere = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
     away = pose[:3, 3] - middle
-    reach = float(np.linalg.norm(away))
     poses: list[Array] = []
     for towards in sphere:
-        about = Rotation.align_vectors(towards, away / reach)[0].as_matrix()
+        about = Rotation.align_vectors(towards, away / np.linalg.norm(away))[0]
         for roll in np.arange(_ROLLS) * (2.0 * np.pi / _ROLLS):
-            turned = Rotation.from_rotvec(roll * towards).as_matrix() @ about
+            turned = (Rotation.from_rotvec(roll * towards) * about).as_matrix()
             new = np.eye(4)
             new[:3, :3] = turned @ pose[:3, :3]
             new[:3, 3] = middle + turned @ away

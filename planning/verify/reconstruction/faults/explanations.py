@@ -4,25 +4,17 @@ A change is scored by the mismatch it leaves, a mean over the pairs of devices o
 mean over each pair's sound edges; without outliers, and whichever pair has most edges.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 
-from .corrections import (
-    Correction,
-    far_poses,
-    of_device,
-    of_object,
-    standing_at,
-    swapped,
-    turns_aside,
-)
+from .corrections import Correction, Device, Move, far_poses, turns_aside
 from .fits import fit
-from .supposed import Evidence, Role, Supposed, mismatches, places
+from .supposed import Evidence, Places, Role, Supposed, mismatches, places
 
 # A pair's mismatch is the mean of this share of its edges, the rest are outliers.
 SOUND_SHARE = 0.85
@@ -33,171 +25,187 @@ _FAR_CAP_M = 5e-2
 # Beyond so many times what is fine, other places than those nearby are looked at.
 _FAR_TIMES = 4.0
 _ROLES: tuple[Role, Role] = ("cameras", "projectors")
+_DEVICE_MOVES: tuple[tuple[Move, ...], ...] = (
+    ("zoom",),
+    ("turn",),
+    ("shift",),
+    ("turn", "shift"),
+)
+_OBJECT_MOVES: tuple[tuple[Move, ...], ...] = (
+    ("zoom",),
+    ("turn", "shift"),
+    ("turn", "shift", "zoom"),
+)
 # Starts are compared on every fourth edge, the best few are fitted.
 _THIN = 4
 _FITTED_FAR = 12
 
-Look = Callable[[Supposed], Array]
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """A fitted change.
-
-    Attributes:
-        correction: What is changed.
-        before: How everything was supposed to stand without it.
-        after: How everything is supposed to stand with it.
-        mismatch: Of each edge after it [m], shape (n,).
-        remaining_m: Mismatch that is left, mean over the pairs of devices [m].
-        rows: Edges that it bears on, shape (n,).
-    """
-
-    correction: Correction
-    before: Supposed
-    after: Supposed
-    mismatch: Array
-    remaining_m: float
-    rows: Mask
-
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The edges, and how they lie before the next change."""
+    """How the edges lie, were everything as it is supposed.
+
+    Attributes:
+        evidence: The edges.
+        supposed: How everything is supposed to stand.
+        fine_m: Mismatch that nothing is wrong with [m].
+    """
 
     evidence: Evidence
     supposed: Supposed
-    mismatch: Array
     fine_m: float
 
-    def misfit(self, mismatch: Array | None = None, rows: Mask | None = None) -> float:
-        """Return the mismatch [m], mean over the pairs of some of the edges."""
-        error = self.mismatch if mismatch is None else mismatch
-        chosen = np.ones(len(error), dtype=bool) if rows is None else rows
-        keys = (self.evidence.projector << 16 | self.evidence.camera)[chosen]
-        size = capped(error[chosen], CAP_M)
-        return float(np.mean([_sound(size[keys == key]) for key in np.unique(keys)]))
+    @cached_property
+    def mismatch(self) -> Array:
+        """Of each edge [m], shape (n,)."""
+        return mismatches(self.evidence, self.supposed, self._places)
 
-    def explanations(self) -> list[Explanation]:
+    @cached_property
+    def _places(self) -> Places:
+        return places(self.evidence, self.supposed)
+
+    def misfit(self, chosen: Mask | None = None) -> float:
+        """Return the mismatch [m], mean over the pairs of some of the edges."""
+        return float(np.mean([*self._misfits(chosen).values()]))
+
+    def _misfits(self, chosen: Mask | None = None) -> dict[tuple[int, int], float]:
+        some = np.arange(len(self.evidence)) if chosen is None else chosen
+        size = capped(self.mismatch[some], CAP_M)
+        devices = self.evidence.projector[some], self.evidence.camera[some]
+        pairs = sorted({*zip(*(one.tolist() for one in devices), strict=True)})
+        return {
+            (p, c): _sound(size[(devices[0] == p) & (devices[1] == c)])
+            for p, c in pairs
+        }
+
+    def explanations(self) -> list["Explanation"]:
         """Fit every change to the edges that it bears on."""
         off = self._off()
-        swaps = [
-            self._fitted(swapped(role, *two))
+        tried = [
+            self._fitted(Correction(role, two, ("swap",)))
             for role in _ROLES
             for two in combinations(off[role], 2)
         ]
-        tried = swaps
-        if all(len(off[role]) == self._n_measured(role) for role in _ROLES):
-            tried += [self._fitted(of_object(k)) for k in ("scale", "moved", "similar")]
+        if all(
+            len(off[role]) == len(np.unique(self.evidence.index(role)))
+            for role in _ROLES
+        ):
+            tried += [
+                self._fitted(Correction.of(self.supposed, "objects", 0, moves))
+                for moves in _OBJECT_MOVES
+            ]
         several = all(len(off[role]) > 1 for role in _ROLES)
         if several and any(e.remaining_m <= self.fine_m for e in tried):
             # No change of one device would do as well.
             return tried
-        devices: list[tuple[Role, int]] = [
-            (role, index) for role in _ROLES for index in off[role]
-        ]
+        devices: list[tuple[Role, int]] = [(r, k) for r in _ROLES for k in off[r]]
         for role, index in devices:
             tried += self._nearby(role, index)
         best = min(tried, key=lambda e: e.remaining_m)
         for role, index in devices:
             concerned = self.evidence.index(role) == index
-            does = [best, *(e for e in tried if np.array_equal(e.rows, concerned))]
-            least = min(self.misfit(e.mismatch, concerned) for e in does)
+            same = [e for e in tried if np.array_equal(e.concerned, concerned)]
+            least = min(e.after.misfit(concerned) for e in (best, *same))
             if least > _FAR_TIMES * self.fine_m:
                 tried.append(self._afar(role, index))
         return tried
 
-    def _n_measured(self, role: Role) -> int:
-        return len(np.unique(self.evidence.index(role)))
-
     def _off(self) -> dict[Role, list[int]]:
         """Devices whose edges are off their rings with all partners, else with some."""
-        pairs = {
-            (p, c): self.misfit(
-                rows=(self.evidence.projector == p) & (self.evidence.camera == c)
-            )
-            for p, c in self.evidence.pairs()
-        }
+        misfits = self._misfits()
+        off: dict[Role, list[int]] = {}
         for enough in (min, max):
-            off: dict[Role, list[int]] = {}
             for axis, role in enumerate(reversed(_ROLES)):
-                every = sorted({pair[axis] for pair in pairs})
                 off[role] = [
                     k
-                    for k in every
-                    if enough(m for pair, m in pairs.items() if pair[axis] == k)
+                    for k in sorted({pair[axis] for pair in misfits})
+                    if enough(m for pair, m in misfits.items() if pair[axis] == k)
                     > self.fine_m
                 ]
             if any(off.values()):
-                return off
-        return {role: [] for role in _ROLES}
+                break
+        return off
 
-    def _nearby(self, role: Role, index: int) -> list[Explanation]:
+    def _nearby(self, role: Role, index: int) -> list["Explanation"]:
         """Fit the changes of one device that begin where it should stand."""
-        reach = self._reach(role, index)
-        aim = of_device(role, index, "aim", reach)
-        pose = getattr(self.supposed, role)[index].world_from_device
-        aside = turns_aside(pose)
-        turn = aside[self._nearest([aim] * len(aside), aside)[0]]
-        starts = {"aim": turn, "pose": np.concatenate([turn, np.zeros(3)])}
-        return [
-            self._fitted(of_device(role, index, kind, reach), starts.get(kind))
-            for kind in ("focal", "aim", "place", "pose")
+        changes = [
+            Correction.of(self.supposed, role, index, moves) for moves in _DEVICE_MOVES
         ]
+        device: Device = getattr(self.supposed, role)[index]
+        aside = turns_aside(device.world_from_device)
+        turn = aside[self._nearest([changes[1]] * len(aside), aside)[0]]
+        starts = (None, turn, None, np.append(turn, np.zeros(3)))
+        return [self._fitted(*one) for one in zip(changes, starts, strict=True)]
 
-    def _afar(self, role: Role, index: int) -> Explanation:
+    def _afar(self, role: Role, index: int) -> "Explanation":
         """Fit a device's pose from all about the object."""
-        reach = self._reach(role, index)
-        pose = getattr(self.supposed, role)[index].world_from_device
-        poses = far_poses(pose, self.supposed.body.centre)
-        changes = [standing_at(role, index, pose, reach) for pose in poses]
+        device: Device = getattr(self.supposed, role)[index]
+        moves: tuple[Move, ...] = ("afar", "turn", "shift")
+        changes = [
+            Correction.of(self.supposed, role, index, moves, pose)
+            for pose in far_poses(
+                device.world_from_device, self.supposed.objects[0].centre
+            )
+        ]
         start = np.zeros(6)
-        best = self._nearest(changes, [start] * len(changes))[:_FITTED_FAR]
-        tried = [changes[k] for k in best]
-        rows = np.flatnonzero(tried[0].concerns(self.evidence))[::_THIN]
-        look = self._looking(tried[0], rows)
+        nearest = self._nearest(changes, [start] * len(changes))[:_FITTED_FAR]
+        tried = [changes[k] for k in nearest]
+        thin = self._thin(tried[0])
         starts = [
-            fit(lambda x, one=one: look(one.apply(self.supposed, x)), start)
-            for one in tried
+            fit(lambda x, one=one: self._changed(one, x, thin), start) for one in tried
         ]
         k = self._nearest(tried, starts)[0]
         return self._fitted(tried[k], starts[k])
 
-    def _reach(self, role: Role, index: int) -> float:
-        device = getattr(self.supposed, role)[index]
-        return float(np.linalg.norm(device.centre - self.supposed.body.centre))
-
     def _nearest(self, changes: list[Correction], starts: list[Array]) -> list[int]:
         """Return which changes leave least at their starts, the best first."""
-        rows = np.flatnonzero(changes[0].concerns(self.evidence))[::_THIN]
-        look = self._looking(changes[0], rows)
-        left = [
-            capped(look(c.apply(self.supposed, x)), _FAR_CAP_M).mean()
-            for c, x in zip(changes, starts, strict=True)
+        thin = self._thin(changes[0])
+        remaining = [
+            capped(self._changed(one, x, thin), _FAR_CAP_M).mean()
+            for one, x in zip(changes, starts, strict=True)
         ]
-        return np.argsort(left, kind="stable").tolist()
+        return np.argsort(remaining, kind="stable").tolist()
 
-    def _looking(self, correction: Correction, rows: Indices) -> Look:
-        """Return what tells the mismatch of some edges, however all stands."""
-        few = self.evidence.take(rows)
+    def _thin(self, correction: Correction) -> Indices:
+        return np.flatnonzero(correction.concerns(self.evidence))[::_THIN]
+
+    def _changed(self, correction: Correction, x: Array, chosen: Indices) -> Array:
+        """Mismatch of some edges [m] after a change of given parameters."""
+        after = correction.apply(self.supposed, x)
+        some = self.evidence.take(chosen)
         if correction.role == "projectors":
-            at = places(few, self.supposed)
-            return lambda supposed: mismatches(few, supposed, at)
-        return lambda supposed: mismatches(few, supposed, places(few, supposed))
+            points, normals = self._places
+            return mismatches(some, after, (points[chosen], normals[chosen]))
+        return mismatches(some, after, places(some, after))
 
     def _fitted(
         self, correction: Correction, start: Array | None = None
-    ) -> Explanation:
-        rows = correction.concerns(self.evidence)
-        look = self._looking(correction, np.flatnonzero(rows))
+    ) -> "Explanation":
+        concerned = np.flatnonzero(correction.concerns(self.evidence))
         x = np.zeros(correction.n_parameters) if start is None else start
         if len(x):
-            x = fit(lambda x: look(correction.apply(self.supposed, x)), x)
-        after = correction.apply(self.supposed, x)
-        mismatch = self.mismatch.copy()
-        mismatch[rows] = look(after)
-        error = self.misfit(mismatch)
-        return Explanation(correction, self.supposed, after, mismatch, error, rows)
+            x = fit(lambda x: self._changed(correction, x, concerned), x)
+        after = State(self.evidence, correction.apply(self.supposed, x), self.fine_m)
+        return Explanation(correction, self, after)
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A fitted change, and how the edges lie before and after it."""
+
+    correction: Correction
+    before: State
+    after: State
+
+    @cached_property
+    def remaining_m(self) -> float:
+        """Mismatch that it leaves, mean over the pairs of devices [m]."""
+        return self.after.misfit()
+
+    @cached_property
+    def concerned(self) -> Mask:
+        """Edges that it bears on, shape (n,)."""
+        return self.correction.concerns(self.before.evidence)
 
 
 def capped(mismatch: Array, cap: float) -> Array:

@@ -33,15 +33,14 @@ def fit(mismatch: Callable[[Array], Array], start: Array) -> Array:
     """
     x = start
     for _ in range(_ROUNDS):
-        error = mismatch(x)
-        size = np.abs(error)
+        size = np.abs(mismatch(x))
         if not np.isfinite(size).any():
             return x
         typical = float(np.nanmedian(size))
         cap = max(_FAR_MEDIANS * typical, _FAR_M)
         small = max(_SMALL_SHARE * typical, _SMALL_M)
         pulls = np.where(size < cap, 1.0 / np.sqrt(np.fmax(size, small)), 0.0)
-        before, x = x, _weighed(mismatch, x, pulls, cap, small)
+        before, x = x, _weighed(mismatch, x, pulls, cap, _DRAWN_BACK / np.sqrt(small))
         if np.abs(x - before).max() < _SETTLED_M:
             return x
     return x
@@ -52,10 +51,9 @@ def _weighed(
     start: Array,
     pulls: Array,
     cap: float,
-    small: float,
+    back: float,
 ) -> Array:
     """Least squares of mismatches by fixed weights, from a start."""
-    back = _DRAWN_BACK / np.sqrt(small)
 
     def residuals(x: Array) -> Array:
         error = mismatch(x)

@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.rays.proximity import closest_points
-from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.arrays import Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.decode.decode import PairIndex, Pairs
 from planning.verify.reconstruction.scanner import Scanner
 
 from .supposed import GRAZING, Evidence, Supposed, mismatches, places
@@ -16,7 +15,7 @@ from .supposed import GRAZING, Evidence, Supposed, mismatches, places
 _MM = 1e3
 # Points of each pair that are looked at.
 _POINTS_A_PAIR = 1000
-# A projector counts if so many of the points that are off are its own.
+# A projector counts if it lit so many of the points that are off.
 _MUCH = 0.25
 # An edge lies on its ring on the mesh within this, its point lies this far from there:
 # as shares of the limit on the rms distance.
@@ -27,133 +26,105 @@ _LEAST_SHARE = 0.05
 
 def where_inaccurate(plan: Scanner, cloud: Cloud) -> str:
     """Say what the points that are off have in common, nothing being displaced."""
-    limit = plan.limits.check.max_rms_m
-    key = cloud.projector.astype(np.int64) << 16 | cloud.camera
-    by_pair = [cloud.take(key == k) for k in np.unique(key)]
-    few = Cloud.join([one.thinned(_POINTS_A_PAIR) for one in by_pair])
-    mesh = plan.mesh
+    limit, mesh = plan.limits.check.max_rms_m, plan.mesh
+    few = Cloud.join(
+        [
+            cloud.take((cloud.projector == p) & (cloud.camera == c)).thinned(
+                _POINTS_A_PAIR
+            )
+            for p in range(len(plan.projectors))
+            for c in range(len(plan.cameras))
+        ]
+    )
     nearest = closest_points(mesh, few.points)
     error = np.abs(nearest.distances)
-    far = error > limit
-    cosine = -np.einsum("ij,ij->i", few.beams, mesh.face_normals[nearest.faces])
-    grazing = _grazing(plan, few.projector[far], cosine[far])
+    grazing = _grazing(plan, few, nearest.faces, error > limit)
     if grazing:
         return (
             f"the points that are off were lit at grazing incidence, where edges "
             f"smear: {', '.join(grazing)} (median)"
         )
-    medians = _pair_medians(few, error, len(plan.projectors), len(plan.cameras))
-    off = medians > limit
-    if not off.any():
+    pairs = sorted({*zip(few.projector.tolist(), few.camera.tolist(), strict=True)})
+    medians = {
+        (p, c): float(np.median(error[(few.projector == p) & (few.camera == c)]))
+        for p, c in pairs
+    }
+    off = {pair for pair, median in medians.items() if median > limit}
+    if not off:
         return (
             "most points of every pair are accurate: the rest, or the surface that is "
             "missing, lies where few rings reach"
         )
-    known = np.isfinite(medians)
-    if np.all(off[known]):
+    if len(off) == len(medians):
         return (
             f"every pair of devices is off (median error "
-            f"{_MM * np.nanmin(medians):.3f} to {_MM * np.nanmax(medians):.3f} mm), "
-            f"and no change of one device, nor of the object's place or size, explains "
-            f"it: the object isn't the mesh of the plan, or several devices differ"
+            f"{_MM * min(medians.values()):.3f} to {_MM * max(medians.values()):.3f} "
+            f"mm), and no change of one device, nor of the object's place or size, "
+            f"explains it: the object isn't the mesh of the plan, or several devices "
+            f"differ"
         )
-    ids = tuple(p.id for p in plan.projectors), tuple(c.id for c in plan.cameras)
-    return _name_devices(off, known, medians, *ids)
+    return _name_devices(off, medians, plan)
 
 
-def _grazing(plan: Scanner, projector: NDArray[np.int16], cosine: Array) -> list[str]:
-    """Name projectors whose points among those that are off are lit at grazing light.
-
-    Args:
-        plan: Of the rig.
-        projector: Of each point that is off, shape (n,).
-        cosine: Of the incidence of its light, shape (n,).
-    """
+def _grazing(plan: Scanner, cloud: Cloud, faces: Indices, far: Mask) -> list[str]:
+    """Name projectors that lit many of the points that are off at grazing incidence."""
+    cosine = -np.einsum("ij,ij->i", cloud.beams, plan.mesh.face_normals[faces])
     names: list[str] = []
     for p, device in enumerate(plan.projectors):
-        chosen = projector == p
-        if len(chosen) and np.mean(chosen) > _MUCH:
-            lit = float(np.median(cosine[chosen]))
+        lit_by = cloud.projector[far] == p
+        if len(lit_by) and np.mean(lit_by) > _MUCH:
+            lit = float(np.median(cosine[far][lit_by]))
             if lit < np.cos(GRAZING):
                 angle = np.rad2deg(np.arccos(np.clip(lit, -1.0, 1.0)))
                 names.append(f"{device.id} at {angle:.0f} degrees")
     return names
 
 
-def _pair_medians(
-    cloud: Cloud, error: Array, n_projectors: int, n_cameras: int
-) -> Array:
-    """Median error of each pair [m], NaN where it has no point."""
-    medians = np.full((n_projectors, n_cameras), np.nan)
-    for p in range(n_projectors):
-        for c in range(n_cameras):
-            chosen = (cloud.projector == p) & (cloud.camera == c)
-            if chosen.any():
-                medians[p, c] = np.median(error[chosen])
-    return medians
-
-
 def _name_devices(
-    off: Mask,
-    known: Mask,
-    medians: Array,
-    projectors: tuple[str, ...],
-    cameras: tuple[str, ...],
+    off: set[PairIndex], medians: dict[PairIndex, float], plan: Scanner
 ) -> str:
     """Name the devices whose every pair is off, if they account for all that is."""
-    bad_cameras = np.all(off | ~known, axis=0)
-    bad_projectors = np.all(off | ~known, axis=1)
-    cameras_off = [name for name, bad in zip(cameras, bad_cameras, strict=True) if bad]
-    projectors_off = [
-        name for name, bad in zip(projectors, bad_projectors, strict=True) if bad
-    ]
-    by_camera = np.tile(bad_cameras, (len(projectors), 1))
-    by_projector = np.tile(bad_projectors[:, None], len(cameras))
-    explanations: tuple[tuple[list[str], Mask], ...] = (
-        (projectors_off, by_projector),
-        (cameras_off, by_camera),
-        (projectors_off + cameras_off, by_camera | by_projector),
-    )
-    for names, blamed in explanations:
-        if names and not np.any(off & ~blamed):
-            others = known & ~blamed
+    right = medians.keys() - off
+    projectors = {p for p, _ in off} - {p for p, _ in right}
+    cameras = {c for _, c in off} - {c for _, c in right}
+    none: set[int] = set()
+    for some, others in ((projectors, none), (none, cameras), (projectors, cameras)):
+        if all(p in some or c in others for p, c in off):
+            names = [plan.projectors[p].id for p in sorted(some)]
+            names += [plan.cameras[c].id for c in sorted(others)]
             verb = "differs" if len(names) == 1 else "differ"
             return (
                 f"{' and '.join(names)} {verb} from the plan in pose or optics: median "
-                f"error {_MM * np.median(medians[off]):.3f} mm, of the other pairs "
-                f"{_MM * np.median(medians[others]):.3f} mm"
+                f"error {_MM * np.median([medians[pair] for pair in off]):.3f} mm, of "
+                f"the other pairs "
+                f"{_MM * np.median([medians[pair] for pair in right]):.3f} mm"
             )
-    pairs = ", ".join(f"{projectors[p]} with {cameras[c]}" for p, c in np.argwhere(off))
+    pairs = ", ".join(plan.name(pair) for pair in sorted(off))
     return f"some pairs of devices are off and others aren't: {pairs}"
 
 
-def wrong_roots(plan: Scanner, decoded: Pairs) -> tuple[tuple[str, str, float], ...]:
-    """Return pairs of projector and camera whose points often lie on the other root.
+def wrong_roots(plan: Scanner, decoded: Pairs) -> list[str]:
+    """Name pairs of projector and camera whose points often lie on the other root.
 
     The ray of such a point meets the mesh where its ring is drawn, but the point was
     put elsewhere on the ray: labels and poses are right, the root bit isn't.
-
-    Args:
-        plan: Of the rig.
-        decoded: What each pair gave.
-
-    Returns:
-        Id of the projector and the camera, and the share of the pair's points.
     """
-    limit = plan.limits.check.max_rms_m
-    supposed = Supposed.of(plan)
-    wrong_pairs: list[tuple[str, str, float]] = []
+    limit, supposed = plan.limits.check.max_rms_m, Supposed.of(plan)
+    words: list[str] = []
     for (p, c), pair in decoded:
         cloud = pair.cloud.thinned(_POINTS_A_PAIR)
         if len(cloud) == 0:
             continue
         radii = plan.projectors[p].pattern.radii[cloud.ring]
-        evidence = replace(Evidence.at(plan, cloud.pixels, p, c), radii=radii)
+        evidence = replace(Evidence.at(cloud.pixels, p, c), radii=radii)
         at = places(evidence, supposed)
         off = np.abs(mismatches(evidence, supposed, at))
         apart = np.linalg.norm(cloud.points - at[0], axis=1)
         wrong = (off < _ON_RING_SHARE * limit) & (apart > _ELSEWHERE_SHARE * limit)
-        share = float(np.mean(wrong))
-        if share > _LEAST_SHARE:
-            wrong_pairs.append((plan.projectors[p].id, plan.cameras[c].id, share))
-    return tuple(wrong_pairs)
+        if np.mean(wrong) > _LEAST_SHARE:
+            words.append(
+                f"{plan.name((p, c))}: {100 * np.mean(wrong):.0f} % of the points took "
+                f"the wrong one of the two roots; the root disc isn't the one drawn "
+                f"for {plan.cameras[c].id}"
+            )
+    return words

@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from geometry.mesh.sampling import SurfaceSamples
 from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import ProjectorCalibration
-from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.decode.decode import CAUSES, Pairs
+from planning.verify.reconstruction.decode.decode import CAUSES
 from planning.verify.reconstruction.render.occluders import Occluder
 from planning.verify.reconstruction.render.rendered_light import SHADOW_SLACK
-from planning.verify.reconstruction.scanner import Scanner
 
-from .supposed import GRAZING, Evidence, Supposed, places
+from .measured_clouds import REJECTED, MeasuredClouds
+from .supposed import GRAZING, Supposed
 
 _MM = 1e3
 _MOST_REGIONS = 3
@@ -33,13 +31,26 @@ _MOST = 0.5
 _GLANCING = np.cos(np.deg2rad(89.0))
 
 
-def missing_where(
-    plan: Scanner, samples: SurfaceSamples, predicted: Mask, missing: Mask
-) -> str:
-    """Return the regions that most of the missing samples lie in, with their shares."""
-    region = plan.region[samples.faces]
+def where_missing(measured: MeasuredClouds, *, displaced: bool) -> list[str]:
+    """Say where samples are missing, and why unless devices are to blame as a whole."""
+    claimed, missing = measured.expected.measured, measured.missing
+    if claimed is None or not missing.any():
+        return []
+    where = _regions(measured, claimed)
+    if displaced:
+        return [where]
+    samples = measured.expected.samples
+    points, normals = samples.points[missing], samples.normals[missing]
+    why = _hole_between(measured, points) or _left_out(measured, points)
+    return [where, why or _no_edges(measured.supposed, points, normals)]
+
+
+def _regions(measured: MeasuredClouds, claimed: Mask) -> str:
+    """Name the regions that most of the missing samples lie in, with their shares."""
+    samples, missing = measured.expected.samples, measured.missing
+    region = measured.plan.region[samples.faces]
     ids, place = np.unique(region, return_inverse=True)
-    promised = np.bincount(place[predicted], minlength=len(ids))
+    promised = np.bincount(place[claimed], minlength=len(ids))
     lost = np.bincount(place[missing], minlength=len(ids))
     worst = np.argsort(-lost, kind="stable")[:_MOST_REGIONS]
     names = [
@@ -48,28 +59,17 @@ def missing_where(
         for k in worst.tolist()
         if lost[k]
     ]
-    centre = _MM * np.median(samples.points[missing], axis=0)
-    return (
-        f"missing: {', '.join(names)}, about ({centre[0]:.0f}, {centre[1]:.0f}, "
-        f"{centre[2]:.0f}) mm"
-    )
+    x, y, z = _MM * np.median(samples.points[missing], axis=0)
+    return f"missing: {', '.join(names)}, about ({x:.0f}, {y:.0f}, {z:.0f}) mm"
 
 
-def hole_between(
-    plan: Scanner, cloud: Cloud, samples: SurfaceSamples, missing: Mask
-) -> str | None:
-    """Return the pair of cameras between whose measured parts most missing samples lie.
+def _hole_between(measured: MeasuredClouds, points: Array) -> str | None:
+    """Name two cameras between whose measured surface most missing points lie.
 
-    A sample lies between two cameras if the points of either about it lie on one side,
+    A point lies between two cameras if the points of either about it lie on one side,
     opposite to the other's: neither camera's image reaches across.
-
-    Args:
-        plan: Of the rig.
-        cloud: All points.
-        samples: Of the target.
-        missing: Which of them have no point, shape (n,).
     """
-    points = samples.points[missing]
+    plan, cloud = measured.plan, measured.cloud
     reach = _REACH_TAU * plan.limits.check.tau_m
     sides = {
         c: _side(cloud.points[cloud.camera == c], points, reach)
@@ -81,9 +81,9 @@ def hole_between(
         if np.mean(between) < _MOST:
             continue
         width = float(np.median((near + far)[between]))
-        centres = [plan.cameras[k].centre for k in (one, other)]
-        d = float(np.linalg.norm(centres[1] - centres[0]))
-        names = f"{plan.cameras[one].id} and {plan.cameras[other].id}"
+        first, second = plan.cameras[one], plan.cameras[other]
+        d = float(np.linalg.norm(second.centre - first.centre))
+        names = f"{first.id} and {second.id}"
         return (
             f"they lie between what {names} measured, a hole about "
             f"{_MM * width:.1f} mm wide: the baseline of {names}, {_MM * d:.1f} mm, is "
@@ -110,52 +110,33 @@ def _side(measured: Array, points: Array, reach: float) -> tuple[Array, Array]:
     return np.where(sound[:, None], side, 0.0), distance[:, 0]
 
 
-def left_out_nearby(
-    plan: Scanner, decoded: Pairs, samples: SurfaceSamples, missing: Mask
-) -> tuple[str, float] | None:
-    """Return why most edges on missing samples gave no point, and for which share.
-
-    Args:
-        plan: Of the rig.
-        decoded: What each pair gave.
-        samples: Of the target.
-        missing: Which of them have no point, shape (n,).
-
-    Returns:
-        A name of `decode.CAUSES` and the share of the missing samples that have such an
-        edge within tau; None where most of them have none.
-    """
-    supposed = Supposed.of(plan)
-    points = samples.points[missing]
-    tau = plan.limits.check.tau_m
+def _left_out(measured: MeasuredClouds, points: Array) -> str | None:
+    """Say why most edges on missing points gave none; None where most have no edge."""
+    tau = measured.plan.limits.check.tau_m
     reached = np.zeros((len(CAUSES), len(points)), dtype=bool)
-    for (p, c), pair in decoded:
+    for (_, c), pair in measured.decoded:
         for cause in np.unique(pair.outcomes[pair.outcomes >= 0]).tolist():
-            own = pair.outcomes == cause
-            evidence = Evidence.at(plan, pair.edges.pixels[own], p, c)
-            lie, _ = places(evidence, supposed)
-            lie = lie[np.isfinite(lie[:, 0])]
-            if len(lie):
-                reached[cause] |= KDTree(lie).query(points)[0] <= tau
+            pixels = pair.edges.pixels[pair.outcomes == cause]
+            edges, _ = measured.supposed.seen(c, pixels)
+            edges = edges[np.isfinite(edges[:, 0])]
+            if len(edges):
+                reached[cause] |= KDTree(edges).query(points)[0] <= tau
     shares = reached.mean(axis=1)
     cause = int(np.argmax(shares))
     if not shares[cause] >= _MOST:
         return None
-    return CAUSES[cause], float(shares[cause])
+    name = CAUSES[cause]
+    return (
+        f"edges on {100 * shares[cause]:.0f} % of them were left out as `{name}`, "
+        f"{REJECTED[name]}"
+    )
 
 
-def no_edges(plan: Scanner, points: Array, normals: Array) -> str:
-    """Say why there is no edge about missing samples, by the plan's own geometry.
-
-    Args:
-        plan: Of the rig.
-        points: Of the samples [m], shape (n, 3).
-        normals: Unit normals there, shape (n, 3).
-    """
-    supposed = Supposed.of(plan)
+def _no_edges(supposed: Supposed, points: Array, normals: Array) -> str:
+    """Say why there is no edge about missing points, by the plan's own geometry."""
     cosines = np.full((len(supposed.projectors), len(points)), -1.0)
     for p, projector in enumerate(supposed.projectors):
-        lit = light_falls(projector, supposed.body.caster, points, normals)
+        lit = light_falls(projector, supposed.objects[0].caster, points, normals)
         cosines[p, lit] = projector.incidence_cosine(points, normals)[lit]
     best, projector = cosines.max(axis=0), cosines.argmax(axis=0)
     if np.mean(best > 0.0) < _MOST:
@@ -164,7 +145,7 @@ def no_edges(plan: Scanner, points: Array, normals: Array) -> str:
     if angle < GRAZING:
         return "no edge was found there: dark, hidden or outside the images"
     squarest = np.bincount(projector[best > 0.0], minlength=len(cosines))
-    name = plan.projectors[int(np.argmax(squarest))].id
+    name = supposed.projectors[int(np.argmax(squarest))].id
     return (
         f"no edge was found there: {name} meets them at {np.rad2deg(angle):.0f} "
         f"degrees (median), at grazing incidence"
@@ -188,30 +169,21 @@ def light_falls(
         drawn = projector.ring_coordinate(points) <= projector.pattern.outer_radius
         lit = projector.in_panel(pixels) & (depth > 0.0) & drawn
     lit &= -np.einsum("ij,ij->i", beams, normals) > _GLANCING
-    rows = np.flatnonzero(lit)
-    starts = np.broadcast_to(starts, points.shape)[rows]
-    stop = reach[rows] * (1.0 - SHADOW_SLACK)
-    lit[rows] = ~caster.occluded(np.ascontiguousarray(starts), beams[rows], stop)
+    starts = np.broadcast_to(starts, points.shape)[lit]
+    stop = reach[lit] * (1.0 - SHADOW_SLACK)
+    lit[lit] = ~caster.occluded(np.ascontiguousarray(starts), beams[lit], stop)
     return lit
 
 
-def lit_twice(plan: Scanner, pixels: Array, p: int, c: int) -> tuple[str, ...]:
-    """Return which other projectors light most of some pixels, by the plan's geometry.
-
-    Args:
-        plan: Of the rig.
-        pixels: In the image of camera `c`, shape (n, 2).
-        p: Index of the projector that lights them anyway.
-        c: Index of the camera.
-    """
-    supposed = Supposed.of(plan)
-    points, normals = places(Evidence.at(plan, pixels, p, c), supposed)
+def lit_twice(supposed: Supposed, pixels: Array, p: int, c: int) -> tuple[str, ...]:
+    """Return which other projectors than p light most of some pixels of camera c."""
+    points, normals = supposed.seen(c, pixels)
     known = np.isfinite(points[:, 0])
     if not known.any():
         return ()
-    spot = supposed.body.caster, points[known], normals[known]
-    lit: list[str] = []
-    for q, projector in enumerate(supposed.projectors):
-        if q != p and np.mean(light_falls(projector, *spot)) > 0.5:
-            lit.append(projector.id)
-    return tuple(lit)
+    spot = supposed.objects[0].caster, points[known], normals[known]
+    return tuple(
+        projector.id
+        for q, projector in enumerate(supposed.projectors)
+        if q != p and np.mean(light_falls(projector, *spot)) > 0.5
+    )
