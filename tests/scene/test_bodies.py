@@ -222,7 +222,7 @@ def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
         starts = points + [0.0, 0.0, 1.0]
     ways = points - starts
     reach = np.linalg.norm(ways, axis=1)
-    rig = SimpleNamespace(projectors=[lamp], cameras=[eye])
+    rig = SimpleNamespace(projectors=[lamp], cameras=[eye], obstacles=())
     caster = Both(scene.visibility.caster, obstacles_of(rig, "P1"))
     hidden = caster.occluded(starts, ways / reach[:, None], 0.999 * reach)
     assert np.array_equal(hidden, dark)
@@ -560,7 +560,9 @@ def test_the_bodies_of_all_devices_but_ones_own_stand(scene):
         "C1",
     ]
     assert scene.among([projector(), camera(body=None)]) is scene
-    mesh = obstacles_of(SimpleNamespace(projectors=[lamp], cameras=[eye]), "X").mesh
+    mesh = obstacles_of(
+        SimpleNamespace(projectors=[lamp], cameras=[eye], obstacles=()), "X"
+    ).mesh
     assert isinstance(mesh, TriangleMesh)
     # Closed, and outwards: the divergence theorem gives both volumes.
     volume = np.linalg.det(mesh.corners).sum() / 6.0

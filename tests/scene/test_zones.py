@@ -342,6 +342,7 @@ def planned(tmp_path_factory, with_few_samples):
     path.write_text(
         'base = "default"\n[workspace]\n' + CEILING + "[[workspace.keep_out]]\n"
         'name = "hole"\ncentre_mm = [0, 0, 1000]\nsize_mm = [500, 500, 100]\n'
+        "blocks = false\n"
         "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\nmin_reachable = 0.1\n"
         "[placement]\nn_candidate_projectors = 600\nn_reference_projectors = 600\n"
         "n_candidate_cameras = 400\nn_reference_cameras = 400\n"

@@ -438,7 +438,7 @@ def _reference_sight(
 
 
 def light_steps(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> int:
-    """Limits of *lit* that a point on a convex body passes, 6: lit."""
+    """Limits of *lit* that a point on a convex body passes, 7: lit."""
     local = _into(entry["world_from_device"], p)
     ring = _into(entry["world_from_ring"], p)
     last = entry["ring_radii"][-1]
@@ -465,7 +465,7 @@ def light_steps(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> int:
         return 2
     if not abs(_dot(steep, along)) <= math.cos(limits["min_tangent_angle"]):
         return 3
-    return 6
+    return 7
 
 
 def light(entry: Any, p: Any) -> tuple[list[float], float]:
@@ -487,7 +487,7 @@ def margin(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> float:
 
 
 def pair_steps(projector: Any, camera: Any, p: Any, n: Any, limits: Any) -> int:
-    """Limits of *seen*, then *measurable*, that a lit point passes, 9: measured."""
+    """Limits of *seen*, then *measurable*, that a lit point passes, 10: measured."""
     local = _into(camera["world_from_device"], p)
     origin = [camera["world_from_device"][i][3] for i in range(3)]
     r, t = _unit([p[i] - origin[i] for i in range(3)])
@@ -504,8 +504,8 @@ def pair_steps(projector: Any, camera: Any, p: Any, n: Any, limits: Any) -> int:
         return 2
     focal = math.sqrt(camera["K"][0][0] * camera["K"][1][1])
     if not local[2] / (focal * cosine) <= limits["camera"]["max_sample_distance_m"]:
-        return 5
-    return 6 + _triangulation_steps(projector, camera, p, n, (r, t, u, v), limits)
+        return 6
+    return 7 + _triangulation_steps(projector, camera, p, n, (r, t, u, v), limits)
 
 
 def _triangulation_steps(

@@ -224,6 +224,7 @@ def test_the_audit_imports_nothing_of_the_planner():
         "planning.model.document.part",
         "planning.model.document.coverage_records",
         "planning.model.document.input_records",
+        "planning.model.obstacles",
         "planning.model.planned",
         "planning.model.plan",
         "planning.model.requirements",
