@@ -52,24 +52,20 @@ def unpacked(path: Path, data: bytes) -> _Unpacked:
     Raises:
         MeshError: If an archive is damaged, holds other than one mesh, or too much.
     """
-    try:
-        return _unpacked(path, data)
-    except _DAMAGED as error:
-        raise MeshError(f"{path}: can't be unpacked ({error})") from None
-
-
-def _unpacked(path: Path, data: bytes) -> _Unpacked:
     suffixes = [suffix.lower().lstrip(".") for suffix in path.suffixes] or [""]
-    if suffixes[-1] == "zip":
-        return _from_zip(data)
-    if suffixes[-1] in ("gz", "bz2"):
+    try:
+        if suffixes[-1] == "zip":
+            return _from_zip(data)
         if suffixes[-1] == "gz":
             with gzip.open(io.BytesIO(data)) as stream:
                 content = _at_most(_pieces(stream))
-        else:
+        elif suffixes[-1] == "bz2":
             content = _at_most(_bunzipped(data))
-        return (suffixes[-2] if len(suffixes) > 1 else ""), content, None
-    return suffixes[-1], data, lambda name: (path.parent / name).read_bytes()
+        else:
+            return suffixes[-1], data, lambda name: (path.parent / name).read_bytes()
+    except _DAMAGED as error:
+        raise MeshError(f"{path}: can't be unpacked ({error})") from None
+    return (suffixes[-2] if len(suffixes) > 1 else ""), content, None
 
 
 def _from_zip(data: bytes) -> _Unpacked:

@@ -26,20 +26,12 @@ from .three_mf_format import read_three_mf
 
 SUPPORTED = ("obj", "ply", "stl", "off", "glb", "gltf", "3mf")
 
-# As 3MF names them, and in the plural, as glTF files of mesh libraries do.
+METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
+# As 3MF and, in the plural, mesh libraries name them; without the s of the plural.
 _UNIT_NAMES = {
-    name + plural: unit
-    for name, unit in (
-        ("micron", "um"),
-        ("micrometer", "um"),
-        ("millimeter", "mm"),
-        ("centimeter", "cm"),
-        ("meter", "m"),
-        ("inch", "in"),
-        ("foot", "ft"),
-    )
-    for plural in ("", "s")
-} | {"inches": "in", "feet": "ft"}
+    **{"micron": "um", "micrometer": "um", "millimeter": "mm", "centimeter": "cm"},
+    **{"meter": "m", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft"},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +67,6 @@ def read_format(
         raise FormatError(
             f"it holds {len(raw.vertices)} points and no faces; a surface is needed"
         )
-    _check_range(raw.faces, len(raw.vertices))
     return raw
 
 
@@ -92,7 +83,16 @@ def _raw(kind: str, data: bytes, fetch: Callable[[str], bytes] | None) -> RawMes
         vertices, faces, unit = read_gltf(data, partial(_beside, fetch))
     else:
         vertices, faces, unit = read_three_mf(data)
-    return RawMesh(vertices, faces, _UNIT_NAMES.get(unit.lower(), unit))
+    known = known_unit(unit)
+    if known is None:
+        raise FormatError(f"it states the unit '{unit}', which isn't known")
+    return RawMesh(vertices, faces, known)
+
+
+def known_unit(name: str) -> str | None:
+    """Return the short name of a unit; None: not known."""
+    unit = _UNIT_NAMES.get(name.lower().removesuffix("s"), name)
+    return unit if unit in METRES else None
 
 
 def _beside(fetch: Callable[[str], bytes] | None, name: str) -> bytes:
@@ -110,13 +110,11 @@ def _beside(fetch: Callable[[str], bytes] | None, name: str) -> bytes:
 def _ply(data: bytes) -> RawMesh:
     elements = read_ply(data)
     points, polygons = ply_surface(elements)
-    corners = np.asarray(polygons.values, np.int64)
-    _check_range(corners, len(points))
     of_vertices = elements["vertex"].scalars.items()
     return _of_polygons(
         points,
         polygons.lengths,
-        corners,
+        np.asarray(polygons.values, np.int64),
         {name: values for name, values in of_vertices if name not in ("x", "y", "z")},
         elements["face"].scalars if "face" in elements else {},
     )
@@ -132,11 +130,3 @@ def _of_polygons(
     faces, polygon = cut_polygons(points, sizes, corners)
     origin = FileOrigin(polygon, faces, len(sizes), len(points), of_faces, of_vertices)
     return RawMesh(points, faces, None, origin)
-
-
-def _check_range(corners: Ints, n_vertices: int) -> None:
-    if corners.size and not (corners.min() >= 0 and corners.max() < n_vertices):
-        raise FormatError(
-            f"faces name vertices {corners.min()}..{corners.max()}, "
-            f"there are {n_vertices}"
-        )

@@ -7,8 +7,8 @@ import trimesh
 
 from geometry.mesh.mesh import MeshError, TriangleMesh
 
-from .formats import RawMesh
-from .readers import METRES, UNITS, usable_mesh
+from .formats import RawMesh, known_unit
+from .readers import UNITS, usable_mesh
 
 _NAME = "a trimesh object"
 
@@ -27,9 +27,8 @@ def from_trimesh(
         MeshError: If the unit isn't known, or there is no usable surface.
     """
     stated = unit or mesh.units
-    named = {"millimeters": "mm", "meters": "m", "inches": "in", "centimeters": "cm"}
-    known = named.get(str(stated), stated)
-    if known not in METRES:
+    known = known_unit(str(stated))
+    if known is None:
         raise MeshError(
             f"{_NAME}: its unit is {stated!r}, must be one of {', '.join(UNITS)}; "
             "state it with unit="
@@ -41,7 +40,7 @@ def from_trimesh(
     if len(faces) == 0:
         raise MeshError(f"{_NAME}: it has no faces; a surface is needed")
     digest = hashlib.sha256(vertices.tobytes() + faces.tobytes()).hexdigest()
-    return usable_mesh(RawMesh(vertices, faces, None), _NAME, digest, str(known))
+    return usable_mesh(RawMesh(vertices, faces, None), _NAME, digest, known)
 
 
 def to_trimesh(mesh: TriangleMesh) -> trimesh.Trimesh:

@@ -32,14 +32,21 @@ def cut_polygons(points: Array, sizes: Ints, corners: Ints) -> tuple[Ints, Ints]
     Args:
         points: Positions, shape (n, 3).
         sizes: Number of corners of each polygon, shape (n_p,).
-        corners: Vertex indices of all polygons, end to end, all in range.
+        corners: Vertex indices of all polygons, end to end.
 
     Returns:
         Vertex indices, shape (m, 3), and the polygon each was cut from, shape (m,).
 
     Raises:
-        FormatError: If a concave one has more than 3,000 corners.
+        FormatError: If one names a vertex that isn't there, or a concave one has more
+            than 3,000 corners.
     """
+    outside = np.flatnonzero((corners < 0) | (corners >= len(points)))
+    if len(outside):
+        at = int(np.searchsorted(np.cumsum(sizes), outside[0], side="right"))
+        raise FormatError(
+            f"face {at + 1} names a vertex that isn't there, of {len(points)}"
+        )
     starts = np.cumsum(sizes) - sizes
     cut: list[Ints] = []
     owner: list[Ints] = []

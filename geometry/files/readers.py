@@ -1,7 +1,6 @@
 """Read a mesh file into a repaired, oriented TriangleMesh in metres."""
 
 import hashlib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +13,9 @@ from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
 
 from .archives import file_bytes, unpacked
-from .formats import SUPPORTED, RawMesh, read_format
+from .formats import METRES, SUPPORTED, RawMesh, read_format
 from .reading import FormatError
 
-METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 UNITS = ("mm", "cm", "m", "in", "um")
 SIZE_RANGE_M = (1e-3, 100.0)
 
@@ -69,27 +67,18 @@ def usable_mesh(
     unit: str | None = None,
     size_mm: float | None = None,
 ) -> TriangleMesh:
-    """Return raw triangles in metres, repaired and oriented outwards.
-
-    Args:
-        raw: What a file holds.
-        path: Its name, for messages and the record.
-        sha256: Digest of its bytes.
-        unit: Of its numbers; else the stated one, else mm.
-        size_mm: Instead of a unit.
-
-    Raises:
-        MeshError: As `load_mesh`.
-    """
+    """Return raw triangles of a file so named, as `load_mesh` does."""
     try:
-        vertices, faces, kept, repairs = clean(raw.vertices, raw.faces)
+        vertices, faces, kept, cleaned = clean(raw.vertices, raw.faces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     mesh, near, far = _without_far(TriangleMesh(vertices, faces))
-    kept, repairs = kept[near], repairs + far
     longest, stray = _longest_side(mesh)
     name, scale = _scale(raw, longest, unit, size_mm)
     _check_size(path, longest, name, scale)
+    mesh = TriangleMesh(mesh.vertices * scale, mesh.faces)
+    # Orientation turns faces and keeps their order, so that the origin stays theirs.
+    faces, turned = orient(mesh)
     source = MeshSource(
         path=path,
         sha256=sha256,
@@ -97,15 +86,10 @@ def usable_mesh(
         scale_to_m=scale,
         n_vertices=len(raw.vertices),
         n_faces=len(raw.faces),
-        repairs=repairs,
+        repairs=(*cleaned, *far, *turned, *stray),
     )
-    # Orientation turns faces and keeps their order, so that the origin stays theirs.
-    mesh = TriangleMesh(mesh.vertices * scale, mesh.faces)
-    faces, turned = orient(mesh)
-    if not np.array_equal(faces, mesh.faces):
-        mesh = TriangleMesh(mesh.vertices, faces)
-    source = replace(source, repairs=repairs + turned + stray)
-    return mesh.tagged(source, _origin(raw).of_faces(kept))
+    origin = raw.origin or FileOrigin.of_itself(raw.faces, len(raw.vertices))
+    return TriangleMesh(mesh.vertices, faces, source, origin.of_faces(kept[near]))
 
 
 def _without_far(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints, tuple[Repair, ...]]:
@@ -134,13 +118,6 @@ def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
     count = int(outside.sum())
     found = (Repair(kind, count),) if count else ()
     return longest, found
-
-
-def _origin(raw: RawMesh) -> FileOrigin:
-    if raw.origin is not None:
-        return raw.origin
-    n = len(raw.faces)
-    return FileOrigin(np.arange(n), raw.faces, n, len(raw.vertices))
 
 
 def _scale(
@@ -191,7 +168,7 @@ def _read(path: str | Path, data: bytes) -> RawMesh:
             f"{', '.join(SUPPORTED)}"
         )
     try:
-        return _known_unit(read_format(kind, data, fetch))
+        return read_format(kind, data, fetch)
     except FormatError as error:
         raise MeshError(f"{path}: not a usable {kind.upper()} mesh: {error}") from None
     except Exception as error:
@@ -201,9 +178,3 @@ def _read(path: str | Path, data: bytes) -> RawMesh:
             f"{path}: can't be read as {kind.upper()} "
             f"({type(error).__name__}: {reason}); export the mesh again"
         ) from error
-
-
-def _known_unit(raw: RawMesh) -> RawMesh:
-    if raw.unit is not None and raw.unit not in METRES:
-        raise FormatError(f"it states the unit '{raw.unit}', which isn't known")
-    return raw

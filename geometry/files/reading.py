@@ -58,13 +58,7 @@ _MAX_FACES = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class ScenePart:
-    """A body in its own coordinates, and where it stands.
-
-    Attributes:
-        vertices: Shape (n, 3).
-        faces: Shape (m, 3).
-        world_from_part: Affine map, shape (4, 4).
-    """
+    """A body in its own coordinates, and the affine map (4, 4) to where it stands."""
 
     vertices: Array
     faces: Ints

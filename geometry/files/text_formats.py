@@ -26,6 +26,7 @@ _ELSEWHERE = frozenset({"call", "csh"})
 _NAMES = frozenset({"mtllib", "usemtl", "maplib", "usemap", "g", "o"})
 # "v" and x y z, with a weight, a colour, or both.
 _VERTEX_COLUMNS = (4, 5, 7, 8)
+_MOST = 1 << 60
 _OFF_HEADER = re.compile(r"(ST|C|N|4|n)*OFF", re.ASCII)
 
 
@@ -33,7 +34,8 @@ def _whole(word: str) -> int:
     """Return a whole number; ValueError if it isn't written in plain digits."""
     if not (word.isascii() and word.lstrip("+-").isdecimal()):
         raise ValueError(word)
-    return int(word)
+    # More than any file counts to, and an array still holds it.
+    return min(max(int(word), -_MOST), _MOST)
 
 
 def _lines(text: str) -> list[str]:
@@ -65,8 +67,7 @@ def read_obj(data: bytes) -> _PointsAndPolygons:
             polygons.append(_obj_polygon(number, words[1:], len(vertices)))
         elif words[0] not in _NO_GEOMETRY:
             raise FormatError(f"line {number}: {_refusal(words[0])}")
-    points = _points(vertices)
-    return points, *end_to_end(_in_range(polygons, len(points)))
+    return _points(vertices), *end_to_end(polygons)
 
 
 def _refusal(word: str) -> str:
@@ -142,8 +143,7 @@ def read_off(data: bytes) -> _PointsAndPolygons:
     for stream in (by_line, whole_text):
         found = None if stream is None else _off_stream(stream, n_vertices, n_faces)
         if found is not None:
-            points = _points(found[0])
-            return points, *end_to_end(_in_range(found[1], len(points)))
+            return _points(found[0]), *end_to_end(found[1])
     raise FormatError(
         f"the header promises {n_vertices} vertices and {n_faces} faces, "
         "the content holds something else"
@@ -196,12 +196,3 @@ def _off_stream(
 
 def _points(rows: list[list[str]]) -> Array:
     return numbers([word for row in rows for word in row]).reshape(-1, 3)
-
-
-def _in_range(polygons: list[list[int]], n_vertices: int) -> list[list[int]]:
-    for number, corners in enumerate(polygons, 1):
-        if min(corners) < 0 or max(corners) >= n_vertices:
-            raise FormatError(
-                f"face {number} names a vertex that isn't there, of {n_vertices}"
-            )
-    return polygons

@@ -67,6 +67,11 @@ class FileOrigin:
                 values.setflags(write=False)
             object.__setattr__(self, name, MappingProxyType(held))
 
+    @classmethod
+    def of_itself(cls, faces: Ints, n_vertices: int) -> "FileOrigin":
+        """Return the origin of a mesh of which each face is a polygon of its own."""
+        return cls(np.arange(len(faces)), faces, len(faces), n_vertices)
+
     def of_faces(self, kept: Ints) -> "FileOrigin":
         """Return the origin of a mesh that keeps these of the faces."""
         return replace(self, face=self.face[kept], corners=self.corners[kept])

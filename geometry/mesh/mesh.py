@@ -1,9 +1,9 @@
 """A triangle mesh in metres, and where it came from."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,13 +214,6 @@ class TriangleMesh:
         """Lengths of the three edges of each face in [m], shape (n_f, 3)."""
         edges = self.corners - self.corners[:, [2, 0, 1]]
         return np.sqrt(np.einsum("fki,fki->fk", edges, edges))
-
-    def tagged(self, source: MeshSource | None, origin: FileOrigin | None) -> Self:
-        """Return the same mesh from there, with what is known of it already."""
-        mesh = replace(self, source=source, origin=origin)
-        known = {name for name in self.__dict__ if name not in mesh.__dict__}
-        mesh.__dict__.update({name: self.__dict__[name] for name in known})
-        return mesh
 
 
 def _read_only(values: NDArray[_Scalar]) -> NDArray[_Scalar]:

@@ -169,10 +169,7 @@ def read_weight(where: str, mesh: TriangleMesh) -> Interest:
 
 def _origin(mesh: TriangleMesh) -> FileOrigin:
     """Return the file's numbering; a mesh made in memory has its own."""
-    if mesh.origin is not None:
-        return mesh.origin
-    n = len(mesh.faces)
-    return FileOrigin(np.arange(n), mesh.faces, n, len(mesh.vertices))
+    return mesh.origin or FileOrigin.of_itself(mesh.faces, len(mesh.vertices))
 
 
 def _mask(values: NDArray[Any], n: int, name: str) -> NDArray[np.bool_]:
