@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import rounding
-from solvers.covers.search.neighbourhood import prune
 from solvers.status import SolveStatus, WorkBudget
 
 NONE = np.empty(0, dtype=np.int64)
@@ -20,37 +19,21 @@ INTEGER_PROOF = "branch and bound (HiGHS)"
 
 
 @dataclass(frozen=True, eq=False)
-class CountAnswer:
-    """Fewest or cheapest sets that reach the weight; indices of the reduced cover.
+class Answer:
+    """Sets chosen, by their indices of the reduced cover.
 
-    The bound counts sets or sums costs, as was asked.
+    Attributes:
+        status: How the search ended.
+        selected: The sets.
+        bound: On the number or the cost of sets from below, or on the integer-valued
+            weight from above, as was asked.
+        proof: What proves the bound.
     """
 
     status: SolveStatus
     selected: NDArray[np.int64]
-    lower_bound: float
+    bound: float
     proof: str
-
-
-@dataclass(frozen=True, eq=False)
-class WeightAnswer:
-    """Most weight of K sets; indices and weight of the reduced cover."""
-
-    status: SolveStatus
-    selected: NDArray[np.int64]
-    upper_bound: float
-    proof: str
-
-
-def better(
-    cover: ReducedCover, selected: NDArray[np.int64], other: NDArray[np.int64] | None
-) -> NDArray[np.int64]:
-    """Return the cheaper of a cover and a proposal that may not be one."""
-    if other is None or not cover.meets(other):
-        return selected
-    other = prune(cover, other)
-    cheaper = cover.costs[other].sum() < cover.costs[selected].sum() * (1.0 - 1e-12)
-    return other if cheaper else selected
 
 
 def cut_short(proof: str, budget: WorkBudget) -> str:
@@ -78,17 +61,13 @@ class ExactSearch:
 
 
 class Incumbent:
-    """What a search for the most weight of K sets has found.
+    """The most weight of K sets that a search has met.
 
     Args:
         cover: The cover.
-        target: Integer-valued weight below which nothing is of interest.
+        target: Integer-valued weight below which nothing is of interest; raised beyond
+            each selection that is kept.
         first: Whether any selection that reaches the target will do.
-
-    Attributes:
-        target: Raised beyond each selection that is kept.
-        selected: The best selection that reached the target, or None.
-        weight: Integer-valued weight that it covers, 0 without one.
     """
 
     def __init__(self, cover: ReducedCover, target: float, *, first: bool) -> None:

@@ -1,26 +1,40 @@
-"""Cheapest sets: heuristic, linear and Lagrangian bound, HiGHS' branch and bound."""
+"""Cheapest sets, and fewest where rows have several needs or row sets.
+
+Drop and repair from above, the linear program from below, then HiGHS' branch and bound.
+"""
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from solvers.covers.bounds.lagrangian import ascend
-from solvers.covers.bounds.mixed_integer import fits, linear_multipliers, solve_integer
+from solvers.covers.bounds.mixed_integer import (
+    branch_and_bound,
+    fits,
+    linear_multipliers,
+)
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import cost_bound
-from solvers.covers.search.neighbourhood import cheapest, greedy
+from solvers.covers.search.neighbourhood import better, cheapest, greedy
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import INTEGER_PROOF, NONE, CountAnswer, better, cut_short
-from .counts import fewest_sets
+from .answers import INTEGER_PROOF, NONE, Answer, cut_short
+from .counts import HEAVIEST, fewest_sets
+from .heaviest import heavier, most_weight
 
 # Relative to the cost; HiGHS' own tolerance is below it.
 _SETTLED = 1e-5
+_KICKS = 600
 
 
 def cheapest_sets(
-    cover: ReducedCover, budget: WorkBudget, *, seed: int, max_sets: int | None = None
-) -> CountAnswer:
+    cover: ReducedCover,
+    budget: WorkBudget,
+    *,
+    seed: int,
+    max_sets: int | None = None,
+    heaviest: bool = True,
+) -> Answer:
     """Find the cheapest sets that meet what is required, with a lower bound.
 
     Args:
@@ -29,63 +43,76 @@ def cheapest_sets(
         seed: Seed of the neighbourhood search.
         max_sets: Sets allowed. If more are proved necessary, the selection is that of
             most weight, the bound that of any cover.
+        heaviest: Whether to look for more weight at the same count, where all cost 1.
     """
-    start = greedy(cover, NONE, budget)
-    few = None
-    if max_sets is not None:
+    counting = bool(np.all(cover.costs == 1.0))
+    start, limit = greedy(cover, NONE, budget), None
+    if max_sets is not None and not counting:
         # Whether so few can do at all.
-        part = budget.part(0.3 * budget.units)
-        few = fewest_sets(cover, part, seed=seed, max_sets=max_sets, heaviest=False)
-    if few is not None and few.status is SolveStatus.INFEASIBLE:
-        lower, _ = _linear_bound(cover, budget, np.inf, None)
-        return replace(few, lower_bound=lower)
-    if few is not None and few.status is not SolveStatus.UNKNOWN:
-        start = few.selected
+        limit, part = max_sets, budget.part(0.3 * budget.units)
+        equal = replace(cover, costs=np.ones(cover.n_sets))
+        search = fewest_sets if cover.simple else cheapest_sets
+        few = search(equal, part, seed=seed, max_sets=max_sets, heaviest=False)
+        if few.status is SolveStatus.INFEASIBLE:
+            return replace(few, bound=_linear_bound(cover, budget, None)[0])
+        if few.status is not SolveStatus.UNKNOWN:
+            start = few.selected
+    selected, lower, proof = _searched(cover, start, budget, seed, limit)
+    cost = float(cover.costs[selected].sum())
+    settled = lower >= cost * (1.0 - _SETTLED)
+    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
+    spare = budget.part(np.inf)
+    spare.units = HEAVIEST * budget.units
+    if max_sets is not None and selected.size > max_sets:
+        settled = counting and lower > max_sets
+        status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
+        selected = most_weight(cover, max_sets, spare, seed=seed).selected
+    elif settled:
+        lower = cost
+    if counting and heaviest and status.has_point:
+        selected = heavier(cover, selected, spare, seed)
+    proof = proof if settled else cut_short(proof, budget)
+    return Answer(status, selected, lower, proof)
+
+
+def _searched(
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    seed: int,
+    max_sets: int | None,
+) -> tuple[NDArray[np.int64], float, str]:
+    """Return the best cover found, the bound, and what proves it."""
     selected = cheapest(
         cover,
         start,
         budget.part(0.2 * budget.units),
         seed=seed,
-        max_kicks=300,
+        max_kicks=_KICKS,
         max_sets=max_sets,
     )
-    if few is not None and max_sets is not None and selected.size > max_sets:
-        lower, proof = _linear_bound(cover, budget, np.inf, max_sets)
-        proof = cut_short(proof, budget)
-        return CountAnswer(SolveStatus.UNKNOWN, few.selected, lower, proof)
-    cost = float(cover.costs[selected].sum())
-    lower, proof = _linear_bound(cover, budget, cost, max_sets)
-    if lower < cost * (1.0 - 1e-9) and fits(cover):
-        answer = solve_integer(cover, selected, budget, max_sets=max_sets)
-        other = better(cover, selected, answer.selected)
-        if max_sets is None or other.size <= max_sets:
-            selected = other
-        cost = float(cover.costs[selected].sum())
-        # A bound above a cover that was counted here is none.
+    lower, proof = _linear_bound(cover, budget, max_sets)
+    if lower < cover.costs[selected].sum() * (1.0 - 1e-9) and fits(cover):
+        answer = branch_and_bound(cover, selected, budget, max_sets=max_sets)
+        if answer.selected is not None:
+            selected = better(cover, selected, answer.selected, max_sets)
         bound = 0.0 if answer.bound is None else answer.bound
-        if lower < bound <= cost * (1.0 + _SETTLED):
+        # A bound above a cover that was counted here is none.
+        if lower < bound <= cover.costs[selected].sum() * (1.0 + _SETTLED):
             lower, proof = bound, INTEGER_PROOF
-    settled = lower >= cost * (1.0 - _SETTLED)
-    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-    proof = proof if settled else cut_short(proof, budget)
-    return CountAnswer(status, selected, cost if settled else lower, proof)
+    if np.all(cover.costs == 1.0):
+        lower = float(np.ceil(lower - 1e-5))
+    return selected, lower, proof
 
 
 def _linear_bound(
-    cover: ReducedCover, budget: WorkBudget, cost: float, max_sets: int | None
+    cover: ReducedCover, budget: WorkBudget, max_sets: int | None
 ) -> tuple[float, str]:
-    """Return the better of the bounds by linear program and by ascent, and its name."""
+    """Return the bound by the linear program, and its name."""
     lower, proof = float(cover.costs.min()), "a positive weight needs a set"
     multipliers = linear_multipliers(cover, budget.part(0.5 * budget.remaining))
     if multipliers is not None:
         bound = cost_bound(cover, multipliers, max_sets=max_sets)
         if bound > lower:
             lower, proof = bound, "linear relaxation"
-    if lower < cost * (1.0 - 1e-9):
-        start = np.zeros(cover.weights.size) if multipliers is None else multipliers
-        part = budget.part(0.2 * budget.remaining)
-        step = ascend(cover, start, part, target=min(cost, 1e300))
-        bound = cost_bound(cover, step.multipliers, max_sets=max_sets)
-        if bound > lower:
-            lower, proof = bound, "Lagrangian bound"
     return lower, proof

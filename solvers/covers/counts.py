@@ -1,36 +1,36 @@
-"""Fewest sets: the order in which the methods are tried.
+"""Fewest sets of a simple cover: the order in which the methods are tried.
 
-From above: greedy, then swaps (`neighbourhood`) or, where rows have several needs or
-row sets, exchanges. From below: Lagrangian bound, then exact search, over pairs or over
-groups of alike sets, then HiGHS' branch and bound. Covers of every row have searches
-of their own (``full``). Each method offers a smaller cover or proves one set more, says
-how, and spends a share of one counted budget.
+From above: greedy, then swaps (`neighbourhood`). From below: Lagrangian bound, then
+exact search, over pairs or over groups of alike sets, then HiGHS' branch and bound.
+Covers of every row have searches of their own (``full``). Each method offers a smaller
+cover or proves one set more, says how, and spends a share of one counted budget.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
-from solvers.covers.bounds.lagrangian import ascend, tighten
-from solvers.covers.bounds.mixed_integer import fits, solve_integer
+from solvers.covers.bounds.lagrangian import tighten
+from solvers.covers.bounds.mixed_integer import branch_and_bound, fits
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import count_bound
-from solvers.covers.exact.pairs import any_pair, pair_proof
 from solvers.covers.full.full_cover import fewest_full
-from solvers.covers.search.exchanges import exchange, worth_of
-from solvers.covers.search.neighbourhood import greedy, most_coverage, moves, prune
+from solvers.covers.search.neighbourhood import (
+    better,
+    greedy,
+    most_coverage,
+    moves,
+    prune,
+)
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import INTEGER_PROOF, NONE, CountAnswer, ExactSearch, better, cut_short
+from .answers import INTEGER_PROOF, NONE, Answer, cut_short
 from .heaviest import exact_search, heavier, most_weight
 
 # Work after which the first bounds are asked whether more search is worth it.
 _FIRST_UNITS = 4e8
-# Sets of which all selections are looked at where the cover isn't simple.
-_PAIR = 2
 # Share of the budget that more weight at the same count may cost on top.
-_HEAVIEST = 0.3
+HEAVIEST = 0.3
 
 
 def fewest_sets(
@@ -40,41 +40,39 @@ def fewest_sets(
     seed: int,
     max_sets: int | None = None,
     heaviest: bool = True,
-) -> CountAnswer:
+) -> Answer:
     """Find the fewest sets that meet what is required, with a lower bound.
 
     Args:
-        cover: A cover whose sets together meet the requirements; costs don't count.
+        cover: A simple cover of costs 1 whose sets together meet the requirement.
         budget: Counted work.
         seed: Seed of the searches.
         max_sets: Sets allowed.
         heaviest: Whether to look for more weight at the same count.
     """
-    cover, whole = replace(cover, costs=np.ones(cover.n_sets)), budget.units
+    whole = budget.units
     search = _CountSearch(cover, budget, seed, max_sets)
-    if cover.simple and cover.full:
+    if cover.full:
         known = search.selected
         full = fewest_full(cover, budget, seed=seed, start=known, lower=search.lower)
         search.selected = full.selected
-        search.prove(int(full.lower_bound), full.proof)
+        search.prove(int(full.bound), full.proof)
         return search.closed(heaviest=False)
-    first = min(0.02 * whole, _FIRST_UNITS) if cover.simple else 0.2 * whole
-    search.improve(budget.part(first), seed)
+    search.improve(budget.part(min(0.02 * whole, _FIRST_UNITS)), seed)
     search.by_multipliers(budget.part(0.25 * whole))
-    if cover.simple:
-        search.improve(budget.part(0.15 * whole), seed)
+    search.improve(budget.part(0.15 * whole), seed)
     search.by_tuples()
     if not search.settled and fits(cover):
         search.by_integers()
     again = seed
-    while cover.simple and not search.settled and not budget.exhausted:
+    while not search.settled and not budget.exhausted:
         again += 1
         search.improve(budget, again)
     return search.closed(heaviest=heaviest)
 
 
 class _CountSearch:
-    """Cover from above, bound from below and its proof; costs don't count."""
+    """Cover from above, bound from below and its proof."""
 
     def __init__(
         self, cover: ReducedCover, budget: WorkBudget, seed: int, max_sets: int | None
@@ -82,7 +80,7 @@ class _CountSearch:
         self.cover, self.budget, self.seed = cover, budget, seed
         self.selected = prune(cover, greedy(cover, NONE, budget))
         self.cap = cover.n_sets if max_sets is None else max_sets
-        self.multipliers = cover.weights / cover.needs
+        self.multipliers = cover.weights
         self.lower, self.proof = 1, "a positive weight needs a set"
         self.prove(count_bound(cover, self.multipliers), "sum of the largest sets")
 
@@ -98,41 +96,40 @@ class _CountSearch:
 
     def improve(self, budget: WorkBudget, seed: int) -> None:
         """Take a set out and search from there, while that gives a cover."""
-        cover, simple = self.cover, self.cover.simple
+        cover = self.cover
         while self.selected.size > self.lower:
             without = [np.delete(self.selected, i) for i in range(self.selected.size)]
-            if simple:
-                start = max(without, key=cover.weight_of)
-                n, need = moves(start.size), cover.required
-                fewer = most_coverage(
-                    cover, start, budget, target=need, seed=seed, max_moves=n
-                )
-            else:
-                start = max(without, key=lambda sets: worth_of(cover, sets))
-                fewer = exchange(cover, start, budget, seed=seed, heaviest=False)
+            start = max(without, key=cover.weight_of)
+            n, need = moves(start.size), cover.required
+            fewer = most_coverage(
+                cover, start, budget, target=need, seed=seed, max_moves=n
+            )
             if not cover.meets(fewer):
                 break
             self.selected = prune(cover, fewer)
 
     def by_multipliers(self, budget: WorkBudget) -> None:
-        """Refute counts by multipliers while an ascent from the last ones does it."""
-        cover, start = self.cover, self.multipliers
+        """Refute counts by multipliers while a descent from the last ones does it."""
+        cover, required = self.cover, self.cover.required
         while not self.settled:
-            count = self.lower
-            if cover.simple:
-                step = tighten(cover, count, cover.required, start, budget)
-            else:
-                step = ascend(cover, start, budget, target=0.0, n_sets=count)
-            self.multipliers = start = step.multipliers
-            self.prove(count_bound(cover, start), "Lagrangian bound")
+            count, start = self.lower, self.multipliers
+            self.multipliers = tighten(cover, count, required, start, budget)
+            self.prove(count_bound(cover, self.multipliers), "Lagrangian bound")
             if self.lower == count:
                 break
 
     def by_tuples(self) -> None:
         """Exhaust the tuples of as many sets as the bound, then of one more."""
-        while not self.settled and (self.cover.simple or self.lower <= _PAIR):
-            part = self.budget.part(0.7 * self.budget.remaining)
-            answer, proof = self._exhausted(self.lower, part)
+        while not self.settled:
+            search, proof = exact_search(self.lower)
+            answer = search(
+                self.cover,
+                self.lower,
+                target=self.cover.required,
+                multipliers=self.multipliers,
+                budget=self.budget.part(0.7 * self.budget.remaining),
+                first=True,
+            )
             if answer.selected is not None:
                 self.selected = answer.selected
             elif answer.complete:
@@ -140,43 +137,29 @@ class _CountSearch:
             else:
                 break
 
-    def _exhausted(self, n_sets: int, part: WorkBudget) -> tuple[ExactSearch, str]:
-        if not self.cover.simple:
-            return any_pair(self.cover, n_sets, part), pair_proof(n_sets)
-        search, proof = exact_search(n_sets)
-        answer = search(
-            self.cover,
-            n_sets,
-            target=self.cover.required,
-            multipliers=self.multipliers,
-            budget=part,
-            first=True,
-        )
-        return answer, proof
-
     def by_integers(self) -> None:
         """Leave a small program to HiGHS."""
-        answer = solve_integer(self.cover, self.selected, self.budget)
-        self.selected = better(self.cover, self.selected, answer.selected)
+        answer = branch_and_bound(self.cover, self.selected, self.budget)
+        if answer.selected is not None:
+            self.selected = better(self.cover, self.selected, answer.selected)
         if answer.bound is not None:
             proved = math.ceil(answer.bound - 1e-5)
             # A bound above a cover that was counted here is none.
             if proved <= self.selected.size:
                 self.prove(proved, INTEGER_PROOF)
 
-    def closed(self, *, heaviest: bool) -> CountAnswer:
+    def closed(self, *, heaviest: bool) -> Answer:
         """Return the answer, of most weight where that is asked for."""
         selected, settled = self.selected, self.lower >= self.selected.size
         status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
         # Its own allowance, so that a hard proof doesn't cost the larger area.
         spare = self.budget.part(np.inf)
-        spare.units = _HEAVIEST * self.budget.units
+        spare.units = HEAVIEST * self.budget.units
         if selected.size > self.cap:
             settled = self.lower > self.cap
             status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
-            heaviest_few = most_weight(self.cover, self.cap, spare, seed=self.seed)
-            selected = heaviest_few.selected
+            selected = most_weight(self.cover, self.cap, spare, seed=self.seed).selected
         elif heaviest and selected.size:
             selected = heavier(self.cover, selected, spare, self.seed)
         proof = self.proof if settled else cut_short(self.proof, self.budget)
-        return CountAnswer(status, selected, float(self.lower), proof)
+        return Answer(status, selected, float(self.lower), proof)

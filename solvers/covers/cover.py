@@ -3,7 +3,7 @@
 The program is stated in ``cover_problem``. Counts (unit costs) are solved by greedy and
 large-neighbourhood search from above, Lagrangian bound and exact search over tuples
 from below; among the covers of the fewest sets the one of most weight is sought.
-Costs go to the linear program and HiGHS' branch and bound.
+Costs, several needs and row sets go to the linear program and HiGHS.
 
 References:
     Tarbox and Gottschlich, "Planning for complete sensor coverage in inspection",
@@ -21,7 +21,7 @@ from solvers.covers.search.neighbourhood import greedy, prune
 from solvers.one_thread import on_one_thread
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import NONE, CountAnswer
+from .answers import NONE, Answer
 from .cheapest import cheapest_sets
 from .counts import fewest_sets
 from .cover_problem import CoverProblem
@@ -146,17 +146,18 @@ def solve_cover(
     if not np.any(cover.quotas > 0):
         nothing = "no weight is required"
         proof = "the fixed sets suffice" if fixed.size else nothing
-        answer = CountAnswer(SolveStatus.OPTIMAL, NONE, 0.0, proof)
+        answer = Answer(SolveStatus.OPTIMAL, NONE, 0.0, proof)
     elif not cover.reachable:
         answer = _unreachable(cover, work, seed, free)
-    elif problem.unit_costs:
-        answer = fewest_sets(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
-        unit = float(problem.costs[0])
-        answer = replace(answer, lower_bound=answer.lower_bound * unit)
     else:
-        answer = cheapest_sets(cover, work, seed=seed, max_sets=free)
+        counting = problem.unit_costs
+        unit = float(problem.costs[0]) if counting else 1.0
+        cover = replace(cover, costs=cover.costs / unit)
+        search = fewest_sets if counting and cover.simple else cheapest_sets
+        answer = search(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
+        answer = replace(answer, bound=answer.bound * unit)
     selected = np.union1d(fixed, cover.kept[answer.selected])
-    lower = answer.lower_bound + float(problem.costs[fixed].sum())
+    lower = answer.bound + float(problem.costs[fixed].sum())
     cost = float(problem.costs[selected].sum())
     # Both are sums of costs, in another order.
     lower = cost if cost < lower <= cost * (1.0 + 1e-12) else lower
@@ -209,7 +210,7 @@ def solve_max_coverage(
         selected = warm
     covered = problem.covered_weight(selected)
     optimal = answer.status is SolveStatus.OPTIMAL
-    upper = (cover.settled + answer.upper_bound) * cover.unit
+    upper = (cover.settled + answer.bound) * cover.unit
     return MaxCoverageSolution(
         problem,
         n_sets,
@@ -246,11 +247,11 @@ def _or_reduce(
 
 def _unreachable(
     cover: ReducedCover, work: WorkBudget, seed: int, max_sets: int | None
-) -> CountAnswer:
+) -> Answer:
     """Answer a problem whose requirement exceeds the weight of all sets together."""
     everything = replace(cover, quotas=cover.totals)
     few = prune(everything, greedy(everything, NONE, work))
     if max_sets is not None and few.size > max_sets:
         few = most_weight(cover, max_sets, work, seed=seed).selected
     proof = "all sets together cover less than is required"
-    return CountAnswer(SolveStatus.INFEASIBLE, few, float("inf"), proof)
+    return Answer(SolveStatus.INFEASIBLE, few, float("inf"), proof)

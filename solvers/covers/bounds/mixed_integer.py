@@ -79,39 +79,23 @@ def fits(cover: ReducedCover) -> bool:
     return cover.entries <= _MAX_ENTRIES
 
 
-def solve_integer(
+def branch_and_bound(
     cover: ReducedCover,
     start: NDArray[np.int64],
     budget: WorkBudget,
     *,
     max_sets: int | None = None,
+    heaviest: bool = False,
 ) -> IntegerAnswer:
-    """Look for the cheapest cover by branch and bound, up to a number of nodes.
+    """Look for the cheapest cover, or the heaviest, up to a number of nodes.
 
     Args:
         cover: The cover.
         start: A selection to start from.
         budget: Counted work.
         max_sets: Sets allowed.
+        heaviest: Whether to look for the most weight that meets the requirements.
     """
-    return _branch(cover, start, budget, max_sets=max_sets, heaviest=False)
-
-
-def heaviest_integer(
-    cover: ReducedCover, start: NDArray[np.int64], budget: WorkBudget, *, n_sets: int
-) -> IntegerAnswer:
-    """Look for the most weight of K sets that meet the requirements."""
-    return _branch(cover, start, budget, max_sets=n_sets, heaviest=True)
-
-
-def _branch(
-    cover: ReducedCover,
-    start: NDArray[np.int64],
-    budget: WorkBudget,
-    *,
-    max_sets: int | None,
-    heaviest: bool,
-) -> IntegerAnswer:
     light = cover.full and not heaviest
     root = _UNITS_PER_FULL_ROOT if light else _UNITS_PER_ROOT
     spare = budget.remaining / cover.entries - root
@@ -121,29 +105,26 @@ def _branch(
     solver.setOptionValue("mip_max_nodes", 1 + int(min(spare / _UNITS_PER_NODE, 1e7)))
     _warm_start(solver, cover, start)
     run_highs(solver)
-    return _answer(solver, cover, root, budget, heaviest=heaviest)
+    nodes = max(0, int(solver.getInfo().mip_node_count))
+    budget.spend((root + _UNITS_PER_NODE * nodes) * cover.entries)
+    return _answer(solver, cover, heaviest=heaviest)
 
 
 def _answer(
     solver: Any,  # noqa: ANN401
     cover: ReducedCover,
-    root: float,
-    budget: WorkBudget,
     *,
     heaviest: bool,
 ) -> IntegerAnswer:
     import highspy
 
-    info = solver.getInfo()
-    nodes = _UNITS_PER_NODE * max(0, int(info.mip_node_count))
-    budget.spend((root + nodes) * cover.entries)
     if solver.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
         return IntegerAnswer(None, None)
     values = np.asarray(solver.getSolution().col_value, dtype=np.float64)
     n = cover.n_sets
     usable = bool(solver.getSolution().value_valid) and values.size >= n
     selected = np.flatnonzero(values[:n] > 0.5) if usable else None
-    bound = float(info.mip_dual_bound)
+    bound = float(solver.getInfo().mip_dual_bound)
     if not np.isfinite(bound):
         return IntegerAnswer(selected, None)
     tolerance = TOLERANCE * max(1.0, abs(bound))
@@ -151,8 +132,7 @@ def _answer(
         light = float(_weights(cover)[1].sum())
         weight = float(cover.weights.mean()) * (light + tolerance - bound)
         return IntegerAnswer(selected, weight)
-    cost = _cost_unit(cover) * max(0.0, bound - tolerance)
-    return IntegerAnswer(selected, cost)
+    return IntegerAnswer(selected, _cost_unit(cover) * max(0.0, bound - tolerance))
 
 
 def _cost_unit(cover: ReducedCover) -> float:

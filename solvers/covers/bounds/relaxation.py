@@ -94,18 +94,6 @@ def least_service(cover: ReducedCover, multipliers: NDArray[np.float64]) -> floa
         cover: The cover.
         multipliers: Numbers of at least 0, shape (n_e,).
     """
-    return cheapest_rows(cover, multipliers)[1]
-
-
-def cheapest_rows(
-    cover: ReducedCover, multipliers: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], float]:
-    """Return the fractional rows y, shape (n_e,), that attain need(lambda), and it.
-
-    Args:
-        cover: The cover.
-        multipliers: Numbers of at least 0, shape (n_e,).
-    """
     payments = multipliers * cover.needs
     order = np.lexsort((payments / cover.weights, cover.row_sets))
     weights, groups = cover.weights[order], cover.row_sets[order]
@@ -115,7 +103,7 @@ def cheapest_rows(
     missing = cover.quotas[groups] - (before - ahead[groups])
     rows = np.zeros(weights.size)
     rows[order] = np.clip(missing / weights, 0.0, 1.0)
-    return rows, float(payments @ rows)
+    return float(payments @ rows)
 
 
 def _usable(multipliers: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:

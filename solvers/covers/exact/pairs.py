@@ -1,16 +1,10 @@
-"""The one or two sets that cover the most, or that are enough, by looking at all.
+"""The one or two sets of a simple cover that cover the most, by looking at all.
 
-What a pair leaves open of a cover in which each row is needed once is a product of
-matrices over the open rows::
+What a pair leaves open is a product of matrices over the open rows::
 
     missing(i, j) = sum_e w_e (1 - a_ei) (1 - a_ej)
 
-With several needs and row sets, i and j complete the rows that need one set and have
-either, and those that need two and have both, in each row set G::
-
-    w_G(i, j) = g_i + g_j - sum_{r_e = 1} w_e a_ei a_ej + sum_{r_e = 2} w_e a_ei a_ej
-
-Integer-valued weights make both exact, whatever the BLAS and its threads.
+Integer-valued weights make it exact, whatever the BLAS and its threads.
 """
 
 import numpy as np
@@ -30,7 +24,6 @@ _FEW_PAIRS = 64
 # A dense multiply-add costs this share of a unit.
 _DENSE_UNIT = 1.0 / 8.0
 _CALL_UNITS = 1e5
-_PAIR = 2
 
 
 def pair_proof(n_sets: int) -> str:
@@ -155,44 +148,3 @@ class _Pairs:
         i, j = np.unravel_index(int(np.argmin(missing)), missing.shape)
         value = float(missing[i, j])
         return int(i), int(j), value if value <= allowed else None
-
-
-def any_pair(cover: ReducedCover, n_sets: int, budget: WorkBudget) -> ExactSearch:
-    """Find one or two sets that meet the requirements, or show that there are none.
-
-    Args:
-        cover: A cover of any needs and row sets.
-        n_sets: K, 1 or 2.
-        budget: Counted work.
-    """
-    cut = ExactSearch(None, 0.0, cover.total, complete=False)
-    if cover.n_sets * cover.weights.size > _MAX_DENSE:
-        return cut
-    n_sets, dense = min(n_sets, cover.n_sets), cover.by_set.toarray()
-    quotas = [
-        (float(quota), cover.needs[rows], cover.weights[rows], dense[:, rows])
-        for g, quota in enumerate(cover.quotas)
-        for rows in [np.flatnonzero(cover.row_sets == g)]
-    ]
-    # A set counts once: where one is asked for, none stands beside it.
-    beside = np.arange(cover.n_sets if n_sets == _PAIR else 1)
-    for start in range(0, cover.n_sets, _PAIR_BLOCK):
-        if budget.exhausted:
-            return cut
-        block = slice(start, start + _PAIR_BLOCK)
-        enough = np.ones((len(dense[block]), beside.size), dtype=bool)
-        for quota, needs, weights, covers in quotas:
-            light, heavy = weights * (needs == 1), weights * (needs == _PAIR)
-            gains = covers @ light
-            reached = np.repeat(gains[block, None], beside.size, axis=1)
-            if n_sets == _PAIR:
-                reached += gains + ((covers[block] * (heavy - light)) @ covers.T)
-            enough &= reached >= quota
-            budget.spend(2.0 * enough.size * (4.0 + _DENSE_UNIT * needs.size))
-        i, j = np.nonzero(enough)
-        apart = np.flatnonzero((i + start != j) | (n_sets == 1))
-        if apart.size:
-            k = apart[0]
-            pair = [i[k] + start, j[k]] if n_sets == _PAIR else [i[k] + start]
-            return ExactSearch(np.sort(pair), 0.0, cover.total, complete=True)
-    return ExactSearch(None, 0.0, cover.total, complete=True)

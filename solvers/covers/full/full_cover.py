@@ -11,7 +11,7 @@ of them.
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.answers import CountAnswer
+from solvers.covers.answers import Answer
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import SolveStatus, WorkBudget
 
@@ -53,7 +53,7 @@ def fewest_full(
     seed: int,
     start: NDArray[np.int64],
     lower: int,
-) -> CountAnswer:
+) -> Answer:
     """Find the fewest sets that cover every row, with a lower bound.
 
     Args:
@@ -90,7 +90,7 @@ def fewest_full(
     if bound <= lower:
         bound, proof = lower, "bound known before"
     status = SolveStatus.OPTIMAL if bound >= start.size else SolveStatus.FEASIBLE
-    return CountAnswer(status, start, float(min(bound, start.size)), proof)
+    return Answer(status, start, float(min(bound, start.size)), proof)
 
 
 def _of_parts(

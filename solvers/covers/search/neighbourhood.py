@@ -139,33 +139,41 @@ def cheapest(
 ) -> NDArray[np.int64]:
     """Lower the cost of a selection that reaches what is required.
 
-    Drops some sets at random, lets greedy repair the cover, keeps what is cheaper, or
-    smaller while more sets are selected than allowed.
+    Drops some sets at random, lets greedy repair the cover, keeps what is better.
 
     Returns:
         The cheapest selection found, increasing.
     """
     rng = np.random.default_rng(seed)
     best = prune(cover, start)
-    worth = _worth(cover, best, max_sets)
     for _ in range(max_kicks):
         if budget.exhausted or best.size == 0:
             break
         n_kept = best.size - int(rng.integers(1, max(2, best.size // 2 + 1)))
         kept = np.sort(rng.choice(best, size=n_kept, replace=False))
         fresh = int(rng.integers(cover.n_sets))
-        trial = prune(cover, greedy(cover, np.union1d(kept, [fresh]), budget))
-        other = _worth(cover, trial, max_sets)
-        if other[0] < worth[0] or (
-            other[0] == worth[0] and other[1] < worth[1] * (1.0 - 1e-12)
-        ):
-            best, worth = trial, other
+        trial = greedy(cover, np.union1d(kept, [fresh]), budget)
+        # Also where it is no dearer, so that the search moves on.
+        best = better(cover, best, trial, max_sets, slack=1e-12)
     return best
 
 
-def _worth(
-    cover: ReducedCover, selected: NDArray[np.int64], max_sets: int | None
-) -> tuple[int, float]:
-    """Return the sets above the number allowed, then the cost."""
-    excess = 0 if max_sets is None else max(0, selected.size - max_sets)
-    return excess, float(cover.costs[selected].sum())
+def better(
+    cover: ReducedCover,
+    selected: NDArray[np.int64],
+    other: NDArray[np.int64],
+    max_sets: int | None = None,
+    *,
+    slack: float = -1e-12,
+) -> NDArray[np.int64]:
+    """Return the cheaper of a cover and a proposal that may not be one.
+
+    Or the smaller, while more sets are selected than allowed.
+    """
+    if not cover.meets(other):
+        return selected
+    other = prune(cover, other)
+    allowed = cover.n_sets if max_sets is None else max_sets
+    excess, than = (max(0, sets.size - allowed) for sets in (other, selected))
+    cheaper = cover.costs[other].sum() < cover.costs[selected].sum() * (1.0 + slack)
+    return other if excess < than or (excess == than and cheaper) else selected

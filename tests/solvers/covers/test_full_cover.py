@@ -98,10 +98,10 @@ def test_equals_brute_force_and_bounds_hold_however_the_budget_cuts(first):
         best = fewest_by_hand(covers)
         for budget in (PLENTY, 3e6, 1e5, 0.0):
             answer = solve(covers, budget, seed=seed)
-            assert answer.lower_bound <= best <= answer.selected.size, seed
+            assert answer.bound <= best <= answer.selected.size, seed
             if answer.status is SolveStatus.OPTIMAL or budget == PLENTY:
                 assert answer.status is SolveStatus.OPTIMAL, seed
-                assert answer.lower_bound == answer.selected.size == best, seed
+                assert answer.bound == answer.selected.size == best, seed
             else:
                 assert answer.status is SolveStatus.FEASIBLE
 
@@ -113,7 +113,7 @@ def test_steiner_triples_have_the_known_covers(dimension, n_lines, fewest):
     assert covers.shape == (n_lines, 3**dimension)
     answer = solve(covers)
     assert answer.status is SolveStatus.OPTIMAL
-    assert answer.selected.size == answer.lower_bound == fewest
+    assert answer.selected.size == answer.bound == fewest
     assert "branch and bound" in answer.proof
 
 
@@ -126,7 +126,7 @@ def test_shared_stn27_is_proved():
     covers = np.zeros((len(triples), numbers[0]), dtype=bool)
     np.put_along_axis(covers, triples, values=True, axis=1)
     answer = solve(covers)
-    assert (answer.selected.size, answer.lower_bound) == (18, 18.0)
+    assert (answer.selected.size, answer.bound) == (18, 18.0)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -252,11 +252,11 @@ def test_separate_parts_are_solved_apart():
     covers = covers[rng.permutation(60)][:, rng.permutation(60)]
     answer = solve(covers, 2e9)
     assert answer.status is SolveStatus.OPTIMAL
-    assert answer.selected.size == answer.lower_bound == 36
+    assert answer.selected.size == answer.bound == 36
     assert answer.proof.startswith("separate parts: ")
     for budget in (0.0, 1e6, 3e7):
         cut = solve(covers, budget)
-        assert cut.lower_bound <= 36 <= cut.selected.size
+        assert cut.bound <= 36 <= cut.selected.size
 
 
 def test_parts_share_neither_rows_nor_columns():
@@ -385,7 +385,7 @@ def test_same_answer_twice_and_as_many_when_permuted():
     covers[np.arange(120), rng.integers(0, 40, 120)] = True
     once, again = (solve(covers, 3e9, seed=3) for _ in range(2))
     assert once.selected.tolist() == again.selected.tolist()
-    assert (once.lower_bound, once.proof) == (again.lower_bound, again.proof)
+    assert (once.bound, once.proof) == (again.bound, again.proof)
     assert once.status is SolveStatus.OPTIMAL
     for _ in range(2):
         rows, columns = rng.permutation(120), rng.permutation(40)
@@ -398,7 +398,7 @@ def test_what_is_known_is_kept():
     covers = np.eye(4, dtype=bool)
     answer = solve(covers, 0.0, lower=4)
     assert answer.status is SolveStatus.OPTIMAL
-    assert answer.lower_bound == 4.0
+    assert answer.bound == 4.0
     cover = reduced(covers)
     with pytest.raises(ValueError, match="start of 3 sets must cover every row"):
         fewest_full(cover, WorkBudget(1e9), seed=0, start=np.arange(3), lower=1)
@@ -413,4 +413,4 @@ def test_clock_cuts():
     start = np.arange(cover.n_sets)
     answer = fewest_full(cover, work, seed=0, start=start, lower=1)
     assert answer.status is SolveStatus.FEASIBLE
-    assert answer.lower_bound <= solve(covers, 1e8).selected.size
+    assert answer.bound <= solve(covers, 1e8).selected.size

@@ -11,14 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solvers import CoverProblem, SolveStatus, solve_cover
-from solvers.covers.bounds.lagrangian import ascend
-from solvers.covers.bounds.mixed_integer import heaviest_integer, linear_multipliers
+from solvers.covers.bounds.mixed_integer import branch_and_bound
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.bounds.relaxation import cost_bound, count_bound, coverage_bounds
 from solvers.covers.cover import solve_max_coverage
-from solvers.covers.exact.pairs import any_pair
-from solvers.covers.search.exchanges import exchange, worth_of
-from solvers.covers.search.neighbourhood import greedy
+from solvers.covers.search.neighbourhood import cheapest, greedy
 from solvers.status import WorkBudget
 
 NONE = np.empty(0, dtype=np.int64)
@@ -239,66 +236,18 @@ def test_bounds_hold_for_any_multipliers(seed, scale):
             assert weight <= bound * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("share", [0.4, 0.7, 1.0])
-def test_pairs_equal_brute_force(share):
-    settled = 0
-    for seed in range(12):
-        problem = random_cover(seed, share=share, n_s=10)
-        cover = reduce_problem(problem)
-        found = met_by(problem)
-        for k in (1, 2):
-            search = any_pair(cover, k, plenty())
-            assert search.complete
-            assert (search.selected is not None) is bool(found[k]), (seed, k)
-            if search.selected is not None:
-                assert cover.meets(search.selected)
-                assert search.selected.size <= k
-            else:
-                settled += k > 1
-            cut = any_pair(cover, k, WorkBudget(1e6))
-            if cut.complete:
-                assert (cut.selected is not None) is bool(found[k]), (seed, k)
-    assert settled > 5
-
-
-def test_exchanges_only_raise_the_worth_and_find_small_covers():
-    found = 0
+def test_drop_and_repair_finds_small_covers():
     for seed in range(6):
         problem = random_cover(seed, n_s=10)
         cover = reduce_problem(problem)
         fewest = min(k for k, ones in met_by(problem).items() if ones)
-        start = greedy(cover, NONE, plenty(), n_sets=fewest)
-        kicked = exchange(cover, start, plenty(), seed=0, max_kicks=40, heaviest=False)
-        assert kicked.size <= fewest
-        assert worth_of(cover, kicked) >= worth_of(cover, start)
-        found += cover.meets(kicked)
-        if cover.meets(kicked):
-            more = exchange(
-                cover, kicked, plenty(), seed=0, max_kicks=40, heaviest=True
-            )
-            assert cover.meets(more)
-            assert cover.weight_of(more) >= cover.weight_of(kicked)
-            best = heaviest_integer(cover, more, plenty(), n_sets=fewest)
-            assert cover.weight_of(more) <= best.bound
-            assert cover.weight_of(best.selected) == cover.weight_of(more)
-    assert found == 6
-
-
-@pytest.mark.parametrize("n_sets", [None, 3])
-def test_ascent_comes_near_the_linear_program(n_sets):
-    for seed in range(6):
-        costs = np.random.default_rng(seed).uniform(0.5, 2.0, 20)
-        cover = reduce_problem(random_cover(seed, n_e=80, n_s=20, costs=costs))
-        if n_sets is None:
-            best = cost_bound(cover, linear_multipliers(cover, plenty()))
-            start = np.zeros(cover.weights.size)
-            step = ascend(cover, start, plenty(), target=1.001 * best, max_steps=2000)
-            bound = cost_bound(cover, step.multipliers)
-            assert 0.97 * best <= bound <= best * (1 + 1e-6)
-        else:
-            start = cover.weights / cover.needs
-            step = ascend(cover, start, plenty(), target=0.0, n_sets=n_sets)
-            assert count_bound(cover, step.multipliers) > n_sets
+        start = greedy(cover, NONE, plenty())
+        few = cheapest(cover, start, plenty(), seed=0, max_kicks=100)
+        assert cover.meets(few)
+        assert few.size == fewest
+        best = branch_and_bound(cover, few, plenty(), max_sets=fewest, heaviest=True)
+        assert cover.meets(best.selected)
+        assert cover.weight_of(few) <= cover.weight_of(best.selected) <= best.bound
 
 
 def test_max_coverage_counts_rows_only_when_served_often_enough():
