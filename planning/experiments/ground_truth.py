@@ -140,12 +140,12 @@ def judged_labels(scanner: Scanner, shots: Sequence[Shot]) -> LabelCount:
     caster = RayCaster(scanner.mesh, threads=1)
     total: Counter[str] = Counter()
     for shot in shots:
-        rings, roots = shot.labels.rings, shot.labels.roots
+        rings, roots = shot.lines.rings, shot.lines.roots
         ring, root = true_labels(shot.lines.pixels, shot.pair, caster, shot.width)
         labelled = rings >= 0
         right = labelled & (rings == ring) & (roots == root)
         total.update(
-            shot.labels.rejected,
+            shot.decoded.rejected,
             n=len(rings),
             right=int(right.sum()),
             wrong=int(np.sum(labelled & ~right & (ring >= 0))),

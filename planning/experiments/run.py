@@ -13,7 +13,6 @@ from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import Progress
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.single_shot import (
-    decoded_pairs,
     shoot_rig,
 )
 
@@ -114,7 +113,7 @@ def run_experiment(
             seed=seed,
             progress=progress,
         )
-        pairs = decoded_pairs(shots)
+        pairs = [(shot.index, shot.decoded) for shot in shots]
         result = conclude(scanner, pairs, seed=seed, photometry=photometry)
         labels = judged_labels(scanner, shots)
     samples = sample_surface(experiment.mesh, _SAMPLES, seed=seed)

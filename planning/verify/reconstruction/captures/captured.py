@@ -35,7 +35,6 @@ from planning.verify.reconstruction.scanner import Scanner
 from .captures import CaptureFolder, whole_image
 from .confirm import Confirmed, confirm
 
-_MM = 1e3
 # A pair that should measure this share of the target, and gives nothing, is missed.
 _MISSED = 0.01
 
@@ -88,14 +87,7 @@ def reconstruct_rendered(
         believed=believed,
         develop=develop,
     )
-    return _concluded(
-        believed or plan,
-        pairs,
-        inspection,
-        expected,
-        spent,
-        photometry=light,
-    )
+    return _concluded(believed or plan, pairs, inspection, expected, spent, light)
 
 
 def reconstruct_captured(
@@ -140,19 +132,12 @@ def reconstruct_captured(
 
 
 class _Inspection:
-    """What the images of each pair are found to be on their way to the decoder.
-
-    Attributes:
-        refused: Why the images of a pair aren't used, in words.
-        dark: Likewise, of pairs without light.
-        notes: What was left out of the images of a pair.
-    """
+    """What the images of each pair are found to be on their way to the decoder."""
 
     def __init__(self, plan: Scanner) -> None:
         self._plan = plan
-        self.refused: dict[PairIndex, str] = {}
-        self.dark: dict[PairIndex, str] = {}
-        self.notes: dict[PairIndex, tuple[str, ...]] = {}
+        self._refused: dict[PairIndex, CapturesError] = {}
+        self._notes: dict[PairIndex, tuple[str, ...]] = {}
 
     def patterns(self, pair: PairIndex) -> RingsForCamera:
         """Return what a projector drew, as a camera's decoder knows it."""
@@ -161,29 +146,28 @@ class _Inspection:
 
     def frames(self, pair: PairIndex, read: Callable[[], Images]) -> Frames | None:
         """Return what may be decoded of a pair's images; None: nothing."""
-        p, c = pair
-        names = self._plan.frame_names(p, c)
         try:
+            names = self._plan.frame_names(*pair)
             inspected = inspect(read(), self.patterns(pair), names)
-        except DarkError as error:
-            self.dark[pair] = str(error)
         except CapturesError as error:
-            self.refused[pair] = str(error)
-        else:
-            self.notes[pair] = inspected.notes
-            return inspected.frames
-        return None
+            self._refused[pair] = error
+            return None
+        self._notes[pair] = inspected.notes
+        return inspected.frames
 
     def require_some(self) -> None:
         """Refuse a folder of which no image is used.
 
         Raises:
-            CapturesError: With the reason of the first pair.
+            CapturesError: With the reason of the first pair, darkness last.
         """
-        if self.notes or not (self.refused or self.dark):
+        if self._notes or not self._refused:
             return
-        pair, why = min((self.refused or self.dark).items())
-        others = len(self.refused) + len(self.dark) - 1
+        pair, why = min(
+            self._refused.items(),
+            key=lambda one: (isinstance(one[1], DarkError), one[0]),
+        )
+        others = len(self._refused) - 1
         more = f"; the other {others} pairs can't be used either" if others else ""
         raise CapturesError(f"{self._plan.name(pair)}: {why}{more}")
 
@@ -192,49 +176,34 @@ class _Inspection:
     ) -> tuple[str, ...]:
         """Return a sentence for each reason for which the cloud is smaller."""
         assert expected.by_pair is not None
-        found = [
+        reasons = [
             f"{self._plan.name(pair)}: {why}"
             for pair, decoded in pairs
             for why in self._reasons(
                 pair, decoded, confirmed, float(expected.by_pair[pair])
             )
         ]
-        if confirmed.by_each_other:
-            found.append(
-                "the pairs agree with each other, but not with the mesh of the plan: "
-                "the object differs from it, or stands elsewhere"
-            )
-        return tuple(found)
+        return (*reasons, confirmed.remark) if confirmed.remark else tuple(reasons)
 
     def _reasons(
         self, pair: PairIndex, decoded: Decoded, confirmed: Confirmed, share: float
     ) -> list[str]:
         should = f"it should measure {share:.0%} of the target"
-        if pair in self.refused:
-            return [f"left out: {self.refused[pair]}"]
-        if pair in self.dark:
-            dark = f"left out: {self.dark[pair]} ({should})"
-            return [dark] if share >= _MISSED else []
-        found = list(self.notes.get(pair, ()))
-        if pair in confirmed.errors_m:
-            found.append(
-                f"left out: its points lie {_MM * confirmed.errors_m[pair]:.3g} mm off "
-                f"the mesh (median), and no other pair confirms them: images of other "
-                f"devices, or exchanged, or poses that aren't those of the plan or the "
-                f"calibration"
-            )
-        elif pair in confirmed.strays:
-            found.append(
-                f"{confirmed.strays[pair]} of its {len(decoded.cloud)} points are left "
-                f"out: far off the mesh, and no other pair confirms them"
-            )
+        refused = self._refused.get(pair)
+        if isinstance(refused, DarkError):
+            return [f"left out: {refused} ({should})"] if share >= _MISSED else []
+        if refused is not None:
+            return [f"left out: {refused}"]
+        reasons = list(self._notes.get(pair, ()))
+        if pair in confirmed.reasons:
+            reasons.append(confirmed.reasons[pair])
         elif not len(decoded.cloud) and (
             share >= _MISSED or decoded.rejected.get("labels")
         ):
             count = PairCount.of(self._plan, pair, decoded)
             why = rejection((count,)) or "no ring edge was decoded"
-            found.append(f"gave no point: {why} ({should})")
-        return found
+            reasons.append(f"gave no point: {why} ({should})")
+        return reasons
 
 
 def _concluded(
@@ -243,17 +212,11 @@ def _concluded(
     inspection: _Inspection,
     expected: Expected,
     spent: Spent,
-    *,
     photometry: Photometry | None = None,
 ) -> Reconstruction:
     """Leave out what nothing confirms, merge, judge, and say what is missing."""
-    confirmed = confirm(
-        pairs,
-        plan.mesh,
-        plan.cameras,
-        limit_m=plan.limits.check.max_rms_m,
-    )
-    found = conclude(
+    confirmed = confirm(pairs, plan)
+    result = conclude(
         plan,
         confirmed.pairs,
         seed=0,
@@ -262,4 +225,4 @@ def _concluded(
         spent=spent,
     )
     sentences = inspection.sentences(pairs, confirmed, expected)
-    return replace(found, failures=sentences + found.failures)
+    return replace(result, failures=sentences + result.failures)

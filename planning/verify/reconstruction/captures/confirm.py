@@ -4,7 +4,7 @@ Images that were mixed up among cameras or projectors can decode without a fault
 every point is wrong. No cloud is made of what nothing confirms.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -24,6 +24,7 @@ from planning.verify.reconstruction.decode.decode import (
     PairIndex,
     Pairs,
 )
+from planning.verify.reconstruction.scanner import Scanner
 
 _MM = 1e3
 # Points of a pair that are looked at, and the fewest that say anything.
@@ -42,33 +43,28 @@ _APART = 3.0
 _STRAY = 10.0
 _FEW_STRAYS = 0.005
 _FEWEST_STRAYS = 10
+_OTHER_OBJECT = (
+    "the pairs agree with each other, but not with the mesh of the plan: the object "
+    "differs from it, or stands elsewhere"
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Confirmed:
-    """Pairs with what is left of them.
+    """Pairs with the points that something confirms.
 
     Attributes:
-        pairs: As they were, those that nothing confirms without points.
-        errors_m: Median distance from the mesh [m] of each pair that is left out.
-        strays: Points of a pair that are left out, far from the mesh and confirmed by
-            no other pair.
-        by_each_other: Whether the pairs agree with each other, but not with the mesh.
+        pairs: What each pair gave, without the others.
+        reasons: Of each pair that lost points, in words.
+        remark: What the pairs together say of the object; None: nothing.
     """
 
     pairs: Pairs
-    errors_m: dict[PairIndex, float]
-    strays: dict[PairIndex, int]
-    by_each_other: bool
+    reasons: dict[PairIndex, str]
+    remark: str | None = None
 
 
-def confirm(
-    pairs: Pairs,
-    mesh: TriangleMesh,
-    cameras: Sequence[CameraCalibration],
-    *,
-    limit_m: float,
-) -> Confirmed:
+def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
     """Leave out the pairs that neither the mesh nor a confirmed pair confirms.
 
     The mesh confirms a pair whose median distance from it keeps the limit. A pair that
@@ -79,55 +75,58 @@ def confirm(
 
     Args:
         pairs: What each pair gave.
-        mesh: Of the plan.
-        cameras: By the index of the cloud.
-        limit_m: Largest root mean square distance from the mesh [m].
+        plan: What is known of devices and object, and the limit on the rms distance.
     """
+    limit, cameras = plan.limits.check.max_rms_m, plan.cameras
+    clouds = {key: pair.cloud for key, pair in pairs if len(pair.cloud)}
     errors = {
-        key: np.abs(_distances(mesh, pair.cloud.thinned(_LOOKED_AT)))
-        for key, pair in pairs
-        if len(pair.cloud)
+        key: _distances(plan.mesh, cloud.thinned(_LOOKED_AT))
+        for key, cloud in clouds.items()
     }
     medians = {key: float(np.median(error)) for key, error in errors.items()}
-    good = {key for key, median in medians.items() if median <= limit_m}
-    clouds = {key: pair.cloud for key, pair in pairs if key in errors}
-    off = set(medians) - good
-    if off:
-        apart = _disagreements(clouds, cameras)
-        if not good and _agree(off, apart, _APART * limit_m):
-            return Confirmed(pairs, {}, {}, by_each_other=True)
-        off = {key for key in off if not _seen_by(good, key, apart, _APART * limit_m)}
-    strays: dict[PairIndex, int] = {}
+    good = {key for key, median in medians.items() if median <= limit}
+    off = medians.keys() - good
+    apart = _disagreements(clouds, cameras) if off else {}
+    if off and not good and _agree(off, apart, _APART * limit):
+        return Confirmed(pairs, {}, _OTHER_OBJECT)
     kept: Pairs = []
+    reasons: dict[PairIndex, str] = {}
     for key, pair in pairs:
-        if key in off:
-            nothing = np.zeros(len(pair.cloud), dtype=bool)
-            kept.append((key, _with_points(pair, nothing)))
-            continue
-        if key in good and np.mean(errors[key] > _STRAY * limit_m) > _FEW_STRAYS:
-            far = np.abs(_distances(mesh, pair.cloud)) > _STRAY * limit_m
+        unconfirmed = np.zeros(len(pair.cloud), dtype=bool)
+        if key in off and not _seen_by(good, key, apart, _APART * limit):
+            unconfirmed[:] = True
+            reasons[key] = (
+                f"left out: its points lie {_MM * medians[key]:.3g} mm off the mesh "
+                f"(median), and no other pair confirms them: images of other devices, "
+                f"or exchanged, or poses that aren't those of the plan or the "
+                f"calibration"
+            )
+        if key in good and np.mean(errors[key] > _STRAY * limit) > _FEW_STRAYS:
+            far = _distances(plan.mesh, pair.cloud) > _STRAY * limit
             others = {one: clouds[one] for one in sorted(good - {key})}
-            camera = cameras[key[1]]
-            taken = pair.cloud.take(far)
-            if not _seen_too(key, taken, others, camera, _APART * limit_m):
-                strays[key] = int(np.count_nonzero(far))
-                pair = _with_points(pair, ~far)
-        kept.append((key, pair))
-    return Confirmed(
-        kept, {key: medians[key] for key in off}, strays, by_each_other=False
-    )
+            strays, camera = pair.cloud.take(far), cameras[key[1]]
+            if not _seen_too(key, strays, others, camera, _APART * limit):
+                unconfirmed = far
+                reasons[key] = (
+                    f"{len(strays)} of its {len(pair.cloud)} points are left out: far "
+                    f"off the mesh, and no other pair confirms them"
+                )
+        kept.append((key, _without(pair, unconfirmed) if key in reasons else pair))
+    return Confirmed(kept, reasons)
 
 
 def _distances(mesh: TriangleMesh, cloud: Cloud) -> Array:
-    return closest_points(mesh, cloud.points).distances
+    """From the mesh [m], shape (n,)."""
+    return np.abs(closest_points(mesh, cloud.points).distances)
 
 
-def _with_points(pair: Decoded, kept: Mask) -> Decoded:
-    """Return a pair with some of its points, the others counted as unconfirmed."""
-    why = pair.rejected | {"unconfirmed": int(np.count_nonzero(~kept))}
+def _without(pair: Decoded, unconfirmed: Mask) -> Decoded:
+    """Return a pair without some of its points, those counted as unconfirmed."""
+    why = pair.rejected | {"unconfirmed": int(np.count_nonzero(unconfirmed))}
     outcomes = pair.outcomes.copy()
-    outcomes[np.flatnonzero(outcomes < 0)[~kept]] = CAUSES.index("unconfirmed")
-    return replace(pair, cloud=pair.cloud.take(kept), rejected=why, outcomes=outcomes)
+    outcomes[np.flatnonzero(outcomes < 0)[unconfirmed]] = CAUSES.index("unconfirmed")
+    cloud = pair.cloud.take(~unconfirmed)
+    return replace(pair, cloud=cloud, rejected=why, outcomes=outcomes)
 
 
 def _seen_by(
@@ -150,33 +149,30 @@ def _seen_too(
     tolerance: float,
 ) -> bool:
     """Whether other pairs measured stray points alike."""
-    found = [
+    differences = [
         _difference(strays, other, camera, same=one[0] == key[0])
         for one, other in others.items()
     ]
-    differences = np.concatenate([*found, np.zeros(0)])
-    return len(differences) >= _FEWEST_STRAYS and bool(
-        np.median(differences) <= tolerance
-    )
+    every = np.concatenate([*differences, np.zeros(0)])
+    return len(every) >= _FEWEST_STRAYS and bool(np.median(every) <= tolerance)
 
 
 def _disagreements(
     clouds: dict[PairIndex, Cloud], cameras: Sequence[CameraCalibration]
 ) -> dict[frozenset[PairIndex], float]:
     """Median difference [m] of each two pairs where both saw one spot."""
-    found: dict[frozenset[PairIndex], float] = {}
+    apart: dict[frozenset[PairIndex], float] = {}
     for one, other in combinations(sorted(clouds), 2):
-        seen, also = clouds[one], clouds[other]
         same = one[0] == other[0]
         differences = np.concatenate(
             [
-                _difference(seen, also, cameras[one[1]], same=same),
-                _difference(also, seen, cameras[other[1]], same=same),
+                _difference(clouds[a], clouds[b], cameras[a[1]], same=same)
+                for a, b in ((one, other), (other, one))
             ]
         )
         if len(differences) >= _FEWEST:
-            found[frozenset((one, other))] = float(np.median(differences))
-    return found
+            apart[frozenset((one, other))] = float(np.median(differences))
+    return apart
 
 
 def _difference(
@@ -192,19 +188,18 @@ def _difference(
     shown = np.flatnonzero(np.isfinite(pixels[:, 0]))
     if len(shown) == 0:
         return np.zeros(0)
-    apart, nearest = KDTree(_place(pixels[shown], other.ring[shown], same)).query(
+    beside, nearest = KDTree(_place(pixels[shown], other.ring[shown], same)).query(
         _place(seen.pixels, seen.ring, same),
         distance_upper_bound=_BESIDE_PX if same else _SAME_SPOT_PX,
     )
-    hit = np.isfinite(apart)
-    beside, others = np.asarray(apart)[hit], shown[np.asarray(nearest)[hit]]
-    own, reach = (
+    hit = np.isfinite(beside)
+    beside, others = np.asarray(beside)[hit], shown[np.asarray(nearest)[hit]]
+    reach, further = (
         np.sqrt(np.sum((points - camera.centre) ** 2, axis=1))
         for points in (seen.points[hit], other.points[others])
     )
-    deep = np.where(beside <= _SAME_SPOT_PX, np.abs(own - reach), 0.0)
-    wide = beside * own / camera.focal_px if same else np.zeros(len(own))
-    return np.maximum(deep, wide)
+    deep = np.where(beside <= _SAME_SPOT_PX, np.abs(reach - further), 0.0)
+    return np.maximum(deep, beside * reach / camera.focal_px) if same else deep
 
 
 def _place(pixels: Array, rings: NDArray[np.int16], by_ring: bool) -> Array:
@@ -214,7 +209,7 @@ def _place(pixels: Array, rings: NDArray[np.int16], by_ring: bool) -> Array:
 
 
 def _agree(
-    keys: set[PairIndex], apart: dict[frozenset[PairIndex], float], tolerance: float
+    keys: Set[PairIndex], apart: dict[frozenset[PairIndex], float], tolerance: float
 ) -> bool:
     """Whether pairs of several cameras and projectors agree, each with some other."""
     if len({p for p, _ in keys}) < 2 or len({c for _, c in keys}) < 2:

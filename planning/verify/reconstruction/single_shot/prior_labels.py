@@ -1,6 +1,6 @@
 """Labels for one image of rings, from a mesh that the object is known to lie near."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from geometry.rays.proximity import closest_points
 from geometry.rays.rays import RayCaster
 from planning.verify.reconstruction.arrays import Array, Columns, Indices, Mask
 from planning.verify.reconstruction.calibration import PairCalibration
+from planning.verify.reconstruction.decode.edges import ImageEdges
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
 
 # Places on a ray at which its depth in the prior is looked at.
@@ -17,31 +18,15 @@ _STEPS = 12
 _ROOTS = (1, -1)
 
 
-@dataclass(frozen=True, eq=False)
-class PriorLabels:
-    """What each point of a line is taken for.
-
-    Attributes:
-        rings: Ring, -1 where none is sure, shape (n,).
-        roots: Sign of r.m, 0 where none is sure, shape (n,).
-        rejected: Points without a label, by cause: `off_prior`, no ring meets the ray
-            near the prior; `ambiguous`, several do.
-    """
-
-    rings: Indices
-    roots: NDArray[np.int8]
-    rejected: dict[str, int]
-
-
 def label_by_prior(
-    pixels: Array,
+    lines: ImageEdges,
     radii: Array,
     pair: PairCalibration,
     prior: TriangleMesh,
     *,
     tolerance_m: float,
-) -> PriorLabels:
-    """Return the ring and root of points on lines, where the prior leaves one choice.
+) -> tuple[ImageEdges, dict[str, int]]:
+    """Label points on lines with ring and root, where the prior leaves one choice.
 
     Each ray meets every ring surface in up to two points. A point is labelled if
     exactly one of them lies within the tolerance of the prior, where the object itself
@@ -51,41 +36,40 @@ def label_by_prior(
     a prior may be: a depth range dZ <= dR / |r.m|.
 
     Args:
-        pixels: Points of lines in the camera's image, shape (n, 2).
+        lines: Points of lines in the camera's image.
         radii: Of the rings, rising, shape (n_rings,).
         pair: Calibration of both devices.
         prior: What the object is known to lie near.
         tolerance_m: How near [m].
+
+    Returns:
+        The lines, ring -1 and root 0 where none is sure; and how many of these are
+        `off_prior`, no ring meeting the ray near the prior, or `ambiguous`, several.
 
     Raises:
         ValueError: If the tolerance isn't positive.
     """
     if not (tolerance_m > 0.0 and np.isfinite(tolerance_m)):
         raise ValueError(f"tolerance_m must be positive, got {tolerance_m} m")
-    rays = pair.camera.rays(pixels)
+    rays = pair.camera.rays(lines.pixels)
     met = _candidates(rays, radii, pair, prior, tolerance_m)
     near = _possible(met, rays, pair, prior, tolerance_m)
-    count = np.bincount(near.rows, minlength=len(pixels))
-    rings = np.full(len(pixels), -1, dtype=np.int64)
-    roots = np.zeros(len(pixels), dtype=np.int8)
-    one = count[near.rows] == 1
-    rings[near.rows[one]] = near.rings[one]
-    roots[near.rows[one]] = near.roots[one]
-    return PriorLabels(
-        rings,
-        roots,
-        {
-            "off_prior": int(np.count_nonzero(count == 0)),
-            "ambiguous": int(np.count_nonzero(count > 1)),
-        },
-    )
+    count = np.bincount(near.ray, minlength=len(lines))
+    sure = near.take(count[near.ray] == 1)
+    rings = np.full(len(lines), -1, dtype=np.int64)
+    roots = np.zeros(len(lines), dtype=np.int8)
+    rings[sure.ray], roots[sure.ray] = sure.rings, sure.roots
+    return replace(lines, rings=rings, roots=roots), {
+        "off_prior": int(np.count_nonzero(count == 0)),
+        "ambiguous": int(np.count_nonzero(count > 1)),
+    }
 
 
 @dataclass(frozen=True, eq=False)
 class _Crossings(Columns):
     """Where rays meet ring surfaces: ray, ring, root and point of each."""
 
-    rows: Indices
+    ray: Indices
     rings: Indices
     roots: NDArray[np.int8]
     points: Array
@@ -100,18 +84,18 @@ def _candidates(
 ) -> _Crossings:
     """Intersections of every ray with every ring in the prior's box."""
     low, high = prior.bounds[0] - tolerance_m, prior.bounds[1] + tolerance_m
-    parts: list[_Crossings] = []
+    n, parts = len(rays), list[_Crossings]()
     for ring, radius in enumerate(radii):
         for root in _ROOTS:
-            every, side = np.full(len(rays), radius), np.full(len(rays), root, np.int8)
+            side, on_ring = np.full(n, root, np.int8), np.full(n, radius)
             hits = intersect_rings(
-                pair.camera.centre, rays, every, side, pair.projector
+                pair.camera.centre, rays, on_ring, side, pair.projector
             )
             # NaN, where a ray misses the ring, is in no box.
             inside = np.all((hits.points >= low) & (hits.points <= high), axis=1)
-            rows = np.flatnonzero(inside)
-            number = np.full(len(rows), ring, dtype=np.int64)
-            parts.append(_Crossings(rows, number, side[rows], hits.points[rows]))
+            number = np.full(n, ring, dtype=np.int64)
+            every = _Crossings(np.arange(n), number, side, hits.points)
+            parts.append(every.take(inside))
     return _Crossings.join(parts)
 
 
@@ -123,7 +107,7 @@ def _possible(
     tolerance_m: float,
 ) -> _Crossings:
     """Those near the prior, in the panel, that the object leaves seen and lit."""
-    if len(met.rows) == 0:
+    if len(met.ray) == 0:
         return met
     projector = pair.projector
     near = np.abs(closest_points(prior, met.points).distances) <= tolerance_m
@@ -131,7 +115,7 @@ def _possible(
     met = met.take(near & projector.in_panel(pixels))
     caster = RayCaster(prior, threads=1)
     reach = np.linalg.norm(met.points - pair.camera.centre, axis=1)
-    hidden = _behind_prior(met.points, rays[met.rows], reach, caster, tolerance_m)
+    hidden = _behind_prior(met.points, rays[met.ray], reach, caster, tolerance_m)
     _, beams, length = projector.aim(met.points)
     hidden |= _behind_prior(met.points, beams, length, caster, tolerance_m)
     return met.take(~hidden)
@@ -146,14 +130,14 @@ def _behind_prior(
     is turned away, says nothing so surely.
     """
     faces, first = caster.first_hits(points - away[:, None] * towards, towards)
-    rows = np.flatnonzero((faces >= 0) & (away > first + 2.0 * tolerance_m))
+    deep = np.flatnonzero((faces >= 0) & (away > first + 2.0 * tolerance_m))
     blocked = np.zeros(len(points), dtype=bool)
     for share in (np.arange(_STEPS) + 0.5) / _STEPS:
-        left = rows[~blocked[rows]]
-        if len(left) == 0:
+        clear = deep[~blocked[deep]]
+        if len(clear) == 0:
             break
-        along = first[left] + share * (away[left] - first[left])
-        inner = points[left] + (along - away[left])[:, None] * towards[left]
+        back = (1.0 - share) * (first[clear] - away[clear])
+        inner = points[clear] + back[:, None] * towards[clear]
         depth = closest_points(caster.mesh, inner).distances
-        blocked[left] = depth < -tolerance_m
+        blocked[clear] = depth < -tolerance_m
     return blocked

@@ -4,12 +4,11 @@ Lines are found after Steger, "An unbiased detector of curvilinear structures", 
 PAMI 20(2), 1998: where the image, smoothed at the scale of the line, has a ridge.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.ndimage import convolve, gaussian_filter1d, map_coordinates
 
 from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.decode.edges import ImageEdges
 from planning.verify.reconstruction.patterns.ring_patterns import Frames
 
 # Least brightness of a line above what lies beside it, in grey levels and in noises.
@@ -25,26 +24,8 @@ _MIN_FALL = 0.4
 _NOISE_MASK = np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]])
 
 
-@dataclass(frozen=True, eq=False)
-class RingLines:
-    """Points on the middles of bright lines in one camera's image.
-
-    Attributes:
-        pixels: Sub-pixel positions (u, v) in the camera's image, shape (n, 2).
-        across: Unit direction in the image across the line, shape (n, 2).
-        noise_px: Standard deviation of the position along `across` [px], shape (n,).
-    """
-
-    pixels: Array
-    across: Array
-    noise_px: Array
-
-    def __len__(self) -> int:
-        return len(self.pixels)
-
-
-def find_lines(frames: Frames, width_px: float) -> RingLines:
-    """Return the points of bright lines in an image.
+def find_lines(frames: Frames, width_px: float) -> ImageEdges:
+    """Return points on the middles of bright lines in an image, without labels.
 
     With I smoothed by a Gaussian of sigma = w / (2 sqrt 3) and n the direction of its
     most negative second derivative, the ridge is at ``-(n.grad I) / (n.H n)`` from the
@@ -78,7 +59,8 @@ def find_lines(frames: Frames, width_px: float) -> RingLines:
     # A derivative of white noise, smoothed, varies by 1 / (8 pi scale^4).
     spread = noise / (np.sqrt(8.0 * np.pi) * scale * scale * np.abs(curve[inside]))
     pixels = places[inside] + np.array(frames.corner)
-    return RingLines(pixels, across[inside], spread)
+    ring, root = np.full(len(pixels), -1), np.zeros(len(pixels), dtype=np.int8)
+    return ImageEdges(pixels, ring, root, across[inside], spread)
 
 
 def _falls(smooth: Array, places: Array, reach: Array, least: Array) -> Mask:

@@ -3,7 +3,6 @@
 Rings are told apart by a mesh that the object is known to lie near, not by a sequence.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,11 +17,10 @@ from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.decode.decode import (
     Decoded,
     PairIndex,
-    Pairs,
     measure_edges,
 )
 from planning.verify.reconstruction.decode.edges import ImageEdges
-from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
+from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
 from planning.verify.reconstruction.reconstruct import conclude
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_lines
@@ -33,8 +31,8 @@ from planning.verify.reconstruction.render.rendered import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .prior_labels import PriorLabels, label_by_prior
-from .ring_lines import RingLines, find_lines
+from .prior_labels import label_by_prior
+from .ring_lines import find_lines
 
 # Drawn width of a ring at the object [m]: 4 blurs of a projector; and at most this
 # share of the least gap between rings.
@@ -53,16 +51,14 @@ class Shot:
         pair: Calibration of both.
         width: Of a drawn line, in the unit of the radii.
         decoded: The points.
-        lines: Points of lines that were found.
-        labels: What they were taken for.
+        lines: Points of lines that were found; ring -1: not told.
     """
 
     index: PairIndex
     pair: PairCalibration
     width: float
     decoded: Decoded
-    lines: RingLines
-    labels: PriorLabels
+    lines: ImageEdges
 
 
 def reconstruct_single_shot(
@@ -97,7 +93,7 @@ def reconstruct_single_shot(
         )
     return conclude(
         plan,
-        decoded_pairs(shots),
+        [(shot.index, shot.decoded) for shot in shots],
         seed=seed,
         expected=expected,
         photometry=light,
@@ -112,7 +108,7 @@ def shoot_rig(
     tolerance_m: float,
     photometry: Photometry,
     seed: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Shot, ...]:
     """Render and decode single images of bright rings, projectors shining in turn.
 
@@ -129,31 +125,34 @@ def shoot_rig(
     scene = RenderedScene(plan, plan, photometry)
     views = [scene.seen(c) for c in range(len(plan.cameras))]
     shots: list[Shot] = []
-    total = len(plan.cameras) * len(plan.projectors)
-    for done, ((p, c), pair) in enumerate(plan.pairs(), start=1):
+    pairs = list(plan.pairs())
+    for done, ((p, c), pair) in enumerate(pairs, start=1):
         patterns = pair.projector.pattern_for(pair.camera)
-        width, lines = drawn_lines(pair.projector, patterns, plan.mesh)
-        seen, shown = views[c], scene.shown(p, lines)
+        width, drawn = drawn_lines(pair.projector, patterns, plan.mesh)
+        seen, shown = views[c], scene.shown(p, drawn)
         if seen is not None and shown is not None:
-            key = (seed, _STREAM, p, c)
-            measured = decode_single_shot(
-                render_lines(seen, [shown], scene.lenses[c], key),
-                patterns,
+            frames = render_lines(seen, [shown], scene.lenses[c], (seed, _STREAM, p, c))
+            lines, rejected = label_by_prior(
+                find_lines(frames, _width_px(width, pair, prior)),
+                patterns.radii,
                 pair,
                 prior,
-                line_width=width,
                 tolerance_m=tolerance_m,
+            )
+            decoded = measure_edges(
+                lines.take(lines.rings >= 0),
+                patterns,
+                pair,
+                int(np.count_nonzero(frames.stack[0])),
+                np.zeros((0, 2)),
                 min_conditioning=plan.limits.min_conditioning,
             )
-            shots.append(Shot((p, c), pair, width, *measured))
+            rejected |= decoded.rejected
+            decoded = replace(decoded, n_edges=len(lines), rejected=rejected)
+            shots.append(Shot((p, c), pair, width, decoded, lines))
         if progress is not None:
-            progress(done, total)
+            progress(done, len(pairs))
     return tuple(shots)
-
-
-def decoded_pairs(shots: Sequence[Shot]) -> Pairs:
-    """Return what each pair of projector and camera measured."""
-    return [(shot.index, shot.decoded) for shot in shots]
 
 
 def drawn_lines(
@@ -166,54 +165,9 @@ def drawn_lines(
     return width, patterns.lines(width)
 
 
-def decode_single_shot(
-    frames: Frames,
-    patterns: RingsForCamera,
-    calibration: PairCalibration,
-    prior: TriangleMesh,
-    *,
-    line_width: float,
-    tolerance_m: float,
-    min_conditioning: float = 0.1,
-) -> tuple[Decoded, RingLines, PriorLabels]:
-    """Measure points from one image of bright rings and a prior of the object.
-
-    Args:
-        frames: One image of one camera under one projector, shape (1, h, w).
-        patterns: Whose rings are the middles of the lines.
-        calibration: Of both devices.
-        prior: What the object is known to lie near.
-        line_width: Of a line, in the unit of the radii.
-        tolerance_m: How near the object lies to the prior [m].
-        min_conditioning: Least |r.m|.
-
-    Returns:
-        What was measured; the points of lines that were found; their labels.
-    """
-    camera, projector = calibration.camera, calibration.projector
-    away = float(np.linalg.norm(prior.centre - camera.centre))
-    depth = projector.to_ring(prior.centre[None])[:, 2]
-    # Lines are as wide as at the ring axis.
-    width_m = line_width / float(projector.light.shrink(depth)[0])
-    lines = find_lines(frames, width_m * camera.focal_px / away)
-    labels = label_by_prior(
-        lines.pixels, patterns.radii, calibration, prior, tolerance_m=tolerance_m
-    )
-    sure = labels.rings >= 0
-    edges = ImageEdges(
-        lines.pixels[sure],
-        labels.rings[sure],
-        labels.roots[sure],
-        lines.across[sure],
-        lines.noise_px[sure],
-    )
-    found = measure_edges(
-        edges,
-        patterns,
-        calibration,
-        int(np.count_nonzero(frames.stack[0])),
-        np.zeros((0, 2)),
-        min_conditioning=min_conditioning,
-    )
-    rejected = labels.rejected | found.rejected
-    return replace(found, n_edges=len(lines), rejected=rejected), lines, labels
+def _width_px(width: float, pair: PairCalibration, prior: TriangleMesh) -> float:
+    """Width of a line in the image; lines are as wide as at the ring axis."""
+    away = float(np.linalg.norm(prior.centre - pair.camera.centre))
+    depth = pair.projector.to_ring(prior.centre[None])[:, 2]
+    width_m = width / float(pair.projector.light.shrink(depth)[0])
+    return width_m * pair.camera.focal_px / away
