@@ -1,6 +1,6 @@
 """What both planning stages look at: the surface, its target, and how rays see it."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -63,9 +63,11 @@ class Scene:
         placed = bodies_of(device for device in devices if not device.existing)
         return self._with(placed=placed) if placed or self.placed else self
 
-    def with_obstructions(self, obstructions: tuple[Obstruction, ...]) -> "Scene":
-        """Return the scene with these obstacles, and no other."""
-        return self._with(obstructions=obstructions)
+    def less_one_obstacle(self) -> Iterator[tuple[str, "Scene"]]:
+        """Yield what each obstacle is called, and the scene without it."""
+        for moved in self.obstructions:
+            rest = tuple(other for other in self.obstructions if other is not moved)
+            yield moved.words, self._with(obstructions=rest)
 
     def _with(self, **changes: tuple[object, ...]) -> "Scene":
         other = replace(self, **changes)

@@ -27,6 +27,7 @@ LIGHT = (
     "tangent_angle",
     "projector_occlusion",
     "projector_body",
+    "blocked_by_obstacle",
 )
 SIGHT = (
     "camera_field",
@@ -34,6 +35,7 @@ SIGHT = (
     "camera_incidence",
     "camera_occlusion",
     "camera_body",
+    "blocked_by_obstacle",
     "sample_distance",
 )
 PAIR = ("conditioning", "sigma", "pitch")
@@ -351,13 +353,13 @@ def _evaluate(
     steps = [
         light_steps(entry, p, n, steep, limits["projector"]) for entry in projectors
     ]
-    lit = [s == 6 for s in steps]
+    lit = [s == 7 for s in steps]
     pairs = [
         [pair_steps(projector, camera, p, n, limits) for camera in cameras]
         for projector, on in zip(projectors, lit, strict=True)
         if on
     ]
-    seen = [any(pair[j] == 9 for pair in pairs) for j in range(len(cameras))]
+    seen = [any(pair[j] == 10 for pair in pairs) for j in range(len(cameras))]
     margins = [
         margin(entry, p, n, steep, limits["projector"]) if on else -math.inf
         for entry, on in zip(projectors, lit, strict=True)
@@ -375,7 +377,7 @@ def _evaluate(
     return {
         "falls": [
             light_steps({**entry, "range_m": [0.0, 99.0]}, p, n, [0.0] * 3, any_light)
-            == 6
+            == 7
             for entry in projectors
         ],
         "lit": any(lit),
@@ -384,11 +386,11 @@ def _evaluate(
         "measured": measured,
         "margins": margins,
         "server": margins.index(max(margins)) if any(lit) else None,
-        "by_projectors": reference == 6,
-        "by_cameras": any(lit) and sight == 9,
+        "by_projectors": reference == 7,
+        "by_cameras": any(lit) and sight == 10,
         "uncovered_by_cause": cause,
-        "unreachable_by_cause": None if reference == 6 else LIGHT[reference],
-        "unmeasurable_by_cause": None if sight == 9 else (SIGHT + PAIR)[sight],
+        "unreachable_by_cause": None if reference == 7 else LIGHT[reference],
+        "unmeasurable_by_cause": None if sight == 10 else (SIGHT + PAIR)[sight],
         "inside": inside,
     }
 

@@ -70,6 +70,10 @@ def out_of_reach(
     out = asked.furthest < MEASURED
     share = Share(int(lit.sum()), int(lit.sum() - out.sum()), required.min_reachable)
     changes = least_changes(relaxations, asked.demanded[:, out], share.wanted)
+    unmeasured = taken(samples, np.flatnonzero(out), samples.lit)
+    for moved, rest in among.less_one_obstacle():
+        gained = measured_by_any(rest, devices.reference_cameras, unmeasured)
+        changes[f"{moved} out of the way"] = int(gained.sum())
     whole = required.workspace.whole_shell
     if whole != required.workspace and share.wanted > 0:
         camera = devices.reference_cameras[0]
@@ -80,7 +84,6 @@ def out_of_reach(
             required.workspace.n_reference_cameras,
             None if site is None else replace(site, workspace=whole),
         )
-        unmeasured = taken(samples, np.flatnonzero(out), samples.lit)
         changes[ANYWHERE] = int(measured_by_any(among, anywhere, unmeasured).sum())
     counts = np.bincount(asked.furthest[out], minlength=MEASURED)
     by_cause = {

@@ -60,10 +60,9 @@ def reachability_relaxations(
     n, workspace = len(target), scene.requirements.workspace
     share = Share(n, n - len(dark), scene.requirements.min_reachable)
     gained = _least(scene, reference, dark, share.wanted)
-    for moved in scene.obstructions:
-        rest = tuple(other for other in scene.obstructions if other is not moved)
-        furthest = furthest_lit(scene.with_obstructions(rest), reference, dark)
-        gained[f"{moved.words} out of the way"] = int((furthest == LIT).sum())
+    for moved, rest in scene.less_one_obstacle():
+        furthest = furthest_lit(rest, reference, dark)
+        gained[f"{moved} out of the way"] = int((furthest == LIT).sum())
     whole = workspace.whole_shell
     if whole != workspace:
         site = scene.site("projector", reference[0].device)
