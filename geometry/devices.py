@@ -65,12 +65,7 @@ class PinholeModel:
         return self.rays(0.5 * (np.array(self.resolution) - 1.0))
 
     def holds_ball(self, radius: float, distance: float) -> bool:
-        """Return whether a sphere about the aim lies inside the image.
-
-        Args:
-            radius: Of the sphere [m].
-            distance: From the device to its centre [m].
-        """
+        """Return whether a sphere about the aim, so far away, lies inside the image."""
         width, height = self.resolution
         x, y = (width - 1) / 2, (height - 1) / 2
         edges = np.array([[-0.5, y], [x, -0.5], [width - 0.5, y], [x, height - 0.5]])
@@ -80,19 +75,14 @@ class PinholeModel:
         )
 
     def holds_more_on_side(self, radius: float, distance: float) -> bool:
-        """Return whether a quarter turn may show more of a sphere about the aim.
-
-        The arguments are those of `holds_ball`.
-        """
+        """Return whether a quarter turn may show more of a sphere about the aim."""
         return not self.holds_ball(radius, distance)
 
     def half_rectangle(self, distance: float) -> Array:
         """Return half the sides of a rectangle in the field, in [m], shape (2,).
 
-        It is across the line of sight, sides along the image's, its middle on the aim.
-
-        Args:
-            distance: From the device to the rectangle [m].
+        It is across the line of sight at a distance in [m], sides along the image's,
+        its middle on the aim.
         """
         width, height = self.resolution
         u, v = np.array([-0.5, width - 0.5]), np.array([-0.5, height - 0.5])
@@ -134,17 +124,11 @@ class PinholeModel:
         return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
     def ray_jacobian(self, points: Array) -> Array:
-        """Return J_r = dr/d(u, v) in [1/px] at points of the device frame.
+        """Return J_r = dr/d(u, v) in [1/px] at points in the device frame, (n, 3, 2).
 
         With p = (x/z, y/z), q(p) the distorted p and r = (p, 1)/|(p, 1)|::
 
             J_r = dr/dp (dq/dp)^-1 diag(1/fx, 1/fy)
-
-        Args:
-            points: In front of the device, in [m], shape (n, 3).
-
-        Returns:
-            Shape (n, 3, 2).
         """
         p = points[:, :2] / points[:, 2:]
         # Column by column, several times as fast as over axes of three and two.
@@ -240,30 +224,15 @@ class ParallelModel:
         return np.array([0.0, 0.0, 1.0])
 
     def holds_ball(self, radius: float, distance: float) -> bool:
-        """Return whether a sphere about the aim lies inside the beam, at any distance.
-
-        Args:
-            radius: Of the sphere [m].
-            distance: From the device to its centre [m].
-        """
+        """As of `PinholeModel`, at any distance."""
         return bool(radius <= min(float(self.half_panel.min()), self.beam_reach))
 
     def holds_more_on_side(self, radius: float, distance: float) -> bool:
-        """Return whether a quarter turn of the panel may show more of a sphere.
-
-        The arguments are those of `holds_ball`.
-        """
+        """As of `PinholeModel`; a round beam shows the same however it is turned."""
         return radius > float(self.half_panel.min())
 
     def half_rectangle(self, distance: float) -> Array:
-        """Return half the sides of a rectangle in the field, in [m], shape (2,).
-
-        Sides along the panel's, its middle on the axis. In a round beam, of the
-        rectangles inside, the one that is nearest to a square.
-
-        Args:
-            distance: From the device to the rectangle [m].
-        """
+        """As of `PinholeModel`; in a round beam the one nearest to a square."""
         half, beam = self.half_panel, self.beam_reach
         if beam >= np.hypot(*half):
             return half
@@ -271,7 +240,7 @@ class ParallelModel:
         return np.minimum(half, max(short, np.sqrt(beam**2 - short**2)))
 
     def pixel_m(self, distance: float) -> float:
-        """Return the side of a pixel on a surface across the axis [m]."""
+        """As of `PinholeModel`."""
         return self.pixel_pitch_m
 
     def widened(self, times: int) -> "ParallelModel":
@@ -282,7 +251,7 @@ class ParallelModel:
         )
 
     def ray_starts(self, points: Array) -> Array:
-        """Return where the rays to points (..., 3) of the device frame start."""
+        """As of `PinholeModel`."""
         return points * [1.0, 1.0, 0.0]
 
 

@@ -25,9 +25,6 @@ def look_at(positions: Array, targets: Array, up: Array, *, roll: float = 0.0) -
         up: World direction that appears upwards (-y) in the image, shape (3,).
         roll: Turn of the device about its own axis, from +x towards +y, in [rad].
 
-    Returns:
-        Poses, shape (n, 4, 4) or (4, 4).
-
     Raises:
         ValueError: If a target is at its position.
     """
@@ -73,7 +70,7 @@ def transform(b_from_a: Array, points: Array) -> Array:
 def fibonacci_cap(
     n: int, axis: Array, half_angle: float, *, start: Array | None = None
 ) -> Array:
-    """Return n unit vectors spread evenly over a spherical cap.
+    """Return n unit vectors spread evenly over a spherical cap, from the axis outwards.
 
     Args:
         n: Number of directions, at least 1.
@@ -81,9 +78,6 @@ def fibonacci_cap(
         half_angle: Opening of the cap in [rad]; pi is the whole sphere.
         start: Unit direction across the axis from which azimuth counts, shape (3,);
             default one that a world axis gives.
-
-    Returns:
-        Shape (n, 3), from the axis outwards.
     """
     axis = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
     e1 = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]) if start is None else start

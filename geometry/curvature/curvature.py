@@ -76,15 +76,11 @@ def principal_curvatures(
     averaged out. Both averages vanish with the radius, down to 0.6 edges for tensors
     and none for positions: a radius below an edge is the route for clean meshes.
 
-    The scale is a radius that is given; else it is 2 % of the mesh's size, or the size
-    of the facets (`facet_size`) of a coarse mesh where those are larger, since the mesh
-    knows nothing smaller of the shape. Edges should not be longer than it
-    (`refinement` cuts them). Source of the fit: Panozzo, Puppo and Rocca,
-    "Efficient multi-scale curvature and crease estimation", 2010.
-
-    Args:
-        mesh: Repaired and oriented outwards.
-        radius: Of the neighbourhood in [m]; default 2 % of the mesh's size.
+    The scale is a radius [m] that is given; else it is 2 % of the mesh's size, or the
+    size of the facets (`facet_size`) of a coarse mesh where those are larger, since the
+    mesh knows nothing smaller of the shape. Edges should not be longer than it
+    (`refinement` cuts them). Source of the fit: Panozzo, Puppo and Rocca, "Efficient
+    multi-scale curvature and crease estimation", 2010.
 
     Raises:
         ValueError: If the radius isn't positive.
@@ -154,7 +150,6 @@ def _averaged_fit(
     whole: Mask,
     scale: float,
 ) -> tuple[Array, Array, Mask]:
-    """Fit where neighbourhoods are whole, averaged over a scale in mean edges."""
     beyond = (_AVERAGED_SHARE * scale) ** 2 - _FITTED_EDGES**2
     if beyond > 0:
         vertices = diffused(vertices, mass, laplacian, np.sqrt(beyond))
@@ -173,7 +168,6 @@ def _averaged_fit(
 
 
 def _joined_to(chosen: Mask, laplacian: csr_array) -> Mask:
-    """Which nodes are connected to a chosen one, shape (n,)."""
     count, label = connected_components(laplacian, directed=False)
     held = np.zeros(count, dtype=bool)
     held[label[chosen]] = True

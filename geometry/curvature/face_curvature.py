@@ -24,9 +24,6 @@ def steep_directions(mesh: TriangleMesh, field: CurvatureField) -> Array:
     the eigenvalues of that 2 x 2 form are its principal curvatures. Zero where
     |k1 - k2| <= 0.3 max(|k1|, |k2|), where the face is flat, and where its curvature
     isn't trusted.
-
-    Raises:
-        ValueError: If the field is of another mesh.
     """
     six = packed((field.k_max, field.k_min), (field.direction_max, field.direction_min))
     tensors, trusted = averaged_on_faces(mesh, field, six, _SMOOTHING_SHARE)
@@ -43,18 +40,10 @@ def steep_directions(mesh: TriangleMesh, field: CurvatureField) -> Array:
 def averaged_on_faces(
     mesh: TriangleMesh, field: CurvatureField, values: Array, share: float
 ) -> tuple[Array, Mask]:
-    """Return values averaged on the faces, and which faces have valid corners only.
+    """Return values averaged on the faces, (n_f, m), and which have valid corners only.
 
-    Vertices that aren't valid give nothing.
-
-    Args:
-        mesh: The surface.
-        field: Its curvatures.
-        values: Of each vertex, shape (n_v, m).
-        share: Of the field's scale, over which diffusion averages.
-
-    Returns:
-        Shapes (n_f, m) and (n_f,).
+    Diffusion averages the values of the vertices, (n_v, m), over a share of the field's
+    scale. Vertices that aren't valid give nothing.
 
     Raises:
         ValueError: If the field is of another mesh.

@@ -22,12 +22,8 @@ def fit_quadrics(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask, Mask
 
     The tensor is k1 d1 d1^T + k2 d2 d2^T; an outward-oriented sphere is positive.
     Source: Panozzo, Puppo and Rocca, "Efficient multi-scale curvature and crease
-    estimation", 2010, as libigl has it.
-
-    Args:
-        vertices: Shape (n, 3), of about unit edges near the origin: libigl's thresholds
-            are absolute numbers.
-        faces: With area, shape (m, 3).
+    estimation", 2010, as libigl has it, whose thresholds are absolute numbers: vertices
+    (n, 3) must have about unit edges near the origin, faces (m, 3) area.
 
     Returns:
         Tensors as six numbers each (`tensors.packed`), (n, 6); the unit normals that

@@ -26,18 +26,12 @@ def cut_for_curvature(
 ) -> tuple[TriangleMesh, Ints]:
     """Cut the long edges of a mesh on which curvature knows no places, as of CAD parts.
 
-    Curvature lives at vertices: on triangles far larger than its scale (the radius, or
-    the size of the facets of a coarse smooth mesh) it depends on the triangulation
-    alone, and a face of which a part is curved could only be chosen as a whole. Edges
-    are cut to 1.25 times the scale, or twice where it is more than 1.5 radii. A mesh
-    with less than a fifth of its area in faces with a longer edge comes back as it is.
-
-    Args:
-        mesh: The surface.
-        radius: Of the curvature's neighbourhood in [m]; default 2 % of the mesh's size.
-
-    Returns:
-        The mesh, and of which face each of its faces is a part, as `cut_long_edges`.
+    Curvature lives at vertices: on triangles far larger than its scale (the radius [m]
+    of its neighbourhood, or the size of the facets of a coarse smooth mesh) it depends
+    on the triangulation alone, and a face of which a part is curved could only be
+    chosen as a whole. Edges are cut to 1.25 times the scale, or twice where it is more
+    than 1.5 radii. A mesh with less than a fifth of its area in faces with a longer
+    edge comes back as it is. Returns what `cut_long_edges` does.
     """
     radius = DEFAULT_RADIUS_SHARE * mesh.size if radius is None else radius
     facet = facet_size(mesh)
@@ -51,15 +45,11 @@ def cut_for_curvature(
 
 
 def cut_long_edges(mesh: TriangleMesh, longest: float) -> tuple[TriangleMesh, Ints]:
-    """Halve edges longer than a length until there are none; the surface stays.
+    """Halve edges longer than a length [m] until there are none; the surface stays.
 
     Where that would make more than 100,000 faces and more than twice those there are,
     shorter edges are left alone. `source` is kept; `origin` isn't, since new vertices
     are none of the file's.
-
-    Args:
-        mesh: The surface.
-        longest: Length in [m] that an edge may have.
 
     Returns:
         The mesh (the same object if nothing is long), and of which face each of its

@@ -24,14 +24,8 @@ def mark_segments(
     """Mark every cell that a segment, seen from the origin, passes through.
 
     A few cells that it misses by less than rounding are marked too, none is left out. A
-    segment through the origin itself is seen as its two ends.
-
-    Args:
-        cube: The map.
-        starts: Where segments begin, shape (m, 3).
-        ends: Where they end, shape (m, 3).
-        owners: Row of the marks that each belongs to, shape (m,).
-        marks: What is marked, in place, shape (n_owners, cube.size).
+    segment through the origin itself is seen as its two ends. Starts and ends (m, 3)
+    are marked in the rows of their owners (m,), in place, shape (n_owners, cube.size).
     """
     flat = marks.reshape(-1)
     # Column by column: rows of three are too short for numpy's loops.
@@ -124,7 +118,6 @@ def _by_column(
 
 
 def _mark(cube: CubeMap, flat: Mask, begin: Ints, low: Ints, high: Ints) -> None:
-    """Mark rows low to high of columns that begin at a place."""
     counts = high - low + 1
     for some in _parts(counts):
         which, nth = _spread(counts[some])
@@ -192,12 +185,9 @@ class Pieces:
 def pieces(marks: Mask, n: int) -> Pieces:
     """Return the pieces of marked cells that share an edge within a face of a map.
 
-    Runs of cells in a row are joined with the runs of the next row that they touch:
-    there are far fewer runs than cells.
-
-    Args:
-        marks: Of the cells of any number of square faces of n x n, (n_maps, 6 n n).
-        n: Cells along an edge of a face.
+    Marks (n_maps, 6 n n) are those of square faces of n x n. Runs of cells in a row are
+    joined with the runs of the next row that they touch: there are far fewer runs than
+    cells.
     """
     rows = np.ascontiguousarray(marks).reshape(-1, n)
     begins, ends = rows.copy(), rows.copy()

@@ -110,19 +110,11 @@ class CubeMap:
         return around
 
     def locate(self, directions: Array) -> Ints:
-        """Return the cell that each direction lies in, shape (m,).
-
-        Args:
-            directions: Not zero, of any length, shape (m, 3).
-        """
+        """Return the cell that each direction lies in, shape (m,)."""
         return located(directions, self.n)
 
     def halved(self, rows: NDArray[Any]) -> NDArray[Any]:
-        """Return for each cell of the map of n/2 the rows of its four cells, joined.
-
-        Args:
-            rows: Bits or booleans of each cell, shape (size, k).
-        """
+        """Return the rows of bits for the map of n/2: those of four cells, joined."""
         n = self.n // 2
         across = np.bitwise_or.reduce(rows.reshape(FACES, n, 2, n, 2, -1), axis=4)
         return np.bitwise_or.reduce(across, axis=2).reshape(FACES * n * n, -1)
@@ -139,11 +131,9 @@ class CubeMap:
 
 
 def located(directions: Array, n: Ints | int) -> Ints:
-    """Return the cell that each direction lies in, on a map of its own, shape (m,).
+    """Return the cell of each direction (m, 3) on a map of n cells an edge, (m,).
 
-    Args:
-        directions: Not zero, of any length, shape (m, 3).
-        n: Cells along an edge of each one's map, shape (m,), or of all.
+    Directions may have any length but 0; `n` is one number, or each one's own.
     """
     # Column by column: rows of three are too short for numpy's loops.
     flat = np.ascontiguousarray(directions, dtype=np.float64).ravel()
@@ -162,7 +152,6 @@ def located(directions: Array, n: Ints | int) -> Ints:
 
 
 def _steps(gnomonic: Array, n: Ints | int) -> Ints:
-    """Column or row of cells that a gnomonic coordinate falls into, shape (m,)."""
     steps = (np.arctan(gnomonic) * (4.0 / np.pi) + 1.0) / 2.0
     # No coordinate lies below -1, so none is less than the first cell's.
     return np.minimum((steps * n).astype(np.int64), n - 1)
@@ -171,9 +160,7 @@ def _steps(gnomonic: Array, n: Ints | int) -> Ints:
 def quarters(level: Ints, cells: Ints) -> Ints:
     """Return the four parts of cells on the map of the next level, shape (m, 4).
 
-    Args:
-        level: Cell k is one of the map of 2^level cells an edge, shape (m,).
-        cells: Numbers of the cells, shape (m,).
+    A cell of level k is one of the map of 2^k cells an edge.
     """
     n = 1 << level
     face, rest = np.divmod(cells, n * n)

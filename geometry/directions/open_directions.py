@@ -86,11 +86,8 @@ class OpenDirections:
     def maps(self, points: Array, normals: Array, steep: Array, faces: Ints) -> Mask:
         """Return which cells are open to each sample, shape (n, cube.size).
 
-        Args:
-            points: On the mesh in [m], at most `POINTS`, shape (n, 3).
-            normals: Unit normals of their faces, same shape.
-            steep: Unit T1, or zero where it doesn't bind, same shape.
-            faces: Face of each, shape (n,).
+        At most `POINTS` on the mesh [m] with the unit normals of their faces; `steep`
+        is unit T1, or zero where it doesn't bind; (n, 3) each.
         """
         cells = self._within_incidence(normals)
         cells &= ~self._along_steep(steep)

@@ -19,11 +19,7 @@ _ROWS = 1 << 11
 
 
 class ProductSigns:
-    """Rows, ready to be multiplied.
-
-    Args:
-        rows: Finite numbers, shape (m, k).
-    """
+    """Rows (m, k) of finite numbers, ready to be multiplied."""
 
     def __init__(self, rows: Array) -> None:
         self._rows = rows
@@ -32,11 +28,7 @@ class ProductSigns:
         self._single = (rows / self._scale).astype(np.float32)
 
     def over(self, columns: Array, near: float = 0.0) -> tuple[Words, Ints, Array]:
-        """Return which products are above zero, and those that come near to it.
-
-        Args:
-            columns: At most 64 of them, shape (n, k).
-            near: What counts as near to zero.
+        """Return which products with at most 64 columns (n, k) are above zero.
 
         Returns:
             A word for each row, column i in bit i, true of all rows but those told

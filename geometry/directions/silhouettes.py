@@ -59,11 +59,7 @@ class Sides:
 
 
 class Silhouettes:
-    """The edges of a mesh, ready to be compared.
-
-    Args:
-        mesh: What stands in the way.
-    """
+    """The edges of a mesh that stands in the way, ready to be compared."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
         edges = mesh.edges
@@ -100,12 +96,10 @@ class Silhouettes:
         self._balls: dict[float, ProductSigns] = {}
 
     def sides(self, points: Array, normals: Array, close: float = 0.0) -> Sides:
-        """Return from which side points see each face.
+        """Return from which side at most `POINTS` points on the mesh see each face.
 
-        Args:
-            points: On the mesh in [m], at most `POINTS`, shape (n, 3).
-            normals: Unit axes of the cones that are asked about, same shape.
-            close: How far from a face's plane is close to it, in [m].
+        `normals` are unit axes of the cones that are asked about; `close` says in [m]
+        how far from a face's plane is close to it.
         """
         local = points - self._middle
         own = np.einsum("ij,ij->i", normals, local)
@@ -130,13 +124,9 @@ class Silhouettes:
         )
 
     def faces_within(self, sides: Sides, reach: float) -> Words:
-        """Return for each face the points to which it comes within reach, as bits.
+        """Return for each face the points to which it comes within reach [m], as bits.
 
         A few faces that don't quite are told too, none that does is left out.
-
-        Args:
-            sides: Of the points.
-            reach: How near, in [m].
         """
         own = np.einsum("ij,ij->i", sides.local, sides.local)
         columns = np.column_stack([-2.0 * sides.local, np.ones(len(own)), own])
@@ -158,11 +148,8 @@ class Silhouettes:
     ) -> tuple[Ints, Array, Array]:
         """Return the silhouettes that may cross a cone above each point.
 
-        Args:
-            sides: Of the points.
-            half_angle: Half opening of the cones [rad], at most pi / 2.
-            among: For each face the points for which it counts, as bits; None: all do
-                for every point.
+        Cones open by at most pi / 2 [rad] to each side. Only faces `among` count for
+        the points that their bits name; None: all do for every point.
 
         Returns:
             The point that each belongs to, (m,), and the edge's ends relative to it in
@@ -202,16 +189,10 @@ class Silhouettes:
     ) -> Mask:
         """Return to which points something comes near that may rise into a cone, (n,).
 
-        Every face but their own may, except one that goes on from it across an edge and
-        rises by less than the cone leaves.
-
-        Args:
-            sides: Of the points; what is `close` there mustn't be less than the reach.
-            faces: The face that each lies on, shape (n,).
-            reach: How near, in [m].
-            half_angle: Half opening of the cone about the face's normal [rad].
-            among: For each face the points to which it may come as near, as bits; None:
-                every face may to every point.
+        Every face but their own (of `faces`) may, except one that goes on from it
+        across an edge and rises by less than the cone leaves. What is `close` to the
+        points' sides mustn't be less than the reach [m]; only faces `among` come near
+        to the points that their bits name, None: every face may to every point.
         """
         local = sides.local
         close = sides.close if among is None else sides.close & among

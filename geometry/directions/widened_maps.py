@@ -17,12 +17,10 @@ _COARSER = (2, 3)
 
 
 class WidenedMaps:
-    """The maps of all samples.
+    """The maps of all samples, on a map of a power of two cells an edge.
 
-    Args:
-        rows: Samples to which each cell is open, packed along the samples as
-            `numpy.packbits` does, uint8, shape (cube.size, n_bytes).
-        cube: The map, of a power of two cells an edge.
+    `rows` are the samples to which each cell is open, packed along the samples as
+    `numpy.packbits` does, uint8, shape (cube.size, n_bytes).
     """
 
     def __init__(self, rows: Words, cube: CubeMap) -> None:
@@ -47,14 +45,10 @@ class WidenedMaps:
         self._first = np.cumsum([0, *(len(own) for own in made[:-1])])
 
     def open(self, directions: Array, angles: Array, samples: Ints) -> Mask:
-        """Return whether a sample has an open direction within an angle of one given.
+        """Return whether samples (m,) have an open direction near to one given, (m,).
 
-        More may be called open than is, never less.
-
-        Args:
-            directions: Of any length, not zero unless no map answers, shape (m, 3).
-            angles: In [rad], shape (m,).
-            samples: Number of each sample, shape (m,).
+        Directions (m, 3) have any length, but 0 only if no map answers; angles (m,) say
+        in [rad] how near. More may be called open than is, never less.
         """
         level = np.searchsorted(self._angles, angles)
         found = np.ones(len(angles), dtype=bool)

@@ -25,11 +25,7 @@ _DAMAGED = (
 
 
 def file_bytes(path: str | Path) -> bytes:
-    """Return the bytes of a file as it is.
-
-    Raises:
-        MeshError: If it can't be read, or is empty.
-    """
+    """Return the bytes of a file as it is."""
     try:
         data = Path(path).read_bytes()
     except FileNotFoundError:
@@ -47,11 +43,7 @@ _Unpacked = tuple[str, bytes, Callable[[str], bytes] | None]
 
 
 def unpacked(path: Path, data: bytes) -> _Unpacked:
-    """Return the format, its bytes, and how to fetch files that it names.
-
-    Raises:
-        MeshError: If an archive is damaged, holds other than one mesh, or too much.
-    """
+    """Return the format, its bytes, and how to fetch files that it names."""
     suffixes = [suffix.lower().lstrip(".") for suffix in path.suffixes] or [""]
     try:
         if suffixes[-1] == "zip":

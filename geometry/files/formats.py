@@ -96,7 +96,6 @@ def known_unit(name: str) -> str | None:
 
 
 def _beside(fetch: Callable[[str], bytes] | None, name: str) -> bytes:
-    """Return a file that a .gltf names, if it lies in its folder."""
     rooted = PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive
     missing = FormatError(f"it needs the file '{name}', which isn't beside it")
     if fetch is None or rooted or ".." in name:

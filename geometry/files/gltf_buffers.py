@@ -37,7 +37,7 @@ def item(tree: Tree, kind: str, index: object) -> Any:  # noqa: ANN401
 
 
 class Buffers:
-    """The numbers that accessors name, with every offset held to what is there."""
+    """The buffers of a file, each read once."""
 
     def __init__(self, tree: Tree, fetch: Fetch | None, stored: bytes | None) -> None:
         self._tree = tree

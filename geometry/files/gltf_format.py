@@ -17,11 +17,7 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
 def read_glb(data: bytes) -> tuple[Array, Ints, str]:
-    """Return vertices (n, 3), triangles (m, 3) and the unit of a GLB file.
-
-    Raises:
-        FormatError: If it isn't whole, or holds what can't be read as triangles.
-    """
+    """Return vertices (n, 3), triangles (m, 3) and the unit of a GLB file."""
     if len(data) < 20 or not data.startswith(b"glTF"):
         raise FormatError("it has no GLB header")
     version, length = struct.unpack("<2I", data[4:12])
@@ -50,16 +46,8 @@ def read_gltf(
     """Return vertices (n, 3), triangles (m, 3) and the unit of the default scene.
 
     The unit is the metre, unless all meshes state the same other one under
-    ``extras.units``, as mesh libraries write it.
-
-    Args:
-        text: The JSON.
-        fetch: Returns a file beside it.
-        stored: The binary part of a GLB, which is its first buffer.
-
-    Raises:
-        FormatError: If something that it names isn't there, or it holds deformed,
-            compressed or sparse meshes.
+    ``extras.units``, as mesh libraries write it. The first buffer of a GLB is what it
+    has ``stored``.
     """
     try:
         tree = json.loads(text)

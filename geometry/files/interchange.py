@@ -18,10 +18,8 @@ def from_trimesh(
 ) -> TriangleMesh:
     """Return a trimesh object in metres, repaired and oriented like a file.
 
-    Args:
-        mesh: One mesh, or a scene, whose transforms are applied.
-        unit: Of its coordinates: mm, cm, m, in or um; default ``mesh.units``. In memory
-            there is no customary unit, so one of the two must be given.
+    A scene's transforms are applied. Coordinates are in ``unit``, else ``mesh.units``:
+    in memory there is no customary unit, so one of the two must be given.
 
     Raises:
         MeshError: If the unit isn't known, or there is no usable surface.

@@ -16,12 +16,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 
 
 def read_ply(data: bytes) -> dict[str, PlyElement]:
-    """Return every element of a PLY file.
-
-    Raises:
-        FormatError: If the header can't be understood, or what follows it isn't exactly
-            what it promises.
-    """
+    """Return every element of a PLY file."""
     order, elements, body = read_header(data)
     cursor = _Cursor(body, order)
     for element in elements:
@@ -31,11 +26,7 @@ def read_ply(data: bytes) -> dict[str, PlyElement]:
 
 
 def ply_surface(elements: dict[str, PlyElement]) -> tuple[Array, PlyLists]:
-    """Return positions (n, 3) in file units and the corners of every face.
-
-    Raises:
-        FormatError: If there are no positions, or faces are stored as something else.
-    """
+    """Return positions (n, 3) in file units and the corners of every face."""
     if any(name.startswith("tristrip") for name in elements):
         raise FormatError("it stores triangle strips, which aren't read; store faces")
     vertex = elements.get("vertex")
@@ -69,7 +60,6 @@ class _Cursor:
         self._at = 0
 
     def fill(self, element: PlyElement) -> None:
-        """Take all rows of an element."""
         lengths = self._first_lengths(element) if element.count else {}
         dtype = self._row_type(element, lengths)
         table = np.empty(0, dtype)
@@ -88,7 +78,6 @@ class _Cursor:
             _store(element, p, table[p.name].reshape(-1), lists)
 
     def finish(self) -> None:
-        """Refuse what is left behind the last element."""
         rest = self._body[self._at :].strip(b" \t\r\n") if self._order else b""
         extra = len(rest) if self._order else self._left() // 8
         if extra:
@@ -152,7 +141,6 @@ class _Cursor:
         return length
 
     def _row_by_row(self, element: PlyElement) -> None:
-        """Take rows whose lists differ in length."""
         at, rows = self._at, list[dict[str, tuple[int, int]]]()
         for _ in range(element.count):
             places, at = self._places(element, at)

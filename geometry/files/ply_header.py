@@ -43,14 +43,7 @@ class PlyLists:
 
 @dataclass(frozen=True, eq=False)
 class PlyElement:
-    """One element of the header with its rows, column by column.
-
-    Attributes:
-        count: Number of rows.
-        properties: Its columns, in their order.
-        scalars: Values of each plain property, shape (count,).
-        lists: Values of each list property.
-    """
+    """One element of the header with its rows, column by column."""
 
     name: str
     count: int

@@ -36,10 +36,6 @@ def cut_polygons(points: Array, sizes: Ints, corners: Ints) -> tuple[Ints, Ints]
 
     Returns:
         Vertex indices, shape (m, 3), and the polygon each was cut from, shape (m,).
-
-    Raises:
-        FormatError: If one names a vertex that isn't there, or a concave one has more
-            than 3,000 corners.
     """
     outside = np.flatnonzero((corners < 0) | (corners >= len(points)))
     if len(outside):

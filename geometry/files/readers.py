@@ -34,14 +34,11 @@ def load_mesh(
 ) -> TriangleMesh:
     """Return the mesh of a file in metres, repaired and oriented outwards.
 
-    The file's numbers are taken in ``unit``, else in the unit that the format states
-    (3MF, glTF), else in millimetres. What was repaired is in ``mesh.source.repairs``.
-
-    Args:
-        path: OBJ, PLY, STL, OFF, GLB, glTF or 3MF, also inside .gz, .bz2 or .zip.
-        unit: mm, cm, m, in or um.
-        size_mm: Instead of a unit: the longest side of the bounding box in [mm]. Small
-            floating fragments don't count for it.
+    The file's numbers are taken in ``unit`` (mm, cm, m, in or um), else in the one that
+    the format states (3MF, glTF), else in millimetres; or so that the longest side of
+    the bounding box is ``size_mm``, small floating fragments not counted. What was
+    repaired is in ``mesh.source.repairs``. OBJ, PLY, STL, OFF, GLB, glTF and 3MF are
+    read, also inside .gz, .bz2 or .zip.
 
     Raises:
         MeshError: If the file can't be read whole, holds no surface, or has a longest

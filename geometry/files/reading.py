@@ -27,9 +27,6 @@ def numbers(words: Sequence[str]) -> Array:
 
     Python also takes digit groups (1_000) and digits of other scripts; no mesh format
     does, so there they are damage.
-
-    Raises:
-        FormatError: If a word isn't a decimal number, "nan" or "inf".
     """
     try:
         values = np.array(words, dtype=np.float64).reshape(-1)
@@ -42,11 +39,7 @@ def numbers(words: Sequence[str]) -> Array:
 
 
 def whole(values: Array | Ints) -> Ints:
-    """Return vertex numbers as integers.
-
-    Raises:
-        FormatError: If one isn't whole, or too large to count anything.
-    """
+    """Return vertex numbers as integers."""
     if not np.all((values == np.floor(values)) & (np.abs(values) < _LARGEST)):
         raise FormatError("a face names a vertex by a number that isn't whole")
     return values.astype(np.int64)
@@ -66,12 +59,7 @@ class ScenePart:
 
 
 def joined(parts: Sequence[ScenePart]) -> tuple[Array, Ints]:
-    """Return all parts in the world; mirrored ones keep their outside outside.
-
-    Raises:
-        FormatError: If a face names a vertex that its own part doesn't have, or the
-            parts add up to more faces than can be held.
-    """
+    """Return all parts in the world; mirrored ones keep their outside outside."""
     total = sum(len(part.faces) for part in parts)
     if total > _MAX_FACES:
         raise FormatError(

@@ -28,9 +28,6 @@ def read_stl(data: bytes) -> tuple[Array, Ints]:
 
     A file whose length is the one that its counter states is binary, even if it begins
     with "solid"; colours in the attribute bytes are passed over.
-
-    Raises:
-        FormatError: If a facet isn't one, or the file ends early.
     """
     counted = struct.unpack("<I", data[80:84])[0] if len(data) >= 84 else -1
     if len(data) == 84 + 50 * counted:

@@ -50,9 +50,6 @@ def read_obj(data: bytes) -> _PointsAndPolygons:
     """Return the vertices in file units and the polygons of a Wavefront OBJ.
 
     Shapes (n, 3); (n_p,), the number of corners of each; and all corners end to end.
-
-    Raises:
-        FormatError: At the first line that can't be understood.
     """
     vertices: list[list[str]] = []
     polygons: list[list[int]] = []
@@ -82,7 +79,6 @@ def _refusal(word: str) -> str:
 
 
 def _obj_lines(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield line numbers and words, backslash continuations joined."""
     held = ""
     lines = _lines(text)
     for number, line in enumerate(lines, 1):
@@ -117,9 +113,6 @@ def read_off(data: bytes) -> _PointsAndPolygons:
     """Return the vertices and polygons of an OFF file, as `read_obj` does.
 
     Lines may be wrapped anywhere if neither vertices nor faces carry extra columns.
-
-    Raises:
-        FormatError: If the counts of the header and the content disagree.
     """
     text = re.sub(r"#[^\r\n]*", "", decode(data)).strip()
     header = _OFF_HEADER.match(text)

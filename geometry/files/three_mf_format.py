@@ -32,12 +32,7 @@ class _Object:
 
 
 def read_three_mf(data: bytes) -> tuple[Array, Ints, str]:
-    """Return vertices (n, 3), triangles (m, 3) and the unit of what a 3MF file builds.
-
-    Raises:
-        FormatError: If something that it names isn't there, or it needs an extension
-            that changes the shape.
-    """
+    """Return vertices (n, 3), triangles (m, 3) and the unit of what a file builds."""
     try:
         package = _Package(zipfile.ZipFile(io.BytesIO(data)))
     except zipfile.BadZipFile as error:
@@ -63,7 +58,6 @@ class _Package:
         self.root = self._root()
 
     def _root(self) -> str:
-        """Name of the model that the package's relationships call the root."""
         if "_rels/.rels" in self._names:
             for link in self._xml("_rels/.rels").iter():
                 if link.get("Type", "").endswith("/3dmodel"):

@@ -23,13 +23,6 @@ def bearing(mesh: TriangleMesh, axis: Array) -> Array:
     Of the m directions that this leaves (a box has two), the one that most of the
     lower harmonics point to. A body of revolution about the axis has none: then a world
     axis decides, and any other would do as well.
-
-    Args:
-        mesh: The object.
-        axis: Unit vector, shape (3,).
-
-    Returns:
-        Shape (3,).
     """
     spare: Array = np.eye(3)[np.argmin(np.abs(axis))]
     e1 = np.asarray(np.cross(axis, spare), dtype=np.float64)

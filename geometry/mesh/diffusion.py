@@ -47,10 +47,7 @@ def surface_laplacian(vertices: Array, faces: Ints, edges: MeshEdges) -> csr_arr
 
 
 def graph_laplacian(ends: Ints, weights: Array, n: int) -> csr_array:
-    """Return L of n nodes with links (m, 2) and their weights (m,), shape (n, n).
-
-    L_ij = -w_ij, and rows sum to zero.
-    """
+    """Return L of n nodes, L_ij = -w_ij on links (m, 2), rows sum to zero; (n, n)."""
     a, b = ends.T
     nodes = np.arange(n)
     total = np.bincount(a, weights, n) + np.bincount(b, weights, n)
@@ -60,17 +57,12 @@ def graph_laplacian(ends: Ints, weights: Array, n: int) -> csr_array:
 
 
 def diffused(values: Array, mass: Array, laplacian: csr_array, length: float) -> Array:
-    """Return x of (M + length^2/2 L) x = M values: one implicit step of diffusion.
+    """Return x of (M + length^2/2 L) x = M values: an implicit step of diffusion.
 
-    The weights of the average fall off over about `length`; where the mass is zero the
-    surroundings are carried on. All columns are one system to the conjugate gradients,
-    so that turning the values turns every step alike.
-
-    Args:
-        values: Shape (n, m).
-        mass: Weight of each node, not negative, shape (n,).
-        laplacian: Positive semi-definite with zero row sums, shape (n, n).
-        length: In the unit of the mass's square root.
+    The weights of the average fall off over about `length`, in the unit of the root of
+    the mass (n,). Where that is zero the surroundings are carried on. All columns are
+    one system to the conjugate gradients, so that turning the values turns every step
+    alike.
     """
     columns, starts = laplacian.indices, laplacian.indptr
     entries = (0.5 * length * length) * laplacian.data

@@ -21,13 +21,6 @@ def main_bodies(faces: Ints, areas: Array) -> Mask:
     A body is connected by shared vertices. The smallest ones are left out, as long as
     each has under 1 % of the largest one's area and all of them together under 1 % of
     the whole: a floating fragment must not decide where the object is.
-
-    Args:
-        faces: Vertex indices, shape (n_f, 3).
-        areas: Area of each face, shape (n_f,).
-
-    Returns:
-        Shape (n_f,).
     """
     links = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     count, label = components(links, int(faces.max()) + 1)
@@ -43,18 +36,12 @@ def main_bodies(faces: Ints, areas: Array) -> Mask:
 
 
 def enclosing_ball(points: Array) -> tuple[Array, float]:
-    """Return centre and radius of the smallest ball that holds all points, exactly.
+    """Return centre and radius of the smallest ball that holds points (n, 3).
 
     The ball is spanned by at most four of them. From the ball of those found so far,
     the farthest point outside joins them, and the smallest ball of these few is found
     by trying all; its radius grows with each step, so this ends, after a dozen or so.
     Unlike a bounding box the ball turns with the object.
-
-    Args:
-        points: In any unit, shape (n, 3), n >= 1.
-
-    Returns:
-        Shape (3,), and the radius in the same unit.
     """
     origin = points.mean(axis=0)
     local = points - origin

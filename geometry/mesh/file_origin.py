@@ -29,9 +29,6 @@ class FileOrigin:
         n_vertices: Vertices in the file.
         face_properties: By name, a number for each polygon (PLY), shape (n_faces,).
         vertex_properties: By name, a number for each vertex (PLY), shape (n_vertices,).
-
-    Raises:
-        ValueError: If an array's shape or an index doesn't fit the others.
     """
 
     face: Ints

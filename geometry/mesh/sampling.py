@@ -47,12 +47,7 @@ def sample_surface(
     barycentric coordinates are uniform. That spreads the samples more evenly than
     independent draws, and each face's expected number of samples is proportional to
     its area. (Equal steps would fall on few columns of a mesh that comes in rows.)
-
-    Args:
-        mesh: The surface.
-        n: Number of samples, at least 1.
-        seed: Of the random generator; the same seed gives the same samples.
-        within: Faces to sample, shape (n_f,); default all.
+    The same seed gives the same samples; only faces ``within`` (n_f,) get any.
 
     Raises:
         ValueError: If n < 1 or the faces have no area.

@@ -14,9 +14,7 @@ _PACKED_AT = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 def packed(values: tuple[Array, Array], ways: tuple[Array, Array]) -> Array:
     """Return k1 d1 d1^T + k2 d2 d2^T as six numbers each, (n, 6), of the same norm.
 
-    Args:
-        values: k1 and k2, each (n,).
-        ways: d1 and d2, each (n, 3).
+    `values` are k1 and k2, each (n,); `ways` d1 and d2, each (n, 3).
     """
     i, j = _UPPER
     first, second = (
@@ -79,14 +77,10 @@ def lengths(vectors: Array) -> Array:
 
 
 def principal(tensors: Array, planes: Array) -> tuple[Array, Array]:
-    """Return eigenvalues, larger first, and unit eigenvectors of tensors in planes.
+    """Return eigenvalues (2, n), larger first, and unit eigenvectors (2, n, 3).
 
-    Args:
-        tensors: Symmetric, shape (n, 3, 3).
-        planes: Two orthonormal vectors that span each plane, as columns, (n, 3, 2).
-
-    Returns:
-        Shapes (2, n) and (2, n, 3).
+    Tensors are symmetric, (n, 3, 3); two orthonormal vectors span each plane, as
+    columns, (n, 3, 2).
     """
     a, b = planes[:, :, 0], planes[:, :, 1]
     across_a = np.einsum("nij,nj->ni", tensors, a)

@@ -25,17 +25,13 @@ class ClosestPoints:
 
 
 def closest_points(mesh: TriangleMesh, points: Array) -> ClosestPoints:
-    """Return the closest point of the mesh to each query point.
+    """Return the closest point of the mesh to each query point (n, 3) [m].
 
     The sign is that of (P - C) . n, with n the face normal where the closest point C
     lies inside a face, the sum of the normals of both faces on an edge, and the
     angle-weighted sum at a corner; one face's normal alone gives the wrong sign at
     edges sharper than 90 degrees. Source: Baerentzen and Aanaes, "Signed distance
     computation using the angle weighted pseudonormal", TVCG 2005.
-
-    Args:
-        mesh: The surface.
-        points: Query points in [m], shape (n, 3).
 
     Raises:
         ValueError: If the points aren't (n, 3) or a coordinate isn't finite.

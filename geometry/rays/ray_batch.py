@@ -94,12 +94,9 @@ class RayBatch:
     ) -> Ints:
         """Add rays to some samples, and return the index in the part of each.
 
-        Args:
-            samples: All of them.
-            part: Which are offered: at most a block, and as many as there is room for.
-            source: The device.
-            wanted: Whether each sample of the part is worth a ray; default all.
-            facing: Whether only those are that face the device.
+        The part has at most a block, and as many as there is room for. Samples that
+        aren't wanted (default: all are) get none, nor do those that face away, if they
+        must face.
         """
         climb = self._climbs(samples, part, source)
         worth = np.less(climb, 0, out=self._worth[: len(climb)])

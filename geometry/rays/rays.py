@@ -31,10 +31,6 @@ class RayCaster:
     is hit as precisely as any. Rays are traced in chunks, so memory stays bounded, and
     each ray's answer is independent of the number of threads.
 
-    Args:
-        mesh: The occluder.
-        threads: Worker threads; embree releases the interpreter lock.
-
     Attributes:
         middle: Of the bounding box in [m]; the origin of the caster's own frame. (Not
             `mesh.centre`, which may leave small fragments out of account.)
@@ -82,9 +78,6 @@ class RayCaster:
             directions: Unit directions, shape (n, 3).
             distances: Reach of each ray in [m], shape (n,).
 
-        Returns:
-            Whether each ray is blocked, shape (n,).
-
         Raises:
             ValueError: If shapes disagree or a number isn't finite (embree would read
                 out of bounds, or let the ray through, without a word).
@@ -107,31 +100,18 @@ class RayCaster:
         """Return whether rays in the caster's own frame are blocked; checks nothing.
 
         For engines that prepare float32 rays themselves, in their own threads: one call
-        of embree on at most `CHUNK` rays.
-
-        Args:
-            start: Origins, shape (n, 3), any strides.
-            along: Directions of any length, same shape.
-            reach: How far each ray goes in units of its direction, shape (n,).
+        of embree on at most `CHUNK` rays, origins and directions (n, 3) of any strides,
+        whose reach (n,) is in units of their directions.
         """
         # embree answers 0 for blocked and -1 for clear.
         answer = self._scene.run(start, along, reach, query="OCCLUDED")
         return np.equal(answer, 0)
 
     def first_hits(self, origins: Array, directions: Array) -> tuple[Ints, Array]:
-        """Return the first face that each ray hits, and how far away it is.
+        """Return the first face that each ray hits, and how far away it is in [m].
 
-        The distance is recomputed in float64 from the plane of the face.
-
-        Args:
-            origins: Ray origins in [m], shape (n, 3) or (3,) for a common one.
-            directions: Unit directions, shape (n, 3).
-
-        Returns:
-            Face indices, -1 for a miss; distances in [m], inf for a miss; (n,) each.
-
-        Raises:
-            ValueError: If shapes disagree or a number isn't finite.
+        The distance is recomputed in float64 from the plane of the face; a miss is face
+        -1 at inf. Arguments and errors are those of `occluded`.
         """
         origins, directions = _checked(origins, directions)
         faces = np.empty(len(directions), dtype=np.int64)
@@ -162,12 +142,7 @@ class RayCaster:
         return equal_parts(n, CHUNK, self.threads if n >= 1024 * self.threads else 1)
 
     def share(self, work: Callable[[slice], None], parts: Iterable[slice]) -> None:
-        """Do work on every part, shared among the threads; the first failure is raised.
-
-        Args:
-            work: What to do with a part; writes to places of its own.
-            parts: The parts.
-        """
+        """Do work on every part, shared among the threads; raise the first failure."""
         mapped(work, parts, self.threads)
 
     def _rays(

@@ -2,18 +2,14 @@
 
 Policy: rays run *from the device to the sample* and stop a little short of it. Casting
 from the sample needs an offset along the normal, which trades falsely blocked samples
-for falsely clear ones. Three things make it hold at any scale.
-
-* Coordinates are relative to the mesh (`RayCaster`), and a ray starts where it is about
-  to enter the ball that holds the mesh (or at the device, if that is nearer), so every
-  float32 rounding is in proportion to the mesh, wherever it lies and however far the
-  device stands.
-* Rounding moves a face along its normal by a few 2^-24 of the mesh's half diagonal R;
-  along a ray of incidence angle t by 1 / cos t times as much. The ray stops ``slack /
-  cos t`` short of the sample, that is ``slack`` above its face, with slack = 2e-6 R.
-* Nothing depends on the edges of the mesh: CAD plates with edges of 1 m and walls of
-  0.1 mm have no useful mean edge. An occluder is lost only if it is nearer than
-  `slack` above the sample's own face: 0.2 micrometres on a part of 200 mm.
+for falsely clear ones. Coordinates are relative to the mesh (`RayCaster`), and a ray
+starts where it is about to enter the ball that holds the mesh (or at the device, if
+that is nearer), so every float32 rounding is in proportion to the mesh. It moves a face
+along its normal by a few 2^-24 of the mesh's half diagonal R; along a ray of incidence
+angle t by 1 / cos t times as much. The ray stops ``slack / cos t`` short of the sample,
+that is ``slack`` above its face, with slack = 2e-6 R: an occluder is lost only if it is
+nearer than that, 0.2 micrometres on a part of 200 mm. Edges have no say: CAD plates
+have no useful mean edge.
 
 `docs/method/rays.md` has the measurements behind it.
 """
@@ -42,11 +38,7 @@ _FARTHEST = 1e15
 
 
 class Visibility:
-    """Occlusion queries against one mesh.
-
-    Args:
-        mesh: The occluder, on which the samples lie.
-        threads: Worker threads; no answer depends on it.
+    """Occlusion queries against one mesh, on which the samples lie.
 
     Attributes:
         slack: Height in [m] above a sample's face at which its ray ends.
@@ -63,13 +55,10 @@ class Visibility:
         self._own = threading.local()
 
     def samples(self, points: Array, normals: Array, *, sort: bool) -> SampleSet:
-        """Return samples made ready for queries.
+        """Return samples (n, 3), and normals of their faces, ready for queries.
 
-        Args:
-            points: Positions on the mesh in [m], shape (n, 3).
-            normals: Unit normal of each sample's face, same shape.
-            sort: Whether to sort them along a Morton curve: neighbours then follow each
-                other through the tree. Worth it from a few queries on.
+        Sorted along a Morton curve, neighbours follow each other through the tree,
+        which is worth it from a few queries on.
 
         Raises:
             ValueError: If shapes disagree or a number isn't finite.
@@ -100,7 +89,7 @@ class Visibility:
         *,
         along: Array | None = None,
     ) -> Mask:
-        """Return whether something stands between a device and points, shape (n,).
+        """Return whether something stands between a device and samples, shape (n,).
 
         Args:
             origin: Optical centre in [m], shape (3,); or any point of the plane that

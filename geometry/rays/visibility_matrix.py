@@ -23,21 +23,13 @@ def visibility_matrix(
 ) -> Mask:
     """Return which device (row) sees which sample (column), shape (m, n).
 
-    An entry is set where the pair is a candidate and the segment between them is free.
-    A sample that faces away is no candidate: it has ``N . (P - O) >= 0``, or ``N . L >=
-    0`` in parallel light. Limits beyond that are the caller's, through `candidates`.
+    An entry is set where the pair is a candidate (default: all are) and the segment
+    between them is free. A sample that faces away is no candidate: it has ``N . (P - O)
+    >= 0``, or ``N . L >= 0`` in parallel light. Limits beyond that are the caller's.
 
     Devices are shared among the threads. Beside the answer and the prepared samples
-    (40 n bytes), a thread holds 3 MB of rays.
-
-    Args:
-        visibility: The occluder.
-        origins: Optical centres in [m], shape (m, 3); in parallel light, a point of the
-            plane that each beam leaves.
-        points: Samples on the mesh in [m], shape (n, 3).
-        normals: Unit normals of the samples' faces, (n, 3).
-        along: Unit directions of parallel light, shape (m, 3); None for centres.
-        candidates: Pairs worth a ray, shape (m, n); default all.
+    (40 n bytes), a thread holds 3 MB of rays. Arguments are those of
+    `Visibility.blocked`, with a row for each device.
 
     Raises:
         ValueError: If shapes disagree or a number isn't finite.

@@ -30,11 +30,7 @@ _HALVINGS = ((1.0 / 2.0, 1.0 / 4.0), (1.0 / 8.0, 1.0 / 16.0))
 
 
 def check_cone_options(min_region_share: float, cone_half_angle: float) -> None:
-    """Refuse what no pieces can be cut by.
-
-    Raises:
-        ValueError: If the share isn't in [0, 1) or the angle not in (0, pi).
-    """
+    """Raise ValueError if the share isn't in [0, 1) or the angle not in (0, pi)."""
     if not 0 <= min_region_share < 1:
         raise ValueError(f"min_region_share must lie in [0, 1), got {min_region_share}")
     if not 0 < cone_half_angle < np.pi:
@@ -50,26 +46,18 @@ def cone_pieces(
     *,
     keep_all: bool = False,
 ) -> list[Ints]:
-    """Connected pieces that fit the cone, largest area first.
+    """Connected pieces of chosen faces (n_f,) that fit the cone, largest area first.
 
     At least 95 % of a piece's area has its averaged normal (`averaged_normals`: a face
     that noise has turned is no feature) within the half angle of their mean. Of what
     doesn't fit, the part about its mean is taken as seen from its own front, then what
-    is left on its sides. Parts below the least area join the adjacent piece that they
-    fit best; what fits none is dropped, or with `keep_all` a piece of its own. Where
-    more than a tenth would be dropped (a surface of many small parts, or of sharp
+    is left on its sides. Parts below the least area [m²] join the adjacent piece that
+    they fit best; what fits none is dropped, or with `keep_all` a piece of its own.
+    Where more than a tenth would be dropped (a surface of many small parts, or of sharp
     corners that fit no cone), the least area is halved until that ends, down to a
     sixteenth and as long as that makes no more than 200 pieces; not so where what was
     chosen is less than a twentieth of the mesh, as the rim of a plate. Adjacent pieces
-    stay apart only if their union fits no cone.
-
-    Args:
-        mesh: The surface.
-        chosen: Which faces, shape (n_f,).
-        pairs: Adjacent faces, (m, 2).
-        least: Area in [m²].
-        half_angle: In [rad].
-        keep_all: Whether every chosen face must be in a piece.
+    (pairs of faces, (m, 2)) stay apart only if their union fits no cone.
     """
     faces = np.flatnonzero(chosen)
     if not len(faces):

@@ -26,9 +26,6 @@ def face_curvedness(mesh: TriangleMesh, field: CurvatureField) -> tuple[Array, M
     averaged by diffusion over 1.5 scales. Without sign: a ball in a socket stays
     curved. A sharp edge measures at anything above the limit, by its triangles; with
     it all sharp edges are alike. 0 where it isn't trusted or flat.
-
-    Raises:
-        ValueError: If the field is of another mesh.
     """
     capped = np.minimum(field.curvedness, _SHARPEST / field.scale)[:, None]
     averaged, trusted = averaged_on_faces(mesh, field, capped, _AVERAGED_SHARE)
@@ -47,13 +44,8 @@ def dominant_faces(
 ) -> Mask:
     """Return which faces are dominant, shape (n_f,).
 
-    Args:
-        mesh: The surface.
-        curvedness: From `face_curvedness`, as `trusted`.
-        trusted: Faces that may be.
-        pairs: Adjacent faces, (m, 2).
-        area_share: Share of the trusted area.
-        least: Area in [m²] below which islands, holes and bodies are small components.
+    Curvedness and trust are those of `face_curvedness`, pairs (m, 2) are adjacent
+    faces. Islands, holes and bodies below the least area [m²] are small components.
     """
     judged = trusted & _on_main_bodies(mesh, least)
     judged = judged if judged.any() else np.ones(len(mesh.faces), dtype=bool)

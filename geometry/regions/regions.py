@@ -93,8 +93,7 @@ def dominant_regions(
             60 degrees of incidence by what position and perspective need.
 
     Raises:
-        ValueError: If a share or angle is out of range, or the field is of another
-            mesh.
+        ValueError: If a share or angle is out of range, or the field isn't its own.
     """
     if not 0 < area_share <= 1:
         raise ValueError(f"area_share must lie in (0, 1], got {area_share}")
@@ -116,10 +115,7 @@ def regions_of_pieces(
     steep: Array,
     trusted: Mask,
 ) -> DominantRegions:
-    """Return pieces (each the ascending indices of its faces) as numbered regions.
-
-    The other arrays are those of `face_curvedness` and `steep_directions`.
-    """
+    """Return pieces (each the ascending indices of its faces) as numbered regions."""
     regions = tuple(
         _region(i, mesh, faces, curvedness) for i, faces in enumerate(pieces)
     )

@@ -71,11 +71,7 @@ class _Sight:
 
 
 def measure_shell(caster: RayCaster) -> MeshShell:
-    """Tell a hollow shell from a solid, from rays at spots all over the surface.
-
-    Args:
-        caster: Of the surface, oriented outwards.
-    """
+    """Tell a hollow shell from a solid, from rays at spots all over the surface."""
     mesh = caster.mesh
     body = _bodies(mesh)
     spots = spots_on(mesh, _SPOTS, group=body, least=1)
@@ -103,15 +99,10 @@ def measure_shell(caster: RayCaster) -> MeshShell:
 
 
 def lies_inside(caster: RayCaster, faces: Ints, points: Array) -> Mask:
-    """Return whether points of a surface lie inside it, shape (n,).
+    """Return whether points (n, 3) [m] on faces (n,) of a surface lie inside it, (n,).
 
     A point does if less than a twentieth of its cosine-weighted hemisphere is free, or
     if it sees less than a third of what the other side of a thin wall sees.
-
-    Args:
-        caster: Of the surface, oriented outwards.
-        faces: Face of each point, shape (n,).
-        points: In [m], shape (n, 3).
     """
     return _sight(caster, spots_at(caster.mesh, faces, points)).inside
 

@@ -25,22 +25,13 @@ _MAX_PAIRS = 1 << 24
 def containers(
     mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask, caster: RayCaster
 ) -> list[Ints]:
-    """Return the patches that wholly hold each patch, the outermost first.
+    """Return the patches that wholly hold each that is asked, the outermost first.
 
-    A point lies inside a patch if a ray from it crosses the patch an odd number
-    of times; three rays vote, since one may pass through an edge. A patch is held if
-    its points, spread over its area, lie inside: a body that sticks out isn't.
-
-    Args:
-        mesh: The surface.
-        patch: Number of the patch of each face, shape (n_f,).
-        holding: Whether each patch may hold others, shape (n,): closed ones, and those
-            open ones that are closed but for a crack.
-        asked: Patches of which the containers are wanted, shape (n,).
-        caster: Of the mesh.
-
-    Returns:
-        For each patch, the patches that hold it; none where it wasn't asked.
+    A point lies inside a patch if a ray from it crosses the patch an odd number of
+    times; three rays vote, since one may pass through an edge. A patch is held if its
+    points, spread over its area, lie inside: a body that sticks out isn't. Only patches
+    that are `holding` (n,) hold others: closed ones, and those open ones that are
+    closed but for a crack. `patch` is the number of the patch of each face, (n_f,).
     """
     n = len(holding)
     inner = _in_some_box(mesh, patch, holding, asked)

@@ -69,14 +69,10 @@ def spots_on(
     least: int = 1,
     within: Mask | None = None,
 ) -> Spots:
-    """Return spots spread over faces in proportion to their area.
+    """Return about n spots spread over faces in proportion to their area.
 
-    Args:
-        mesh: The surface.
-        n: Spots in all, about.
-        group: Number of the group of each face, shape (n_f,); default all in one.
-        least: Spots that every group gets, however small it is.
-        within: Faces that get any, shape (n_f,); default all.
+    Only faces `within` (default: all) get any; every group of faces, by the number of
+    each, (n_f,), gets at least so many, however small it is.
     """
     areas = mesh.face_areas
     used = areas > 0 if within is None else within & (areas > 0)
@@ -109,13 +105,7 @@ def _spots(mesh: TriangleMesh, faces: Ints) -> Spots:
 
 
 def spots_at(mesh: TriangleMesh, faces: Ints, points: Array) -> Spots:
-    """Return spots at given points of faces.
-
-    Args:
-        mesh: The surface.
-        faces: Face of each point, shape (n,), each with an area.
-        points: In [m], shape (n, 3).
-    """
+    """Return spots at given points (n, 3) of faces (n,), each with an area."""
     a, b, c = _ordered_corners(mesh, faces)
     e1 = b - a
     e1 = e1 / np.linalg.norm(e1, axis=1, keepdims=True)
@@ -137,11 +127,7 @@ def look_out(
 ) -> Ints:
     """Return how many rays over each spot's cosine-weighted hemisphere escape, (n,).
 
-    Args:
-        caster: Of the mesh that the spots lie on.
-        spots: Where from.
-        n_rays: Rays of each spot, at least 1.
-        behind: From the back of the faces, inwards, instead of the front.
+    `behind`: from the back of the faces, inwards, instead of the front.
     """
     side = -1.0 if behind else 1.0
     k = (np.arange(n_rays) + 0.5) / n_rays

@@ -50,12 +50,7 @@ def orient(mesh: TriangleMesh) -> tuple[Ints, tuple[Repair, ...]]:
     4. A patch that nothing decides (flat, or never seen) is turned with the closed one
        that holds it, else if most of the decided area was.
 
-    Args:
-        mesh: Welded, without duplicate or zero-area faces.
-
-    Returns:
-        Faces (n_f, 3), and the repairs: rewound faces, turned faces and pieces, those
-        of them that followed others, and seams of one-sided surfaces.
+    The mesh must be welded, without duplicate or zero-area faces.
     """
     wound, patch = _consistent(mesh)
     straight = mesh if wound is mesh.faces else TriangleMesh(mesh.vertices, wound)

@@ -26,10 +26,6 @@ def clean(vertices: Array, faces: Ints) -> tuple[Array, Ints, Ints, tuple[Repair
     faces without area and faces with the corners of an earlier one are removed;
     vertices that no face uses are removed. Winding and order of what stays are kept.
 
-    Args:
-        vertices: In any unit, shape (n_v, 3).
-        faces: Indices in range, shape (n_f, 3).
-
     Returns:
         Vertices (n, 3), faces (m, 3), the index that each of these had among the faces
         handed in (m,), ascending, and the repairs.

@@ -49,15 +49,7 @@ class BestSphere:
     chi_square: float
 
     def point_covariances(self, outward: Array) -> Array:
-        """Return the covariance of surface points c + rho u, shape (n, 3, 3) [m^2].
-
-        ::
-
-            [I u] C [I u]^T + tau^2 u u^T
-
-        Args:
-            outward: Unit directions u, shape (n, 3).
-        """
+        """Return [I u] C [I u]^T + tau^2 u u^T of points c + rho u, (n, 3, 3) [m^2]."""
         jacobian = np.empty((len(outward), 3, _UNKNOWNS))
         jacobian[:, :, :3], jacobian[:, :, 3] = np.eye(3), outward
         of_fit = np.einsum("nij,jk,nlk->nil", jacobian, self.covariance, jacobian)

@@ -62,18 +62,11 @@ def boxes_overlap(a: OrientedBox, b: OrientedBox) -> bool:
 
 
 def lines_cross(box: OrientedBox, starts: Array, ends: Array) -> Mask:
-    """Return which straight lines from starts to ends share a point with a box.
+    """Return which straight lines from starts to ends share a point with a box, (n,).
 
     A line is in the slab between two opposite faces on an interval of its length; it
-    meets the box iff the three intervals have a point in common.
-
-    Args:
-        box: The box.
-        starts: Shape (n, 3) [m], or (3,) for a common one.
-        ends: Shape (n, 3) [m].
-
-    Returns:
-        Shape (n,).
+    meets the box iff the three intervals have a point in common. Starts are (n, 3) [m],
+    or (3,) for a common one.
     """
     begin = box.local(np.broadcast_to(starts, ends.shape))
     way = box.local(ends) - begin
@@ -88,15 +81,7 @@ def lines_cross(box: OrientedBox, starts: Array, ends: Array) -> Mask:
 
 
 def triangles_touch(box: OrientedBox, corners: Array) -> Mask:
-    """Return which triangles share a point with a box.
-
-    Args:
-        box: The box.
-        corners: Of each triangle [m], shape (n, 3, 3).
-
-    Returns:
-        Shape (n,).
-    """
+    """Return which triangles (n, 3, 3) [m] share a point with a box, (n,)."""
     found = np.zeros(len(corners), dtype=bool)
     local = box.local(corners)
     low, high = local.min(axis=1), local.max(axis=1)

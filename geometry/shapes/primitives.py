@@ -15,11 +15,7 @@ _LINKED = 4.5
 
 
 def box(size: tuple[float, float, float]) -> TriangleMesh:
-    """Return an axis-aligned closed box of twelve triangles about the origin.
-
-    Args:
-        size: Extent along x, y and z in [m].
-    """
+    """Return an axis-aligned closed box about the origin, sides in [m]."""
     import trimesh.creation
 
     plain = trimesh.creation.box(extents=size)
@@ -43,11 +39,8 @@ def sphere(radius: float, *, subdivisions: int = 4) -> TriangleMesh:
     """Return a subdivided icosahedron about the origin, 20 * 4^subdivisions faces.
 
     Not trimesh's: samples of a surface follow the order of its faces, and with them
-    every plan of a body that is known by its ranges.
-
-    Args:
-        radius: In [m]; every vertex lies at this distance.
-        subdivisions: Times each face is cut in four.
+    every plan of a body that is known by its ranges. Every vertex lies at the radius
+    in [m].
 
     Raises:
         ValueError: If the radius isn't positive or subdivisions is negative.
@@ -76,9 +69,7 @@ def sphere(radius: float, *, subdivisions: int = 4) -> TriangleMesh:
 def icosahedron_faces(corners: Array) -> tuple[Ints, Mask]:
     """Return the triangles between the corners (12, 3) of an icosahedron of edge 2.
 
-    Returns:
-        Corners of each, ascending, (20, 3), and whether they run counter-clockwise
-        seen from outside, (20,).
+    Corners of each, ascending, (20, 3), and whether they run counter-clockwise.
     """
     triples = np.array(list(combinations(range(12), 3)))
     sides = corners[triples] - corners[np.roll(triples, -1, axis=1)]

@@ -69,9 +69,6 @@ class SightedPoint:
 def locate(lines: SightLines) -> SightedPoint:
     """Return the point that observations agree on best.
 
-    Args:
-        lines: At least two directions that cross, or one with a distance.
-
     Raises:
         ValueError: If the lines are parallel, or the point lies behind a viewpoint.
     """

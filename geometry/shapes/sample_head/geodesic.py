@@ -31,15 +31,7 @@ class GeodesicGrid:
     lattice: Ints
 
     def interpolate(self, values: Array, onto: "GeodesicGrid") -> Array:
-        """Return values of this grid's directions at those of a finer one, linearly.
-
-        Args:
-            values: One row for each direction of this grid, shape (n, k).
-            onto: The grid to interpolate to.
-
-        Returns:
-            Shape (len(onto.directions), k).
-        """
+        """Return values (n, k) at this grid's directions for those of a finer one."""
         n = self.frequency
         place = onto.steps[:, 1:] * (n / onto.frequency)
         cell = np.minimum(place.astype(np.int64), n - 1)
@@ -62,11 +54,7 @@ class GeodesicGrid:
 
 
 def geodesic_grid(frequency: int) -> GeodesicGrid:
-    """Return the geodesic grid of a frequency.
-
-    Raises:
-        ValueError: If the frequency is below 1.
-    """
+    """Return the geodesic grid of a frequency, at least 1."""
     n = frequency
     if not n >= 1:
         raise ValueError(f"frequency must be at least 1, got {n}")

@@ -26,15 +26,7 @@ _EYEBALL = 12.0
 
 
 def head_field(shape: HeadShape, points: Array) -> Array:
-    """Return the field of a head: negative inside, about the distance in [mm].
-
-    Args:
-        shape: Proportions of the head.
-        points: Shape (n, 3), in [mm].
-
-    Returns:
-        Shape (n,).
-    """
+    """Return the field of a head at points (n, 3) [mm]: negative inside, (n,)."""
     x = np.sqrt(points[:, 0] ** 2 + _SEAM**2) - _SEAM
     y, z = points[:, 1], points[:, 2]
     p = (x - _ear_relief(shape, (x, y, z)), y, z)

@@ -78,11 +78,7 @@ class HeadShape:
 
     @classmethod
     def random(cls, seed: int) -> "HeadShape":
-        """Return one head of a population: normal, cut off at 2.5 deviations.
-
-        Args:
-            seed: The same seed gives the same head.
-        """
+        """Return one head of a population: normal, cut off at 2.5 deviations."""
         rng = np.random.default_rng(seed)
         proportions = fields(cls)
         draws = np.clip(rng.standard_normal(len(proportions)), -2.5, 2.5)
