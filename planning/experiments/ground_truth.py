@@ -145,11 +145,12 @@ def judged_labels(scanner: Scanner, shots: Sequence[Shot]) -> LabelCount:
         labelled = rings >= 0
         right = labelled & (rings == ring) & (roots == root)
         total.update(
-            shot.decoded.rejected,
             n=len(rings),
             right=int(right.sum()),
             wrong=int(np.sum(labelled & ~right & (ring >= 0))),
             stray=int(np.sum(labelled & (ring < 0))),
+            off_prior=shot.decoded.rejected["off_prior"],
+            ambiguous=shot.decoded.rejected["ambiguous"],
         )
     return LabelCount(**total)
 
