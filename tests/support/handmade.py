@@ -369,8 +369,8 @@ def _evaluate(
         cause = (SIGHT + PAIR)[max(map(max, pairs))] if not measured else None
     else:
         cause = LIGHT[max(steps)]
-    reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 6
-    sight = 9 if measured or not any(lit) else 0
+    reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 7
+    sight = 10 if measured or not any(lit) else 0
     if not measured and any(lit):
         sight = _reference_sight(document, surface, p, n, lit)
     any_light = {"max_incidence": math.radians(89.0), "min_tangent_angle": 0.0}
