@@ -28,7 +28,7 @@ import numpy as np
 
 from geometry import dominant_regions, principal_curvatures
 from planning import RigPlan, load_mesh, load_rig, plan_rig, verify_plan
-from planning.cli.sample_command import write_sample
+from planning.cli.other_commands import write_sample
 from planning.report.drawing.face_colours import face_status, region_colours
 from planning.report.drawing.rig_picture import draw_rig
 from planning.report.drawing.shader import draw_mesh

@@ -26,7 +26,7 @@ import tempfile
 from pathlib import Path
 
 from planning import RequirementError, load_mesh, load_rig, plan_rig
-from planning.cli.sample_command import write_sample
+from planning.cli.other_commands import write_sample
 from planning.experiments.ground_truth import Prior
 from planning.experiments.paper_figures import (
     draw_camera_images,

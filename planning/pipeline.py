@@ -92,43 +92,25 @@ def plan_rig(
         RequirementError: If a requirement is missed; it carries the best plan.
         TimeLimitError: If the time limit came before any plan.
     """
-    request = request_of(
-        mesh,
-        rig,
-        Wishes(
-            max_projectors=max_projectors,
-            max_cameras=max_cameras,
-            target=target,
-            dominant_coverage=dominant_coverage,
-            coverage=coverage,
-            min_reachable=min_reachable,
-            accuracy_mm=accuracy_mm,
-            up=up,
-        ),
-        select=select,
-        weight=weight,
+    wishes = Wishes(
+        max_projectors=max_projectors,
+        max_cameras=max_cameras,
+        target=target,
+        dominant_coverage=dominant_coverage,
+        coverage=coverage,
+        min_reachable=min_reachable,
+        accuracy_mm=accuracy_mm,
+        up=up,
+    )
+    clock = Stopwatch(progress, time_limit=time_limit)
+    request = replace(
+        request_of(mesh, rig, wishes, clock, select=select, weight=weight),
         seed=seed,
         threads=threads,
         command=tuple(command),
         prove=prove,
         cameras_by=cameras_by,
     )
-    return plan_requested(
-        request, check=check, time_limit=time_limit, progress=progress
-    )
-
-
-def plan_requested(
-    request: PlanRequest,
-    *,
-    check: bool = True,
-    time_limit: float | None = None,
-    progress: Report | None = None,
-) -> RigPlan:
-    """Return the plan of a request; `plan_rig` documents arguments and errors."""
-    clock = Stopwatch(progress, time_limit=time_limit)
-    for note in request.notes:
-        clock.say(note)
     # BLAS must not split sums differently with another number of threads.
     with threadpool_limits(1):
         plan = _planned(request, clock, check=check)

@@ -12,7 +12,6 @@ from geometry.mesh.bearing import bearing
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
-from planning.model.document.certificates import CamerasBy
 from planning.model.errors import InputError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
@@ -33,19 +32,14 @@ def request_of(
     mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
     rig: Rig,
     wishes: Wishes,
+    clock: Stopwatch,
     *,
-    select: Select | None = None,
-    weight: Weight | None = None,
-    seed: int = 0,
-    threads: int = 2,
-    command: tuple[str, ...] = (),
-    prove: bool = False,
-    cameras_by: CamerasBy = "both",
+    select: Select | None,
+    weight: Weight | None,
 ) -> PlanRequest:
     """Return what is asked, of a surface whose long edges are cut.
 
-    Args are those of `plan_rig`, with what it asks beside the rig as one value. Limits
-    of the rig are tightened by what isn't known of a body of ranges.
+    Limits of the rig are tightened by what isn't known of a body of ranges.
 
     Raises:
         InputError: If the target is none, or there are several meshes.
@@ -63,23 +57,14 @@ def request_of(
     interest = interest_of(surface, select, weight)
     # Planned and judged on places, not on whatever triangles a flat face came in.
     cut, parent = cut_for_curvature(surface)
-    notes = (
-        f"  long edges cut: {len(surface.faces):,} triangles become "
-        f"{len(cut.faces):,}, the surface stays",
-    )
-    return PlanRequest(
-        cut,
-        rig,
-        wishes,
-        seed,
-        threads,
-        command,
-        None if interest is None else interest.on_parts(parent),
-        prove,
-        ranges,
-        cameras_by,
-        notes if len(cut.faces) > len(surface.faces) else (),
-    )
+    if len(cut.faces) > len(surface.faces):
+        clock.say(
+            f"  long edges cut: {len(surface.faces):,} triangles become "
+            f"{len(cut.faces):,}, the surface stays"
+        )
+    if interest is not None:
+        interest = interest.on_parts(parent)
+    return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges)
 
 
 def _whole(target: str | None, selected: bool) -> TargetName:

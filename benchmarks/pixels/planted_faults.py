@@ -26,7 +26,7 @@ from benchmarks.pixels.seam_gap import GAP, predicted_limit, seam_samples, wall_
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from planning import load_mesh, load_rig, plan_rig
-from planning.cli.sample_command import write_sample
+from planning.cli.other_commands import write_sample
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit import audit_plan
 from planning.verify.verification import verify_plan

@@ -26,13 +26,10 @@ from planning.experiments.run import DARK, Outcome, double_density, run_experime
 from planning.experiments.setups import Experiment, paper_experiment
 from planning.experiments.table import outcome_document, outcome_lines
 from planning.model.files import write_atomically
-from planning.verify.reconstruction.cloud_file import (
-    CloudFile,
-    LengthUnit,
-    remove_cloud,
-)
+from planning.verify.reconstruction.cloud_file import LengthUnit
 
 from .console import print_json, reporter, say, writable
+from .reconstruct_command import CLOUD, save_cloud
 
 _MM = LengthUnit("mm", 1e-3)
 # How near to a prior the object is known to lie, where the user doesn't say.
@@ -65,17 +62,20 @@ def experiment_command(options: Mapping[str, Any]) -> int:
             say(report, "second sequence")
             both = double_density(outcome, seed=seed, threads=threads)
         say(report, "drawing")
-        document = outcome_document(outcome, both)
-        files = [
-            *_save_pictures(outcome, both, folder),
-            *_save_cloud(outcome, folder / "cloud.ply"),
-            _save_document(document, folder / "result.json"),
-        ]
+        document, pictures = outcome_document(outcome, both), _pictures(outcome, both)
+        files = [folder / name for name in (*pictures, CLOUD, "result.json")]
+        for path, picture in zip(files, pictures.values(), strict=False):
+            _write_picture(picture, path)
+        if save_cloud(outcome.reconstruction, _MM, files[-2]) is None:
+            del files[-2]
+        text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+        write_atomically(files[-1], lambda file: file.write(text.encode()))
+    names = [str(path) for path in files]
     if options["as_json"]:
-        print_json(document | {"files": files})
+        print_json(document | {"files": names})
         return 0
     click.echo("\n".join([*outcome_lines(outcome, both), ""]))
-    for name in files:
+    for name in names:
         click.echo(f"wrote {name}")
     return 0
 
@@ -90,10 +90,7 @@ def experiment_of(options: Mapping[str, Any]) -> Experiment:
     )
 
 
-def _save_pictures(
-    outcome: Outcome, both: MeasuredErrors | None, folder: Path
-) -> list[str]:
-    """Write every picture; return the paths."""
+def _pictures(outcome: Outcome, both: MeasuredErrors | None) -> dict[str, Image.Image]:
     stage = PanelStage(outcome.experiment.mesh)
     pictures = {
         "cameras.png": draw_camera_images(outcome),
@@ -103,27 +100,8 @@ def _save_pictures(
     }
     if both is not None:
         pictures["densities.png"] = draw_densities(outcome.union, both, stage)
-    for name, picture in pictures.items():
-        _write_picture(picture, folder / name)
-    return [str(folder / name) for name in pictures]
+    return pictures
 
 
 def _write_picture(picture: Image.Image, path: Path) -> None:
-    """Write a picture as a PNG file."""
     write_atomically(path, lambda file: picture.save(file, format="PNG"))
-
-
-def _save_cloud(outcome: Outcome, path: Path) -> list[str]:
-    """Write the merged cloud; without points none, and none of an earlier run stays."""
-    if not len(outcome.merged.cloud):
-        remove_cloud(path)
-        return []
-    CloudFile.of(outcome.reconstruction.merged, _MM).save(path)
-    return [str(path)]
-
-
-def _save_document(document: Mapping[str, Any], path: Path) -> str:
-    """Write every number; return the path."""
-    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
-    write_atomically(path, lambda file: file.write(text.encode()))
-    return str(path)

@@ -1,9 +1,18 @@
-"""What `plan rigs` and `plan schema` do."""
+"""What `plan rigs`, `plan schema` and `plan sample` do."""
 
 from importlib.resources import files
+from pathlib import Path
 
 import click
 
+from geometry.mesh.mesh import TriangleMesh
+from geometry.shapes.sample_head.head_shape import HeadShape
+from geometry.shapes.sample_head.sample_head import (
+    DEFAULT_FACES,
+    head_as_obj,
+    sample_head,
+)
+from planning.model.files import write_atomically
 from planning.rig.rig_files import list_presets
 
 
@@ -25,3 +34,34 @@ def schema_command() -> int:
     text = files("planning.model").joinpath("plan.schema.json").read_text()
     click.echo(text, nl=False)
     return 0
+
+
+def sample_command(output: Path, faces: int, variant: int | None) -> int:
+    """Write the sample head."""
+    shape = HeadShape() if variant is None else HeadShape.random(variant)
+    write_sample(output, shape=shape, n_faces=faces)
+    click.echo(f"wrote {output}: a head in millimetres, face along -y, up z")
+    return 0
+
+
+def write_sample(
+    path: str | Path, *, shape: HeadShape | None = None, n_faces: int = DEFAULT_FACES
+) -> TriangleMesh:
+    """Write a sample head as an OBJ file in millimetres, the same bytes every time.
+
+    Args:
+        path: Where the file goes; its folder must exist.
+        shape: Proportions of the head; default an average adult.
+        n_faces: Least number of faces of the closed head.
+
+    Returns:
+        The mesh, in metres, before its coordinates were rounded to 0.1 um.
+
+    Raises:
+        MeshError: If `n_faces` is out of range.
+        OSError: If the file can't be written.
+    """
+    mesh = sample_head(shape, n_faces=n_faces)
+    text = head_as_obj(mesh, "open at the neck")
+    write_atomically(Path(path), lambda file: file.write(text.encode("ascii")))
+    return mesh

@@ -12,20 +12,33 @@ from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
-from planning.pipeline import plan_requested
-from planning.prepare import request_of
+from planning.pipeline import plan_rig
 from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.rig_picture import save_rig_picture
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.summary.summary import summary
 from planning.rig.rig import load_rig
-from planning.rig.wishes import Wishes
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import read_ranges
 from planning.verify.reconstruction.pattern_files import remove_patterns, write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 
 from .console import cores, print_json, reporter, say, writable
+
+# Options that `plan_rig` takes as they are.
+_ASKED = (
+    "max_projectors",
+    "max_cameras",
+    "target",
+    "dominant_coverage",
+    "coverage",
+    "min_reachable",
+    "accuracy_mm",
+    "up",
+    "seed",
+    "prove",
+    "cameras_by",
+)
 
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
@@ -37,35 +50,27 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     with writable(folder):
         rig = load_rig(options["rig_name"], light=options["light"])
         say(report, f"reading {path}")
-        selection = weight = None
+        interest = None
         if options["ranges"] is not None:
             surface = read_ranges(path)
             say(report, *ranges_lines(surface))
         else:
             surface = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
             say(report, *_size_lines(surface))
-            selection, weight = _interest(options, surface, report)
-        wishes = Wishes(**{key: options[key] for key in Wishes.__dataclass_fields__})
+            interest = _interest(options, surface, report)
         missed: tuple[str, ...] = ()
         code = 0
         try:
-            request = request_of(
+            plan = plan_rig(
                 surface,
                 rig,
-                wishes,
-                select=selection,
-                weight=weight,
-                seed=options["seed"],
+                select=interest,
                 threads=options["threads"] or cores(),
-                command=("plan", *command),
-                prove=options["prove"],
-                cameras_by=options["cameras_by"],
-            )
-            plan = plan_requested(
-                request,
                 check=not options["no_check"],
                 time_limit=_remaining(options["time_limit"], begin),
                 progress=report,
+                command=("plan", *command),
+                **{name: options[name] for name in _ASKED},
             )
         except RequirementError as error:
             plan, missed, code = error.plan, error.shortfalls, error.exit_code
@@ -83,24 +88,23 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
 
 def _interest(
     options: Mapping[str, Any], mesh: TriangleMesh, report: Report | None
-) -> tuple[Interest | None, Interest | None]:
+) -> Interest | None:
     """Read the user's own target, by faces or by weight, and say what it holds."""
-    selection = weight = None
     if options["select"] is not None:
-        selection = read_selection(options["select"], mesh)
-    if options["weight"] is not None:
-        weight = read_weight(options["weight"], mesh)
-    interest = selection or weight
-    if interest is not None:
-        share = mesh.face_areas[interest.chosen].sum() / mesh.area
-        say(
-            report,
-            f"{interest.source}: {interest.chosen.sum()} of {len(mesh.faces)} "
-            f"triangles are the target, {share:.1%} of the area",
-        )
-        if interest.n_removed:
-            say(report, f"  {interest.n_removed} chosen faces were removed by repair")
-    return selection, weight
+        interest = read_selection(options["select"], mesh)
+    elif options["weight"] is not None:
+        interest = read_weight(options["weight"], mesh)
+    else:
+        return None
+    share = mesh.face_areas[interest.chosen].sum() / mesh.area
+    say(
+        report,
+        f"{interest.source}: {interest.chosen.sum()} of {len(mesh.faces)} "
+        f"triangles are the target, {share:.1%} of the area",
+    )
+    if interest.n_removed:
+        say(report, f"  {interest.n_removed} chosen faces were removed by repair")
+    return interest
 
 
 def _remaining(limit: float | None, begin: float) -> float | None:

@@ -60,7 +60,8 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
         except CapturesError:
             remove_cloud(folder / CLOUD)
             raise
-        file = _save(plan, result, folder / CLOUD)
+        unit = LengthUnit.of(plan.document.meshes[0])
+        file = save_cloud(result, unit, folder / CLOUD)
     _print(plan, result, file, folder / CLOUD, as_json=options["as_json"])
     return 0 if result.passed else 1
 
@@ -117,12 +118,14 @@ def _expected(plan: RigPlan, seed: int, threads: int) -> Expected:
     return Expected(samples, predicted.measured, predicted.by_pair)
 
 
-def _save(plan: RigPlan, result: Reconstruction, path: Path) -> CloudFile | None:
+def save_cloud(
+    result: Reconstruction, unit: LengthUnit, path: Path
+) -> CloudFile | None:
     """Write the cloud; without points none, and none of an earlier run stays."""
     if not result.n_merged:
         remove_cloud(path)
         return None
-    file = CloudFile.of(result.merged, LengthUnit.of(plan.document.meshes[0]))
+    file = CloudFile.of(result.merged, unit)
     file.save(path)
     return file
 

@@ -23,20 +23,19 @@ def verify_command(options: Mapping[str, Any]) -> int:
     if options["mesh"] is not None:
         mesh = _same_scale(options["mesh"], plan)
     truth = None if options["truth"] is None else RigPlan.load(options["truth"])
-    seed = {} if options["seed"] is None else {"seed": options["seed"]}
-    found = verify_plan(
+    verification = verify_plan(
         plan,
         mesh,
         truth=truth,
+        seed=options["seed"],
         threads=options["threads"] or cores(),
         progress=report,
-        **seed,
     )
     if options["as_json"]:
-        print_json(found.to_document())
+        print_json(verification.to_document())
     else:
-        click.echo(found.summary())
-    return 0 if found.passed else 1
+        click.echo(verification.summary())
+    return 0 if verification.passed else 1
 
 
 def _same_scale(path: Path, plan: RigPlan) -> TriangleMesh:

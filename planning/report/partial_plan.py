@@ -22,19 +22,10 @@ from planning.scene.scene import Scene
 class PlanRequest:
     """What is asked: the mesh, the rig, the wishes, and how to go about it.
 
-    Attributes:
-        mesh: The surface.
-        rig: Devices and limits.
-        wishes: What is asked beside what the rig says.
-        seed: Of every random draw.
-        threads: Worker threads.
-        command: Words of the command line, for the record.
+    Attributes, where they aren't those of `plan_rig`:
         interest: The user's own target; None: the dominant regions by curvature.
-        prove: Whether more work is spent on the bounds over all poses.
         ranges: The body whose sphere the mesh is, and what the rig's limits keep free
             for it; None: the mesh was known.
-        cameras_by: Route to the cameras.
-        notes: Lines to report before the run.
     """
 
     mesh: TriangleMesh
@@ -47,7 +38,6 @@ class PlanRequest:
     prove: bool = False
     ranges: tuple[RangedBody, Guard] | None = None
     cameras_by: CamerasBy = "both"
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +45,6 @@ class Prepared:
     """A request, ready to have devices placed.
 
     Attributes:
-        request: What is asked.
-        scene: Surface, target and requirements.
-        regions: The target.
         curvature_radius_m: Physical scale of the curvature.
         template: A projector that stands nowhere: light, optics and rings.
         camera: A camera that stands nowhere.

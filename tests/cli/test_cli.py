@@ -12,7 +12,7 @@ import pytest
 
 import planning
 from planning.cli.main import main
-from planning.cli.sample_command import write_sample
+from planning.cli.other_commands import write_sample
 from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -167,7 +167,7 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
     code = (
         "import planning.cli.plan_command as c, sys\n"
         "def stop(*a, **k): raise KeyboardInterrupt\n"
-        "c.plan_requested = stop\n"
+        "c.plan_rig = stop\n"
         f"sys.argv = ['plan', '--mesh', {str(face)!r}, '--max-projectors', '3']\n"
         "from planning.cli.main import main; main()"
     )

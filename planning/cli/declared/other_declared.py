@@ -79,6 +79,6 @@ def schema(debug: bool) -> None:
 @debug_option
 def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
     """Write the sample head, an OBJ file in millimetres."""
-    from planning.cli.sample_command import sample_command
+    from planning.cli.other_commands import sample_command
 
     run(lambda: sample_command(output, faces, variant), debug=debug)

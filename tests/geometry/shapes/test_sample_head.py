@@ -12,7 +12,7 @@ from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.rays.rays import RayCaster
 from geometry.shapes.sample_head.geodesic import geodesic_grid
 from geometry.shapes.sample_head.sample_head import HeadShape, sample_head
-from planning.cli.sample_command import write_sample
+from planning.cli.other_commands import write_sample
 
 ROOT = Path(__file__).resolve().parents[3]
 
