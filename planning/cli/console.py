@@ -69,16 +69,14 @@ class Positive(Finite):
         super().__init__(0.0, largest, min_open=True)
 
 
-def reporter(*, quiet: bool) -> Report | None:
-    """Return what writes a line of progress to stderr; None if nothing shall."""
-    return None if quiet else lambda line: click.echo(f"plan: {line}", err=True)
+def reporter(*, quiet: bool) -> Report:
+    """Return what writes a line of progress to stderr, or nothing."""
 
+    def report(line: str) -> None:
+        if not quiet:
+            click.echo(f"plan: {line}", err=True)
 
-def say(report: Report | None, *lines: str) -> None:
-    """Report lines of progress, if anybody listens."""
-    if report is not None:
-        for line in lines:
-            report(line)
+    return report
 
 
 def cores() -> int:

@@ -28,7 +28,7 @@ from planning.experiments.table import outcome_document, outcome_lines
 from planning.model.files import write_atomically
 from planning.verify.reconstruction.cloud_file import LengthUnit
 
-from .console import print_json, reporter, say, writable
+from .console import print_json, reporter, writable
 from .reconstruct_command import CLOUD, save_cloud
 
 _MM = LengthUnit("mm", 1e-3)
@@ -55,13 +55,13 @@ def experiment_command(options: Mapping[str, Any]) -> int:
             seed=seed,
             threads=threads,
             prior=prior,
-            progress=lambda done, total: say(report, f"pair {done} of {total}"),
+            progress=lambda done, total: report(f"pair {done} of {total}"),
         )
         both = None
         if options["second_sequence"]:
-            say(report, "second sequence")
+            report("second sequence")
             both = double_density(outcome, seed=seed, threads=threads)
-        say(report, "drawing")
+        report("drawing")
         document, pictures = outcome_document(outcome, both), _pictures(outcome, both)
         files = [folder / name for name in (*pictures, CLOUD, "result.json")]
         for path, picture in zip(files, pictures.values(), strict=False):

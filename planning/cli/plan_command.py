@@ -23,7 +23,7 @@ from planning.scene.ranges.ranged_body import read_ranges
 from planning.verify.reconstruction.pattern_files import remove_patterns, write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 
-from .console import cores, print_json, reporter, say, writable
+from .console import cores, print_json, reporter, writable
 
 # Options that `plan_rig` takes as they are.
 _ASKED = (
@@ -49,15 +49,17 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
     with writable(folder):
         rig = load_rig(options["rig_name"], light=options["light"])
-        say(report, f"reading {path}")
+        report(f"reading {path}")
         interest = None
         if options["ranges"] is not None:
             surface = read_ranges(path)
-            say(report, *ranges_lines(surface))
+            progress = ranges_lines(surface)
         else:
             surface = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
-            say(report, *_size_lines(surface))
-            interest = _interest(options, surface, report)
+            interest, chosen = _interest(options, surface)
+            progress = [*_size_lines(surface), *chosen]
+        for line in progress:
+            report(line)
         missed: tuple[str, ...] = ()
         code = 0
         try:
@@ -87,24 +89,23 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
 
 
 def _interest(
-    options: Mapping[str, Any], mesh: TriangleMesh, report: Report | None
-) -> Interest | None:
+    options: Mapping[str, Any], mesh: TriangleMesh
+) -> tuple[Interest | None, list[str]]:
     """Read the user's own target, by faces or by weight, and say what it holds."""
     if options["select"] is not None:
         interest = read_selection(options["select"], mesh)
     elif options["weight"] is not None:
         interest = read_weight(options["weight"], mesh)
     else:
-        return None
+        return None, []
     share = mesh.face_areas[interest.chosen].sum() / mesh.area
-    say(
-        report,
+    lines = [
         f"{interest.source}: {interest.chosen.sum()} of {len(mesh.faces)} "
-        f"triangles are the target, {share:.1%} of the area",
-    )
+        f"triangles are the target, {share:.1%} of the area"
+    ]
     if interest.n_removed:
-        say(report, f"  {interest.n_removed} chosen faces were removed by repair")
-    return interest
+        lines.append(f"  {interest.n_removed} chosen faces were removed by repair")
+    return interest, lines
 
 
 def _remaining(limit: float | None, begin: float) -> float | None:
@@ -126,12 +127,10 @@ def _size_lines(mesh: TriangleMesh) -> list[str]:
     ]
 
 
-def _save(
-    plan: RigPlan, folder: Path, report: Report | None, *, patterns: bool
-) -> list[str]:
+def _save(plan: RigPlan, folder: Path, report: Report, *, patterns: bool) -> list[str]:
     names = [folder / name for name in ("plan.json", "surface.npz", "rig.png")]
     plan.save(names[0])
-    say(report, "drawing")
+    report("drawing")
     save_rig_picture(plan, names[2], face_status=face_status(plan))
     if patterns:
         names.append(write_patterns(Scanner.of(plan), folder))

@@ -35,7 +35,7 @@ from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
 )
 
-from .console import cores, print_json, reporter, say, writable
+from .console import cores, print_json, reporter, writable
 
 CLOUD = "cloud.ply"
 # How near the object is taken to lie to the mesh that labels single images.
@@ -70,18 +70,18 @@ def _reconstruct(
     plan: RigPlan,
     scanner: Scanner,
     options: Mapping[str, Any],
-    report: Report | None,
+    report: Report,
 ) -> Reconstruction:
     seed = options["seed"]
     seed = plan.document.seed if seed is None else seed
     threads = options["threads"] or cores()
     mounted = options["calibration"]
     mounted = None if mounted is None else calibrated(scanner, mounted)
-    say(report, "predicting what the plan's poses measure")
+    report("predicting what the plan's poses measure")
     expected = _expected(plan, seed, threads)
 
     def progress(done: int, total: int) -> None:
-        say(report, f"pair {done} of {total}")
+        report(f"pair {done} of {total}")
 
     if options["single_shot"]:
         return reconstruct_single_shot(

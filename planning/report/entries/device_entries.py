@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.mesh import MeshSource, TriangleMesh
 from geometry.regions.regions import DominantRegions
 from geometry.repair.hollow import MeshShell
 from planning.model.device_poses import DECIMALS, rounded_pose
@@ -60,14 +60,7 @@ def rounded_camera(camera: PlannedCamera, name: str) -> PlannedCamera:
 def projector_records(
     scene: Scene, devices: Devices, rings: RingStage | None, claims: Claims
 ) -> tuple[ProjectorRecord, ...]:
-    """Return the plan's `projectors`.
-
-    Args:
-        scene: Surface and requirements, with the bodies of the devices.
-        devices: As written.
-        rings: How the rings were spaced; None: the run was cut before that.
-        claims: Made for these devices.
-    """
+    """Return the plan's `projectors`; no `rings` where the run was cut before them."""
     return tuple(
         projector_record(
             projector,
@@ -97,19 +90,17 @@ def camera_records(
 
 def mesh_record(mesh: TriangleMesh, shell: MeshShell) -> MeshRecord:
     """Return one entry of the plan's `meshes`."""
-    source = mesh.source
+    n_vertices, n_faces = len(mesh.vertices), len(mesh.faces)
+    source = mesh.source or MeshSource("", "", "m", 1.0, n_vertices, n_faces)
     return MeshRecord(
-        path=None if source is None else source.path,
-        sha256=None if source is None else source.sha256,
-        unit="m" if source is None else source.unit,
-        scale_to_m=1.0 if source is None else source.scale_to_m,
-        n_vertices=len(mesh.vertices) if source is None else source.n_vertices,
-        n_faces=len(mesh.faces) if source is None else source.n_faces,
+        path=source.path or None,
+        sha256=source.sha256 or None,
+        unit=source.unit,
+        scale_to_m=source.scale_to_m,
+        n_vertices=source.n_vertices,
+        n_faces=source.n_faces,
         area_m2=mesh.area,
-        repairs=tuple(
-            Repair(kind=repair.kind, count=repair.count)
-            for repair in (() if source is None else source.repairs)
-        ),
+        repairs=tuple(Repair(**asdict(repair)) for repair in source.repairs),
         shell=ShellRecord(**asdict(shell)),
     )
 
@@ -119,13 +110,14 @@ def selection_record(
 ) -> SelectionRecord:
     """Return `surface.selection`: what the faces with a region were chosen by."""
     chosen = region >= 0
+    interest = interest or Interest("curvature", chosen)
     return SelectionRecord(
-        kind="curvature" if interest is None else interest.kind,
-        source=None if interest is None else interest.source,
-        sha256=None if interest is None else interest.sha256,
+        kind=interest.kind,
+        source=interest.source,
+        sha256=interest.sha256,
         n_faces=int(chosen.sum()),
         area_m2=float(mesh.face_areas[chosen].sum()),
-        n_removed_by_repair=0 if interest is None else interest.n_removed,
+        n_removed_by_repair=interest.n_removed,
     )
 
 
@@ -170,8 +162,7 @@ def cost_record(
         seconds: Measured processor times in [s]: of the stages of planning, and where a
             check was made of `render`, `decode` and `merge`.
     """
-    sizes = [c.device.resolution[0] * c.device.resolution[1] for c in cameras]
-    pixels = sum(sizes)
+    pixels = sum(c.device.resolution[0] * c.device.resolution[1] for c in cameras)
     t4, t5 = (
         sum(seconds.get(name, 0.0) for name in names)
         for names in (_PROJECTOR_STAGES, _CAMERA_STAGES)

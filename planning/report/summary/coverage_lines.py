@@ -1,15 +1,9 @@
 """What a plan lights and measures, and what one device more would, for a person."""
 
-from collections.abc import Mapping
-
-from planning.model.document.coverage_records import (
-    Areas,
-    CameraMarginal,
-    ProjectorMarginal,
-)
+from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.words import area_words, percent
+from planning.model.words import area_words, labelled, percent
 
 from .proof_lines import user_selection
 from .shortfall import causes_line
@@ -32,21 +26,25 @@ def coverage_lines(plan: RigPlan) -> list[str]:
     chosen = "your selection" if user_selection(plan) else plan.requirements.target
     lit = _ratio(target.lit_m2, target.reachable_by_projectors_m2)
     measured = _ratio(target.measured_m2, target.reachable_by_cameras_m2)
+    table = [f"{'':<25}{'target (' + chosen + ')':>24}{'whole surface':>24}"]
+    for label, key in _ROWS.items():
+        cells = (area_cell(getattr(a, key), a.area_m2) for a in (target, surface))
+        table.append(f"{label:<25}{''.join(f'{cell:>24}' for cell in cells)}")
     lines = [
-        "",
-        f"{'':<34}{'target (' + chosen + ')':>24}{'whole surface':>24}",
-        *(
-            f"{'':<9}{label:<25}{_cell(target, key):>24}{_cell(surface, key):>24}"
-            for label, key in _ROWS.items()
-        ),
-        f"COVERAGE lit / reachable by projectors {lit}, measured / reachable by "
+        f"lit / reachable by projectors {lit}, measured / reachable by "
         f"cameras {measured}, on the target, {coverage.samples} fresh samples",
     ]
     if causes := coverage.uncovered_by_cause:
-        lines.append(f"         not measured: {causes_line(causes, target.area_m2)}")
+        lines.append(f"not measured: {causes_line(causes, target.area_m2)}")
     if blocked := coverage.blocked_by_obstacle_m2:
-        lines.append(f"         {_behind(blocked)}")
-    return [*lines, *_apart(document), *_idle(document), *schedule_lines(document)]
+        lines.append(_behind(blocked))
+    lines += [*_apart(document), *_idle(document)]
+    return [
+        "",
+        *labelled("", table),
+        *labelled("COVERAGE", lines),
+        *schedule_lines(document),
+    ]
 
 
 def _behind(blocked: dict[str, float]) -> str:
@@ -68,7 +66,7 @@ def _apart(document: PlanDocument) -> list[str]:
         return []
     names = ", ".join("{" + " ".join(group) + "}" for group in groups)
     return [
-        f"         the parts of {names} don't overlap: register them by the "
+        f"the parts of {names} don't overlap: register them by the "
         f"calibrated poses, not by the surface"
     ]
 
@@ -79,9 +77,7 @@ def _idle(document: PlanDocument) -> list[str]:
         *((c.id, "measures", c.seen_area_m2) for c in document.cameras),
     )
     return [
-        f"         {name} {does} none of the target"
-        for name, does, area in areas
-        if area == 0.0
+        f"{name} {does} none of the target" for name, does, area in areas if area == 0.0
     ]
 
 
@@ -108,10 +104,6 @@ def schedule_lines(document: PlanDocument) -> list[str]:
     ]
 
 
-def _cell(areas: Areas, key: str) -> str:
-    return area_cell(getattr(areas, key), areas.area_m2)
-
-
 def area_cell(area_m2: float, whole_m2: float) -> str:
     """Return an area and its share of a whole, in the unit that suits the whole."""
     small = whole_m2 < _SMALL_M2
@@ -125,31 +117,25 @@ def _ratio(part: float, whole: float) -> str:
 
 def marginal_lines(plan: RigPlan) -> list[str]:
     """Return the covered share of the target by the number of devices."""
-    rows = plan.document.marginal
-    lit = {
-        row.n_projectors: row.lit_target_m2
-        for row in rows
-        if isinstance(row, ProjectorMarginal)
-    }
-    measured = {
-        row.n_cameras: row.measured_target_m2
-        for row in rows
-        if isinstance(row, CameraMarginal)
-    }
-    return [
-        "",
-        "MARGINAL what one more or fewer would change (* as planned)",
-        _counted("projectors", "lit", lit, len(plan.projectors), plan),
-        _counted("cameras", "measured", measured, len(plan.cameras), plan),
-    ]
-
-
-def _counted(
-    kind: str, verb: str, areas: Mapping[int, float], planned: int, plan: RigPlan
-) -> str:
-    whole = plan.coverage.target.area_m2
-    cells = [
-        f"{n}{'*' if n == planned else ''}: {percent(area / whole)}"
-        for n, area in areas.items()
-    ]
-    return f"         {kind:<10} {verb} of the target   {'   '.join(cells)}"
+    rows, whole = plan.document.marginal, plan.coverage.target.area_m2
+    lit = [row for row in rows if isinstance(row, ProjectorMarginal)]
+    measured = [row for row in rows if isinstance(row, CameraMarginal)]
+    lines = ["what one more or fewer would change (* as planned)"]
+    for deed, areas, planned in (
+        (
+            "projectors lit",
+            {row.n_projectors: row.lit_target_m2 for row in lit},
+            len(plan.projectors),
+        ),
+        (
+            "cameras    measured",
+            {row.n_cameras: row.measured_target_m2 for row in measured},
+            len(plan.cameras),
+        ),
+    ):
+        cells = [
+            f"{n}{'*' * (n == planned)}: {percent(area / whole)}"
+            for n, area in areas.items()
+        ]
+        lines.append(f"{deed} of the target   {'   '.join(cells)}")
+    return ["", *labelled("MARGINAL", lines)]
