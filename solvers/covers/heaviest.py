@@ -53,7 +53,7 @@ def most_weight(
 
 
 def exact_search(n_sets: int) -> tuple[Callable[..., ExactSearch], str]:
-    """Return the search that exhausts K sets of a simple cover, and what it proves."""
+    """Return the search that exhausts K sets of a simple cover, and its proof."""
     if n_sets < _LEAST_GROUPED:
         return best_pair, pair_proof(n_sets)
     return best_by_groups, f"sets of {n_sets} by branching on groups of alike sets"

@@ -2,11 +2,9 @@
 
 The two variables are a in units of the largest ring, so of order 1, for one camera a
 sample. All in it is rational, so derivatives are exact and have no singular point: the
-gap damps the axis itself. The program is built once for each kind of light and number
-of pairs and held points; every number in it is a parameter.
+gap damps the axis itself. Every number in it is a parameter.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -14,30 +12,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.status import interruptible
-
 from .axis_problem import INSET, PITCH_POWER, AxisProgram
-from .compiled import Light, Nlp, slots_for, strict_solver
+from .compiled import IpoptRun, Light, Nlp, run_solver, slots_for, strict_solver
 
 _COLUMNS = 16
 _SLOTS = (64, 128, 256, 512, 1024)
 _HELD_SLOTS = (32, 64, 128, 256)
-
-
-@dataclass(frozen=True, eq=False)
-class AxisOutcome:
-    """What IPOPT left, unchecked.
-
-    Attributes:
-        axis: a, shape (2,).
-        success: Whether IPOPT reports a local optimum.
-        multipliers: Of g, as CasADi signs them: with x = a/largest ring, df/dx +
-            (dg/dx)^T multipliers = 0, and 0 or less where a held point binds.
-    """
-
-    axis: NDArray[np.float64]
-    success: bool
-    multipliers: NDArray[np.float64]
 
 
 def build_axis_nlp(light: Light, n: int, n_held: int) -> Nlp:
@@ -119,8 +99,8 @@ def run_ipopt(
     start: NDArray[np.float64],
     reach: float,
     max_iterations: int,
-) -> AxisOutcome:
-    """Run IPOPT on one camera a sample; ``nlpsol`` never raises, so check.
+) -> IpoptRun:
+    """Run IPOPT on one camera a sample.
 
     Args:
         program: The program.
@@ -129,23 +109,22 @@ def run_ipopt(
         start: a to start from, shape (2,).
         reach: Largest change of each coordinate, in units of the largest ring.
         max_iterations: Limit of the run.
+
+    Returns:
+        The run, of x = a/largest ring.
     """
     slots, places = slots_for(len(pairs), _SLOTS), slots_for(len(held), _HELD_SLOTS)
     solver = _solver(program.light, slots, places, max_iterations)
-    with interruptible():
-        result = solver(
-            x0=start / program.ring_radius,
-            p=axis_parameters(program, pairs, held),
-            lbg=INSET,
-            ubg=np.inf,
-            lbx=start / program.ring_radius - reach,
-            ubx=start / program.ring_radius + reach,
-        )
-    x, multipliers = (
-        np.asarray(result[name], dtype=np.float64).ravel() for name in ("x", "lam_g")
+    x0 = start / program.ring_radius
+    return run_solver(
+        solver,
+        x0=x0,
+        p=axis_parameters(program, pairs, held),
+        lbg=INSET,
+        ubg=np.inf,
+        lbx=x0 - reach,
+        ubx=x0 + reach,
     )
-    success = bool(solver.stats()["success"])
-    return AxisOutcome(program.ring_radius * x, success, multipliers)
 
 
 def _scaled(program: AxisProgram, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -157,5 +136,4 @@ def _scaled(program: AxisProgram, points: NDArray[np.float64]) -> NDArray[np.flo
 
 @lru_cache(maxsize=16)
 def _solver(light: Light, slots: int, places: int, max_iterations: int) -> Any:  # noqa: ANN401
-    """Return the compiled program for so many slots."""
     return strict_solver("axis", build_axis_nlp(light, slots, places), max_iterations)

@@ -137,7 +137,7 @@ def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSoluti
         if pairs.size == 0:
             break
         outcome = run_ipopt(program, pairs, binding, best, reach, max_iterations)
-        axis = outcome.axis
+        axis = program.ring_radius * outcome.x
         if not np.all(np.isfinite(axis)):
             break
         broken = np.flatnonzero(axis_slack(program, axis) < 0.0)

@@ -34,17 +34,16 @@ Source: Lee and Krim, 2014, eqs. (9)-(10); `formulation.md` section 6.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.status import SolveStatus, interruptible
+from solvers.status import SolveStatus
 
 from .baseline_nlp import BaselineProgram, build_baseline_program
 from .baseline_problem import BaselineProblem, smallest_baseline
-from .compiled import SILENT
+from .compiled import SILENT, IpoptRun, run_solver
 
 _Array = NDArray[np.float64]
 
@@ -66,13 +65,11 @@ class BaselineSolution:
         problem: The problem this answers.
         status: `LOCALLY_OPTIMAL`, or `UNKNOWN` where IPOPT failed.
         centres: O_c in [m], shape (k, 3); those of the start where it failed.
-        iterations: Of IPOPT, over all its runs.
     """
 
     problem: BaselineProblem
     status: SolveStatus
     centres: _Array
-    iterations: int
 
     @property
     def smallest_baseline(self) -> float:
@@ -86,20 +83,17 @@ def solve_baseline(problem: BaselineProblem) -> BaselineSolution:
     A local optimum, the same on every run; no clock is consulted.
     """
     program = build_baseline_program(problem)
-    iterations = 0
     for barrier in _BARRIERS:
-        x, stats = _run_ipopt(problem, program, barrier)
-        iterations += int(stats["iter_count"])
-        if stats["success"] and np.all(np.isfinite(x)):
-            centres = x[:-1].reshape(-1, 3)
-            status = SolveStatus.LOCALLY_OPTIMAL
-            return BaselineSolution(problem, status, centres, iterations)
-    return BaselineSolution(problem, SolveStatus.UNKNOWN, problem.centres, iterations)
+        run = _run_ipopt(problem, program, barrier)
+        if run.success and np.all(np.isfinite(run.x)):
+            centres = run.x[:-1].reshape(-1, 3)
+            return BaselineSolution(problem, SolveStatus.LOCALLY_OPTIMAL, centres)
+    return BaselineSolution(problem, SolveStatus.UNKNOWN, problem.centres)
 
 
 def _run_ipopt(
     problem: BaselineProblem, program: BaselineProgram, barrier: dict[str, str]
-) -> tuple[_Array, dict[str, Any]]:
+) -> IpoptRun:
     solver = ca.nlpsol(
         "baseline",
         "ipopt",
@@ -120,12 +114,11 @@ def _run_ipopt(
     reach = np.full(len(program.start) - 1, 1.1 * problem.max_step)
     longest = 2.0 * (np.abs(program.start[:-1]).max() + reach[0])
     reach.reshape(-1, 3)[list(problem.fixed)] = 0.0
-    with interruptible():
-        answer = solver(
-            x0=program.start,
-            lbx=np.append(program.start[:-1] - reach, 0.0),
-            ubx=np.append(program.start[:-1] + reach, 2.0 * longest),
-            lbg=program.low,
-            ubg=program.high,
-        )
-    return np.asarray(answer["x"], dtype=np.float64).ravel(), solver.stats()
+    return run_solver(
+        solver,
+        x0=program.start,
+        lbx=np.append(program.start[:-1] - reach, 0.0),
+        ubx=np.append(program.start[:-1] + reach, 2.0 * longest),
+        lbg=program.low,
+        ubg=program.high,
+    )

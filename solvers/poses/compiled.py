@@ -1,13 +1,13 @@
-"""Programs compiled once for each kind of light and size, and IPOPT on them.
-
-IPOPT has exact derivatives and strict limits, and says nothing.
-"""
+"""IPOPT, silent, on programs that are compiled once for each kind of light and size."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
+
+from solvers.status import interruptible
 
 Light = Literal["diverging", "parallel"]
 
@@ -24,15 +24,10 @@ SILENT: dict[str, Any] = {
 def check_program(
     program: object, light: str, shapes: Mapping[str, tuple[int, ...]]
 ) -> None:
-    """Refuse a program's data.
-
-    Args:
-        program: Has the arrays as attributes.
-        light: Must be a kind of light.
-        shapes: Of each array by its name; all must be finite.
+    """Refuse an unknown light, and arrays that aren't finite or of these shapes.
 
     Raises:
-        ValueError: If something can't be used.
+        ValueError: With the name of what can't be used.
     """
     for name, shape in shapes.items():
         value = np.asarray(getattr(program, name), dtype=np.float64)
@@ -58,13 +53,7 @@ class Nlp:
 
 
 def strict_solver(name: str, nlp: Nlp, max_iterations: int) -> Any:  # noqa: ANN401
-    """Return the compiled program.
-
-    Args:
-        name: For CasADi's own messages.
-        nlp: The program.
-        max_iterations: Limit of a run.
-    """
+    """Return the compiled program; the name is for CasADi's own messages."""
     import casadi as ca
 
     options = SILENT | {
@@ -76,3 +65,32 @@ def strict_solver(name: str, nlp: Nlp, max_iterations: int) -> Any:  # noqa: ANN
     }
     parts = {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}
     return ca.nlpsol(name, "ipopt", parts, options)
+
+
+@dataclass(frozen=True, eq=False)
+class IpoptRun:
+    """What IPOPT left, unchecked.
+
+    Attributes:
+        x: Variables at the end.
+        success: Whether IPOPT reports a local optimum.
+        multipliers: Of g, as CasADi signs them: df/dx + (dg/dx)^T multipliers +
+            bound_multipliers = 0, and 0 or less where a lower bound holds.
+        bound_multipliers: Of the bounds on x.
+    """
+
+    x: NDArray[np.float64]
+    success: bool
+    multipliers: NDArray[np.float64]
+    bound_multipliers: NDArray[np.float64]
+
+
+def run_solver(solver: Any, **arguments: object) -> IpoptRun:  # noqa: ANN401
+    """Run a compiled program; it never raises but on Ctrl-C, so check what it left."""
+    with interruptible():
+        result = solver(**arguments)
+    x, of_g, of_x = (
+        np.asarray(result[name], dtype=np.float64).ravel()
+        for name in ("x", "lam_g", "lam_x")
+    )
+    return IpoptRun(x, bool(solver.stats()["success"]), of_g, of_x)

@@ -7,11 +7,9 @@ rotation R0, margin t [rad]::
 
 Both are rational, so derivatives are exact and have no singular point nearby. A ridge
 1e-6 (q.q + s.s) makes the free directions (a turn that no limit feels) stay where they
-are. The program is built once for each kind of light and number of samples; every
-number in it is a parameter.
+are. Every number in it is a parameter.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -19,9 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.status import interruptible
-
-from .compiled import Light, Nlp, slots_for, strict_solver
+from .compiled import IpoptRun, Light, Nlp, run_solver, slots_for, strict_solver
 from .pose_problem import INSET, PoseProgram, pose_margins
 
 RIDGE = 1e-6
@@ -33,35 +29,8 @@ _SLOTS = (16, 32, 64, 128, 256, 512)
 _PLANES = 8
 
 
-@dataclass(frozen=True, eq=False)
-class IpoptOutcome:
-    """What IPOPT left, unchecked.
-
-    Attributes:
-        world_from_device: Pose, shape (4, 4).
-        margin_rad: The variable t at the end.
-        success: Whether IPOPT reports a local optimum.
-        variables: x at the end, shape (7,).
-        multipliers: Of g, as CasADi signs them: df/dx + (dg/dx)^T multipliers +
-            bound_multipliers = 0, and 0 or less where a lower bound holds.
-        bound_multipliers: Of the bounds on x, shape (7,).
-    """
-
-    world_from_device: NDArray[np.float64]
-    margin_rad: float
-    success: bool
-    variables: NDArray[np.float64]
-    multipliers: NDArray[np.float64]
-    bound_multipliers: NDArray[np.float64]
-
-
 def build_pose_nlp(light: Light, n: int, n_planes: int = 0) -> Nlp:
-    """State the program for n samples.
-
-    Args:
-        light: Kind of light.
-        n: Number of samples.
-        n_planes: Number of half-spaces.
+    """State the program for n samples and n_planes half-spaces.
 
     Returns:
         x = (q, s, t); p as :func:`pose_parameters` packs it.
@@ -233,38 +202,23 @@ def run_ipopt(
     start: NDArray[np.float64],
     *,
     max_iterations: int,
-) -> IpoptOutcome:
-    """Run IPOPT over some samples from a pose; ``nlpsol`` never raises, so check.
-
-    Args:
-        program: The program.
-        active: Samples to hold, at least one.
-        start: Pose to start from, shape (4, 4).
-        max_iterations: Limit of the run.
-    """
+) -> IpoptRun:
+    """Run IPOPT over some samples, at least one, from a pose, shape (4, 4)."""
     slots = slots_for(active.size, _SLOTS)
     index = np.resize(active, slots)
     p, lower = pose_parameters(program, index)
     solver = _solver(program.light, slots, max_iterations, n_planes_of(program))
-    size = _size(program)
-    x0 = variables_of(program, start)
-    reach = program.max_move_m / size
-    box = np.array([*[reach] * 3, *[_MAX_GIBBS] * 3, np.inf])
-    with interruptible():
-        result = solver(
-            x0=x0,
-            p=p,
-            lbg=lower,
-            ubg=np.inf,
-            lbx=np.append(-box[:6], -0.5 * np.pi),
-            ubx=np.append(box[:6], program.max_incidence),
-        )
-    x, of_g, of_x = (
-        np.asarray(result[name], dtype=np.float64).ravel()
-        for name in ("x", "lam_g", "lam_x")
+    reach = program.max_move_m / _size(program)
+    box = np.array([*[reach] * 3, *[_MAX_GIBBS] * 3])
+    return run_solver(
+        solver,
+        x0=variables_of(program, start),
+        p=p,
+        lbg=lower,
+        ubg=np.inf,
+        lbx=np.append(-box, -0.5 * np.pi),
+        ubx=np.append(box, program.max_incidence),
     )
-    success = bool(solver.stats()["success"])
-    return IpoptOutcome(pose_of(program, x), float(x[6]), success, x, of_g, of_x)
 
 
 def pose_of(program: PoseProgram, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -295,7 +249,6 @@ def variables_of(
 
 @lru_cache(maxsize=16)
 def _solver(light: Light, slots: int, max_iterations: int, n_planes: int) -> Any:  # noqa: ANN401
-    """Return the compiled program for so many slots."""
     nlp = build_pose_nlp(light, slots, n_planes)
     return strict_solver("pose", nlp, max_iterations)
 

@@ -148,7 +148,7 @@ def solve_pose(
     """
     if program.light == "parallel" and (proved := _globally_best(program)):
         return proved
-    from .pose_nlp import run_ipopt
+    from .pose_nlp import pose_of, run_ipopt
 
     start = np.array(program.world_from_device, dtype=np.float64)
     best, best_margin, best_slack = start, *_figures(program, start)
@@ -156,13 +156,13 @@ def solve_pose(
     settled, pose, margin, slack = False, start, best_margin, best_slack
     for _ in range(_ROUNDS):
         outcome = run_ipopt(program, active, pose, max_iterations=max_iterations)
-        if not np.all(np.isfinite(outcome.world_from_device)):
+        if not np.all(np.isfinite(outcome.x)):
             break
-        pose = outcome.world_from_device
+        pose = pose_of(program, outcome.x)
         margin, slack = _figures(program, pose)
         if _improves(margin, slack, best_margin, best_slack):
             best, best_margin, best_slack = pose, margin, slack
-        violated = _violated(program, pose, outcome.margin_rad)
+        violated = _violated(program, pose, float(outcome.x[6]))
         fresh = np.setdiff1d(violated, active)[:max_points]
         if fresh.size == 0:
             settled = outcome.success

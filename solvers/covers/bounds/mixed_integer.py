@@ -75,7 +75,7 @@ def linear_multipliers(
 
 
 def fits(cover: ReducedCover) -> bool:
-    """Whether the program is small enough for branch and bound to be of use."""
+    """Whether the program is small enough for branch and bound."""
     return cover.entries <= _MAX_ENTRIES
 
 
@@ -87,15 +87,7 @@ def branch_and_bound(
     max_sets: int | None = None,
     heaviest: bool = False,
 ) -> IntegerAnswer:
-    """Look for the cheapest cover, or the heaviest, up to a number of nodes.
-
-    Args:
-        cover: The cover.
-        start: A selection to start from.
-        budget: Counted work.
-        max_sets: Sets allowed.
-        heaviest: Whether to look for the most weight that meets the requirements.
-    """
+    """Look for the cheapest cover, or the heaviest, up to a number of nodes."""
     light = cover.full and not heaviest
     root = _UNITS_PER_FULL_ROOT if light else _UNITS_PER_ROOT
     spare = budget.remaining / cover.entries - root
@@ -150,7 +142,6 @@ def _model(
     max_sets: int | None = None,
     heaviest: bool = False,
 ) -> Any:  # noqa: ANN401
-    """Return a HiGHS instance that holds the program."""
     import highspy
 
     n_e, n_s = cover.weights.size, cover.n_sets

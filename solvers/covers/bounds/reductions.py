@@ -64,7 +64,7 @@ class ReducedCover:
 
     @property
     def n_sets(self) -> int:
-        """Number of sets left."""
+        """Number of sets."""
         return self.kept.size
 
     @cached_property
@@ -141,9 +141,7 @@ def reduce_problem(
 ) -> ReducedCover:
     """Return an equivalent cover with fewer rows and columns.
 
-    Args:
-        problem: The cover.
-        costs: Costs to count with instead of the problem's, positive, shape (n_s,).
+    Costs, positive, shape (n_s,), count instead of the problem's.
     """
     costs = problem.costs if costs is None else costs
     exponent, whole, inexact = _whole_weights(problem)

@@ -33,9 +33,7 @@ def coverage_bounds(
 ) -> NDArray[np.float64]:
     """Return an upper bound on the weight of any K sets, for K = 0, ..., n_s.
 
-    Args:
-        cover: The cover.
-        multipliers: Any numbers, shape (n_e,); clipped into [0, w].
+    Multipliers are any numbers, shape (n_e,); clipped into [0, w].
     """
     clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
     payments = np.sort(cover.by_set @ (clipped / cover.needs))[::-1]
@@ -47,11 +45,8 @@ def coverage_bounds(
 def count_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> int:
     """Return a lower bound on the number of sets that reach what is required.
 
-    It is n_s + 1 where no number of sets reaches it.
-
-    Args:
-        cover: The cover.
-        multipliers: Any numbers, shape (n_e,); negative ones count as 0.
+    It is n_s + 1 where no number of sets reaches it. Multipliers are any numbers, shape
+    (n_e,); negative ones count as 0.
     """
     usable, _ = _usable(multipliers)
     paid = np.concatenate([[0.0], np.cumsum(np.sort(cover.by_set @ usable)[::-1])])
@@ -68,10 +63,7 @@ def cost_bound(
 ) -> float:
     """Return a lower bound on the cost of any selection that reaches what is required.
 
-    Args:
-        cover: The cover.
-        multipliers: Any numbers, shape (n_e,), in cost; negative ones count as 0.
-        max_sets: Sets allowed.
+    Multipliers are any numbers, shape (n_e,), in cost; negative ones count as 0.
     """
     usable, unit = _usable(multipliers)
     payments = cover.by_set @ usable
@@ -88,12 +80,7 @@ def cost_bound(
 
 
 def least_service(cover: ReducedCover, multipliers: NDArray[np.float64]) -> float:
-    """Return need(lambda), what rows that meet the requirements ask for at least.
-
-    Args:
-        cover: The cover.
-        multipliers: Numbers of at least 0, shape (n_e,).
-    """
+    """Return need(lambda), for multipliers of at least 0, shape (n_e,)."""
     payments = multipliers * cover.needs
     order = np.lexsort((payments / cover.weights, cover.row_sets))
     weights, groups = cover.weights[order], cover.row_sets[order]

@@ -7,9 +7,8 @@ most::
     sum_e (w_e - lambda_e) + the costliest such selection, a set paying lambda(a_j)
 
 which is the costliest of each group and the costliest others. Multipliers are whole
-steps of a grid so coarse that sums of all of them are exact in single precision: bounds
-are exact, and the same whatever the BLAS and its threads. The volume algorithm
-(``relaxation``) lowers the bounds of many parts by one matrix product a step.
+steps of a grid so coarse that sums of all of them are exact in single precision. The
+volume algorithm (``lagrangian``) lowers many bounds by one matrix product a step.
 """
 
 from dataclasses import dataclass, replace
@@ -58,13 +57,9 @@ class GroupPart:
 
 
 class PartBounds:
-    """Bounds parts of the selections of K sets.
+    """Bounds parts of the selections of K sets of a simple cover.
 
-    Args:
-        cover: A simple cover: one row set, each row needed once.
-        n_sets: K.
-        target: Weight below which a part needs no lower bound.
-        budget: Work.
+    Bounds below the target are as good as any.
 
     Attributes:
         covers: Whether set s covers row e, as 0 and 1, shape (n_s, n_e).
@@ -93,10 +88,7 @@ class PartBounds:
         )
 
     def lowered(self, parts: list[GroupPart], steps: int) -> list[GroupPart]:
-        """Return the parts with bounds as low as so many steps bring them.
-
-        Bounds below the target are as good as any: the steps end there.
-        """
+        """Return the parts with bounds as low as so many steps bring them."""
         bounded: list[GroupPart] = []
         live = parts
         for _ in range(0, steps, _ROUND):
@@ -112,7 +104,6 @@ class PartBounds:
         return float(self._weights[self.covers[chosen].any(axis=0)].sum())
 
     def _stepped(self, parts: list[GroupPart]) -> list[GroupPart]:
-        """Some steps of the volume algorithm on all parts."""
         weights, aim = self._weights, 0.998 * self._target
         shares = np.stack([part.shares for part in parts]).astype(np.float64)
         best, (bounds, chosen) = shares, self._bounds(parts, shares)
@@ -172,7 +163,6 @@ class PartBounds:
     def _costliest(
         self, part: GroupPart, payments: NDArray[np.float32]
     ) -> NDArray[np.int64]:
-        """Return the costliest selection of a part."""
         picks = [int(group[np.argmax(payments[group])]) for group in part.groups]
         spare = self.n_sets - len(picks)
         if spare == 0:

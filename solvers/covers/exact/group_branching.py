@@ -50,15 +50,9 @@ def best_by_groups(
     budget: WorkBudget,
     first: bool = False,
 ) -> ExactSearch:
-    """Find K sets that cover at least a target, the most if all of the budget lasts.
+    """Find K sets of a simple cover, as `pairs.best_pair` does, K at least 1.
 
-    Args:
-        cover: A simple cover.
-        n_sets: K, at least 1.
-        target: Integer-valued weight below which nothing is of interest.
-        multipliers: Row multipliers in [0, w] to start from, shape (n_e,).
-        budget: Work; when it ends, the bound of what is left open is returned.
-        first: Whether any selection that reaches the target will do.
+    Where the budget ends, the bound of what is left open is returned.
     """
     size = cover.n_sets * cover.weights.size
     too_large = size > _MAX_DENSE or cover.n_sets > _MAX_SETS
@@ -71,7 +65,7 @@ def best_by_groups(
 
 
 class _Tree(Incumbent):
-    """Search over groups; see `best_by_groups`. It is its own incumbent."""
+    """Search over groups; it is its own incumbent."""
 
     def __init__(
         self,
@@ -107,7 +101,6 @@ class _Tree(Incumbent):
 
     @property
     def _promising(self) -> bool:
-        """Whether a part is open that may reach the target."""
         return bool(self._open) and -self._open[0][0] >= self.target
 
     def _take(self, parts: list[GroupPart], steps: int) -> None:
@@ -178,13 +171,11 @@ class _Tree(Incumbent):
         return chosen if chosen[1].size else self._halves(part)
 
     def _halves(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
-        """Half of the largest group, where no set of it is alike to some only."""
         i = int(np.argmax([group.size for group in part.groups]))
         return i, part.groups[i][: part.groups[i].size // 2]
 
 
 def _table_units(cover: ReducedCover) -> float:
-    """Work of `_likeness`."""
     return cover.n_sets * cover.n_sets * cover.weights.size / 16.0
 
 

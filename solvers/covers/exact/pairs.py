@@ -27,7 +27,7 @@ _CALL_UNITS = 1e5
 
 
 def pair_proof(n_sets: int) -> str:
-    """Return the sentence for an exhaustion of one or two sets."""
+    """Return what an exhaustion of one or two sets proves."""
     return "single sets by exhaustion" if n_sets == 1 else "pairs by exhaustion"
 
 

@@ -1,8 +1,7 @@
 """Branch and bound on full covers of equal costs, best bound first.
 
-What the nodes are bounded with is shared (``node_program``); how a node is split is
-told by who derives from the tree. Rows of the whole that a node's relaxation misses by
-much are taken in as they are met: any subset of the rows bounds the whole.
+Who derives from the tree tells how a node is split. Rows of the whole that a node's
+relaxation misses by much are taken in: any subset of the rows bounds the whole.
 """
 
 import heapq
@@ -47,11 +46,6 @@ class Tree(ABC):
         rows: Rows to start from; more join as they are missed.
         size: Sets of a known cover.
         budget: Work; where it ends, the least bound of what is open is returned.
-
-    Attributes:
-        cut: A node goes where its bound exceeds this.
-        linear: The program that bounds nodes.
-        made: Nodes kept so far.
     """
 
     def __init__(
@@ -65,7 +59,9 @@ class Tree(ABC):
         self.cut = size - 1 + _ROUNDING
         self.size = size
         self.budget = budget
-        self.linear = NodeProgram(covers[rows], self.cut + _BEYOND, budget)
+        self.linear = NodeProgram(
+            covers[rows], budget, presolve="off", objective_bound=self.cut + _BEYOND
+        )
         self.made = 0
         self._nodes: list[tuple[int, int, int, Node]] = []
 
@@ -77,10 +73,7 @@ class Tree(ABC):
         """
 
     def run(self) -> Refutation:
-        """Refute all smaller covers, or find one.
-
-        Best bound first, deepest first among equal ones.
-        """
+        """Refute all smaller covers, or find one; deepest first among equal bounds."""
         root = self.linear.root()
         if root is None:
             return Refutation(None, 0)

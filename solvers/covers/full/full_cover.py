@@ -58,14 +58,10 @@ def fewest_full(
 
     Args:
         cover: A cover of equal costs of which no row's weight may be lost.
-        budget: Counted work; the clock only cuts.
+        budget: Counted work; who gave it says what it cut.
         seed: Seed of the search.
-        start: Sets that cover every row.
-        lower: Sets known to be necessary.
-
-    Returns:
-        The answer; its selection is never larger than the start, its bound never below
-        ``lower``. Whoever gave the budget says what it cut.
+        start: Sets that cover every row; the selection is never larger.
+        lower: Sets known to be necessary; the bound is never below.
 
     Raises:
         ValueError: If the start leaves a row open.
@@ -117,7 +113,7 @@ def _of_parts(
 
 
 class _Search:
-    """Cover, bound and critical rows of a full cover under search."""
+    """Cover, bound and critical rows under search."""
 
     def __init__(
         self, covers: NDArray[np.bool_], budget: WorkBudget, seed: int, size: int
@@ -162,11 +158,9 @@ class _Search:
 
     @property
     def settled(self) -> bool:
-        """Whether no smaller cover is left to be found."""
         return self.lower >= self.size
 
     def _offer(self, selected: NDArray[np.int64]) -> None:
-        """Keep a cover of every row if it is smaller."""
         self._known = selected if selected.size <= self._known.size else self._known
         if selected.size < self.size:
             self.best, self.size = selected, selected.size
@@ -176,10 +170,10 @@ class _Search:
             self.lower, self.proof = bound, proof
 
     def _take_in(self, selected: NDArray[np.int64]) -> bool:
-        """Add some rows that a selection misses; return whether it misses any.
+        """Add some rows that a selection misses, those of fewest sets first.
 
-        Those of fewest sets come first, and none that shares half of its sets with one
-        taken just before.
+        None shares half of its sets with one taken just before. Return whether any was
+        missed.
         """
         missed = np.flatnonzero(~self.covers[:, selected].any(axis=1))
         self.budget.spend(float(len(self.covers) * selected.size))
@@ -196,7 +190,6 @@ class _Search:
         return missed.size > 0
 
     def _search_over(self, rows: NDArray[np.int64]) -> None:
-        """Take rows into the search, those that are new to it."""
         new = np.setdiff1d(rows, self._rows)
         self._rows = np.concatenate([self._rows, new])
         self._search.add_rows(self.covers[new], np.ones(new.size))
@@ -250,7 +243,7 @@ class _Search:
 
 
 def _spread_rows(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return rows to start from: all of few, else those of fewest sets, and more."""
+    """Return all of few rows, else those of fewest sets, and more."""
     if len(covers) <= _FEW_ROWS:
         return np.arange(len(covers))
     order = np.argsort(covers.sum(axis=1), kind="stable")

@@ -1,7 +1,9 @@
-"""Linear programs of the nodes of ``branching``, one HiGHS instance for all.
+"""Linear programs of full covers of equal costs, one HiGHS instance for many.
 
-Each starts from the optimal basis of its parent. What a node may claim is evaluated
-here from its multipliers, whatever HiGHS says of them.
+What a node may claim is evaluated here from its multipliers y >= 0, whatever HiGHS says
+of them::
+
+    count >= sum_e y_e + sum_j min(0, 1 - y a_j)
 """
 
 import dataclasses
@@ -11,12 +13,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from solvers.one_thread import run_highs
+from solvers.one_thread import quiet_highs, row_program, run_highs, seconds_left
 from solvers.status import WorkBudget
 
-from .row_generation import needed_sets, program
-
+# Units of work a nonzero of a simplex iteration.
 _UNITS_PER_ITERATION = 4.0
 # A call, and each row and column that its basis is handed over for.
 _CALL_UNITS = 3e5
@@ -55,30 +57,38 @@ class Node:
 
 
 class NodeProgram:
-    """Linear program of a node, from the optimal basis of its parent.
+    """Minimises sum x, A x >= 1, 0 <= x <= 1, over parts of the covers.
+
+    Args:
+        rows: Rows of the cover that are in every node's program, shape (m, n_s).
+        budget: Work.
+        options: Of HiGHS.
 
     Attributes:
-        rows: Rows of the cover that are in every node's program, shape (m, n_s).
+        rows: With those taken in since.
     """
 
     def __init__(
-        self, rows: NDArray[np.bool_], enough: float, budget: WorkBudget
+        self, rows: NDArray[np.bool_], budget: WorkBudget, **options: object
     ) -> None:
         import highspy
 
         self.rows = rows
         self.budget = budget
-        self._solver = program(rows, budget)
-        self._solver.setOptionValue("presolve", "off")
-        self._solver.setOptionValue("objective_bound", enough)
-        whole = np.ones(rows.shape[1], dtype=bool)
+        n_rows, n_sets = rows.shape
+        ones, endless = np.ones(n_rows), np.full(n_rows, np.inf)
+        self._solver = quiet_highs(**options)
+        self._solver.passModel(
+            row_program(np.ones(n_sets), sparse.csr_array(rows), ones, endless)
+        )
+        whole = np.ones(n_sets, dtype=bool)
         self._whole = self._part = NodePart(whole, ~whole)
         self._basic = highspy.HighsBasisStatus.kBasic
         self._basis = highspy.HighsBasis()
         self._measure()
 
     def root(self) -> Node | None:
-        """Return the whole bounded, or None where the budget ended before."""
+        """Return all covers bounded, or None where the budget ended before."""
         return self.solve(self._whole, None)
 
     def take_in(self, rows: NDArray[np.bool_]) -> None:
@@ -103,6 +113,11 @@ class NodeProgram:
             self._basis.row_status = [*base, *new, *local, *last][: n_base + len(added)]
             self._basis.valid = True
             self._solver.setBasis(self._basis)
+        steps = self.budget.remaining / (_UNITS_PER_ITERATION * self._entries)
+        limit = max(1, int(min(steps, 1e7)))
+        self._solver.setOptionValue("simplex_iteration_limit", limit)
+        clock = self._solver.getRunTime() + seconds_left(self.budget)
+        self._solver.setOptionValue("time_limit", clock)
         run_highs(self._solver)
         steps = float(self._solver.getInfo().simplex_iteration_count)
         self.budget.spend(_UNITS_PER_ITERATION * self._entries * steps + _CALL_UNITS)
@@ -129,13 +144,11 @@ class NodeProgram:
         self._entries = float(np.count_nonzero(self.rows) + sum(self.rows.shape))
 
     def _served(self, part: NodePart) -> bool:
-        """Whether the sets allowed cover every row at all."""
         if not np.all(self._values @ part.allowed.astype(np.float64) > 0):
             return False
         return all(bool(np.any(row & part.allowed)) for row in part.added)
 
     def _change(self, part: NodePart) -> None:
-        """Bring the program from the part solved last to another."""
         old, self._part = self._part, part
         other = (part.allowed != old.allowed) | (part.taken != old.taken)
         moved = np.flatnonzero(other).astype(np.int32)
@@ -158,3 +171,11 @@ class NodeProgram:
         for row in rows:
             sets = np.flatnonzero(row).astype(np.int32)
             self._solver.addRow(1.0, np.inf, sets.size, sets, np.ones(sets.size))
+
+
+def needed_sets(
+    multipliers: NDArray[np.float64], reduced: NDArray[np.float64]
+) -> float:
+    """Return the bound by multipliers and the reduced costs of the sets allowed."""
+    bound = float(multipliers.sum() + np.minimum(reduced, 0.0).sum())
+    return bound * (1.0 - 1e-9)

@@ -8,8 +8,7 @@ the orbit goes::
     x_i = 1   or   x_j = 0 for all j in orbit(i)
 
 The orbit branched on is the one that most rows of few sets wait for, by
-sum_e 2^-|S_e| over the open rows e of its sets. A node is bounded as in
-``row_branching``.
+sum_e 2^-|S_e| over the open rows e of its sets.
 
 References:
     Ostrowski, Linderoth, Rossi and Smriglio, "Orbital branching", Mathematical
@@ -33,7 +32,7 @@ class OrbitalTree(Tree):
     """The tree whose nodes are split by an orbit of sets."""
 
     def branch(self, node: Node) -> list[Node] | None:
-        """Return what is left of the node, smaller, or else split by an orbit."""
+        """Return what is left of the node, smaller, or else split."""
         part = node.part
         free = part.allowed & ~part.taken
         allowed = part.allowed & ~(free & (node.bound + node.reduced > self.cut))

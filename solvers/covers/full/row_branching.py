@@ -5,11 +5,7 @@ row S itself, which is harder to cover than r or q, joins the rows; or none is, 
 of S goes. Where many sets are nearly alike, both sides raise the bound, whereas taking
 or leaving a single set leaves its twins. What is left is a full cover again.
 
-Every node is bounded by multipliers evaluated here, whatever the linear program says::
-
-    count >= sum_e y_e + sum_j min(0, 1 - y a_j)
-
-and sets whose reduced cost exceeds what a smaller cover may still spend go below it.
+Sets whose reduced cost exceeds what a smaller cover may still spend go below a node.
 
 References:
     Ryan and Foster, "An integer programming approach to scheduling", in: Computer

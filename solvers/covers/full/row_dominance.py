@@ -69,7 +69,7 @@ def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
     """Return the sets that include no other, and the first of equal ones, increasing.
 
     Args:
-        sets: Whether element i is in set k, shape (n_sets, n_elements).
+        sets: Shape (n_sets, n_elements).
         budget: Work; where it ends, sets that weren't compared are kept.
     """
     if len(sets) <= _FEW:

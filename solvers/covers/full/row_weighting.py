@@ -59,14 +59,9 @@ class RowWeighting:
         self.chosen = np.array(chosen, dtype=np.int64)
         self.add_rows(covers, np.ones(len(covers)) if weights is None else weights)
 
-    @property
-    def n_rows(self) -> int:
-        """Number of rows."""
-        return len(self._sets)
-
     def add_rows(self, covers: NDArray[np.bool_], weights: NDArray[np.float64]) -> None:
         """Take in rows, shape (n, n_s), with their weights, shape (n,)."""
-        before, after = self.n_rows, self.n_rows + len(covers)
+        before, after = len(self._sets), len(self._sets) + len(covers)
         if after > len(self._dense):
             # Room for as many again: rows come few at a time.
             grown = np.empty((2 * after, covers.shape[1]))
@@ -86,9 +81,9 @@ class RowWeighting:
     def select(self, chosen: NDArray[np.int64]) -> None:
         """Replace the selection; the weights stay."""
         self.chosen = np.array(chosen, dtype=np.int64)
-        self._counts = np.zeros(self.n_rows, dtype=np.int64)
+        self._counts = np.zeros(len(self._sets), dtype=np.int64)
         # Sum of the positions of the sets over a row: its owner, where there's one.
-        self._owners = np.zeros(self.n_rows, dtype=np.int64)
+        self._owners = np.zeros(len(self._sets), dtype=np.int64)
         for position, s in enumerate(self.chosen):
             self._counts[self._rows[s]] += 1
             self._owners[self._rows[s]] += position
@@ -159,7 +154,6 @@ class RowWeighting:
         return self.open_rows.size == 0
 
     def _forget_ages(self) -> None:
-        """Count steps from 0 again."""
         self._step = 0
         self._moved[:] = self._changed[:] = 0.0
         self._left[:] = -1.0

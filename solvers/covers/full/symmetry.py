@@ -52,13 +52,9 @@ def column_orbits(covers: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.i
 
     Every symmetry used was checked; where the search for one is given up, an orbit may
     come in several parts.
-
-    Args:
-        covers: Whether set s covers row e, shape (n_e, n_s).
-        budget: Work; where it ends, columns that weren't tried stay apart.
     """
     refinement = _Refinement(covers, budget)
-    first = _Orbits(covers.shape[1])
+    first = np.arange(covers.shape[1])
     colours = refinement.refined(np.zeros(covers.shape[1], dtype=np.uint64))
     rows = _row_keys(covers)
     for colour in np.unique(colours):
@@ -68,16 +64,16 @@ def column_orbits(covers: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.i
         for column in alike.tolist():
             if refinement.given_up:
                 break
-            if first.of(column) in heads:
+            if int(first[column]) in heads:
                 continue
             for head in heads:
                 moved = refinement.symmetry(colours, head, column)
                 if moved is not None and _keeps(covers, moved, rows):
-                    first.join(moved)
+                    _join(first, moved)
                     break
             else:
                 heads[column] = None
-    return first.all()
+    return first
 
 
 class _Refinement:
@@ -102,7 +98,6 @@ class _Refinement:
 
     @property
     def given_up(self) -> bool:
-        """Whether no more is tried."""
         return self._left <= 0 or self._budget.exhausted
 
     def refined(self, colours: Colours) -> Colours:
@@ -170,24 +165,8 @@ def _keeps(
     return _row_keys(carried) == rows
 
 
-class _Orbits:
-    """Columns joined where a symmetry carries one to another."""
-
-    def __init__(self, n: int) -> None:
-        self._above = list(range(n))
-
-    def of(self, column: int) -> int:
-        """Return the first column of an orbit."""
-        while self._above[column] != column:
-            column = self._above[column]
-        return column
-
-    def join(self, moved: NDArray[np.int64]) -> None:
-        """Join each column with the one that it is carried to."""
-        for column, image in enumerate(moved.tolist()):
-            one, other = sorted((self.of(column), self.of(image)))
-            self._above[other] = one
-
-    def all(self) -> NDArray[np.int64]:
-        """Return the first column of each column's orbit, shape (n,)."""
-        return np.array([self.of(c) for c in range(len(self._above))], dtype=np.int64)
+def _join(first: NDArray[np.int64], moved: NDArray[np.int64]) -> None:
+    """Join each column's orbit, known by its first, with that it is carried to."""
+    for column, image in enumerate(moved):
+        one, other = sorted((first[column], first[image]))
+        first[first == other] = one

@@ -28,13 +28,10 @@ def greedy(
     *,
     n_sets: int | None = None,
 ) -> NDArray[np.int64]:
-    """Extend a selection by the set of most new weight a unit of cost.
+    """Return a selection extended by the set of most new weight a unit of cost.
 
     A row that more than one set must serve gives its weight in equal parts. Stops when
     every row set has what it requires or, if ``n_sets`` is given, at that many sets.
-
-    Returns:
-        Selected sets in the order of choice.
     """
     chosen = [int(s) for s in start]
     counts = cover.served(np.array(chosen, dtype=np.int64))
@@ -76,9 +73,6 @@ def most_coverage(
 
     Makes the best swap even where it loses weight; for some moves, drawn at random,
     what went may not come back and what came may not go, unless that beats the best.
-
-    Returns:
-        The best selection found, increasing.
 
     References:
         Glover, "Tabu search - part I", ORSA Journal on Computing 1(3), 1989.
@@ -140,9 +134,6 @@ def cheapest(
     """Lower the cost of a selection that reaches what is required.
 
     Drops some sets at random, lets greedy repair the cover, keeps what is better.
-
-    Returns:
-        The cheapest selection found, increasing.
     """
     rng = np.random.default_rng(seed)
     best = prune(cover, start)
@@ -166,9 +157,9 @@ def better(
     *,
     slack: float = -1e-12,
 ) -> NDArray[np.int64]:
-    """Return the cheaper of a cover and a proposal that may not be one.
+    """Return a proposal, pruned, if it is a cover and better, else the selection.
 
-    Or the smaller, while more sets are selected than allowed.
+    Fewer sets beyond those allowed come first, then the cost.
     """
     if not cover.meets(other):
         return selected

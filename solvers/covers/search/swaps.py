@@ -95,10 +95,7 @@ class Swaps:
     ) -> tuple[float, int, int]:
         """Return the largest change in weight, the position that goes, what comes.
 
-        Args:
-            stay: Positions that may not go, shape (k,); default none.
-            barred: Sets that may not come, shape (n_s,); default none.
-            beyond: Change above which neither counts.
+        Positions that stay, (k,), and barred sets, (n_s,), count beyond a change.
         """
         losses = self.regain[np.arange(len(self.chosen)), self.chosen]
         change = self.regain + self.gain - losses[:, None]

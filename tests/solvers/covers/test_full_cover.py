@@ -11,9 +11,10 @@ from scipy import sparse
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.full.full_cover import fewest_full
+from solvers.covers.full.node_program import needed_sets
 from solvers.covers.full.row_branching import RowTree
 from solvers.covers.full.row_dominance import essential, minimal, separate
-from solvers.covers.full.row_generation import by_multipliers, linear_cover
+from solvers.covers.full.row_generation import linear_cover
 from solvers.covers.full.row_weighting import RowWeighting
 from solvers.status import SolveStatus, WorkBudget
 
@@ -280,11 +281,9 @@ def test_counts_by_any_multipliers_are_bounds():
         best = fewest_by_hand(covers)
         rng = np.random.default_rng(seed)
         for scale in (0.1, 0.5, 1.0, 3.0):
-            given = scale * rng.normal(size=len(covers))
-            assert by_multipliers(covers, given)[0] <= best
-        assert by_multipliers(covers, np.full(len(covers), np.nan))[0] == 0
-    eye = np.eye(4, dtype=bool)
-    assert by_multipliers(eye, np.ones(4))[0] == pytest.approx(4.0)
+            given = scale * np.abs(rng.normal(size=len(covers)))
+            assert needed_sets(given, 1.0 - given @ covers) <= best
+    assert needed_sets(np.ones(4), np.zeros(4)) == pytest.approx(4.0)
 
 
 def test_linear_bound_by_rows_is_that_of_all_rows():

@@ -180,7 +180,7 @@ def test_kkt_from_ipopts_multipliers(light, radius, binds):
     held = np.arange(len(program.held))
     outcome = run_ipopt(program, pairs, held, start, 2.0, 200)
     assert outcome.success
-    x, y = outcome.axis / radius, outcome.multipliers
+    x, y = outcome.x, outcome.multipliers
     n = len(held)
     # Slots repeat the first points: their prices add up.
     prices = np.bincount(np.resize(held, len(y)), weights=y, minlength=n)
