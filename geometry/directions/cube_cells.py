@@ -1,6 +1,5 @@
 """Which cells of a cube map segments pass through, and which of them hang together."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +8,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from geometry.arrays import Array, Ints, Mask
+from geometry.rays.rays import equal_parts
 
 from .cube_map import FACES, CubeMap, face_coordinates
 
 # Gnomonic coordinates are exact to this; whatever comes as near as this is met.
 _MARGIN = 1e-7
-# Cells that are listed at a time.
-_MOST_CELLS = 1 << 21
+# Segments whose cells are listed at a time.
+_SEGMENTS = 1 << 16
 
 
 def mark_segments(
@@ -29,14 +29,14 @@ def mark_segments(
     """
     flat = marks.reshape(-1)
     # Column by column: rows of three are too short for numpy's loops.
-    starts, ends = (np.ascontiguousarray(own.T).T for own in (starts, ends))
-    for face in range(FACES):
-        first, second, met = _clipped(starts, ends, face)
-        if not met.size:
-            continue
-        begin = (owners[met] * FACES + face) * cube.n * cube.n
-        for part, column, low, high in _by_column(cube, first, second):
-            _mark(cube, flat, begin[part] + column, low, high)
+    starts, ends = (np.ascontiguousarray(given.T).T for given in (starts, ends))
+    for part in equal_parts(len(starts), _SEGMENTS):
+        for face in range(FACES):
+            first, second, met = _clipped(starts[part], ends[part], face)
+            segment, column, low, high = _by_column(cube, first, second)
+            begin = (owners[part][met[segment]] * FACES + face) * cube.n * cube.n
+            which, nth = _spread(high - low + 1)
+            flat[(begin + column)[which] + (low[which] + nth) * cube.n] = True
 
 
 def _clipped(starts: Array, ends: Array, face: int) -> tuple[Array, Array, Ints]:
@@ -86,43 +86,25 @@ def _may_meet(starts: Array, ends: Array, face: int) -> Ints:
     return np.flatnonzero(~outside)
 
 
-def _by_column(
-    cube: CubeMap, first: Array, second: Array
-) -> Iterator[tuple[Ints, ...]]:
-    """Yield segment, column, and the first and last row met there, some at a time."""
+def _by_column(cube: CubeMap, first: Array, second: Array) -> tuple[Ints, ...]:
+    """Segment and column of each two that meet, and the first and last row there."""
     low, high = np.minimum(first, second), np.maximum(first, second)
     begin, end = _index(cube, low[:, 0] - _MARGIN), _index(cube, high[:, 0] + _MARGIN)
     step = second - first
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = step[:, 1] / step[:, 0]
-    counts = end - begin + 1
-    for some in _parts(counts):
-        segment, nth = _spread(counts[some])
-        segment += some.start
-        column = begin[segment] + nth
-        reached = []
-        for x in (cube.lines[column] - _MARGIN, cube.lines[column + 1] + _MARGIN):
-            with np.errstate(invalid="ignore"):
-                y = first[segment, 1] + (x - first[segment, 0]) * slope[segment]
-            reached.append(np.clip(y, low[segment, 1], high[segment, 1]))
-        # Upright segments have no slope: they meet all their rows.
-        upright = ~(np.abs(step[segment, 0]) > _MARGIN)
-        bottom = np.where(upright, low[segment, 1], np.minimum(*reached))
-        top = np.where(upright, high[segment, 1], np.maximum(*reached))
-        yield (
-            segment,
-            column,
-            _index(cube, bottom - _MARGIN),
-            _index(cube, top + _MARGIN),
-        )
-
-
-def _mark(cube: CubeMap, flat: Mask, begin: Ints, low: Ints, high: Ints) -> None:
-    counts = high - low + 1
-    for some in _parts(counts):
-        which, nth = _spread(counts[some])
-        which += some.start
-        flat[begin[which] + (low[which] + nth) * cube.n] = True
+    segment, nth = _spread(end - begin + 1)
+    column = begin[segment] + nth
+    reached = []
+    for x in (cube.lines[column] - _MARGIN, cube.lines[column + 1] + _MARGIN):
+        with np.errstate(invalid="ignore"):
+            y = first[segment, 1] + (x - first[segment, 0]) * slope[segment]
+        reached.append(np.clip(y, low[segment, 1], high[segment, 1]))
+    # Upright segments have no slope: they meet all their rows.
+    upright = ~(np.abs(step[segment, 0]) > _MARGIN)
+    bottom = np.where(upright, low[segment, 1], np.minimum(*reached))
+    top = np.where(upright, high[segment, 1], np.maximum(*reached))
+    return segment, column, _index(cube, bottom - _MARGIN), _index(cube, top + _MARGIN)
 
 
 def _index(cube: CubeMap, steps: Array) -> Ints:
@@ -135,18 +117,6 @@ def _spread(counts: Ints) -> tuple[Ints, Ints]:
     which = np.repeat(np.arange(counts.size), counts)
     nth = np.arange(which.size) - np.repeat(np.cumsum(counts) - counts, counts)
     return which, nth
-
-
-def _parts(counts: Ints) -> Iterator[slice]:
-    """Return slices of things that have at most so many parts, or are one thing."""
-    ends = np.cumsum(counts)
-    begin = 0
-    while begin < counts.size:
-        before = ends[begin - 1] if begin else 0
-        stop = int(np.searchsorted(ends, before + _MOST_CELLS, side="right"))
-        stop = max(stop, begin + 1)
-        yield slice(begin, stop)
-        begin = stop
 
 
 @dataclass(frozen=True, eq=False)

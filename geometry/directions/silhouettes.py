@@ -23,7 +23,7 @@ import numpy as np
 from geometry.arrays import Array, Ints, Mask, Words
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import lengths
-from geometry.mesh.topology import face_pairs
+from geometry.mesh.topology import MeshEdges, face_pairs
 from geometry.rays.proximity import triangle_distances
 
 from .product_signs import WORD, ProductSigns, packed, unpacked
@@ -45,9 +45,8 @@ class Sides:
         local: The points relative to the middle of the mesh in [m], shape (n, 3).
         normals: Unit axes of their cones, same shape.
         close: Bits of the points that lie close to each face's plane.
-        changes: Bits of the points for which an edge of two faces is a silhouette.
-        above: Bits of the points over whose horizon such an edge rises.
-        alone: The same of each edge of one face or of more than two.
+        changes: Bits of the points for which each edge is a silhouette.
+        above: Bits of the points over whose horizon it rises.
     """
 
     local: Array
@@ -55,7 +54,6 @@ class Sides:
     close: Words
     changes: Words
     above: Words
-    alone: Words
 
 
 class Silhouettes:
@@ -63,18 +61,14 @@ class Silhouettes:
 
     def __init__(self, mesh: TriangleMesh) -> None:
         edges = mesh.edges
-        pairs, shared = face_pairs(edges)
+        self._pairs, shared = _pairs_and_borders(edges)
+        single = edges.n_faces[shared] != 2
+        self._always = np.where(single, ~_NONE, _NONE)
+        self._ends = edges.ends[shared]
         self._middle = mesh.bounds.mean(axis=0)
         self._vertices = mesh.vertices - self._middle
         self._columns = np.ascontiguousarray(self._vertices.T)
-        single = edges.n_faces != 2
-        self._single_ends = edges.ends[single]
-        sides_of_single = np.flatnonzero(single[edges.of_face.ravel()])
-        number = np.cumsum(single) - 1
-        self._single_faces = sides_of_single // 3
-        self._single_of_face = number[edges.of_face.ravel()[sides_of_single]]
-        self._pairs, self._ends = pairs, edges.ends[shared]
-        forwards = [_runs_along(mesh.faces[f], self._ends) for f in pairs.T]
+        forwards = [_runs_along(mesh.faces[f], self._ends) for f in self._pairs.T]
         self._turned = np.where(forwards[0] == forwards[1], ~_NONE, _NONE)
         anchors = np.einsum(
             "ij,ij->i", mesh.face_normals, mesh.corners[:, 0] - self._middle
@@ -85,7 +79,7 @@ class Silhouettes:
         self._heights = ProductSigns(np.column_stack([used, np.ones(len(used))]))
         self._faces = mesh.faces
         # Both orders of two faces that agree on their outside.
-        f, g = pairs[self._turned == _NONE].T
+        f, g = self._pairs[(self._turned == _NONE) & ~single].T
         n = len(mesh.faces)
         self._smooth = np.sort(np.concatenate([f * n + g, g * n + f, [-1]]))
         self._centroids = mesh.face_centroids - self._middle
@@ -118,9 +112,8 @@ class Silhouettes:
             local,
             normals,
             beside,
-            (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g],
+            (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g] | self._always,
             above[self._ends[:, 0]] | above[self._ends[:, 1]],
-            above[self._single_ends[:, 0]] | above[self._single_ends[:, 1]],
         )
 
     def faces_within(self, sides: Sides, reach: float) -> Words:
@@ -155,20 +148,12 @@ class Silhouettes:
             The point that each belongs to, (m,), and the edge's ends relative to it in
             [m], shape (m, 3) each.
         """
-        words, alone = sides.changes & sides.above, sides.alone
+        words = sides.changes
         if among is not None:
             f, g = self._pairs.T
-            words = (words & among[f] & among[g]) | (
-                sides.above & (among[f] ^ among[g])
-            )
-            counts = np.zeros_like(alone)
-            np.bitwise_or.at(counts, self._single_of_face, among[self._single_faces])
-            alone = alone & counts
-        n = len(sides.local)
-        owners, edges = unpacked(words, n)
-        more, singles = unpacked(alone, n)
-        ends = np.concatenate([self._ends[edges], self._single_ends[singles]])
-        owners = np.concatenate([owners, more])
+            words = (words & among[f] & among[g]) | (among[f] ^ among[g])
+        owners, edges = unpacked(words & sides.above, len(sides.local))
+        ends = self._ends[edges]
         # Column by column: rows of three are too short for numpy's loops.
         from_points = [own.take(owners) for own in sides.local.T]
         begin, end = (
@@ -229,6 +214,15 @@ def _may_cross(begin: Array, end: Array, axes: Array, half_angle: float) -> Mask
     spread = np.arcsin(np.where(around, 0.0, size) / apart)
     off = np.arccos(np.clip(cosine, -1.0, 1.0))
     return around | (off - spread <= half_angle + _ANGLE)
+
+
+def _pairs_and_borders(edges: MeshEdges) -> tuple[Ints, Ints]:
+    """Pairs of faces at an edge, a border's one face with itself, and their edges."""
+    pairs, shared = face_pairs(edges, manifold_only=False)
+    flat = edges.of_face.ravel()
+    border = np.flatnonzero(edges.border[flat])
+    alone = np.repeat(border[:, None] // 3, 2, axis=1)
+    return np.concatenate([pairs, alone]), np.concatenate([shared, flat[border]])
 
 
 def _runs_along(faces: Ints, ends: Ints) -> Mask:

@@ -4,9 +4,8 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.tensors import unit
-from geometry.mesh.topology import components
 
-from .cone_sums import CONE_SHARE, Patch, renumbered
+from .cone_sums import CONE_SHARE, Patch
 
 _MAX_ROUNDS = 12
 _ROOM = 0.7
@@ -54,11 +53,7 @@ def _join(patch: Patch, piece: Ints) -> Ints:
 
 def _fragments(patch: Patch, piece: Ints) -> Ints:
     """Number connected faces without a piece, -1 for the others."""
-    free = piece < 0
-    links = patch.links[free[patch.links].all(axis=1)]
-    label = components(links, patch.n)[1]
-    label[~free] = -1
-    return renumbered(label)
+    return patch.connected(np.where(piece < 0, 0, -1))
 
 
 def _single(patch: Patch, piece: Ints) -> Ints:

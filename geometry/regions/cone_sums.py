@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints
 from geometry.mesh.tensors import unit
-from geometry.mesh.topology import grouped
+from geometry.mesh.topology import components, grouped
 
 # Share of a piece's area whose normals must lie in its cone: while it is cut and
 # merged, and after fragments have joined it.
@@ -50,6 +50,12 @@ class Patch:
     @cached_property
     def _weighted(self) -> Array:
         return np.ascontiguousarray((self.normals * self.areas[:, None]).T)
+
+    def connected(self, part: Ints) -> Ints:
+        """Number the connected faces of parts; -1 stays."""
+        a, b = part[self.links].T
+        label = components(self.links[(a == b) & (a >= 0)], self.n)[1]
+        return renumbered(np.where(part < 0, -1, label))
 
     def cosines(self, piece: Ints, axis: Array) -> Array:
         """Return each face's normal times the axis (k, 3) of its piece, or 0, (n,)."""

@@ -6,8 +6,7 @@ from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.diffusion import diffused, graph_laplacian
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import unit
-from geometry.mesh.topology import components, grouped
-from geometry.parallel import mapped
+from geometry.mesh.topology import grouped
 
 from .cone_fragments import join_fragments
 from .cone_sums import CONE_SHARE, Patch, merged, renumbered
@@ -26,7 +25,7 @@ _AREA_DIGITS = 1e-9
 _LEAST_KEPT, _MAX_PIECES = 0.9, 200
 # Less than this share of the mesh is the rim of a plate: what fits no region isn't one.
 _NO_REST = 0.05
-_HALVINGS = ((1.0 / 2.0, 1.0 / 4.0), (1.0 / 8.0, 1.0 / 16.0))
+_HALVINGS = (0.5, 0.25, 0.125, 0.0625)
 
 
 def check_cone_options(min_region_share: float, cone_half_angle: float) -> None:
@@ -85,15 +84,14 @@ def _more_kept(patch: Patch, piece: Ints, least: float) -> Ints:
     if patch.areas[piece >= 0].sum() >= enough:
         return piece
     # Cutting doesn't depend on the least area but for where it ends.
-    split = _split(patch, np.ones(patch.n, dtype=bool), _HALVINGS[-1][-1] * least)
-    for halvings in _HALVINGS:
-        # Two at a time: the second is often needed, and there are cores for both.
-        for finer in mapped(lambda part: _pieces(patch, split, part * least), halvings):
-            if finer.max(initial=-1) >= _MAX_PIECES:
-                return piece
-            piece = finer
-            if patch.areas[piece >= 0].sum() >= enough:
-                return piece
+    split = _split(patch, np.ones(patch.n, dtype=bool), _HALVINGS[-1] * least)
+    for halving in _HALVINGS:
+        finer = _pieces(patch, split, halving * least)
+        if finer.max(initial=-1) >= _MAX_PIECES:
+            break
+        piece = finer
+        if patch.areas[piece >= 0].sum() >= enough:
+            break
     return piece
 
 
@@ -149,7 +147,7 @@ def _split(patch: Patch, active: Mask, least: float) -> Ints:
     for _ in range(_MAX_ROUNDS):
         if not np.any(part >= 0):
             break
-        part = _connected(patch, part)
+        part = patch.connected(part)
         # What is too small to be a piece waits for a neighbour.
         small = (part >= 0) & (patch.sums(part)[1][part] < least)
         part[small] = -1
@@ -182,15 +180,6 @@ def _core(patch: Patch, part: Ints) -> Mask:
         sums, _ = patch.sums(np.where(core, part, -1), len(areas))
         axis = np.where(np.any(sums, axis=1, keepdims=True), unit(sums), axis)
     return core
-
-
-def _connected(patch: Patch, part: Ints) -> Ints:
-    """Number the connected parts; -1 stays."""
-    a, b = part[patch.links].T
-    same = patch.links[(a == b) & (a >= 0)]
-    label = components(same, patch.n)[1]
-    label[part < 0] = -1
-    return renumbered(label)
 
 
 def _by_area(patch: Patch, piece: Ints, total: float) -> list[Ints]:

@@ -61,31 +61,20 @@ class MeshShell:
     sealed_m2: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Sight:
-    """Of each spot: free share of the hemisphere, wall below in [m], whether inside."""
-
-    openness: Array
-    wall: Array
-    inside: Mask
-
-
 def measure_shell(caster: RayCaster) -> MeshShell:
     """Tell a hollow shell from a solid, from rays at spots all over the surface."""
     mesh = caster.mesh
     body = _bodies(mesh)
     spots = spots_on(mesh, _SPOTS, group=body, least=1)
-    of = np.zeros(len(spots), np.int64) if body is None else body[spots.faces]
+    of = body[spots.faces]
     n_spots = np.bincount(of)
-    area = mesh.face_areas
-    areas = np.array([mesh.area]) if body is None else np.bincount(body, area)
+    areas = np.bincount(body, mesh.face_areas)
     weight = (areas[: len(n_spots)] / np.maximum(n_spots, 1))[of]
     leaks = look_out(caster, spots, _RAYS_BEHIND, behind=True)
     if weight @ leaks > _LEAK * _RAYS_BEHIND * mesh.area:
         return MeshShell(OPEN, None, None, 0.0, 0.0)
-    sight = _sight(caster, spots)
-    seen = np.bincount(of, sight.openness) > 0
-    inside, wall = sight.inside, sight.wall
+    openness, wall, inside = _sight(caster, spots)
+    seen = np.bincount(of, openness) > 0
     inside_m2 = float(weight @ inside)
     lining = inside & np.isfinite(wall)
     wall_m = _weighted_median(wall[lining], weight[lining]) if lining.any() else None
@@ -104,7 +93,7 @@ def lies_inside(caster: RayCaster, faces: Ints, points: Array) -> Mask:
     A point does if less than a twentieth of its cosine-weighted hemisphere is free, or
     if it sees less than a third of what the other side of a thin wall sees.
     """
-    return _sight(caster, spots_at(caster.mesh, faces, points)).inside
+    return _sight(caster, spots_at(caster.mesh, faces, points))[2]
 
 
 def _kind(share: float, wall_m: float | None, thin_m: float) -> str:
@@ -113,7 +102,8 @@ def _kind(share: float, wall_m: float | None, thin_m: float) -> str:
     return HOLLOW if share >= _MUCH and wall_m <= thin_m else CAVITIES
 
 
-def _sight(caster: RayCaster, spots: Spots) -> _Sight:
+def _sight(caster: RayCaster, spots: Spots) -> tuple[Array, Array, Mask]:
+    """Of each spot: free share of the hemisphere, wall below [m], whether inside."""
     openness = look_out(caster, spots, _RAYS) / _RAYS
     wall = np.full(len(spots), np.inf)
     start = spots.points - _OFFSET * caster.extent * spots.normals
@@ -129,14 +119,14 @@ def _sight(caster: RayCaster, spots: Spots) -> _Sight:
     other = spots_at(caster.mesh, behind[unsure], points)
     beyond = look_out(caster, other, _RAYS) / _RAYS
     inside[unsure] = openness[unsure] < LESS_THAN_BEHIND * beyond
-    return _Sight(openness, wall, inside)
+    return openness, wall, inside
 
 
-def _bodies(mesh: TriangleMesh) -> Ints | None:
-    """The body of each face, connected over edges; None where there are too many."""
+def _bodies(mesh: TriangleMesh) -> Ints:
+    """The body of each face, connected over edges; one where there are too many."""
     pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     count, body = components(pairs, len(mesh.faces))
-    return body if count <= _MAX_BODIES else None
+    return body if count <= _MAX_BODIES else np.zeros_like(body)
 
 
 def _mean_wall(mesh: TriangleMesh) -> float:

@@ -65,7 +65,7 @@ def spots_on(
     mesh: TriangleMesh,
     n: int,
     *,
-    group: Ints | None = None,
+    group: Ints,
     least: int = 1,
     within: Mask | None = None,
 ) -> Spots:
@@ -77,10 +77,8 @@ def spots_on(
     areas = mesh.face_areas
     used = areas > 0 if within is None else within & (areas > 0)
     faces = np.flatnonzero(used)
-    label = np.zeros(len(faces), np.int64) if group is None else group[faces]
-    order = np.argsort(label, kind="stable")
-    faces, label = faces[order], label[order]
-    _, start, count = np.unique(label, return_index=True, return_counts=True)
+    faces = faces[np.argsort(group[faces], kind="stable")]
+    _, start, count = np.unique(group[faces], return_index=True, return_counts=True)
     sums = np.add.reduceat(areas[faces], start)
     share = np.ceil(n * sums / sums.sum() - 1e-9).astype(np.int64)
     share = np.maximum(share, least)
@@ -92,10 +90,7 @@ def spots_on(
     ticks += place * (sums / share)[owner]
     chosen = np.searchsorted(cumulated, ticks, side="right")
     chosen = np.clip(chosen, start[owner], (start + count - 1)[owner])
-    return _spots(mesh, faces[chosen])
-
-
-def _spots(mesh: TriangleMesh, faces: Ints) -> Spots:
+    faces = faces[chosen]
     a, b, c = _ordered_corners(mesh, faces)
     i = np.arange(len(faces)) + 0.5
     u, v = (np.modf(i * k)[0] for k in _R2)

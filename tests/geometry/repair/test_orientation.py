@@ -328,7 +328,7 @@ def test_openness_inside_a_tube_is_its_view_factor(depth: float) -> None:
     tube = flipped(cylinder(1.0, 12.0, around=192, along=96, capped=False))
     mouth = 6.0 - depth
     band = np.abs(tube.face_centroids[:, 2] - mouth) < 0.07
-    spots = spots_on(tube, 2000, within=band)
+    spots = spots_on(tube, 2000, group=np.zeros(len(band), np.int64), within=band)
     escaped = look_out(RayCaster(tube), spots, 64)
 
     def factor(z: np.ndarray) -> np.ndarray:
