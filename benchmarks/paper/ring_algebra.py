@@ -121,7 +121,7 @@ def _projector(
         resolution, beam = (1280, 800), None
     none = DrawnRings(LIGHTS[light], np.zeros(0))
     calibration = ProjectorCalibration(
-        "P1", none.light, pose, pose @ shift, matrix, resolution, beam, none
+        "P1", pose, matrix, resolution, pose @ shift, beam, none
     )
     return calibration, off
 
@@ -143,7 +143,7 @@ def _camera(
     focal = rng.uniform(1200.0, 8000.0)
     matrix = np.array([[focal, 0.0, 1023.5], [0.0, focal, 767.5], [0.0, 0.0, 1.0]])
     lens = tuple(rng.uniform(-1.0, 1.0, 5) * [0.15, 0.05, 2e-3, 2e-3, 0.02])
-    return CameraCalibration("C1", pose, matrix, lens, (2048, 1536))
+    return CameraCalibration("C1", pose, matrix, (2048, 1536), lens)
 
 
 def _points(rng: np.random.Generator, projector: ProjectorCalibration) -> Matrix:

@@ -85,9 +85,7 @@ def placed_projector(
     matrix[:2, 2] = 0.5 * (width - 1), 0.5 * (height - 1)
     radii = radii_m / STANDOFF_M if diverging else radii_m
     drawn = DrawnRings(LIGHTS[light], radii)
-    return ProjectorCalibration(
-        name, drawn.light, pose, pose, matrix, PROJECTOR_PX, None, drawn
-    )
+    return ProjectorCalibration(name, pose, matrix, PROJECTOR_PX, pose, None, drawn)
 
 
 def placed_camera(
@@ -110,7 +108,7 @@ def placed_camera(
     pose[:3, :3] = pose[:3, :3] @ _turned_to_z(middle / np.linalg.norm(middle))
     matrix = np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
     lens = (optics.distortion, 0.0, 0.0, 0.0, 0.0)
-    return CameraCalibration(name, pose, matrix, lens, CAMERA_PX)
+    return CameraCalibration(name, pose, matrix, CAMERA_PX, lens)
 
 
 def _turned_to_z(ray: Array) -> Array:

@@ -5,10 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planning.verify.reconstruction.calibration import (
-    CameraCalibration,
-    ProjectorCalibration,
-)
+from planning.verify.reconstruction.calibration import DeviceCalibration
 
 from .ground_truth import Errors, LabelCount, MeasuredErrors
 from .paper_devices import CAMERA_PX, PROJECTOR_PX
@@ -152,7 +149,7 @@ def outcome_document(
 
 
 def _device_document(
-    device: CameraCalibration | ProjectorCalibration,
+    device: DeviceCalibration,
 ) -> dict[str, Any]:
     """Pose and interior; of parallel light, pixels a metre on the diagonal of K."""
     return {

@@ -5,7 +5,7 @@ that a mistake in one shows against the other. Pixels follow OpenCV: the centre 
 top-left pixel is (0, 0).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,14 +25,15 @@ _UNDISTORT_TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
-class CameraCalibration:
-    """A camera: pinhole, Brown-Conrady lens, pose.
+class DeviceCalibration:
+    """A device: optics and pose.
 
     Attributes:
-        id: Name of the camera.
+        id: Name of the device.
         world_from_device: Pose [m], shape (4, 4).
-        matrix: K in [px], shape (3, 3).
-        distortion: k1, k2, p1, p2, k3.
+        matrix: From panel coordinates to pixels, shape (3, 3): K, where panel
+            coordinates are (x/z, y/z); for parallel light, where they are (x, y) in
+            [m], 1 / pixel pitch on the diagonal.
         resolution: Width and height in [px].
         body: Its housing; None: it takes no room.
     """
@@ -40,14 +41,35 @@ class CameraCalibration:
     id: str
     world_from_device: Array
     matrix: Array
-    distortion: tuple[float, ...]
     resolution: tuple[int, int]
-    body: Body | None = None
+    body: Body | None = field(default=None, kw_only=True)
 
     @property
     def centre(self) -> Array:
-        """Optical centre in the world in [m], shape (3,)."""
+        """Optical centre, or centre of the panel, in the world in [m], shape (3,)."""
         return self.world_from_device[:3, 3]
+
+    @property
+    def axis(self) -> Array:
+        """Direction of the optical axis in the world, shape (3,)."""
+        return self.world_from_device[:3, 2]
+
+    def panel_coordinates(self, pixels: Array) -> Array:
+        """Return panel coordinates (n, 2) of pixels (n, 2)."""
+        return (pixels - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
+
+    def _local(self, points: Array) -> Array:
+        return (points - self.centre) @ self.world_from_device[:3, :3]
+
+    def _pixels(self, panel: Array) -> Array:
+        return panel * np.diag(self.matrix)[:2] + self.matrix[:2, 2]
+
+
+@dataclass(frozen=True, eq=False)
+class CameraCalibration(DeviceCalibration):
+    """A camera: pinhole, Brown-Conrady lens k1, k2, p1, p2, k3, pose."""
+
+    distortion: tuple[float, ...]
 
     @property
     def focal_px(self) -> float:
@@ -56,13 +78,12 @@ class CameraCalibration:
 
     def project(self, points: Array) -> Array:
         """Return pixels (n, 2) of world points (n, 3); NaN behind the camera."""
-        turn = self.world_from_device[:3, :3]
-        x, y, z = ((points - self.centre) @ turn).T
+        x, y, z = self._local(points).T
         z = np.where(z > 0.0, z, np.nan)
-        x, y = self._bend(x / z, y / z)
-        matrix = self.matrix
-        return np.column_stack(
-            [matrix[0, 0] * x + matrix[0, 2], matrix[1, 1] * y + matrix[1, 2]]
+        x, y = x / z, y / z
+        radial, shift_x, shift_y = self._terms(x, y)
+        return self._pixels(
+            np.column_stack([x * radial + shift_x, y * radial + shift_y])
         )
 
     def rays(self, pixels: Array) -> Array:
@@ -71,9 +92,7 @@ class CameraCalibration:
         The lens is inverted by the fixed point ``p = (q - tangential(p)) / radial(p)``;
         NaN where that doesn't settle: no point of the scene is imaged there.
         """
-        matrix = self.matrix
-        x = (pixels[:, 0] - matrix[0, 2]) / matrix[0, 0]
-        y = (pixels[:, 1] - matrix[1, 2]) / matrix[1, 1]
+        x, y = self.panel_coordinates(pixels).T
         if any(self.distortion):
             x, y = self._unbend(x, y)
         scale = 1.0 / np.sqrt(x * x + y * y + 1.0)
@@ -92,10 +111,6 @@ class CameraCalibration:
             p1 * (s + 2.0 * yy) + (2.0 * p2 * xy),
         )
 
-    def _bend(self, x: Array, y: Array) -> tuple[Array, Array]:
-        radial, shift_x, shift_y = self._terms(x, y)
-        return x * radial + shift_x, y * radial + shift_y
-
     def _unbend(self, qx: Array, qy: Array) -> tuple[Array, Array]:
         x, y = qx, qy
         change = np.full_like(qx, np.inf)
@@ -112,42 +127,23 @@ class CameraCalibration:
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectorCalibration:
+class ProjectorCalibration(DeviceCalibration):
     """A projector: optics, pose, the frame of its rings and what it draws.
 
     Attributes:
-        id: Name of the projector.
-        light: How its light leaves it.
-        world_from_device: Pose [m], shape (4, 4).
         world_from_ring: Pose of the ring frame [m], shape (4, 4).
-        matrix: From panel coordinates to pixels, shape (3, 3): K for diverging light,
-            where panel coordinates are (x/z, y/z); for parallel light, where they are
-            (x, y) in [m], 1 / pixel pitch on the diagonal.
-        resolution: Width and height in [px].
         beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
         pattern: What it draws.
-        body: Its housing; None: it takes no room.
     """
 
-    id: str
-    light: LightLaw
-    world_from_device: Array
     world_from_ring: Array
-    matrix: Array
-    resolution: tuple[int, int]
     beam_radius: float | None
     pattern: DrawnRings
-    body: Body | None = None
 
     @property
-    def centre(self) -> Array:
-        """Optical centre, or centre of the panel, in the world in [m], shape (3,)."""
-        return self.world_from_device[:3, 3]
-
-    @property
-    def axis(self) -> Array:
-        """Direction of the optical axis in the world, shape (3,)."""
-        return self.world_from_device[:3, 2]
+    def light(self) -> LightLaw:
+        """How its light leaves it."""
+        return self.pattern.light
 
     def pattern_for(self, camera: CameraCalibration) -> RingsForCamera:
         """Return what it draws as a camera's decoder reads it."""
@@ -168,15 +164,6 @@ class ProjectorCalibration:
         """
         return -np.einsum("ij,ij->i", self.aim(points)[1], normals)
 
-    @property
-    def ring_from_device(self) -> Array:
-        """Pose of the device in the ring frame, shape (4, 4)."""
-        turn = self.world_from_ring[:3, :3].T
-        pose = np.eye(4)
-        pose[:3, :3] = turn @ self.world_from_device[:3, :3]
-        pose[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
-        return pose
-
     def to_ring(self, points: Array) -> Array:
         """Return world points (n, 3) in the ring frame."""
         return (points - self.world_from_ring[:3, 3]) @ self.world_from_ring[:3, :3]
@@ -191,19 +178,22 @@ class ProjectorCalibration:
 
         (x/z, y/z) in diverging light, (x, y) in [m] in parallel light.
         """
-        flat = self.panel_coordinates(pixels)
-        return self.light.turned(flat, self.ring_from_device)
+        turn = self.world_from_ring[:3, :3].T
+        ring_from_device = np.eye(4)
+        ring_from_device[:3, :3] = turn @ self.world_from_device[:3, :3]
+        ring_from_device[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
+        return self.light.turned(self.panel_coordinates(pixels), ring_from_device)
 
     def panel(self, points: Array) -> tuple[Array, Array]:
         """Return pixels (n, 2) that light world points (n, 3), and depths z (n,).
 
         Pixels are NaN behind the device.
         """
-        local = (points - self.centre) @ self.world_from_device[:3, :3]
+        local = self._local(points)
         z = local[:, 2]
         shrink = self.light.shrink(np.where(z > 0.0, z, 1.0))
         flat = local[:, :2] * np.where(z > 0.0, shrink, np.nan)[:, None]
-        return flat * np.diag(self.matrix)[:2] + self.matrix[:2, 2], z
+        return self._pixels(flat), z
 
     def in_panel(self, pixels: Array, margin_px: float = 0.0) -> Mask:
         """Return whether pixels (n, 2) are drawn: in the image and in the beam."""
@@ -217,10 +207,6 @@ class ProjectorCalibration:
             reach = self.beam_radius + margin_px / float(self.matrix[0, 0])
             inside &= np.hypot(flat[:, 0], flat[:, 1]) <= reach
         return inside
-
-    def panel_coordinates(self, pixels: Array) -> Array:
-        """Return panel coordinates (n, 2) of pixels (n, 2)."""
-        return (pixels - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
 
 
 @dataclass(frozen=True)
@@ -238,9 +224,9 @@ def calibrate_camera(camera: PlannedCamera) -> CameraCalibration:
         camera.id,
         camera.world_from_device,
         device.camera_matrix,
-        device.distortion,
         device.resolution,
-        camera.body,
+        device.distortion,
+        body=camera.body,
     )
 
 
@@ -257,12 +243,11 @@ def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
         beam_radius, matrix = None, device.camera_matrix
     return ProjectorCalibration(
         projector.id,
-        LIGHTS[projector.light],
         projector.world_from_device,
-        projector.world_from_ring,
         matrix,
         device.resolution,
+        projector.world_from_ring,
         beam_radius,
         DrawnRings(LIGHTS[projector.light], projector.ring_radii),
-        projector.body,
+        body=projector.body,
     )

@@ -106,13 +106,7 @@ def test_a_distorting_lens_moves_edges_and_is_undone(rigs):
     decoded = decode(frames, patterns, calibration)
     assert len(decoded.cloud) > 3000
     assert np.abs(decoded.cloud.points[:, 1]).max() < 3e-5
-    straight = type(calibration.camera)(
-        "C1",
-        calibration.camera.world_from_device,
-        calibration.camera.matrix,
-        (0.0,) * 5,
-        calibration.camera.resolution,
-    )
+    straight = replace(calibration.camera, distortion=(0.0,) * 5)
     wrong = decode(frames, patterns, PairCalibration(calibration.projector, straight))
     assert np.abs(wrong.cloud.points[:, 1]).max() > 1.5e-4
 

@@ -90,13 +90,13 @@ def rig(light: str) -> PairCalibration:
     matrix = np.array([[scale, 0, 499.5], [0, scale, 499.5], [0, 0, 1.0]])
     rings = DrawnRings(LIGHTS[light], RADII[light])
     projector = ProjectorCalibration(
-        "P1", rings.light, pose, pose, matrix, (1000, 1000), None, rings
+        "P1", pose, matrix, (1000, 1000), pose, None, rings
     )
     a = np.deg2rad(35.0)
     eye = np.array([np.sin(a), -np.cos(a) * 0.95, np.cos(a) * 0.3])
     lens = np.array([[3000.0, 0, 639.5], [0, 3000.0, 359.5], [0, 0, 1.0]])
     camera = CameraCalibration(
-        "C1", look_at(eye, np.zeros(3), UP), lens, (0.0,) * 5, (1280, 720)
+        "C1", look_at(eye, np.zeros(3), UP), lens, (1280, 720), (0.0,) * 5
     )
     return PairCalibration(projector, camera)
 

@@ -29,9 +29,7 @@ def random_pose(rng: np.random.Generator, reach: float) -> np.ndarray:
 
 def projector_of(light: str, world_from_ring: np.ndarray) -> ProjectorCalibration:
     frame, none = world_from_ring, DrawnRings(LIGHTS[light], np.zeros(0))
-    return ProjectorCalibration(
-        "P1", none.light, frame, frame, np.eye(3), (9, 9), None, none
-    )
+    return ProjectorCalibration("P1", frame, np.eye(3), (9, 9), frame, None, none)
 
 
 def scene(rng: np.random.Generator, light: str, n: int):
@@ -150,7 +148,7 @@ def test_no_point_lies_behind_the_camera_or_on_the_mirrored_cone():
 def test_root_disc_is_a_distance_in_the_ring_plane():
     """One step of the returned length towards the border ends on it."""
     rng = np.random.default_rng(1)
-    camera = CameraCalibration("C1", np.eye(4), np.eye(3), (0.0,) * 5, (10, 10))
+    camera = CameraCalibration("C1", np.eye(4), np.eye(3), (10, 10), (0.0,) * 5)
     for light in ("diverging", "parallel"):
         projector = projector_of(light, random_pose(rng, 1.0))
         patterns = projector.pattern_for(camera)

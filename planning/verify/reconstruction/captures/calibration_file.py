@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
+from scipy.spatial.transform import Rotation
 
 from planning.model.errors import CalibrationError
 from planning.model.table_types import (
@@ -23,6 +24,7 @@ from planning.model.table_types import (
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
+    DeviceCalibration,
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.scanner import Scanner
@@ -138,9 +140,7 @@ def _projector(
     return replace(projector, world_from_device=pose, world_from_ring=pose @ ring)
 
 
-def _measured_pose(
-    device: _Device, planned: CameraCalibration | ProjectorCalibration, plan: Scanner
-) -> Array:
+def _measured_pose(device: _Device, planned: DeviceCalibration, plan: Scanner) -> Array:
     """Return where a device was measured; where it should stand if it wasn't."""
     if device.world_from_device is None:
         return planned.world_from_device
@@ -154,7 +154,7 @@ def _measured_pose(
             f"with the device as it stands"
         )
     turn = measured[:3, :3].T @ planned.world_from_device[:3, :3]
-    angle = float(np.arccos(np.clip(0.5 * (np.trace(turn) - 1.0), -1.0, 1.0)))
+    angle = float(Rotation.from_matrix(turn).magnitude())
     if not angle <= _MOST_TURNED:
         raise ValueError(
             f"is turned by {np.degrees(angle):.1f} degrees from the plan, at most "

@@ -4,10 +4,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planning.verify.reconstruction.arrays import Array
-from planning.verify.reconstruction.calibration import ProjectorCalibration
+from planning.verify.reconstruction.calibration import (
+    DeviceCalibration,
+    ProjectorCalibration,
+)
 from planning.verify.reconstruction.scanner import Scanner
 
-from .corrections import Device
 from .diagnosis import Cause, Explanation
 from .supposed import GRAZING
 
@@ -68,7 +70,7 @@ def _object_looks(explanation: Explanation) -> str:
     return f"the object looks {', '.join(words)} against the mesh"
 
 
-def _displaced(before: Device, after: Device, away: float) -> str:
+def _displaced(before: DeviceCalibration, after: DeviceCalibration, away: float) -> str:
     poses = before.world_from_device, after.world_from_device
     moved, angle = float(np.linalg.norm(after.centre - before.centre)), _angle(*poses)
     words: list[str] = []
@@ -114,7 +116,7 @@ def _grazing(
     )
 
 
-def _too_wide(name: str, after: Device, plan: Scanner) -> str:
+def _too_wide(name: str, after: DeviceCalibration, plan: Scanner) -> str:
     """Name a baseline of the plan that exceeds its limit with the camera so placed."""
     centres = {camera.id: camera.centre for camera in plan.cameras}
     for limit in plan.baselines:

@@ -10,14 +10,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planning.verify.reconstruction.arrays import Array, Mask
-from planning.verify.reconstruction.calibration import (
-    CameraCalibration,
-    ProjectorCalibration,
-)
+from planning.verify.reconstruction.calibration import DeviceCalibration
 
 from .supposed import Evidence, Object, Role, Supposed
 
-Device = CameraCalibration | ProjectorCalibration
 Move = Literal["swap", "afar", "turn", "shift", "zoom"]
 _N_PARAMETERS: dict[Move, int] = {
     "swap": 0,
@@ -65,7 +61,7 @@ class Correction:
         body = supposed.objects[0]
         size = reach = body.mesh.radius
         if role != "objects":
-            device: Device = getattr(supposed, role)[index]
+            device: DeviceCalibration = getattr(supposed, role)[index]
             reach = float(np.linalg.norm(device.centre - body.centre))
         return cls(role, (index,), moves, reach, size, pose)
 
@@ -93,7 +89,9 @@ class Correction:
             devices[first] = self._changed(devices[first], x)
         return replace(supposed, **{self.role: tuple(devices)})
 
-    def _changed(self, device: Device | Object, x: Array) -> Device | Object:
+    def _changed(
+        self, device: DeviceCalibration | Object, x: Array
+    ) -> DeviceCalibration | Object:
         ends = np.cumsum([_N_PARAMETERS[move] for move in self.moves])
         steps = dict(zip(self.moves, np.split(x, ends[:-1]), strict=True))
         begin = device.world_from_device if self.pose is None else self.pose

@@ -11,8 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.calibration import DeviceCalibration
 
-from .corrections import Correction, Device, Move, far_poses, turns_aside
+from .corrections import Correction, Move, far_poses, turns_aside
 from .fits import fit
 from .supposed import Evidence, Places, Role, Supposed, mismatches, places
 
@@ -131,7 +132,7 @@ class State:
         changes = [
             Correction.of(self.supposed, role, index, moves) for moves in _DEVICE_MOVES
         ]
-        device: Device = getattr(self.supposed, role)[index]
+        device: DeviceCalibration = getattr(self.supposed, role)[index]
         aside = turns_aside(device.world_from_device)
         turn = aside[self._nearest([changes[1]] * len(aside), aside)[0]]
         starts = (None, turn, None, np.append(turn, np.zeros(3)))
@@ -139,7 +140,7 @@ class State:
 
     def _afar(self, role: Role, index: int) -> "Explanation":
         """Fit a device's pose from all about the object."""
-        device: Device = getattr(self.supposed, role)[index]
+        device: DeviceCalibration = getattr(self.supposed, role)[index]
         moves: tuple[Move, ...] = ("afar", "turn", "shift")
         changes = [
             Correction.of(self.supposed, role, index, moves, pose)

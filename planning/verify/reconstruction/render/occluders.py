@@ -12,10 +12,7 @@ import numpy as np
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 from planning.verify.reconstruction.arrays import Array, Mask
-from planning.verify.reconstruction.calibration import (
-    CameraCalibration,
-    ProjectorCalibration,
-)
+from planning.verify.reconstruction.calibration import DeviceCalibration
 from planning.verify.reconstruction.scanner import Scanner
 
 # Six quads of a box whose corner i has the signs of the bits of i.
@@ -62,7 +59,7 @@ def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
     return RayCaster(TriangleMesh.joined(parts), threads=1) if parts else None
 
 
-def _corners(device: ProjectorCalibration | CameraCalibration) -> Array:
+def _corners(device: DeviceCalibration) -> Array:
     """Corners of a device's body in the world, shape (8, 3); it has one."""
     assert device.body is not None
     signs = np.array([[2 * (i >> k & 1) - 1 for k in range(3)] for i in range(8)])

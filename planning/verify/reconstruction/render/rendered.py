@@ -48,7 +48,7 @@ class RenderedScene:
         self.lenses = [
             photometry.through_lens(
                 truth.camera_focus,
-                float((middle - camera.centre) @ camera.world_from_device[:3, 2]),
+                float((middle - camera.centre) @ camera.axis),
                 camera.focal_px,
             )
             for camera in plan.cameras

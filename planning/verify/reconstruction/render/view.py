@@ -140,7 +140,7 @@ def _cast(
         along = camera.rays(pixels[part])
         blind = ~np.isfinite(along[:, 0])
         if blind.any():
-            along[blind] = -camera.world_from_device[:3, 2]
+            along[blind] = -camera.axis
         faces[part], distances[part] = caster.first_hits(camera.centre, along)
         faces[part][blind] = -1
         rays[part] = along
