@@ -158,13 +158,9 @@ def judged_labels(scanner: Scanner, shots: Sequence[Shot]) -> LabelCount:
 def true_labels(
     pixels: Array, pair: PairCalibration, caster: RayCaster, width: float
 ) -> tuple[Indices, NDArray[np.int8]]:
-    """Return the ring and root that really are at pixels; ring -1: none is.
+    """Return the ring and root that really are at pixels (n, 2); ring -1: none is.
 
-    Args:
-        pixels: In the camera's image, shape (n, 2).
-        pair: Calibration of both devices.
-        caster: Over the object.
-        width: Of a line; what lies farther than that from a ring isn't on it.
+    What lies farther from a ring than the width of a line isn't on it.
     """
     camera, projector = pair.camera, pair.projector
     rays = camera.rays(pixels)

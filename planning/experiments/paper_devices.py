@@ -54,9 +54,7 @@ FITTING = Optics(2800.0, (639.5, 359.5))
 def bearing(azimuth_deg: float, elevation_deg: float) -> Array:
     """Return the direction (3,) from the object to a device.
 
-    Args:
-        azimuth_deg: 0 before the object, on the side of -y; positive towards +x.
-        elevation_deg: Above the horizon.
+    Azimuth 0 is before the object, on the side of -y; positive is towards +x.
     """
     a, e = np.deg2rad([azimuth_deg, elevation_deg])
     return np.array([np.cos(e) * np.sin(a), -np.cos(e) * np.cos(a), np.sin(e)])
@@ -67,15 +65,12 @@ def placed_projector(
 ) -> ProjectorCalibration:
     """Return a projector whose rings are centred on a point of the object.
 
-    In parallel light its radii are those on the object; in diverging light those at
-    the standoff.
-
     Args:
         name: Its id.
         light: Kind of light.
         direction: From the target to the device, unit, shape (3,).
         target: Where the ring axis goes through [m], shape (3,).
-        radii_m: Radii of the rings [m], rising.
+        radii_m: Of the rings on the object or, in diverging light, at the standoff.
     """
     width, height = PROJECTOR_PX
     pose = look_at(target + STANDOFF_M * direction, target, UP)
@@ -93,13 +88,8 @@ def placed_camera(
 ) -> CameraCalibration:
     """Return a camera with the target in the middle of its image.
 
-    A principal point off the middle turns the optical axis past the target.
-
-    Args:
-        name: Its id.
-        optics: Its interior.
-        direction: From the target to the device, unit, shape (3,).
-        target: What the image's middle shows [m], shape (3,).
+    A principal point off the middle turns the optical axis past the target. Direction
+    from the target to the device, unit, (3,); target [m], (3,).
     """
     (width, height), (cx, cy), f = CAMERA_PX, optics.centre_px, optics.focal_px
     pose = look_at(target + STANDOFF_M * direction, target, UP)

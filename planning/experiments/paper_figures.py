@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from planning.verify.reconstruction.captures.captures import whole_image
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_lines
@@ -48,8 +49,7 @@ def camera_images(
     scene = RenderedScene(scanner, scanner, photometry)
     images: list[NDArray[np.uint8]] = []
     for c, camera in enumerate(scanner.cameras):
-        whole = np.zeros(CAMERA_PX[::-1], dtype=np.uint8)
-        seen = scene.seen(c)
+        grey, seen = np.zeros(CAMERA_PX[::-1]), scene.seen(c)
         if seen is not None:
             lines = [
                 drawn_lines(one, one.pattern_for(camera), scanner.mesh)[1]
@@ -58,10 +58,8 @@ def camera_images(
             shown = [scene.shown(p, drawn) for p, drawn in enumerate(lines)]
             every = [one for one in shown if one is not None]
             frames = render_lines(seen, every, photometry, (0, 9, c))
-            image = np.clip(np.rint(frames.stack[0]), 0, 255).astype(np.uint8)
-            left, top = frames.corner
-            whole[top : top + image.shape[0], left : left + image.shape[1]] = image
-        images.append(whole)
+            (grey,) = whole_image(frames, CAMERA_PX)
+        images.append(np.clip(np.rint(grey), 0, 255).astype(np.uint8))
     return tuple(images)
 
 
@@ -119,18 +117,13 @@ def draw_redundancy(outcome: Outcome, stage: PanelStage) -> Image.Image:
 
 
 def draw_errors(outcome: Outcome, stage: PanelStage) -> Image.Image:
-    """Return signed errors of one viewpoint and of the merged cloud, and their scale.
-
-    The ground truth that the authors did not have.
-    """
-
-    def panel(one: MeasuredErrors) -> Image.Image:
+    """Return signed errors of one viewpoint and of the merged cloud, and a scale."""
+    panels: list[Image.Image] = []
+    for one in (outcome.single, outcome.merged):
         p95 = one.errors.p95_m
         far = "no point" if p95 is None else f"95 % within {_MM * p95:.3f} mm"
         colours = signed_colours(_MM * one.distances, _ERROR_MM)
-        return stage.panel(f"{one.name}: {far}", one.cloud.points, colours)
-
-    panels = [panel(outcome.single), panel(outcome.merged)]
+        panels.append(stage.panel(f"{one.name}: {far}", one.cloud.points, colours))
     bar = colour_bar(2 * stage.width, _ERROR_MM)
     return side_by_side(panels, columns=2, foot=bar)
 

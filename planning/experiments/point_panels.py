@@ -1,6 +1,7 @@
 """Panels of points on the object, and colours that say what each point is."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,11 +50,6 @@ class PanelStage:
     Args:
         mesh: The object.
         size: Width and height of a panel, its heading aside, in [px].
-
-    Attributes:
-        caster: Over the object.
-        view: How the world falls into a panel, in fine pixels.
-        width: Of a panel [px].
     """
 
     def __init__(self, mesh: TriangleMesh, size: tuple[int, int] = (480, 480)) -> None:
@@ -71,14 +67,7 @@ class PanelStage:
     def panel(
         self, title: str, points: Array, colours: Array, legend: Legend = ()
     ) -> Image.Image:
-        """Return a panel of points on the object; those behind it are left out.
-
-        Args:
-            title: Written above.
-            points: In the world [m], shape (n, 3).
-            colours: Of each, 0 to 255, shape (n, 3).
-            legend: Written below, in one line.
-        """
+        """Return a panel of points (n, 3) of some colours, but for those behind it."""
         panel = Panel(self._object.copy(), self.view)
         picture = np.asarray(panel.image).copy()
         shown = np.flatnonzero(~self._hidden(points))
@@ -90,7 +79,6 @@ class PanelStage:
         return _framed(panel.image, title, legend)
 
     def _hidden(self, points: Array) -> Mask:
-        """Which points lie behind the object, (n,)."""
         if len(points) == 0:
             return np.zeros(0, dtype=bool)
         mesh = self.caster.mesh
@@ -114,16 +102,16 @@ def colour_bar(width: int, limit_mm: float) -> Image.Image:
     """Return a horizontal bar of `signed_colours` with its numbers, `width` px wide."""
     fine = (width * SUPERSAMPLING, 46 * SUPERSAMPLING)
     picture = Image.new("RGB", fine, BACKGROUND)
-    left, right = 0.25 * fine[0], 0.75 * fine[0]
-    ramp = signed_colours(np.linspace(-1.0, 1.0, round(right - left)), 1.0)
+    inner, outer = 0.25 * fine[0], 0.75 * fine[0]
+    ramp = signed_colours(np.linspace(-1.0, 1.0, round(outer - inner)), 1.0)
     bar = np.tile(ramp.astype(np.uint8), (12 * SUPERSAMPLING, 1, 1))
-    picture.paste(Image.fromarray(bar), (round(left), 6 * SUPERSAMPLING))
+    picture.paste(Image.fromarray(bar), (round(inner), 6 * SUPERSAMPLING))
     draw = ImageDraw.Draw(picture)
     for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
-        x = 0.5 * (left + right) + 0.5 * share * (right - left)
+        x = 0.5 * (inner + outer) + 0.5 * share * (outer - inner)
         text = f"{share * limit_mm:+g}" if share else "0 mm"
         draw.text((x, 22 * SUPERSAMPLING), text, INK, font=font(13.0), anchor="mt")
-    for x, text, anchor in ((left, "inside ", "rm"), (right, " outside", "lm")):
+    for x, text, anchor in ((inner, "inside ", "rm"), (outer, " outside", "lm")):
         draw.text((x, 12 * SUPERSAMPLING), text, PALE, font=font(13.0), anchor=anchor)
     return picture.resize((width, 46), Image.Resampling.BOX)
 
@@ -174,10 +162,8 @@ def _splat(picture: NDArray[np.uint8], pixels: Array, colours: Array) -> None:
     height, width = picture.shape[:2]
     middle = np.rint(pixels).astype(np.int64)
     reach = np.arange(-_RADIUS_PX, _RADIUS_PX + 1)
-    for dv in reach:
-        for du in reach:
-            if du * du + dv * dv > _RADIUS_PX * _RADIUS_PX:
-                continue
+    for dv, du in product(reach, reach):
+        if du * du + dv * dv <= _RADIUS_PX * _RADIUS_PX:
             u, v = middle[:, 0] + du, middle[:, 1] + dv
             inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
             picture[v[inside], u[inside]] = colours[inside].astype(np.uint8)

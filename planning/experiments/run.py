@@ -86,14 +86,8 @@ def run_experiment(
 ) -> Outcome:
     """Render, decode, triangulate and merge an experiment, and hold it to the truth.
 
-    Args:
-        experiment: What to run.
-        photometry: Light and sensor; no ambient light by default, as in the paper.
-        seed: Of the pixel noise and the samples.
-        threads: Worker threads; the result doesn't depend on them.
-        prior: What is known of the object: rings are then labelled by it, in a single
-            image of each camera under each projector; None: by a coded sequence.
-        progress: Called with the pairs done and their total.
+    With a prior, what is known of the object, rings are labelled by it in a single
+    image of each camera under each projector; without one, by a coded sequence.
     """
     scanner, labels = experiment.scanner, None
     if prior is None:

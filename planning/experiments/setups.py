@@ -89,10 +89,10 @@ def paper_experiment(
     distortion: float = 0.0,
     radii_m: Array | None = None,
 ) -> Experiment:
-    """Return the box, an edge towards the rig, or the head, and the paper's devices.
+    """Return the `box`, an edge towards the rig, or the `face`, and the devices.
 
     Args:
-        name: `box` or `face`.
+        name: Of the object.
         light: `parallel`, as the paper assumes, or `diverging`.
         variant: Focal length and image centre.
         distortion: k1 of the cameras' lenses; the decoder knows it.

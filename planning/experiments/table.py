@@ -1,6 +1,7 @@
 """What an experiment gave, as lines to read and as plain values."""
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -84,12 +85,7 @@ def label_line(labels: LabelCount) -> str:
 
 
 def outcome_lines(outcome: Outcome, both: MeasuredErrors | None = None) -> list[str]:
-    """Return everything that there is to read of an experiment.
-
-    Args:
-        outcome: What the first sequence gave.
-        both: What it gave with a second one; None: there was none.
-    """
+    """Return all that there is to read; `both`: with a second sequence, if any."""
     return [
         *setup_lines(outcome.experiment),
         f"{100 * outcome.visible:.1f} % of the surface is inside the outermost ring, "
@@ -161,7 +157,6 @@ def _device_document(
 
 
 def _cloud_document(one: MeasuredErrors) -> dict[str, Any]:
-    """Errors and completeness of a cloud, as plain values."""
     return {
         "name": one.name,
         "errors": vars(one.errors),
@@ -172,10 +167,9 @@ def _cloud_document(one: MeasuredErrors) -> dict[str, Any]:
 
 def _numbers(errors: Errors) -> str:
     """Columns: points, rms, p95, bias in mm, share of outliers, rms of the rest."""
-    values = (errors.rms_m, errors.p95_m, errors.bias_m, errors.outliers, errors.rest_m)
-    if any(value is None for value in values):
-        return f"{errors.n:8d}" + f"{'-':>8s}{'-':>8s}{'-':>9s}{'-':>9s}{'-':>10s}"
-    rms, p95, bias, outliers, rest = (float(value or 0.0) for value in values)
+    if errors.n == 0:
+        return f"{errors.n:8d}{'-':>8s}{'-':>8s}{'-':>9s}{'-':>9s}{'-':>10s}"
+    rms, p95, bias, outliers, rest = (value or 0.0 for value in astuple(errors)[1:])
     return (
         f"{errors.n:8d}{_MM * rms:8.3f}{_MM * p95:8.3f}{_MM * bias:+9.4f}"
         f"{100 * outliers:8.2f}%{_MM * rest:10.3f}"

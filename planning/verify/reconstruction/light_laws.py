@@ -40,15 +40,10 @@ class LightLaw:
     def aim(
         self, pose: Array, points: Array, depth: Array
     ) -> tuple[Array, Array, Array]:
-        """Return where the light of world points starts, its directions and lengths.
+        """Return where the light of world points (n, 3) starts, and how it runs.
 
-        Args:
-            pose: Of the device [m], shape (4, 4).
-            points: In the world [m], shape (n, 3).
-            depth: z of the points before the device [m], shape (n,).
-
-        Returns:
-            Origins [m], (3,) or (n, 3); unit directions (n, 3); lengths [m] (n,).
+        Origins [m], (3,) or (n, 3); unit directions (n, 3); lengths [m] (n,), all of
+        points at depths z [m] (n,) before the device.
         """
         beams = np.broadcast_to(pose[:3, 2], points.shape)
         return points - depth[:, None] * beams, beams, depth
@@ -65,7 +60,7 @@ class LightLaw:
         """Return the slope of ring surfaces against their axis: 0, or R, shape (n,)."""
         return np.zeros_like(rho)
 
-    def across_m(self, step: Array | float, rho: Array, depth: Array) -> Array | float:
+    def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
         """Return steps of |p| at rho and depth z as lengths across the beam [m].
 
         In diverging light a step is ``z / sqrt(1 + rho^2)`` times as long.
@@ -91,9 +86,7 @@ class LightLaw:
     def ring_normals(self, outward: Array, rho: Array) -> Array:
         """Return unit normals (n, 3) of ring surfaces in the ring frame.
 
-        Args:
-            outward: Unit directions away from the axis, shape (n, 2).
-            rho: |p| of the ring, shape (n,).
+        At |p| = rho (n,), in unit directions (n, 2) away from the axis.
         """
         tilt = self.tilt(rho)
         slope = np.sqrt(1.0 + tilt * tilt)[:, None]
@@ -135,7 +128,7 @@ class _Diverging(LightLaw):
     def tilt(self, rho: Array) -> Array:
         return rho
 
-    def across_m(self, step: Array | float, rho: Array, depth: Array) -> Array | float:
+    def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
         return step * depth / np.sqrt(1.0 + rho * rho)
 
     def quadric(self, radii: Array) -> tuple[Array | float, Array | float]:

@@ -36,14 +36,8 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
     """Write `patterns/` into a plan's folder: PNG images and `sequence.json`.
 
     No file is moved into place before all are complete, and the manifest is the last.
-    Files that an earlier manifest lists and this one doesn't are removed.
-
-    Args:
-        scanner: Devices as planned.
-        folder: The plan's folder.
-
-    Returns:
-        The folder of the patterns.
+    Files that an earlier manifest lists and this one doesn't are removed. Returns the
+    folder of the patterns.
 
     Raises:
         OSError: If it can't be written.
@@ -99,11 +93,9 @@ def _listed(place: Path) -> set[Path]:
         if manifest["format"] != _SECTION:
             return set()
         names = [
-            name
+            frame["png"]
             for projector in manifest["projectors"]
             for frame in projector["frames"]
-            # Earlier versions wrote each frame as SVG, too.
-            for name in (frame["png"], frame.get("svg"))
         ]
     except (OSError, ValueError, KeyError, TypeError):
         return set()

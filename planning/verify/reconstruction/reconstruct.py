@@ -87,9 +87,9 @@ def conclude(
 
     Args:
         plan: As in `reconstruct`.
-        decoded: Projector, camera and what they gave, of every pair.
+        decoded: What every pair gave.
         seed: Of the samples, where none are given.
-        expected: Likewise.
+        expected: As in `reconstruct`.
         photometry: Of the simulation; None: the images were taken.
         spent: Processor time so far; that of `merge` is added.
     """
@@ -99,8 +99,7 @@ def conclude(
         expected = Expected(fresh)
     expected = expected.within(plan.target)
     spent = spent or Spent()
-    parts = [pair.cloud.of_devices(p, c) for (p, c), pair in decoded]
-    everything = Cloud.join(parts)
+    everything = Cloud.join([pair.cloud.of_devices(p, c) for (p, c), pair in decoded])
     gap_m, pitch_px = _ring_gap(plan, everything)
     with spent.on("merge"):
         merged = merge(everything, gap_m=gap_m, pitch_px=pitch_px)

@@ -43,23 +43,15 @@ class Defocus:
         """Return the standard deviation of the blur at the object [m], any shape.
 
         By similar triangles a point of the plane in focus is a disc of diameter c at
-        depth z, whose standard deviation along any line is c / 4::
+        depth z [m], whose standard deviation along any line is c / 4::
 
             c = A |z / z_0 - 1|
-
-        Args:
-            depth: z [m].
         """
         return 0.25 * self.aperture_m * np.abs(depth / self.focus_m - 1.0)
 
 
 def defocus_of(plan: RigPlan, role: str) -> Defocus | None:
-    """Return how a plan's device model is focused; None if that isn't known.
-
-    Args:
-        plan: With the published figures of its rig.
-        role: `projector` or `camera`.
-    """
+    """Return how a plan's `projector` or `camera` is focused; None: nobody says."""
     rig = plan.document.rig
     device = rig.projector if role == "projector" else rig.camera
     focus, pixel_um = device.figures.focus, device.figures.pixel_um

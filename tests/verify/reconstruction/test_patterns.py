@@ -210,7 +210,7 @@ def test_a_manifest_of_another_maker_removes_nothing(tmp_path):
     place.mkdir()
     victim = tmp_path / "victim.png"
     victim.write_text("kept")
-    frames = [{"png": "../victim.png", "svg": "/etc/none"}]
+    frames = [{"png": "../victim.png"}, {"png": "/etc/none"}]
     manifest = {"format": "ringrig-patterns", "projectors": [{"frames": frames}]}
     (place / "sequence.json").write_text(json.dumps(manifest))
     remove_patterns(tmp_path)

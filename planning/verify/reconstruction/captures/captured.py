@@ -148,12 +148,11 @@ class _Inspection:
         """Return what may be decoded of a pair's images; None: nothing."""
         try:
             names = self._plan.frame_names(*pair)
-            inspected = inspect(read(), self.patterns(pair), names)
+            frames, self._notes[pair] = inspect(read(), self.patterns(pair), names)
         except CapturesError as error:
             self._refused[pair] = error
             return None
-        self._notes[pair] = inspected.notes
-        return inspected.frames
+        return frames
 
     def require_some(self) -> None:
         """Refuse a folder of which no image is used.

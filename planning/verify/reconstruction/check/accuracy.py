@@ -9,14 +9,14 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.rays.proximity import closest_points
 from planning.model.requirements import CheckLimits
-from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.arrays import Array, Columns, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
 
 _MM = 1e3
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy:
+class Accuracy(Columns):
     """Signed distances of points from the mesh along its normals, outside positive.
 
     Attributes:
@@ -108,24 +108,16 @@ def nearest_distance(cloud: Cloud, samples: SurfaceSamples, reach_m: float) -> A
 
     A point counts if its viewing ray r meets the sample's normal with r.N < 0: on a
     thin shell points of the other side are near, too. Each camera's nearest point is
-    tried.
-
-    Args:
-        cloud: Measured points.
-        samples: Of the surface.
-        reach_m: Points farther away aren't looked for [m].
-
-    Returns:
-        In [m], inf where there is no such point within reach, shape (n_samples,).
+    tried. In [m], inf where there is no such point within reach, shape (n_samples,).
     """
     best = np.full(len(samples), np.inf)
     for camera in np.unique(cloud.camera):
-        own = cloud.camera == camera
-        distance, nearest = KDTree(cloud.points[own]).query(
+        seen = cloud.camera == camera
+        distance, nearest = KDTree(cloud.points[seen]).query(
             samples.points, distance_upper_bound=reach_m
         )
         # Where nothing is in reach the index is one past the last point.
-        rays = np.concatenate([cloud.rays[own], np.zeros((1, 3))])[nearest]
+        rays = np.concatenate([cloud.rays[seen], np.zeros((1, 3))])[nearest]
         facing = np.einsum("ij,ij->i", rays, samples.normals) < 0.0
         best = np.where(facing, np.minimum(best, distance), best)
     return best
@@ -139,8 +131,7 @@ def measure_completeness(
     Args:
         everything: All points.
         merged: Those that stay after redundancy is removed.
-        expected: Samples of the target, and which of them the plan claims measured;
-            without a claim, all are asked for.
+        expected: Of the target; without a claim, all samples are asked for.
         tau_m: One ring gap [m].
     """
     samples, predicted = expected.samples, expected.measured

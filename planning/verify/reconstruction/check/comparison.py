@@ -86,7 +86,7 @@ def compare(
     Args:
         prediction: Of the plan, over samples of the whole surface.
         everything: All points, before redundancy was removed.
-        accuracy: Of the merged cloud against the mesh.
+        accuracy: Of the merged cloud.
         face_region: Dominant region of each face, -1 for none, shape (n_faces,).
         tau_m: One ring gap [m].
     """
@@ -94,7 +94,7 @@ def compare(
     measured = distance <= tau_m
     everywhere = np.ones(len(measured), dtype=bool)
     by_limits, by_floors = (
-        (by_camera.any(axis=0), prediction.widened(by_camera, tau_m))
+        (_by_any(by_camera), prediction.widened(by_camera, tau_m))
         for by_camera in (prediction.claimed, prediction.possible)
     )
 
@@ -107,9 +107,9 @@ def compare(
         )
         return ConfusionPair(limits=limits, floors=floors)
 
-    def share(area: Mask, faces: Mask, **id_of_region: int) -> SurfaceShare:
+    def share(area: Mask, faces: Mask, **region: int) -> SurfaceShare:
         shares = _shares(prediction, measured, area)
-        return SurfaceShare(**id_of_region, **shares, **_errors(accuracy, faces))
+        return SurfaceShare(**region, **shares, **_errors(accuracy, faces))
 
     dominant = face_region >= 0
     ids = [int(i) for i in np.unique(face_region[dominant])]
@@ -135,9 +135,9 @@ def confusion(
 
     Args:
         predicted: Samples predicted measurable, shape (n,).
-        near: Samples within tau of predicted ones, shape (n,).
-        measured: Samples within tau of a point, shape (n,).
-        weights: Area of each [m²], shape (n,).
+        near: Those within tau of such, (n,).
+        measured: Those within tau of a point, (n,).
+        weights: Area of each [m²], (n,).
     """
     total = float(weights.sum())
     far = ~predicted & ~near
@@ -166,12 +166,16 @@ def confusion(
     )
 
 
+def _by_any(by_camera: Mask) -> Mask:
+    return np.asarray(by_camera.any(axis=0))
+
+
 def _shares(
     prediction: PredictedSamples, measured: Mask, area: Mask
 ) -> dict[str, float | None]:
     """Shares of a part of the surface; None where nothing of it was sampled."""
     weights = prediction.weights[area]
-    claimed = prediction.claimed.any(axis=0)[area]
+    claimed = _by_any(prediction.claimed)[area]
 
     def share(of: Mask, among: Mask) -> float | None:
         total = float(weights[among].sum())
@@ -187,10 +191,8 @@ def _shares(
 
 def _errors(accuracy: Accuracy | None, faces: Mask) -> dict[str, Any]:
     """Errors of the points whose nearest face is one of these."""
-    nothing = {"n_points": 0, "rms_m": None, "p95_m": None, "bias_m": None}
-    if accuracy is None or not np.any(faces[accuracy.faces]):
-        return nothing
-    here = faces[accuracy.faces]
-    near = Accuracy(accuracy.distances[here], accuracy.faces[here])
-    values = int(here.sum()), near.rms_m, near.p95_m, near.bias_m
-    return dict(zip(nothing, values, strict=True))
+    near = None if accuracy is None else accuracy.take(faces[accuracy.faces])
+    if near is None or not len(near.distances):
+        return {"n_points": 0, "rms_m": None, "p95_m": None, "bias_m": None}
+    errors = {"rms_m": near.rms_m, "p95_m": near.p95_m, "bias_m": near.bias_m}
+    return {"n_points": len(near.distances), **errors}

@@ -31,15 +31,15 @@ _MOVED_SIGMAS = 8.0
 
 
 def broken_pixels(stack: Images, good: Mask, names: Sequence[str]) -> Mask:
-    """Pixels of which a frame and its inverse don't add up to white and black.
+    """Return pixels of which a frame and its inverse don't add up to white and black.
 
     Raises:
         CapturesError: If that is so in much of the image, or a frame is brighter or
             darker than the rest as a whole.
     """
-    rows, columns = np.nonzero(good)
-    pixels = stack[:, rows, columns].astype(np.float32)
-    white, black, pairs = pixels[0], pixels[1], pixels[2:].reshape(-1, 2, len(rows))
+    pixels = stack[:, good].astype(np.float32)
+    n = pixels.shape[1]
+    white, black, pairs = pixels[0], pixels[1], pixels[2:].reshape(-1, 2, n)
     sums = pairs.sum(axis=1)
     by_bits = np.median(sums, axis=0) - 2.0 * black
     contrast = np.maximum(np.maximum(white - black, by_bits), 1.0)
@@ -48,22 +48,19 @@ def broken_pixels(stack: Images, good: Mask, names: Sequence[str]) -> Mask:
     spreads = [float(np.median(np.abs(rest))) for rest in rests]
     spread = max(1.0, 1.4826 * float(np.median(spreads)))
     wrong = np.abs(rests) > _REST_SHARE * contrast + _REST_SIGMAS * spread
-    shares = wrong.mean(axis=1) if len(rows) else np.zeros(len(rests))
+    shares = wrong.mean(axis=1) if n else np.zeros(len(rests))
     if np.any(shares > _MOST_BROKEN):
         raise CapturesError(_which_broke(shares, names))
     _require_one_exposure(pairs, rests, white - black, names)
     broken = np.zeros(good.shape, dtype=bool)
-    broken[rows, columns] = wrong.any(axis=0)
-    _require_still(stack, good & ~broken, rests[:, ~broken[rows, columns]], names)
+    broken[good] = wrong.any(axis=0)
+    _require_still(stack, good & ~broken, rests[:, ~broken[good]], names)
     return broken
 
 
 def _require_linear(pairs: Grey, rests: Grey, contrast: Grey) -> None:
-    """Refuse grey levels that aren't in proportion to light, by half-bright pixels.
-
-    There a frame and its inverse together exceed white if dark tones were lifted, as
-    by a display's gamma; in most of the frames, unlike what befell a single one.
-    """
+    """Refuse grey levels that aren't in proportion to light, by half-bright pixels."""
+    # If dark tones were lifted, most frames and inverses together exceed white there.
     clear = contrast >= 0.5 * float(np.median(contrast))
     level = (pairs[:, 0, clear] - pairs[:, 1, clear]) / contrast[clear]
     share = rests[:, clear] / contrast[clear]
@@ -157,6 +154,6 @@ def _least_squares(terms: Array, rest: Grey) -> tuple[Array, Array]:
     """Return the factors of ``rest = -factors . terms``, and their deviations."""
     normal = np.linalg.pinv(terms @ terms.T, hermitian=True)
     factors = -normal @ (terms @ rest)
-    left = rest + factors @ terms
-    variance = float(left @ left) / max(1, len(rest) - len(terms))
+    residual = rest + factors @ terms
+    variance = float(residual @ residual) / max(1, len(rest) - len(terms))
     return factors, np.sqrt(variance * np.maximum(np.diag(normal), 0.0))

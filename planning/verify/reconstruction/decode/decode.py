@@ -94,14 +94,9 @@ def decode(
 ) -> Decoded:
     """Measure points from images, pattern definitions and calibration alone.
 
-    Args:
-        frames: Images of one camera under one projector.
-        patterns: What the projector drew.
-        calibration: Of both devices.
-        min_conditioning: Least |r.m|; below it a point is left out.
-        max_slant: Most that a ring may run along the viewing ray on one surface, as the
-            tangent of the incidence at the camera. Where one surface hides another,
-            false edges hang in the step between them; this finds them.
+    Left out are points of |r.m| below `min_conditioning`, and where a ring runs more
+    along the viewing ray than `max_slant`, the tangent of the incidence at the camera:
+    where one surface hides another, false edges hang in the step between them.
 
     Raises:
         ValueError: If the frames aren't as many as the patterns ask for.
@@ -142,15 +137,8 @@ def measure_edges(
 ) -> Decoded:
     """Measure the points of labelled edges, wherever the labels come from.
 
-    Args:
-        edges: With a ring and a root each.
-        patterns: Whose rings were drawn.
-        calibration: Of both devices.
-        lit_pixels: Pixels that the projector lights.
-        saturated: Pixels (u, v) that it saturates, shape (k, 2).
-        min_conditioning: As in `decode`.
-        max_slant: As in `decode`.
-        believed: Whether the labels can be; otherwise all are left out.
+    Unless the labels can be believed, all edges are left out. Saturated pixels are
+    (u, v), shape (k, 2); the rest is as in `decode`.
     """
     camera, projector = calibration.camera, calibration.projector
     rays = camera.rays(edges.pixels)
@@ -192,11 +180,8 @@ def _doubtful_root(
     patterns: RingsForCamera,
     calibration: PairCalibration,
 ) -> Mask:
-    """Edges of which both roots, or neither, lie on the side that the disc told.
-
-    The disc was drawn for the planned place of the camera. Where that isn't its
-    measured place, the sign of r.m and the side of the disc differ near its border.
-    """
+    """Edges of which both roots, or neither, lie on the side that the disc told."""
+    # Away from the place that the disc was drawn for, they differ near its border.
     camera, projector = calibration.camera, calibration.projector
     place = projector.to_ring(camera.centre[None])[0]
     if np.allclose(place, patterns.camera_in_ring, rtol=0.0, atol=1e-9):
@@ -214,10 +199,10 @@ def _doubtful_root(
 
 
 def _out_of_order(flips: Indices, named: Indices) -> bool:
-    """Whether some frame isn't the bit that it is taken for.
+    """Whether some frame isn't the bit that it is taken for, by changes of one bit.
 
-    In a Gray code any change of one bit alone between neighbouring annuli is a ring;
-    with bits exchanged, those of some frames lead to annuli far apart, or to none.
+    Between neighbouring annuli any is a ring; with bits exchanged, those of some frames
+    lead to annuli far apart, or to none.
     """
     least = max(_UNNAMED_LEAST, _UNNAMED_SHARE * int(flips.sum()))
     return bool(np.any((flips - named > least) & (named < _MIN_NAMED * flips)))

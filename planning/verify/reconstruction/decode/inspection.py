@@ -1,7 +1,6 @@
 """Whether images can be what they are taken for, from their pixels alone."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import binary_opening
@@ -28,24 +27,13 @@ _SURE = 0.25
 _MARGIN_PX = 4
 
 
-@dataclass(frozen=True, eq=False)
-class Inspected:
-    """Images that may be decoded.
-
-    Attributes:
-        frames: The lit part; pixels that can't be trusted are made dark.
-        notes: A clause for each reason for which pixels were left out.
-    """
-
-    frames: Frames
-    notes: tuple[str, ...]
-
-
 class DarkError(CapturesError):
     """White is no brighter than black; whether light should be there, others know."""
 
 
-def inspect(stack: Images, patterns: RingsForCamera, names: Sequence[str]) -> Inspected:
+def inspect(
+    stack: Images, patterns: RingsForCamera, names: Sequence[str]
+) -> tuple[Frames, tuple[str, ...]]:
     """Hold the images of a camera under a projector against each other.
 
     Args:
@@ -54,40 +42,41 @@ def inspect(stack: Images, patterns: RingsForCamera, names: Sequence[str]) -> In
         patterns: What the projector drew.
         names: Of the frames.
 
+    Returns:
+        The lit part, where pixels that can't be trusted are dark; and a clause for each
+        reason for which pixels were left out.
+
     Raises:
         CapturesError: If the images contradict each other or the patterns.
         DarkError: If there is no light.
     """
-    part, corner = _lit_part(stack)
-    lit = _lit(part)
-    clipped = _clipped(part, lit, names)
+    window, corner = _lit_part(stack)
+    lit = _lit(window)
+    clipped = _clipped(window, lit, names)
     notes: list[str] = []
     share = _share(clipped, lit)
     if share > _WORTH_A_WORD:
         notes.append(f"{share:.1%} of the lit pixels are clipped and left out")
-    _require_different(part, names)
+    _require_different(window, names)
     good = lit & ~clipped
-    broken = broken_pixels(part, good, names)
-    _require_codes(part, good & ~broken, patterns)
+    broken = broken_pixels(window, good, names)
+    _require_codes(window, good & ~broken, patterns)
     share = _share(broken, good)
     if share > _WORTH_A_WORD:
         notes.append(
             f"{share:.1%} of the lit pixels are left out: frames and inverses there "
             f"don't add up to white and black"
         )
-    frames = part.copy()
+    frames = window.copy()
     # Without contrast nothing is decoded; what is clipped stays so for all to see.
     frames[:, broken] = 0
     frames[:, clipped] = 255
-    return Inspected(Frames(frames, corner), tuple(notes))
+    return Frames(frames, corner), tuple(notes)
 
 
 def _lit(stack: Images) -> Mask:
-    """Pixels that get light: in white, or in the first bits and their inverses.
-
-    Two of them, so that a single damaged frame lights nothing; what is isolated is
-    noise.
-    """
+    """Pixels that get light: in white, or in the first bits and their inverses."""
+    # Two bits: a single damaged frame lights nothing. What is isolated is noise.
     black = stack[1].astype(np.float32)
     sums = [np.add(stack[k], stack[k + 1], dtype=np.float32) for k in (2, 4)]
     by_bits = np.minimum(*sums) - 2.0 * black >= _LIT_BY_BITS
@@ -99,17 +88,12 @@ def _contrast(stack: Images) -> Grey:
     return np.subtract(stack[0], stack[1], dtype=np.float32)
 
 
-def _share(part: Mask, whole: Mask) -> float:
-    return float(np.count_nonzero(part & whole) / max(1, np.count_nonzero(whole)))
+def _share(some: Mask, whole: Mask) -> float:
+    return float(np.count_nonzero(some & whole) / max(1, np.count_nonzero(whole)))
 
 
 def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
-    """Return the part of the images that holds all lit pixels, and its corner (u, v).
-
-    Raises:
-        CapturesError: If white is darker than black.
-        DarkError: If there is no light.
-    """
+    """Return the part of the images that holds all lit pixels, and its corner."""
     contrast, lit = _contrast(stack), _lit(stack)
     n_lit = int(np.count_nonzero(contrast >= MIN_CONTRAST))
     n_below = int(np.count_nonzero(contrast <= -MIN_CONTRAST))
@@ -132,11 +116,7 @@ def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
 
 
 def _clipped(stack: Images, lit: Mask, names: Sequence[str]) -> Mask:
-    """Pixels in which any frame reaches what the sensor can tell apart at most.
-
-    Raises:
-        CapturesError: If most of the lit ones are.
-    """
+    """Pixels in which any frame reaches what the sensor can tell apart at most."""
     level = min(_CLIPPED, _piled_level(stack[0]))
     clipped = stack.max(axis=0) >= level
     share = _share(clipped, lit)
@@ -156,10 +136,7 @@ def _clipped(stack: Images, lit: Mask, names: Sequence[str]) -> Mask:
 
 
 def _piled_level(white: Images) -> float:
-    """Return the brightest level if pixels pile up there, inf if they don't.
-
-    A sensor may be full before its numbers are.
-    """
+    """Brightest level if pixels pile up there: sensors may be full before numbers."""
     levels, counts = np.unique(white, return_counts=True)
     if len(levels) < 2 or counts[-1] < _PILED or counts[-1] < _PILE * counts[-2]:
         return float("inf")

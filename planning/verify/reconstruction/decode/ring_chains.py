@@ -21,40 +21,35 @@ _RING_APART_PX = 1000.0
 def chains(
     edges: ImageEdges, hits: RingHits, focal_px: float, max_slant: float
 ) -> tuple[Indices, Array]:
-    """Return how far edges go on as a surface, along their rings and from ring to ring.
+    """Return how many edges go on along the ring of each, and the slant across, (n,).
 
     Slant is the change of distance between edges in units of a pixel's width there:
-    the tangent of the incidence in one direction.
-
-    Returns:
-        Edges in the unbroken chain of each, links steeper than `max_slant` left out;
-        and the slant towards the next rings, the lesser of both sides, NaN where
-        neither is near. Both (n,).
+    the tangent of the incidence in one direction. Chains break at links steeper than
+    `max_slant`; across, it is the lesser towards the next rings, NaN without any near.
     """
     length = np.zeros(len(edges), dtype=np.int64)
     across = np.full(len(edges), np.nan)
-    rows = np.flatnonzero(np.isfinite(hits.distances))
-    if len(rows) == 0:
+    met = np.flatnonzero(np.isfinite(hits.distances))
+    if len(met) == 0:
         return length, across
-    t = hits.distances[rows]
-    place = np.column_stack([edges.pixels[rows], _RING_APART_PX * edges.rings[rows]])
+    t = hits.distances[met]
+    place = np.column_stack([edges.pixels[met], _RING_APART_PX * edges.rings[met]])
     tree = KDTree(place)
     one, other = tree.query_pairs(_NEAR_PX, output_type="ndarray").T
     run = np.linalg.norm(place[one] - place[other], axis=1) * (t[one] / focal_px)
     linked = np.abs(t[one] - t[other]) <= max_slant * run
     ends = one[linked], other[linked]
-    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(rows), len(rows)))
+    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(met), len(met)))
     _, chain = connected_components(links, directed=False)
-    length[rows] = np.bincount(chain)[chain]
+    length[met] = np.bincount(chain)[chain]
 
     def towards(ring: int) -> Array:
-        near = place + np.array([0.0, 0.0, ring * _RING_APART_PX])
-        apart, nearest = tree.query(near, distance_upper_bound=_NEXT_RING_PX)
-        found = (nearest < len(rows)) & (apart > 0.5)
-        steps = np.abs(t[np.where(found, nearest, 0)] - t)
-        return np.where(
-            found, steps * focal_px / (np.where(found, apart, 1.0) * t), np.nan
-        )
+        shifted = place + np.array([0.0, 0.0, ring * _RING_APART_PX])
+        apart, nearest = tree.query(shifted, distance_upper_bound=_NEXT_RING_PX)
+        near = (nearest < len(met)) & (apart > 0.5)
+        steps = np.abs(t[np.where(near, nearest, 0)] - t)
+        slant = steps * focal_px / (np.where(near, apart, 1.0) * t)
+        return np.where(near, slant, np.nan)
 
-    across[rows] = np.fmin(towards(1), towards(-1))
+    across[met] = np.fmin(towards(1), towards(-1))
     return length, across

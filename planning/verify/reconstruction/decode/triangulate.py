@@ -44,16 +44,15 @@ def intersect_rings(
     with k = 0, c = R^2 for the cylinder and k = R^2, c = 0 for the cone. Of the two
     forms of t the one that doesn't subtract nearly equal numbers is used.
 
+    All is NaN where a ray misses, and where the point lies behind the camera or, for a
+    cone, behind the projector.
+
     Args:
         origin: Optical centre in the world [m], shape (3,).
         rays: Unit directions in the world, shape (n, 3).
         radii: R of each ray's ring: [m], or a tangent in diverging light, shape (n,).
         roots: Sign of r.m for each ray, shape (n,).
-        projector: Calibration that holds the ring frame.
-
-    Returns:
-        Points and conditioning; NaN where a ray misses, where the point lies behind
-        the camera or, for a cone, behind the projector.
+        projector: Whose rings they are.
     """
     o = projector.to_ring(origin[None])[0]
     q = rays @ projector.world_from_ring[:3, :3]

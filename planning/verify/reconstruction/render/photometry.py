@@ -46,15 +46,10 @@ class Photometry:
     def through_lens(
         self, defocus: Defocus | None, away_m: float, focal_px: float
     ) -> "Photometry":
-        """Return light as a camera records it whose object is so far away.
+        """Return light as a camera records it whose object's middle is so far away.
 
-        One blur for the whole image, that of the object's middle: across 200 mm of
-        depth it changes by less than the lens's own.
-
-        Args:
-            defocus: Of the camera.
-            away_m: Depth of the object's middle [m].
-            focal_px: Focal length [px].
+        One blur for the whole image: across 200 mm of depth it changes by less than
+        the lens's own.
         """
         if defocus is None or not away_m > 0.0:
             return self
@@ -76,12 +71,7 @@ class Photometry:
         return 1.0 + np.float32(self.albedo_variation / 3.0) * waves
 
     def blur(self, image: Grey, fold: int = 1) -> Grey:
-        """Return an image under the lens's point spread, a separable Gaussian.
-
-        Args:
-            image: Shape (fold h, fold w).
-            fold: Cells along a pixel.
-        """
+        """Return an image of `fold` cells a pixel under the lens's Gaussian."""
         if self.camera_blur_px == 0.0:
             return image
         blur = fold * self.camera_blur_px

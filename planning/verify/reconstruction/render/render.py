@@ -23,19 +23,17 @@ class ImageCanvas:
     Without its light a frame and its inverse are alike, so nothing is decoded there.
 
     Attributes:
+        seen: The view.
         corner: Pixel (u, v) of the top-left pixel.
         shape: Rows and columns, in pixels.
-        fold: Cells along a pixel.
         cells: Flat index of each sample's cell, senseless outside, shape (n,).
-        weights: Share of the cell that each sample stands for, shape (n,).
         inside: Samples inside.
     """
 
+    seen: RenderedView
     corner: tuple[int, int]
     shape: tuple[int, int]
-    fold: int
     cells: Indices
-    weights: Grey
     inside: Indices
 
     @classmethod
@@ -52,21 +50,21 @@ class ImageCanvas:
             right = min(columns, int(u[lit].max()) + 1 + _MARGIN_PX)
         inside = (v >= top) & (v < bottom) & (u >= left) & (u < right)
         return cls(
+            seen,
             (seen.corner[0] + left, seen.corner[1] + top),
             (bottom - top, right - left),
-            fold,
             (y - fold * top) * (fold * (right - left)) + (x - fold * left),
-            seen.weights,
             np.flatnonzero(inside),
         )
 
     def image(self, values: Grey, samples: Indices, lens: Photometry) -> Grey:
         """Return the image (h, w) that samples of these values make behind a lens."""
-        rows, columns = (self.fold * side for side in self.shape)
-        weighted = self.weights[samples] * values
+        fold = self.seen.fold
+        rows, columns = (fold * side for side in self.shape)
+        weighted = self.seen.weights[samples] * values
         summed = np.bincount(self.cells[samples], weighted, rows * columns)
         cells = summed.astype(np.float32).reshape(rows, columns)
-        return _binned(lens.blur(cells, self.fold), self.fold)
+        return _binned(lens.blur(cells, fold), fold)
 
 
 def render_pair(
@@ -78,14 +76,9 @@ def render_pair(
 ) -> Frames:
     """Return the frames of one camera under one projector.
 
-    Args:
-        seen: What the camera sees.
-        shown: The projector.
-        photometry: Light and sensor.
-        seed: Of the noise of this pair.
-        beside: Other projectors that are on at the same time, in step: white with
-            white, each bit and each camera's disc with its like; their light adds up.
-            The exposure is that of the one projector.
+    The light of others that are on at the same time (`beside`) adds up, in step: white
+    with white, each bit and each camera's disc with its like. The exposure is that of
+    the one projector.
     """
     patterns = shown.patterns
     every = [
@@ -137,16 +130,7 @@ def render_lines(
     photometry: Photometry,
     seed: tuple[int, ...],
 ) -> Frames:
-    """Return one image of bright rings, under projectors that shine at once.
-
-    Where the light of several falls on a surface, it adds up.
-
-    Args:
-        seen: What the camera sees.
-        shown: The projectors; the odd annuli of their patterns are bright.
-        photometry: Light and sensor.
-        seed: Of the noise.
-    """
+    """Return one image under projectors that shine at once, odd annuli bright."""
     everything = np.arange(len(seen.cells))
     canvas = ImageCanvas.about(seen, everything)
     around = seen.albedo * np.float32(photometry.ambient)
@@ -163,7 +147,7 @@ def render_lines(
 
 
 def _level(bright: Grey, light: RenderedLight) -> Grey:
-    """Blurred brightness of a bit's frame at each lit sample."""
+    """Blurred brightness at each lit sample, by that of the annuli."""
     inwards = np.concatenate([bright[:1], bright[:-1]]) - bright
     outwards = np.concatenate([bright[1:], bright[-1:]]) - bright
     k = light.annulus
@@ -172,7 +156,7 @@ def _level(bright: Grey, light: RenderedLight) -> Grey:
 
 
 def _binned(cells: Grey, fold: int) -> Grey:
-    """Return the mean of the cells of each pixel."""
+    """Mean of the cells of each pixel."""
     if fold == 1:
         return cells
     total = np.zeros((len(cells) // fold, cells.shape[1] // fold), dtype=np.float32)

@@ -56,12 +56,7 @@ class Shown:
     defocus: Defocus | None = None
 
     def light(self, seen: RenderedView, in_focus_m: float) -> RenderedLight:
-        """Return its light on the samples of a view.
-
-        Args:
-            seen: What the camera sees.
-            in_focus_m: Blur of a drawn edge in focus, across the beam [m].
-        """
+        """Return its light on a view's samples, edges in focus blurred by so much."""
         pose = self.projector.world_from_device
         facing = self.projector.light.faces(pose, seen.points, seen.normals)
         samples = np.flatnonzero(facing)
@@ -80,10 +75,7 @@ class Shown:
     def _light_on(
         self, seen: RenderedView, samples: Indices, in_focus_m: float
     ) -> tuple[RenderedLight, Array]:
-        """Light on those of some samples that it reaches, and their depths.
-
-        How it falls off with depth is left to the caller.
-        """
+        """Light on those of some samples that it reaches, before falloff; depths."""
         law, patterns = self.projector.light, self.patterns
         lit, cosine, pixels, depth = self._reached(seen, samples)
         rays, normals = seen.rays[lit], seen.normals[lit]
@@ -100,7 +92,7 @@ class Shown:
         if self.defocus is not None:
             square = square + self.defocus.blur_m(depth) ** 2
         blur = np.sqrt(square + pixel**2 * np.maximum(stretch, 0.0))
-        spread = blur / law.across_m(1.0, rho, depth)
+        spread = blur / law.across_m(np.ones_like(rho), rho, depth)
         annulus, inner, outer, drawn = patterns.blurred(rho, spread)
         light = RenderedLight(
             lit,

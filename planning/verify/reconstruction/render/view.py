@@ -61,11 +61,11 @@ def view(
     """Cast a camera's pixels against the mesh; None if it sees nothing of it.
 
     Args:
-        camera: The camera that looks.
+        camera: That looks.
         mesh: What it looks at.
-        caster: Casts rays against the mesh.
+        caster: Over the mesh.
         photometry: Albedo of the mesh.
-        obstacles: Casts rays against what stands before it.
+        obstacles: Over what stands before it.
     """
     window = _window(camera, mesh)
     if window is None:
