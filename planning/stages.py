@@ -152,35 +152,19 @@ def one_device_more(
     if falls_short(
         areas.lit_m2, areas.reachable_by_projectors_m2, required.dominant_coverage
     ):
-        more = _one_projector_more(partial, required.max_projectors, clock)
-        if more is not None:
-            return more
+        stage = larger(partial.stage, partial.stage.projectors, required.max_projectors)
+        if stage is not None:
+            clock.say("  fresh samples fall short: one projector more")
+            stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
+            return placed(partial.ready, stage, clock)
     if falls_short(areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage):
-        return _one_camera_more(partial, required.max_cameras, clock)
+        views = larger(partial.camera_stage, partial.cameras, required.max_cameras)
+        if views is not None:
+            clock.say("  fresh samples fall short: one camera more")
+            cameras = views.by_count[views.certificate.count]
+            views = replace(views, cameras=cameras)
+            return replace(partial, camera_stage=views, cameras=cameras, rings=None)
     return None
-
-
-def _one_projector_more(
-    partial: PartialPlan, allowed: int, clock: Stopwatch
-) -> PartialPlan | None:
-    stage = larger(partial.stage, partial.stage.projectors, allowed)
-    if stage is None:
-        return None
-    clock.say("  fresh samples fall short: one projector more")
-    stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
-    return placed(partial.ready, stage, clock)
-
-
-def _one_camera_more(
-    partial: PartialPlan, allowed: int | None, clock: Stopwatch
-) -> PartialPlan | None:
-    stage = larger(partial.camera_stage, partial.cameras, allowed)
-    if stage is None:
-        return None
-    clock.say("  fresh samples fall short: one camera more")
-    cameras = stage.by_count[stage.certificate.count]
-    stage = replace(stage, cameras=cameras)
-    return replace(partial, camera_stage=stage, cameras=cameras, rings=None)
 
 
 def _bound_words(proof: Certificate) -> str:

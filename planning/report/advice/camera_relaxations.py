@@ -49,12 +49,6 @@ def out_of_reach(
 ) -> tuple[dict[str, float], tuple[Relaxation, ...]]:
     """Say why cameras reach too little of what is lit, and what would help.
 
-    Args:
-        scene: Surface and requirements.
-        rig: As written.
-        devices: The plan's and the reference sets.
-        claims: Made for these devices; the same samples are looked at.
-
     Returns:
         The area by the limit at which samples come furthest [m²]; and relaxations with
         their share of what is lit, least gain first.
@@ -95,13 +89,7 @@ def out_of_reach(
 
 
 def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str:
-    """Say the least that makes a part of what is lit measurable.
-
-    Args:
-        scene: With the bodies of the projectors.
-        rig: As written.
-        error: With poses, none of which measures a sample.
-    """
+    """Say the least that makes a part of what is lit measurable."""
     samples = error.samples
     if not len(samples.target):
         return "no limit of a camera helps"
@@ -126,14 +114,7 @@ def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str
 def for_so_many(
     scene: Scene, rig: Rig, stage: CameraStage, count: int
 ) -> tuple[str, ...]:
-    """Return each single change with which so many cameras would be enough.
-
-    Args:
-        scene: With the bodies of the projectors.
-        rig: As written.
-        stage: Candidates, and lit samples.
-        count: Cameras that are allowed.
-    """
+    """Return each single change with which so many cameras would be enough."""
     lit = stage.cover.samples
     samples = taken(lit, np.arange(min(len(lit.target), DRAWS.fewer_devices)), lit.lit)
     relaxations = relaxations_of_cameras(rig, scene.requirements)

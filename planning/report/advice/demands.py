@@ -52,12 +52,6 @@ def light_demands(
     """Return what samples ask of a projector's limits, shape (n_relaxations, n).
 
     It is inf where another limit fails as well, or something stands in between.
-
-    Args:
-        scene: With the bodies that stand in the way.
-        projector: As it stands.
-        target: Samples.
-        relaxations: Limits that may give way.
     """
     scene.check_cancelled()
     rules = scene.requirements.projector
@@ -78,14 +72,7 @@ def demands(
     samples: LitSamples,
     relaxations: Sequence[LimitRelaxation],
 ) -> Demands:
-    """Return what lit samples ask of the limits at a camera's pose.
-
-    Args:
-        scene: With the bodies that stand in the way.
-        camera: As it stands.
-        samples: Lit samples.
-        relaxations: Limits that may give way.
-    """
+    """Return what lit samples ask of the limits at a camera's pose."""
     scene.check_cancelled()
     required, target = scene.requirements, samples.target
     rays = CameraRays.of(camera, target)
@@ -106,17 +93,12 @@ def demands(
     furthest[near] = np.minimum(furthest[near], between)
     near = near[(between == SEEN) & (hopeful | seen)[near]]
     demanded = np.full_like(asks, np.inf)
-    for pair in pairs_of(
-        required.triangulation,
-        samples,
-        _viewed(camera, rays.take(near)),
-        samples=near,
-    ):
+    view = _viewed(camera, rays.take(near))
+    for pair in pairs_of(required.triangulation, samples, view, samples=near):
         indices, quality = pair.samples, pair.quality
-        furthest[indices] = np.where(
-            seen[indices],
-            np.maximum(furthest[indices], pair.first_violated),
-            furthest[indices],
+        beyond = indices[seen[indices]]
+        furthest[beyond] = np.maximum(
+            furthest[beyond], pair.first_violated[seen[indices]]
         )
         of_pair = violated(PAIR_LIMITS, quality, required.triangulation, len(indices))
         table = np.concatenate([failed[:, indices], of_pair])

@@ -46,14 +46,8 @@ def reachability_relaxations(
 ) -> tuple[Relaxation, ...]:
     """Return the share of the target that each single relaxation would make reachable.
 
-    Args:
-        scene: Surface and requirements.
-        reference: The projectors' reference set.
-        ring_offset: Tilt and azimuth of its ring axes.
-
-    Returns:
-        The smallest gain first. A limit gives way as far as `min_reachable` needs, or
-        else as far as it helps.
+    The smallest gain first. A limit gives way as far as `min_reachable` needs, or else
+    as far as it helps. `ring_offset` is tilt and azimuth of the reference's ring axes.
     """
     target = scene.target_samples(DRAWS.relaxations)
     dark = target.take(furthest_lit(scene, reference, target) < LIT)
@@ -103,16 +97,8 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
     """Return the field with which so many projectors would be enough, as one phrase.
 
     Poses for larger tiles join those that are offered, since what is looked at from
-    beside with one field is looked at whole with another.
-
-    Args:
-        scene: Surface and requirements.
-        stage: Poses offered, and the samples to light.
-        count: Projectors that are allowed.
-
-    Returns:
-        Up to a whole degree or millimetre; None where the object fits the field, or
-        where a field three times as wide isn't enough either.
+    beside with one field is looked at whole with another. None where the object fits
+    the field, or where a field three times as wide isn't enough either.
     """
     template, required = stage.reference[0], scene.requirements
     site = scene.site("projector", template.device)

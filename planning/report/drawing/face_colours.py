@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.plan import RigPlan
-from planning.scene.lighting import lit_stages
-from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.obstructions import Obstruction
 from planning.scene.samples import Target
@@ -43,13 +41,9 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
 
     A face is measured if its centroid is; faces outside the target that aren't
     measured count as such.
-
-    Args:
-        plan: The plan.
-        threads: Worker threads.
     """
-    mesh, required = plan.surface.mesh, plan.requirements
-    surface = plan.surface
+    surface, required = plan.surface, plan.requirements
+    mesh = surface.mesh
     scene = Scene(
         mesh,
         surface.region,
@@ -62,28 +56,18 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
     scene = scene.among((*plan.projectors, *plan.cameras))
     faces = np.arange(len(mesh.faces))
     centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)
-    target = Target(centroids, plan.surface.steep)
-    stages = lit_stages(scene, plan.projectors, target)
-    lit = (stages == LIT).any(axis=1)
-    measured = np.zeros(len(faces), dtype=bool)
-    if lit.any():
-        samples = lit_samples(scene, plan.projectors, target)
-        seen = measured_by(scene, plan.cameras, samples).any(axis=1)
-        measured[samples.target.samples.faces[seen]] = True
-    inside = plan.surface.target_faces(required.target)
-    status = np.full(len(faces), OUTSIDE_TARGET, dtype=np.int8)
-    status[inside & lit] = NOT_MEASURED
-    status[inside & ~lit] = NOT_LIT
-    status[measured] = MEASURED
+    lit = lit_samples(scene, plan.projectors, Target(centroids, surface.steep))
+    measured = measured_by(scene, plan.cameras, lit).any(axis=1)
+    inside = surface.target_faces(required.target)
+    status = np.where(inside, NOT_LIT, OUTSIDE_TARGET).astype(np.int8)
+    bright = lit.target.samples.faces
+    status[bright[inside[bright]]] = NOT_MEASURED
+    status[bright[measured]] = MEASURED
     return status
 
 
 def region_colours(region: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return a colour for each face by its dominant region, clay for none; (n_f, 3).
-
-    Args:
-        region: Dominant region of each face, -1 for none, shape (n_f,).
-    """
+    """Return a colour for each face by its region, clay for -1; (n_f,) to (n_f, 3)."""
     palette = np.array([*_REGIONS, CLAY], dtype=np.float64)
     return palette[np.where(region >= 0, region % len(_REGIONS), len(_REGIONS))]
 

@@ -51,12 +51,7 @@ class DeviceFigure:
 
 
 def device_figures(plan: RigPlan, *, body_m: float) -> list[DeviceFigure]:
-    """Return the figures of a plan's projectors, then of its cameras.
-
-    Args:
-        plan: The plan.
-        body_m: Length of the frusta that stand for device bodies [m].
-    """
+    """Return the figures of projectors, then of cameras, as frusta of a length [m]."""
     centre = plan.surface.mesh.centre
     return [
         _figure(device, centre, body_m) for device in (*plan.projectors, *plan.cameras)
@@ -128,12 +123,9 @@ def _closed(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class ZoneFigure:
-    """What is drawn of one zone.
+    """Edges (12, 2, 3) of a zone, and its corners drawn in to the devices (8, 3) [m].
 
-    Attributes:
-        kind: A key of `ZONES`.
-        edges: Pairs of corners [m], shape (12, 2, 3).
-        near: Corners drawn in to where devices may stand [m], shape (8, 3).
+    Its kind is a key of `ZONES`.
     """
 
     kind: str
@@ -177,11 +169,6 @@ def best_direction(
     Tried are 12 turns about `up` at heights of 20 to 40 degrees; the score is the least
     distance in the picture between two devices or a device and the object, relative to
     the picture, plus a preference for the side that the devices stand on.
-
-    Args:
-        positions: Of the devices [m], shape (n, 3).
-        centre: Of the object [m], shape (3,).
-        up: World direction that is up, unit, shape (3,).
     """
     right, ahead = facing(up, up)
     spots = np.concatenate([positions, centre[None]]) - centre

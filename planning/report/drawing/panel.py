@@ -54,13 +54,9 @@ class Panel:
         width: float,
         alpha: int = 255,
     ) -> None:
-        """Draw a polyline of the world; what the mesh hides is nearly left out.
+        """Draw a polyline of the world, (n, 3); what the mesh hides is nearly left out.
 
-        Args:
-            points: In [m], shape (n, 3).
-            colour: Of the line.
-            width: Of the line in final pixels.
-            alpha: Opacity, 0 to 255.
+        The width is in final pixels, the opacity 0 to 255.
         """
         draw, thick = self._draw, max(1, round(width * SUPERSAMPLING))
         for start, end in pairwise(points):

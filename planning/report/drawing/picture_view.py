@@ -54,10 +54,6 @@ def facing(
     Seen straight along `up`, the world axis that follows up's own in the order
     x, y, z, x points right: x where z is up, as on a map.
 
-    Args:
-        direction: From the scene to the viewer, shape (3,).
-        up: What is up in the picture, as far as it can be, shape (3,).
-
     Raises:
         ValueError: If a direction has no length or isn't finite.
     """
@@ -83,15 +79,7 @@ def fitted(
     *,
     margin_px: float,
 ) -> PictureView:
-    """Return the view from a direction that holds all points, as large as can be.
-
-    Args:
-        points: What must be in the picture [m], shape (n, 3).
-        direction: From the scene to the viewer, shape (3,).
-        up: What is up in the picture, shape (3,).
-        size: Width and height in [px].
-        margin_px: Free border in [px].
-    """
+    """Return the view from a direction that holds all points, as large as can be."""
     right, upward = facing(direction, up)
     plane = points @ np.stack([right, upward], axis=1)
     low, high = plane.min(axis=0), plane.max(axis=0)

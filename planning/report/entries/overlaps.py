@@ -60,12 +60,7 @@ def overlap_records(
 def exposure_schedule(
     names: Sequence[str], conflicts: NDArray[np.bool_]
 ) -> ExposureSchedule:
-    """Return the plan's `firing_schedule`: the fewest groups without an overlap.
-
-    Args:
-        names: Ids of the projectors.
-        conflicts: Whether two overlap, shape (k, k).
-    """
+    """Return the plan's `firing_schedule`: the fewest groups without an overlap."""
     colouring = fewest_colours(conflicts)
     return ExposureSchedule(
         groups=tuple(tuple(names[i] for i in group) for group in colouring.groups),

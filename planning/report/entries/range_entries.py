@@ -92,12 +92,6 @@ def with_spread(
 
         sigma^2 = grad_E(d_max)^T S_E grad_E(d_max)
         covered at two sigma <=> d < d_max - 2 sigma
-
-    Args:
-        rows: From `baseline_rows`.
-        cameras: As planned.
-        ball: The least-squares sphere.
-        guard: What was kept free of the limits.
     """
     known = {camera.id: camera for camera in cameras}
     stated = float(guard.stated["camera.max_incidence"])
