@@ -32,18 +32,6 @@ _EXPORTS = {
     "regions_of_faces": "regions.selected_regions",
     "to_trimesh": "files.interchange",
 }
-__all__ = [
-    "CurvatureField",
-    "RayCaster",
-    "Region",
-    "TriangleMesh",
-    "dominant_regions",
-    "from_trimesh",
-    "load_mesh",
-    "principal_curvatures",
-    "regions_of_faces",
-    "to_trimesh",
-]
 
 
 def __getattr__(name: str) -> object:
@@ -53,7 +41,7 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return list(_EXPORTS)
 
 
 check_siblings()

@@ -9,15 +9,15 @@ from scipy.spatial.transform import Rotation
 from geometry.arrays import Array, Ints
 
 from .gltf_buffers import PACKED, QUANTIZED, Buffers, Fetch, Tree, item
-from .reading import FormatError, ScenePart, joined
+from .reading import FormatError, RawMesh, ScenePart, joined
 
 # Required extensions that leave the triangles as the core format stores them.
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
-def read_glb(data: bytes) -> tuple[Array, Ints, str]:
-    """Return vertices (n, 3), triangles (m, 3) and the unit of a GLB file."""
+def read_glb(data: bytes) -> RawMesh:
+    """Return what the default scene of a GLB file shows."""
     if len(data) < 20 or not data.startswith(b"glTF"):
         raise FormatError("it has no GLB header")
     version, length = struct.unpack("<2I", data[4:12])
@@ -40,10 +40,8 @@ def read_glb(data: bytes) -> tuple[Array, Ints, str]:
     return read_gltf(chunks[0][1], None, stored)
 
 
-def read_gltf(
-    text: bytes, fetch: Fetch | None, stored: bytes | None = None
-) -> tuple[Array, Ints, str]:
-    """Return vertices (n, 3), triangles (m, 3) and the unit of the default scene.
+def read_gltf(text: bytes, fetch: Fetch | None, stored: bytes | None = None) -> RawMesh:
+    """Return what the default scene shows.
 
     The unit is the metre, unless all meshes state the same other one under
     ``extras.units``, as mesh libraries write it. The first buffer of a GLB is what it
@@ -75,7 +73,7 @@ def read_gltf(
         raise FormatError("its default scene shows no triangle mesh")
     if len(units) > 1:
         raise FormatError(f"its meshes state different units: {sorted(units)}")
-    return *joined(parts), "".join(units)
+    return joined(parts, "".join(units))
 
 
 def _unit(mesh: Tree) -> str:

@@ -7,8 +7,8 @@ import trimesh
 
 from geometry.mesh.mesh import MeshError, TriangleMesh
 
-from .formats import RawMesh, known_unit
 from .readers import UNITS, usable_mesh
+from .reading import RawMesh, known_unit
 
 _NAME = "a trimesh object"
 

@@ -7,47 +7,47 @@ where a file stores strips; a mesh whose rows don't fit its header is refused he
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Ints
 
 from .ply_header import PlyElement, PlyLists, PlyProperty, read_header, shortened
-from .reading import FormatError, numbers, whole
+from .polygons import triangulated
+from .reading import FormatError, RawMesh, numbers, whole
 
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
-def read_ply(data: bytes) -> dict[str, PlyElement]:
-    """Return every element of a PLY file."""
+def read_ply(data: bytes) -> RawMesh:
+    """Return the faces of a PLY file, and the properties of faces and vertices."""
     order, elements, body = read_header(data)
     cursor = _Cursor(body, order)
     for element in elements:
         cursor.fill(element)
     cursor.finish()
-    return {element.name: element for element in elements}
+    return _surface({element.name: element for element in elements})
 
 
-def ply_surface(elements: dict[str, PlyElement]) -> tuple[Array, PlyLists]:
-    """Return positions (n, 3) in file units and the corners of every face."""
+def _surface(elements: dict[str, PlyElement]) -> RawMesh:
     if any(name.startswith("tristrip") for name in elements):
         raise FormatError("it stores triangle strips, which aren't read; store faces")
-    vertex = elements.get("vertex")
-    if vertex is None:
+    if "vertex" not in elements:
         raise FormatError("its header declares no vertices")
-    if any(axis not in vertex.scalars for axis in "xyz"):
+    of_vertices = dict(elements["vertex"].scalars)
+    if any(axis not in of_vertices for axis in "xyz"):
         raise FormatError("its vertices have no x, y and z")
-    points = np.stack([vertex.scalars[axis] for axis in "xyz"], axis=1)
-    face = elements.get("face")
-    if face is None or face.count == 0:
-        return points, PlyLists(np.empty(0, np.int64), np.empty(0, np.int64))
+    points = np.stack([of_vertices.pop(axis) for axis in "xyz"], axis=1)
+    face = elements.get("face", PlyElement("face", 0))
     named = [face.lists[name] for name in _CORNERS if name in face.lists]
-    if len(named) != 1:
+    if face.count and len(named) != 1:
         raise FormatError("its faces have no list vertex_indices")
-    corners = named[0]
+    none = np.empty(0, np.int64)
+    corners = named[0] if face.count else PlyLists(none, none)
     if not np.all(corners.lengths >= 3):
         at = int(np.argmin(corners.lengths))
         raise FormatError(
             f"face {at + 1} has {corners.lengths[at]} corners, must have three or more"
         )
-    return points, PlyLists(whole(corners.values), corners.lengths)
+    values, lengths = whole(corners.values), corners.lengths
+    return triangulated(points, lengths, values, of_vertices, face.scalars)
 
 
 class _Cursor:

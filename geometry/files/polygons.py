@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from itertools import chain
+from types import MappingProxyType
 
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
+from geometry.mesh.file_origin import FileOrigin, Properties
 
-from .reading import FormatError
+from .reading import FormatError, RawMesh
 
 # Corners closer than this share of the outline's width are one place.
 _SAME = 1e-12
@@ -20,6 +22,19 @@ def end_to_end(polygons: Sequence[Sequence[int]]) -> tuple[Ints, Ints]:
     sizes = np.fromiter(map(len, polygons), np.int64, len(polygons))
     corners = chain.from_iterable(polygons)
     return sizes, np.fromiter(corners, np.int64, int(sizes.sum()))
+
+
+def triangulated(
+    points: Array,
+    sizes: Ints,
+    corners: Ints,
+    of_vertices: Properties = MappingProxyType({}),
+    of_faces: Properties = MappingProxyType({}),
+) -> RawMesh:
+    """Return the triangles of `cut_polygons` with their origin."""
+    faces, polygon = cut_polygons(points, sizes, corners)
+    origin = FileOrigin(polygon, faces, len(sizes), len(points), of_faces, of_vertices)
+    return RawMesh(points, faces, None, origin)
 
 
 def cut_polygons(points: Array, sizes: Ints, corners: Ints) -> tuple[Ints, Ints]:

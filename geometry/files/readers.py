@@ -13,8 +13,8 @@ from geometry.repair.orientation import orient
 from geometry.repair.repair import clean
 
 from .archives import file_bytes, unpacked
-from .formats import METRES, SUPPORTED, RawMesh, read_format
-from .reading import FormatError
+from .formats import SUPPORTED, read_format
+from .reading import METRES, FormatError, RawMesh
 
 UNITS = ("mm", "cm", "m", "in", "um")
 SIZE_RANGE_M = (1e-3, 100.0)

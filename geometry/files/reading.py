@@ -1,4 +1,4 @@
-"""What the readers share: their error, words as numbers, bodies put together."""
+"""What the readers share: error and result, words as numbers, bodies put together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,13 +6,39 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Array, Ints
+from geometry.mesh.file_origin import FileOrigin
 
+METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
+# As 3MF and, in the plural, mesh libraries name them; without the s of the plural.
+_UNIT_NAMES = {
+    **{"micron": "um", "micrometer": "um", "millimeter": "mm", "centimeter": "cm"},
+    **{"meter": "m", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft"},
+}
 # Up to here every whole number has a float64 of its own.
 _LARGEST = 2.0**53
 
 
 class FormatError(Exception):
     """A file's content breaks the rules of its format; the reader names the file."""
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """What a file holds: positions in its own unit, triangles, and the stated unit.
+
+    ``origin`` is None where each triangle is a polygon of the file, in its order.
+    """
+
+    vertices: Array
+    faces: Ints
+    unit: str | None
+    origin: FileOrigin | None = None
+
+
+def known_unit(name: str) -> str | None:
+    """Return the short name of a unit; None: not known."""
+    unit = _UNIT_NAMES.get(name.lower().removesuffix("s"), name)
+    return unit if unit in METRES else None
 
 
 def decode(data: bytes) -> str:
@@ -58,8 +84,11 @@ class ScenePart:
     world_from_part: Array
 
 
-def joined(parts: Sequence[ScenePart]) -> tuple[Array, Ints]:
+def joined(parts: Sequence[ScenePart], unit: str) -> RawMesh:
     """Return all parts in the world; mirrored ones keep their outside outside."""
+    known = known_unit(unit)
+    if known is None:
+        raise FormatError(f"it states the unit '{unit}', which isn't known")
     total = sum(len(part.faces) for part in parts)
     if total > _MAX_FACES:
         raise FormatError(
@@ -79,4 +108,4 @@ def joined(parts: Sequence[ScenePart]) -> tuple[Array, Ints]:
         mirrored = bool(np.linalg.det(turn) < 0)
         faces.append((corners[:, ::-1] if mirrored else corners) + n)
         n += count
-    return np.concatenate(vertices), np.concatenate(faces)
+    return RawMesh(np.concatenate(vertices), np.concatenate(faces), known)

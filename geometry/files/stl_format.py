@@ -5,9 +5,9 @@ import struct
 
 import numpy as np
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array
 
-from .reading import FormatError, decode, numbers
+from .reading import FormatError, RawMesh, decode, numbers
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 # A facet in words; None stands for a number.
@@ -23,8 +23,8 @@ _SOLID = re.compile(
 _GEOMETRY = re.compile(r"\bfacet\s+normal\b|\bendloop\b|\bendfacet\b", re.I)
 
 
-def read_stl(data: bytes) -> tuple[Array, Ints]:
-    """Return vertices (3m, 3) in file units and triangles (m, 3), every corner apart.
+def read_stl(data: bytes) -> RawMesh:
+    """Return the triangles of an STL file, every corner apart.
 
     A file whose length is the one that its counter states is binary, even if it begins
     with "solid"; colours in the attribute bytes are passed over.
@@ -41,7 +41,7 @@ def read_stl(data: bytes) -> tuple[Array, Ints]:
             )
         corners = _ascii(text)
     corners = corners.reshape(-1, 3)
-    return corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3)
+    return RawMesh(corners, np.arange(len(corners)).reshape(-1, 3), None)
 
 
 def _ascii(text: str) -> Array:

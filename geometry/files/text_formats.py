@@ -8,10 +8,10 @@ keeps no face at all.
 import re
 from collections.abc import Iterator, Sequence
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array
 
-from .polygons import end_to_end
-from .reading import FormatError, decode, numbers
+from .polygons import end_to_end, triangulated
+from .reading import FormatError, RawMesh, decode, numbers
 
 # Free-form geometry that has no triangles to give.
 _FREE_FORM = frozenset({"cstype", "curv", "curv2", "surf", "bmat", "bzp", "bsp", "cdc"})
@@ -43,14 +43,8 @@ def _lines(text: str) -> list[str]:
     return re.split(r"\r\n|\r|\n", text)
 
 
-_PointsAndPolygons = tuple[Array, Ints, Ints]
-
-
-def read_obj(data: bytes) -> _PointsAndPolygons:
-    """Return the vertices in file units and the polygons of a Wavefront OBJ.
-
-    Shapes (n, 3); (n_p,), the number of corners of each; and all corners end to end.
-    """
+def read_obj(data: bytes) -> RawMesh:
+    """Return the surface that a Wavefront OBJ stores."""
     vertices: list[list[str]] = []
     polygons: list[list[int]] = []
     for number, words in _obj_lines(decode(data)):
@@ -64,7 +58,7 @@ def read_obj(data: bytes) -> _PointsAndPolygons:
             polygons.append(_obj_polygon(number, words[1:], len(vertices)))
         elif words[0] not in _NO_GEOMETRY:
             raise FormatError(f"line {number}: {_refusal(words[0])}")
-    return _points(vertices), *end_to_end(polygons)
+    return triangulated(_points(vertices), *end_to_end(polygons))
 
 
 def _refusal(word: str) -> str:
@@ -109,8 +103,8 @@ def _obj_polygon(number: int, words: Sequence[str], n_vertices: int) -> list[int
     return [c - 1 if c > 0 else n_vertices + c for c in corners]
 
 
-def read_off(data: bytes) -> _PointsAndPolygons:
-    """Return the vertices and polygons of an OFF file, as `read_obj` does.
+def read_off(data: bytes) -> RawMesh:
+    """Return the surface that an OFF file stores.
 
     Lines may be wrapped anywhere if neither vertices nor faces carry extra columns.
     """
@@ -136,7 +130,7 @@ def read_off(data: bytes) -> _PointsAndPolygons:
     for stream in (by_line, whole_text):
         found = None if stream is None else _off_stream(stream, n_vertices, n_faces)
         if found is not None:
-            return _points(found[0]), *end_to_end(found[1])
+            return triangulated(_points(found[0]), *end_to_end(found[1]))
     raise FormatError(
         f"the header promises {n_vertices} vertices and {n_faces} faces, "
         "the content holds something else"

@@ -5,14 +5,13 @@ import posixpath
 import re
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
 import numpy as np
 
 from geometry.arrays import Array, Ints
 
-from .reading import FormatError, ScenePart, joined, numbers, whole
+from .reading import FormatError, RawMesh, ScenePart, joined, numbers, whole
 
 _NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/"
 _CORE = f"{{{_NAMESPACE}core/2015/02}}"
@@ -21,18 +20,12 @@ _UNDERSTOOD = ("production/", "material/", "core/")
 _MAX_BYTES = 1 << 31
 _MAX_PARTS = 100_000
 _Mesh = tuple[Array, Ints]
+# Its own meshes, and the components that it is made of.
+_Object = tuple[list[_Mesh], list[ElementTree.Element]]
 
 
-@dataclass(frozen=True, eq=False)
-class _Object:
-    meshes: list[_Mesh] = field(default_factory=list[_Mesh])
-    components: list[ElementTree.Element] = field(
-        default_factory=list[ElementTree.Element]
-    )
-
-
-def read_three_mf(data: bytes) -> tuple[Array, Ints, str]:
-    """Return vertices (n, 3), triangles (m, 3) and the unit of what a file builds."""
+def read_three_mf(data: bytes) -> RawMesh:
+    """Return what a 3MF file builds."""
     try:
         package = _Package(zipfile.ZipFile(io.BytesIO(data)))
     except zipfile.BadZipFile as error:
@@ -44,7 +37,7 @@ def read_three_mf(data: bytes) -> tuple[Array, Ints, str]:
     parts: list[ScenePart] = []
     for item in items:
         _collect(package, package.root, item, np.eye(4), (), parts)
-    return *joined(parts), root.get("unit", "millimeter")
+    return joined(parts, root.get("unit", "millimeter"))
 
 
 class _Package:
@@ -140,9 +133,9 @@ def _collect(
     if len(above) > 50 or len(parts) > _MAX_PARTS:
         raise FormatError("its components are nested or repeated without end")
     world_from_object = world_from_parent @ _transform(reference.get("transform"))
-    held = package.object(*key)
-    parts += [ScenePart(v, f, world_from_object) for v, f in held.meshes]
-    for component in held.components:
+    meshes, components = package.object(*key)
+    parts += [ScenePart(v, f, world_from_object) for v, f in meshes]
+    for component in components:
         _collect(package, model, component, world_from_object, (*above, key), parts)
 
 
@@ -165,7 +158,7 @@ def _object(entry: ElementTree.Element) -> _Object:
         raise FormatError(
             f"its object '{entry.get('id', '')[:20]}' is neither mesh nor components"
         )
-    return _Object(meshes, components)
+    return meshes, components
 
 
 def _mesh(mesh: ElementTree.Element) -> _Mesh:

@@ -46,9 +46,15 @@ class FileOrigin:
                 f"face must be (n,) and corners (n, 3), got {face.shape} and "
                 f"{corners.shape}"
             )
-        _check_range("face", face, self.n_faces)
-        _check_range("corners", corners, self.n_vertices)
-        for name, values in (("face", face), ("corners", corners)):
+        for name, values, count in (
+            ("face", face, self.n_faces),
+            ("corners", corners, self.n_vertices),
+        ):
+            if len(values) and not (values.min() >= 0 and values.max() < count):
+                raise ValueError(
+                    f"{name} spans {values.min()}..{values.max()}, must lie in "
+                    f"0..{count - 1}"
+                )
             values.setflags(write=False)
             object.__setattr__(self, name, values)
         for name, count in (
@@ -72,10 +78,3 @@ class FileOrigin:
     def of_faces(self, kept: Ints) -> "FileOrigin":
         """Return the origin of a mesh that keeps these of the faces."""
         return replace(self, face=self.face[kept], corners=self.corners[kept])
-
-
-def _check_range(name: str, indices: NDArray[Any], count: int) -> None:
-    if len(indices) and not (indices.min() >= 0 and indices.max() < count):
-        raise ValueError(
-            f"{name} spans {indices.min()}..{indices.max()}, must lie in 0..{count - 1}"
-        )

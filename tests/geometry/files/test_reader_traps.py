@@ -282,8 +282,8 @@ def test_gltf_strips_and_fans_are_triangles(tmp_path: Path) -> None:
         mesh = read(path, gltf(order=order, **mode(number)))
         assert mesh.area == pytest.approx(AREA, rel=1e-6)
         # Before the winding is mended: every other triangle of a strip is turned.
-        points, faces, _ = read_gltf(gltf(order=order, **mode(number)).encode(), None)
-        a, b, c = (points[faces[:, k]] for k in range(3))
+        raw = read_gltf(gltf(order=order, **mode(number)).encode(), None)
+        a, b, c = (raw.vertices[raw.faces[:, k]] for k in range(3))
         assert np.all(np.cross(b - a, c - a)[:, 2] > 0)
     refused(path, gltf(order=(0, 1, 2, 3)), "4 corners make no triangles")
     refused(path, gltf(order=(0, 1, 2, 0, 2, 4)), "a vertex that isn't there, of 4")
