@@ -26,6 +26,7 @@ from planning.experiments.run import DARK, Outcome, double_density, run_experime
 from planning.experiments.setups import Experiment, paper_experiment
 from planning.experiments.table import outcome_document, outcome_lines
 from planning.model.files import write_atomically
+from planning.report.drawing.picture_view import save_picture
 from planning.verify.reconstruction.cloud_file import LengthUnit
 
 from .console import print_json, reporter, writable
@@ -65,7 +66,7 @@ def experiment_command(options: Mapping[str, Any]) -> int:
         document, pictures = outcome_document(outcome, both), _pictures(outcome, both)
         files = [folder / name for name in (*pictures, CLOUD, "result.json")]
         for path, picture in zip(files, pictures.values(), strict=False):
-            _write_picture(picture, path)
+            save_picture(picture, path)
         if save_cloud(outcome.reconstruction, _MM, files[-2]) is None:
             del files[-2]
         text = json.dumps(document, indent=1, allow_nan=False) + "\n"
@@ -101,7 +102,3 @@ def _pictures(outcome: Outcome, both: MeasuredErrors | None) -> dict[str, Image.
     if both is not None:
         pictures["densities.png"] = draw_densities(outcome.union, both, stage)
     return pictures
-
-
-def _write_picture(picture: Image.Image, path: Path) -> None:
-    write_atomically(path, lambda file: picture.save(file, format="PNG"))

@@ -14,7 +14,8 @@ from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
 from planning.pipeline import plan_rig
 from planning.report.drawing.face_colours import face_status
-from planning.report.drawing.rig_picture import save_rig_picture
+from planning.report.drawing.picture_view import save_picture
+from planning.report.drawing.rig_picture import draw_rig
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.summary.summary import summary
 from planning.rig.rig import load_rig
@@ -131,7 +132,7 @@ def _save(plan: RigPlan, folder: Path, report: Report, *, patterns: bool) -> lis
     names = [folder / name for name in ("plan.json", "surface.npz", "rig.png")]
     plan.save(names[0])
     report("drawing")
-    save_rig_picture(plan, names[2], face_status=face_status(plan))
+    save_picture(draw_rig(plan, face_status=face_status(plan)), names[2])
     if patterns:
         names.append(write_patterns(Scanner.of(plan), folder))
     else:

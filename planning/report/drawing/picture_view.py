@@ -2,10 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
+
+from planning.model.files import write_atomically
 
 Colour: TypeAlias = tuple[int, int, int]
 
@@ -13,6 +17,11 @@ Colour: TypeAlias = tuple[int, int, int]
 SUPERSAMPLING = 2
 BACKGROUND: Colour = (255, 255, 255)
 CLAY: Colour = (214, 205, 196)
+
+
+def save_picture(picture: Image.Image, path: Path) -> None:
+    """Write a picture as a PNG, the same bytes every time."""
+    write_atomically(path, lambda file: picture.save(file, format="PNG"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from geometry.rays.rays import RayCaster
-from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
 from planning.scene.placed_bodies import kind_of
@@ -36,23 +35,6 @@ from .shader import Shader
 _DEVICES: dict[str, Colour] = {"projector": (200, 80, 0), "camera": (0, 90, 160)}
 _MIN_SIZE = (800, 500)
 _LONGEST = 24
-
-
-def save_rig_picture(
-    plan: RigPlan,
-    path: str | Path,
-    *,
-    face_status: NDArray[np.int8],
-    size: tuple[int, int] = (1600, 1000),
-) -> None:
-    """Write what `draw_rig` returns as a PNG, the same bytes for the same plan.
-
-    Raises:
-        ValueError: If the size or the status can't be drawn.
-        OSError: If the file can't be written.
-    """
-    picture = draw_rig(plan, size=size, face_status=face_status)
-    write_atomically(Path(path), lambda file: picture.save(file, format="PNG"))
 
 
 def draw_rig(

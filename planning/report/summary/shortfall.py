@@ -18,16 +18,12 @@ _LEAST_SHARE = 0.01
 _CAUSE_WORDS = {limit.name: limit.words for limit in PROJECTOR_LIMITS + MEASURED_LIMITS}
 
 
-def cause_words(cause: str) -> str:
-    """Return a cause of the plan file as a phrase."""
-    return _CAUSE_WORDS.get(cause, cause)
-
-
 def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
     """Return the largest causes with their share of an area, as one line."""
     ranked = sorted(areas.items(), key=lambda pair: -pair[1])[:most]
     return "; ".join(
-        f"{percent(area / whole)} {cause_words(cause)}" for cause, area in ranked
+        f"{percent(area / whole)} {_CAUSE_WORDS.get(cause, cause)}"
+        for cause, area in ranked
     )
 
 
@@ -36,43 +32,42 @@ def shortfalls(plan: RigPlan) -> tuple[str, ...]:
     required, check = plan.requirements, plan.document.reconstruction
     return (
         *_reachable(plan.document, required),
-        *_measurable(plan.coverage, required),
         *_covered(plan.document, required),
         *(() if check is None or check.passed else check.failures),
     )
 
 
-def _reachable(document: PlanDocument, requirements: Requirements) -> tuple[str, ...]:
-    coverage, areas = document.coverage, document.coverage.target
-    share = areas.reachable_by_projectors_m2 / areas.area_m2
-    least = requirements.min_reachable
-    if share >= least:
-        return ()
-    line = (
-        f"only {percent(share)} of the target can be lit from anywhere in the "
-        f"workspace, {percent(least)} is required (--min-reachable); "
-        f"{area_words(areas.area_m2 - areas.reachable_by_projectors_m2)} of "
-        f"{area_words(areas.area_m2)} can't be reached: "
-        f"{causes_line(coverage.unreachable_by_cause, areas.area_m2)}"
-        f"{_inside(document)}"
-    )
-    return (f"{line}. What would help: {_steps(coverage.relaxations, share)}",)
-
-
-def _measurable(coverage: Coverage, requirements: Requirements) -> tuple[str, ...]:
-    """Whether enough of what is lit is within the cameras' reach."""
-    lit, reached = coverage.target.lit_m2, coverage.target.reachable_by_cameras_m2
-    least = requirements.min_reachable
-    if not lit > 0.0 or reached >= least * lit:
-        return ()
-    share = reached / lit
-    return (
-        f"only {percent(share)} of what is lit can be measured from anywhere in the "
-        f"workspace, {percent(least)} is required (--min-reachable); "
-        f"{area_words(lit - reached)} of {area_words(lit)} can't be: "
-        f"{_areas_line(coverage.unmeasurable_by_cause)}. What "
-        f"would help: {_steps(coverage.camera_relaxations, share)}",
-    )
+def _reachable(document: PlanDocument, requirements: Requirements) -> Iterator[str]:
+    """Whether enough of the target, and of what is lit, is within reach."""
+    coverage, least = document.coverage, requirements.min_reachable
+    areas, unlit = coverage.target, coverage.unreachable_by_cause
+    for what, deed, reached, whole, why, relaxations in (
+        (
+            "the target",
+            "lit",
+            areas.reachable_by_projectors_m2,
+            areas.area_m2,
+            f" reached: {causes_line(unlit, areas.area_m2)}{_inside(document)}",
+            coverage.relaxations,
+        ),
+        (
+            "what is lit",
+            "measured",
+            areas.reachable_by_cameras_m2,
+            areas.lit_m2,
+            f": {_areas_line(coverage.unmeasurable_by_cause)}",
+            coverage.camera_relaxations,
+        ),
+    ):
+        if reached >= least * whole:
+            continue
+        share = reached / whole
+        yield (
+            f"only {percent(share)} of {what} can be {deed} from anywhere in the "
+            f"workspace, {percent(least)} is required (--min-reachable); "
+            f"{area_words(whole - reached)} of {area_words(whole)} can't be{why}. "
+            f"What would help: {_steps(relaxations, share)}"
+        )
 
 
 def _steps(relaxations: tuple[Relaxation, ...], share: float) -> str:
@@ -88,7 +83,9 @@ def _areas_line(areas: dict[str, float]) -> str:
     """The causes with their areas, the largest first, but for what is next to none."""
     ranked = sorted(areas.items(), key=lambda pair: -pair[1])
     phrases = [pair for pair in ranked if pair[1] >= _LEAST_SHARE * sum(areas.values())]
-    return "; ".join(f"{area_words(area)} {cause_words(c)}" for c, area in phrases)
+    return "; ".join(
+        f"{area_words(area)} {_CAUSE_WORDS.get(c, c)}" for c, area in phrases
+    )
 
 
 def _inside(document: PlanDocument) -> str:

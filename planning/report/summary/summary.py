@@ -45,7 +45,6 @@ def _head(plan: RigPlan) -> str:
     mesh = document.meshes[0]
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = "; TRUNCATED, not the best that could be found" if document.truncated else ""
-    where = _where(workspace)
     return (
         f"PLAN     {count_words(len(plan.projectors), 'projector')}, "
         f"{count_words(len(plan.cameras), 'camera')} for "
@@ -54,7 +53,7 @@ def _head(plan: RigPlan) -> str:
         f"{_unit(mesh)}, up {axis_name(workspace.up)}; rig {document.rig.name}, "
         f"{document.rig.light} light\n"
         f"{shell_line(mesh)}"
-        f"         devices may stand in {where}"
+        f"         devices may stand in {_where(workspace)}"
     )
 
 
@@ -75,9 +74,7 @@ def shell_line(mesh: MeshRecord) -> str:
 
 
 def _where(workspace: Workspace) -> str:
-    zones = _zone_phrases(workspace)
-    if workspace.half_angle >= np.pi and workspace.floor_m is None and not zones:
-        return "the whole shell about it (no floor)"
+    """Where devices may stand, by what the workspace leaves of the shell."""
     phrases: list[str] = []
     if workspace.half_angle < np.pi:
         x, y, z = workspace.axis
@@ -87,12 +84,6 @@ def _where(workspace: Workspace) -> str:
         )
     if workspace.floor_m is not None:
         phrases.append(f"at least {1e3 * workspace.floor_m:.0f} mm above its centre")
-    return f"the shell about it, {', '.join(phrases + zones)}"
-
-
-def _zone_phrases(workspace: Workspace) -> list[str]:
-    """Return what a box, keep-out volumes and mounting planes leave, a phrase each."""
-    phrases: list[str] = []
     if workspace.box is not None:
         size = " x ".join(f"{2e3 * half:.0f}" for half in workspace.box.half_m)
         phrases.append(f"in a box of {size} mm")
@@ -103,7 +94,9 @@ def _zone_phrases(workspace: Workspace) -> list[str]:
         phrases.append(
             f"not in {' or '.join(zone.name for zone in workspace.keep_out)}"
         )
-    return phrases
+    if not phrases:
+        return "the whole shell about it (no floor)"
+    return f"the shell about it, {', '.join(phrases)}"
 
 
 def _unit(mesh: MeshRecord) -> str:
