@@ -12,6 +12,7 @@ from geometry.mesh.bearing import bearing
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
+from planning.model.device_poses import ring_frame
 from planning.model.errors import InputError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
@@ -115,7 +116,8 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         "",
         rig.light,
         np.eye(4),
-        np.eye(4),
+        # Upwards in the image until cameras are known.
+        ring_frame(np.eye(4), rig.projector_device(), tilt, -0.5 * np.pi),
         rig.projector_device(),
         radii,
         body=rig.projector_body(),
@@ -123,7 +125,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
     )
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
     check_existing_clearance(scene, template, camera)
-    return Prepared(request, scene, regions, field.radius, template, camera, tilt)
+    return Prepared(request, scene, regions, field.radius, template, camera)
 
 
 def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:

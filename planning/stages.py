@@ -34,9 +34,7 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
     n_poses = ready.request.rig.n_projector_poses
     with clock.stage("projectors", "projectors: candidates and cover"):
         try:
-            stage = plan_projectors(
-                ready.scene, ready.template, n_poses, ring_offset=ready.ring_offset
-            )
+            stage = plan_projectors(ready.scene, ready.template, n_poses)
         except NothingLitError as error:
             helps = nothing_lit(ready.scene, error)
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
@@ -51,9 +49,7 @@ def bounded_projectors(
     prove = ready.request.prove
     with clock.stage("bounds", "bounds over all poses of the workspace"):
         effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
-        stage = prove_fewest(
-            ready.scene, stage, ready.template, effort, ring_offset=ready.ring_offset
-        )
+        stage = prove_fewest(ready.scene, stage, ready.template, effort)
         clock.say(f"  projectors: {_bound_words(stage.certificate)}")
     return stage
 

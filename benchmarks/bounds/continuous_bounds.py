@@ -148,13 +148,7 @@ def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
     rig = ready.request.rig
     number = times * rig.n_projector_poses
     try:
-        return plan_projectors(
-            ready.scene,
-            ready.template,
-            number,
-            ring_offset=ready.ring_offset,
-            rounds=1,
-        )
+        return plan_projectors(ready.scene, ready.template, number, rounds=1)
     except InfeasibleLimitsError:
         return None
 
@@ -181,7 +175,6 @@ def _cell(ready: Prepared, *, prove: bool) -> tuple[str, int]:
         stage,
         ready.template,
         PROVE if prove else DEFAULT,
-        ring_offset=ready.ring_offset,
     )
     seconds = time.perf_counter() - begin
     needed, bound = stage.certificate.needed, stage.certificate.continuous

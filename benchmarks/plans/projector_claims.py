@@ -79,9 +79,7 @@ def _row(ready: Prepared) -> tuple[str, int]:
     number = rig.n_projector_poses
     begin = time.perf_counter()
     try:
-        stage = plan_projectors(
-            scene, ready.template, number, ring_offset=ready.ring_offset
-        )
+        stage = plan_projectors(scene, ready.template, number)
     except InfeasibleLimitsError:
         return "nothing lit |", 0
     posed = widen_margins(scene, stage)

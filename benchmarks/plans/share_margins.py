@@ -122,9 +122,7 @@ def _margins(
     scene = ready.scene
     begin = time.perf_counter()
     try:
-        stage = plan_projectors(
-            scene, ready.template, _number(ready), ring_offset=ready.ring_offset
-        )
+        stage = plan_projectors(scene, ready.template, _number(ready))
     except InfeasibleLimitsError:
         return None
     posed = widen_margins(scene, stage)
@@ -167,9 +165,7 @@ def _print_axes(given: argparse.Namespace) -> None:
 def _axes(ready: Prepared) -> tuple[list[str], str, list[float]]:
     """On fresh samples, by where ring axes stand; and seconds of the last two."""
     scene, rig = ready.scene, ready.request.rig
-    stage = plan_projectors(
-        scene, ready.template, _number(ready), ring_offset=ready.ring_offset
-    )
+    stage = plan_projectors(scene, ready.template, _number(ready))
     posed = widen_margins(scene, stage)
     camera = PlannedCamera("", np.eye(4), rig.camera_device())
     n_cameras = rig.n_camera_poses

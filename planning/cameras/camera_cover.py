@@ -12,7 +12,6 @@ from planning.model.words import area_words
 from planning.proofs.conflicts import Interference
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.scene.bodies.clearance import candidates_with_clearance
-from planning.scene.bodies.existing import existing_cameras
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.limits import pair_limits
@@ -22,9 +21,10 @@ from planning.scene.measured import (
     lit_samples,
     measured_by,
 )
+from planning.scene.placed_bodies import existing_devices
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import camera_candidates
+from planning.scene.workspace.candidates import Candidates
 
 _ROUNDS = 3
 
@@ -86,12 +86,9 @@ def camera_candidate_views(
     """Return the candidates, existing cameras first: they are in every cover."""
     required = scene.requirements
     site = scene.site("camera", template.device)
-
-    def poses(n: int) -> tuple[PlannedCamera, ...]:
-        return camera_candidates(template, required.workspace, n, site)
-
-    free = candidates_with_clearance(scene, n_candidates, poses)
-    return CandidateViews(scene, existing_cameras(required, template) + free)
+    offer = Candidates(template, required.workspace, site)
+    free = candidates_with_clearance(scene, n_candidates, offer.over)
+    return CandidateViews(scene, existing_devices(required, template) + free)
 
 
 def plan_cameras(

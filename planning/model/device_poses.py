@@ -1,6 +1,7 @@
 """Poses of devices: ring frames, projectors moved with theirs, and poses as written."""
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,9 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
 
-from .planned import PlannedProjector
+from .planned import PlannedCamera, PlannedProjector
+
+_D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 _POSITION_DECIMALS = 5
 DECIMALS = 12
@@ -63,13 +66,10 @@ def frame_along(z: NDArray[np.float64]) -> NDArray[np.float64]:
     return frame
 
 
-def moved_to(
-    projector: PlannedProjector, world_from_device: NDArray[np.float64]
-) -> PlannedProjector:
-    """Return a projector at another pose; its ring frame moves along."""
-    device_from_ring = inverse(projector.world_from_device) @ projector.world_from_ring
-    return replace(
-        projector,
-        world_from_device=world_from_device,
-        world_from_ring=world_from_device @ device_from_ring,
-    )
+def moved_to(device: _D, world_from_device: NDArray[np.float64]) -> _D:
+    """Return a device at another pose; the ring frame of a projector moves along."""
+    moved = replace(device, world_from_device=world_from_device)
+    if isinstance(moved, PlannedCamera):
+        return moved
+    device_from_ring = inverse(device.world_from_device) @ moved.world_from_ring
+    return replace(moved, world_from_ring=world_from_device @ device_from_ring)

@@ -11,17 +11,12 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
 from planning.proofs.selection import CandidateCover
 from planning.scene.bodies.clearance import candidates_with_clearance, with_clearance
-from planning.scene.bodies.existing import existing_projectors, movable
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import projector_limits
+from planning.scene.placed_bodies import existing_devices, movable
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import (
-    projector_candidates,
-    projectors_around,
-    projectors_towards,
-)
-from planning.scene.workspace.view_tiles import Site
+from planning.scene.workspace.candidates import Candidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,34 +25,21 @@ class CandidateSource:
 
     Attributes:
         scene: Surface and requirements.
-        template: Optics and rings of the projector.
-        ring_offset: Tilt and azimuth of the ring axis until the cameras are known.
+        template: Optics of the projector, and its rings until cameras are known.
     """
 
     scene: Scene
     template: PlannedProjector
-    ring_offset: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
-    def site(self) -> Site | None:
-        """What projectors stand over in tiled placement; None where the object fits."""
-        return self.scene.site("projector", self.template.device)
+    def _offer(self) -> Candidates[PlannedProjector]:
+        site = self.scene.site("projector", self.template.device)
+        return Candidates(self.template, self.scene.requirements.workspace, site)
 
     def lattice(self, n: int) -> tuple[PlannedProjector, ...]:
         """Return existing projectors, and n candidates or more over the workspace."""
-        required = self.scene.requirements
-
-        def offer(n: int) -> tuple[PlannedProjector, ...]:
-            return projector_candidates(
-                self.template,
-                required.workspace,
-                n,
-                ring_offset=self.ring_offset,
-                site=self.site,
-            )
-
-        existing = existing_projectors(required, self.template, self.ring_offset)
-        return existing + candidates_with_clearance(self.scene, n, offer)
+        existing = existing_devices(self.scene.requirements, self.template)
+        return existing + candidates_with_clearance(self.scene, n, self._offer.over)
 
     def around(
         self, chosen: Sequence[PlannedProjector], n_lattice: int, scale: float = 1.0
@@ -67,26 +49,12 @@ class CandidateSource:
         `n_lattice` is the number of poses of the lattice that they are from; `scale`
         says how far out, as a share of its spacing.
         """
-        between = projectors_around(
-            movable(chosen),
-            self.scene.requirements.workspace,
-            n_lattice,
-            ring_offset=self.ring_offset,
-            scale=scale,
-            site=self.site,
-        )
+        between = self._offer.around(movable(chosen), n_lattice, scale)
         return with_clearance(self.scene, between)
 
     def towards(self, directions: NDArray[np.float64]) -> tuple[PlannedProjector, ...]:
         """Return poses in directions from the centre of the workspace, shape (k, 3)."""
-        found = projectors_towards(
-            self.template,
-            self.scene.requirements.workspace,
-            directions,
-            ring_offset=self.ring_offset,
-            site=self.site,
-        )
-        return with_clearance(self.scene, found)
+        return with_clearance(self.scene, self._offer.towards(directions))
 
 
 @dataclass(frozen=True, eq=False)

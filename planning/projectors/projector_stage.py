@@ -79,7 +79,6 @@ def plan_projectors(
     template: PlannedProjector,
     n_candidates: int,
     *,
-    ring_offset: tuple[float, float],
     rounds: int = _ROUNDS,
 ) -> ProjectorStage:
     """Choose the fewest projectors that light the required share of the target.
@@ -92,7 +91,7 @@ def plan_projectors(
     Raises:
         NothingLitError: If no candidate lights any sample.
     """
-    source = CandidateSource(scene, template, ring_offset)
+    source = CandidateSource(scene, template)
     samples = scene.target_samples(DRAWS.projectors)
     candidates = CandidateSet.over(scene, samples, source.lattice(n_candidates))
     if not candidates.lit.any():

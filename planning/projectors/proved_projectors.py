@@ -15,10 +15,10 @@ from planning.proofs.all_poses import (
 )
 from planning.proofs.projector_bound import bound_projectors
 from planning.proofs.selection import fewest_count, select_fewest
-from planning.scene.bodies.existing import existing_projectors
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns.pattern import pattern_of
+from planning.scene.placed_bodies import existing_devices
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -31,15 +31,13 @@ def prove_fewest(
     stage: ProjectorStage,
     template: PlannedProjector,
     effort: Effort,
-    *,
-    ring_offset: tuple[float, float],
 ) -> ProjectorStage:
     """Return the stage with the bound over all poses in its certificate.
 
     Where the bound leaves room for fewer projectors, candidates are offered there, and
     the cover is solved again.
     """
-    source = CandidateSource(scene, template, ring_offset)
+    source = CandidateSource(scene, template)
     while stage.certificate.needed.count > stage.certificate.given:
         bound = _bound_of(scene, stage, template, effort)
         found = source.towards(bound.directions)
@@ -97,7 +95,7 @@ def _lit_by_existing(
     the bound.
     """
     ringless = pattern_of(template).everywhere()
-    projectors = existing_projectors(scene.requirements, ringless, (0.0, 0.0))
+    projectors = existing_devices(scene.requirements, ringless)
     if not projectors:
         return np.zeros(len(samples), dtype=bool)
     return np.any(lit_stages(scene, projectors, samples) == LIT, axis=1)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
 from planning.proofs.selection import cover_problem
-from planning.scene.bodies.existing import movable
+from planning.scene.placed_bodies import movable
 from planning.scene.scene import Scene
 from solvers import solve_max_coverage
 

@@ -1,7 +1,6 @@
 """A plan in the making: what was ordered, and the stages as far as they came."""
 
 from dataclasses import dataclass
-from math import pi
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
@@ -48,7 +47,6 @@ class Prepared:
         curvature_radius_m: Physical scale of the curvature.
         template: A projector that stands nowhere: light, optics and rings.
         camera: A camera that stands nowhere.
-        tilt: Tilt or shift of ring axes.
     """
 
     request: PlanRequest
@@ -57,12 +55,6 @@ class Prepared:
     curvature_radius_m: float
     template: PlannedProjector
     camera: PlannedCamera
-    tilt: float
-
-    @property
-    def ring_offset(self) -> tuple[float, float]:
-        """Tilt of the ring axis; upwards in the image until cameras are known."""
-        return self.tilt, -float(pi / 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from planning.model.device_poses import rounded_pose
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Existing, Requirements, Workspace
 from planning.model.table_types import Axis, Name, Table, WrittenPose, read_pose
-from planning.scene.workspace.offered_poses import aimed_poses
+from planning.scene.workspace.candidates import aimed_poses
 
 
 class ExistingTable(Table):

@@ -6,7 +6,8 @@ sample.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,14 @@ from numpy.typing import NDArray
 from geometry.poses import inverse, transform
 from geometry.shapes.boxes import OrientedBox, boxes_overlap, lines_cross
 from planning.model.bodies import Body
+from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 
 from .obstructions import Obstruction
 
 Device = PlannedProjector | PlannedCamera
+_D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 # What is planned stays this far apart: positions are rounded to 0.01 mm afterwards.
 CLEARANCE_M = 1e-4
@@ -95,6 +98,23 @@ def bodies_of(devices: Iterable[Device]) -> tuple[PlacedBody, ...]:
 def moves_bodies(devices: Iterable[Device]) -> bool:
     """Return whether any device that doesn't stand already has a body."""
     return any(d.body is not None and not d.existing for d in devices)
+
+
+def existing_devices(required: Requirements, template: _D) -> tuple[_D, ...]:
+    """Return the devices of a template's kind, with its optics, that stand already."""
+    return tuple(
+        replace(
+            moved_to(template, np.array(device.world_from_device)),
+            existing=device.name,
+            body=device.body,
+        )
+        for device in required.existing_of(kind_of(template))
+    )
+
+
+def movable(devices: Sequence[_D]) -> list[_D]:
+    """Return the devices that don't stand already."""
+    return [device for device in devices if not device.existing]
 
 
 def existing_bodies(required: Requirements) -> tuple[PlacedBody, ...]:

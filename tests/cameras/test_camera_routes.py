@@ -28,6 +28,7 @@ from planning.cameras.camera_routes import (
 from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
 from planning.cameras.proved_cameras import camera_stage
 from planning.model.bodies import Body
+from planning.model.device_poses import ring_frame
 from planning.model.document.certificates import Certificate, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
@@ -61,9 +62,9 @@ def ball():
     eye = np.eye(4)
     scene = make_scene(mesh, required)
     lens, radii = rig.projector_device(), uniform_radii(0.3, 0.0035)
-    template = PlannedProjector("", rig.light, eye, eye, lens, radii)
-    offset = (rig.ring_tilt_rad, -np.pi / 2)
-    stage = plan_projectors(scene, template, 120, ring_offset=offset, rounds=1)
+    ring = ring_frame(eye, lens, rig.ring_tilt_rad, -np.pi / 2)
+    template = PlannedProjector("", rig.light, eye, ring, lens, radii)
+    stage = plan_projectors(scene, template, 120, rounds=1)
     camera = make_camera(rig)
     return scene, stage.projectors, camera
 

@@ -67,9 +67,8 @@ def planned(
         requirements=replace(required, projector=limits),
         steep=np.zeros((len(mesh.faces), 3)) if steep is None else steep,
     )
-    offset = {"ring_offset": ready.ring_offset}
-    stage = plan_projectors(scene, ready.template, 300, **offset, rounds=1)
-    stage = prove_fewest(scene, stage, ready.template, effort, **offset)
+    stage = plan_projectors(scene, ready.template, 300, rounds=1)
+    stage = prove_fewest(scene, stage, ready.template, effort)
     proof = stage.certificate
     return Planned(scene, stage, proof.needed.count, proof.continuous.lower_bound)
 

@@ -21,9 +21,7 @@ from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
-from planning.scene.workspace.candidates import projector_candidates
-
-OFFSET = (0.0, 0.0)
+from planning.scene.workspace.candidates import Candidates
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +39,7 @@ def ball():
 @pytest.fixture(scope="module")
 def lattice(ball):
     scene, template = ball
-    poses = projector_candidates(
-        template, scene.requirements.workspace, 40, ring_offset=OFFSET
-    )
+    poses = Candidates(template, scene.requirements.workspace).over(40)
     samples = scene.target_samples(Draw(2000, 100))
     return CandidateSource(scene, template), CandidateSet.over(scene, samples, poses)
 

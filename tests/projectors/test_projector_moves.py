@@ -20,7 +20,7 @@ from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
-from planning.scene.workspace.offered_poses import aimed_poses
+from planning.scene.workspace.candidates import aimed_poses
 
 
 @pytest.fixture(scope="module")
@@ -93,8 +93,8 @@ def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     required = replace(required, workspace=cone, dominant_coverage=0.85)
     whole = np.zeros(len(mesh.faces), dtype=int)
     scene = make_scene(mesh, required, region=whole)
-    template = make_projector(rig, uniform_radii(0.2, 0.0035))
-    stage = plan_projectors(scene, template, 400, ring_offset=(0.14, -1.57), rounds=1)
+    template = make_projector(rig, uniform_radii(0.2, 0.0035), (0.14, -1.57))
+    stage = plan_projectors(scene, template, 400, rounds=1)
     moved = widen_margins(scene, stage)
     before = margins(scene, stage, stage.projectors)
     after = margins(scene, stage, moved)

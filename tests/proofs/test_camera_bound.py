@@ -37,7 +37,7 @@ from planning.scene.lights import LightOnSamples
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.patterns.code_surfaces import CodeSurfaces
-from planning.scene.workspace.offered_poses import aimed_poses
+from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
 
 EFFORT = all_poses.Effort(finest=5, aims=4, maps=5, budget=1e9, shadows=np.inf)

@@ -37,7 +37,7 @@ from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import Draw
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import furthest_failure, lit_samples, measured_by
-from planning.scene.workspace.offered_poses import aimed_poses
+from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 
 FEW = """

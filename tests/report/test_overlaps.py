@@ -17,7 +17,7 @@ from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.report.summary.coverage_lines import schedule_lines
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
-from planning.scene.workspace.offered_poses import aimed_poses
+from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.audit_findings import AuditFindings

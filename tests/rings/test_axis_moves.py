@@ -31,7 +31,7 @@ from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns.pattern import code_surfaces
 from planning.scene.patterns.ring_pattern import ring_coordinate
-from planning.scene.workspace.candidates import projector_candidates
+from planning.scene.workspace.candidates import Candidates
 from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores
 
 RADIUS = 0.1
@@ -48,10 +48,8 @@ def ball(request):
     parallel = rig.light == "parallel"
     tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
-    template = make_projector(rig, radii)
-    offered = projector_candidates(
-        template, required.workspace, 100, ring_offset=(tilt, -np.pi / 2)
-    )
+    template = make_projector(rig, radii, (tilt, -np.pi / 2))
+    offered = Candidates(template, required.workspace).over(100)
     stands = np.stack([p.world_from_device[:3, 3] - mesh.centre for p in offered])
     wanted = np.array([[0.88, -0.46, 0.1], [0.92, 0.38, 0.1]])
     projectors = tuple(offered[i] for i in np.argmax(wanted @ stands.T, axis=1))

@@ -35,8 +35,8 @@ def stages(scene):
     parallel = rig.light == "parallel"
     tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
-    template = make_projector(rig, radii)
-    projectors = plan_projectors(made, template, 200, ring_offset=(tilt, -np.pi / 2))
+    template = make_projector(rig, radii, (tilt, -np.pi / 2))
+    projectors = plan_projectors(made, template, 200)
     camera = make_camera(rig)
     offered = camera_candidate_views(made, camera, 160)
     cover = plan_cameras(made, projectors.projectors, offered)

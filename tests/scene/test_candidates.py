@@ -9,12 +9,7 @@ from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits, Workspace
 from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
-from planning.scene.workspace.candidates import (
-    camera_candidates,
-    projector_candidates,
-    projectors_around,
-)
-from planning.scene.workspace.offered_poses import aimed_poses, rolls_for
+from planning.scene.workspace.candidates import Candidates, aimed_poses
 from planning.scene.workspace.shell_positions import shell_positions
 
 CENTRE = (0.1, -0.2, 0.3)
@@ -102,20 +97,25 @@ def test_up_is_up_in_the_image_also_with_lens_shift():
 
 
 def test_a_device_lies_on_its_side_only_where_the_object_overflows():
-    assert rolls_for(CAMERA, 0.2, 1.2) == (0.0,)
-    assert rolls_for(CAMERA, 0.4, 1.4) == (0.0, np.pi / 2)
-    assert rolls_for(BEAM, 0.3, 1.3) == (0.0,)
-    assert rolls_for(BEAM, 0.35, 1.35) == (0.0, np.pi / 2)
+    def rolls(template, radius):
+        return Candidates(template, workspace(radius=radius)).rolls
+
+    camera = PlannedCamera("", np.eye(4), CAMERA)
+    assert rolls(camera, 0.2) == (0.0,)
+    assert rolls(camera, 0.4) == (0.0, np.pi / 2)
+    beam = PlannedProjector("", "parallel", np.eye(4), np.eye(4), BEAM, np.ones(2))
+    assert rolls(beam, 0.3) == (0.0,)
+    assert rolls(beam, 0.35) == (0.0, np.pi / 2)
 
 
 def test_candidates_are_as_many_as_wanted_whatever_their_roll():
     space = workspace(radius=0.4)
     camera = PlannedCamera("", np.eye(4), CAMERA)
-    assert len(camera_candidates(camera, space, 401)) >= 401
+    assert len(Candidates(camera, space).over(401)) >= 401
     projector = PlannedProjector(
         "", "diverging", np.eye(4), np.eye(4), SHIFTED, np.array([0.1, 0.2])
     )
-    found = projector_candidates(projector, space, 601, ring_offset=(0.14, 0.0))
+    found = Candidates(projector, space).over(601)
     assert len(found) >= 601
     for candidate in found[:5]:
         device, ring = candidate.world_from_device, candidate.world_from_ring
@@ -177,17 +177,18 @@ def test_uniform_radii_end_at_the_outermost_in_equal_steps_no_wider_than_the_gap
     assert 0.019 < steps[0] <= 0.02
 
 
-def _chosen(space, n=640):
+def _offer(space):
+    ring = ring_frame(np.eye(4), SHIFTED, 0.14, -np.pi / 2)
     template = PlannedProjector(
-        "", "diverging", np.eye(4), np.eye(4), SHIFTED, np.linspace(0.01, 0.4, 40)
+        "", "diverging", np.eye(4), ring, SHIFTED, np.linspace(0.01, 0.4, 40)
     )
-    return projector_candidates(template, space, n, ring_offset=(0.14, -np.pi / 2))
+    return Candidates(template, space)
 
 
 def test_candidates_around_a_chosen_one_fill_the_gap_of_the_lattice():
     space = workspace()
-    chosen = _chosen(space)[200]
-    found = projectors_around([chosen], space, 640, ring_offset=(0.14, -np.pi / 2))
+    chosen = _offer(space).over(640)[200]
+    found = _offer(space).around([chosen], 640)
     before, *after = (p.world_from_device[:3, 3] - CENTRE for p in (chosen, *found))
     angles = np.arccos(np.clip(np.array(after) @ before / 1.2**2, -1, 1))
     # 640 on a sphere: 4 pi / 640 sr each.
@@ -211,8 +212,8 @@ def test_candidates_around_a_chosen_one_fill_the_gap_of_the_lattice():
 @pytest.mark.parametrize("floor", [None, 0.3])
 def test_candidates_around_stay_in_cone_and_over_the_floor(floor):
     space = workspace(np.radians(40), floor)
-    chosen = _chosen(space, 60)
-    found = projectors_around(chosen, space, 60, ring_offset=(0.14, -np.pi / 2))
+    chosen = _offer(space).over(60)
+    found = _offer(space).around(chosen, 60)
     offset = np.array([p.world_from_device[:3, 3] for p in found]) - CENTRE
     assert np.arccos(np.clip(-offset[:, 1] / 1.2, -1, 1)).max() <= np.radians(40) + 1e-9
     if floor is not None:
@@ -221,4 +222,4 @@ def test_candidates_around_stay_in_cone_and_over_the_floor(floor):
 
 
 def test_nothing_chosen_offers_nothing_around():
-    assert projectors_around([], workspace(), 640, ring_offset=(0.0, 0.0)) == ()
+    assert _offer(workspace()).around([], 640) == ()

@@ -11,6 +11,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import transform
 from geometry.shapes.primitives import sphere
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.reach import furthest_lit
@@ -23,7 +24,7 @@ from planning.scene.lights import light_on
 from planning.scene.limits import projector_limits
 from planning.scene.patterns.ring_pattern import ring_coordinate
 from planning.scene.samples import Target
-from planning.scene.workspace.candidates import projector_candidates
+from planning.scene.workspace.candidates import Candidates
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])
@@ -40,10 +41,9 @@ def test_candidates_together_light_what_each_lights_alone(light):
     eye = np.eye(4)
     radii = uniform_radii(0.45 if light == "diverging" else 0.3, 0.0035)
     device = rig.projector_device()
-    template = PlannedProjector("", rig.light, eye, eye, device, radii)
-    offered = projector_candidates(
-        template, required.workspace, 60, ring_offset=(0.0, 0.0)
-    )
+    ring = ring_frame(eye, device, 0.0, 0.0)
+    template = PlannedProjector("", rig.light, eye, ring, device, radii)
+    offered = Candidates(template, required.workspace).over(60)
     rows = scene.target_samples(Draw(1500, 7))
     limits = required.projector
     alone = [

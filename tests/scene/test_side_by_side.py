@@ -13,7 +13,7 @@ from geometry.poses import inverse, transform
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.model.bodies import Box
-from planning.model.device_poses import ring_frame
+from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.prepare import prepared
@@ -31,7 +31,7 @@ from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.workspace.candidates import projector_candidates, projectors_towards
+from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
 from planning.verify.audit.devices.workspace_claims import outside_by
 
@@ -55,7 +55,7 @@ def askew(width, height):
 
 
 def readied(mesh, light, incidence, most=9, share=0.99, **workspace):
-    """The scene, the template and the offset of rings, limits as given in degrees."""
+    """The scene, and the template, limits as given in degrees."""
     wishes = Wishes(max_projectors=most, target="surface", dominant_coverage=share)
     order = PlanRequest(mesh, load_rig("default", light), wishes)
     ready = prepared(order, Stopwatch())
@@ -67,7 +67,7 @@ def readied(mesh, light, incidence, most=9, share=0.99, **workspace):
     )
     bare = np.zeros_like(ready.scene.steep)
     scene = replace(ready.scene, requirements=required, steep=bare)
-    return scene, ready.template, ready.ring_offset
+    return scene, ready.template
 
 
 def most_lit(device, incidence):
@@ -103,13 +103,13 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
     The plate lies askew: its sides are along no axis.
     """
     # Directions around the normal alone: a lattice of the whole shell takes more poses.
-    scene, template, offset = readied(
+    scene, template = readied(
         askew(*sides), light, incidence, share=0.98, half_angle=0.6
     )
     least = 0.98 * sides[0] * sides[1] / most_lit(template.device, incidence)
     assert count - 1 < least <= count
-    stage = plan_projectors(scene, template, 60, ring_offset=offset, rounds=1)
-    stage = prove_fewest(scene, stage, template, EFFORT, ring_offset=offset)
+    stage = plan_projectors(scene, template, 60, rounds=1)
+    stage = prove_fewest(scene, stage, template, EFFORT)
     needed = stage.certificate.needed
     assert (needed.count, needed.lower_bound) == (count, count)
     assert stage.certificate.continuous.lower_bound <= count
@@ -136,7 +136,7 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
 
 def test_two_beams_that_leave_a_gap_are_moved_together():
     """Panels of 819 mm, 880 apart over a plate of 1.4 m: 61 mm between are dark."""
-    scene, template, offset = readied(
+    scene, template = readied(
         grid(1.4, 0.55, divisions=(6, 4)), "parallel", 15.0, half_angle=0.3
     )
     rows = scene.target_samples(Draw(1000, 100))
@@ -145,13 +145,12 @@ def test_two_beams_that_leave_a_gap_are_moved_together():
     for x in (-0.44, 0.0, 0.44):
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = turn, (x, 0.0, 1.2)
-        frame = ring_frame(pose, template.device, *offset)
-        apart.append(replace(template, world_from_device=pose, world_from_ring=frame))
+        apart.append(moved_to(template, pose))
     lattice = CandidateSet.over(scene, rows, tuple(apart))
     dark = ~np.any(lattice.lit[:, [0, 2]], axis=1)
     assert dark.mean() == pytest.approx(0.061 / 1.4, abs=0.01)
     found = one_fewer(
-        CandidateSource(scene, template, offset),
+        CandidateSource(scene, template),
         lattice,
         2,
         finer=lambda: lattice,
@@ -163,16 +162,10 @@ def test_two_beams_that_leave_a_gap_are_moved_together():
 
 
 def test_offers_towards_a_direction_look_beside_the_centre_too():
-    scene, template, offset = readied(
-        grid(2.0, 0.5, divisions=(6, 4)), "parallel", 50.0
-    )
-    found = projectors_towards(
-        template,
-        scene.requirements.workspace,
-        np.array([[0.0, 0.6, 0.8]]),
-        ring_offset=offset,
-        site=scene.site("projector", template.device),
-    )
+    scene, template = readied(grid(2.0, 0.5, divisions=(6, 4)), "parallel", 50.0)
+    site = scene.site("projector", template.device)
+    offer = Candidates(template, scene.requirements.workspace, site)
+    found = offer.towards(np.array([[0.0, 0.6, 0.8]]))
     poses = np.stack([p.world_from_device for p in found])
     assert np.allclose(poses[:, :3, 2], [0.0, -0.6, -0.8])
     assert poses[:, 0, 3].min() < -0.5
@@ -183,7 +176,7 @@ def test_offers_towards_a_direction_look_beside_the_centre_too():
 
 @pytest.mark.parametrize("light", ["parallel", "diverging"])
 def test_rings_reach_the_corners_of_an_image_that_looks_beside(light):
-    _, template, _ = readied(box((0.62, 0.1, 0.1)), light, 60.0)
+    _, template = readied(box((0.62, 0.1, 0.1)), light, 60.0)
     corner = load_rig("default", light).outer_ring_radius()
     assert template.ring_radii[-1] == pytest.approx(corner)
 
@@ -193,10 +186,10 @@ def test_one_beam_too_few_says_how_wide_two_must_be():
 
     at least one of that times its cosine where the long side lies along the slant.
     """
-    scene, template, offset = readied(
+    scene, template = readied(
         grid(1.4, 0.55, divisions=(6, 4)), "parallel", 15.0, most=1, share=1.0
     )
-    stage = plan_projectors(scene, template, 60, ring_offset=offset, rounds=1)
+    stage = plan_projectors(scene, template, 60, rounds=1)
     said = wider_field(scene, stage, 1)
     points = stage.candidates.samples.samples.points[:2000, :2]
     upright = 1e3 * np.hypot(*points.T).max()
@@ -207,10 +200,8 @@ def test_one_beam_too_few_says_how_wide_two_must_be():
 
 def test_one_image_too_few_is_wide_enough_from_as_far_as_it_is_sharp():
     """What counts is up to r from the middle, at asin(r / 1.77) degrees or more."""
-    scene, template, offset = readied(
-        askew(1.5, 0.66), "diverging", 40.0, most=1, share=0.95
-    )
-    stage = plan_projectors(scene, template, 60, ring_offset=offset, rounds=1)
+    scene, template = readied(askew(1.5, 0.66), "diverging", 40.0, most=1, share=0.95)
+    stage = plan_projectors(scene, template, 60, rounds=1)
     said = wider_field(scene, stage, 1)
     degrees = int(said.removeprefix("an image that reaches ").split(" degrees")[0])
     off = np.hypot(*stage.candidates.samples.samples.points[:2000, :2].T)
@@ -291,10 +282,10 @@ CEILING = Box(
 def test_devices_side_by_side_stand_where_the_workspace_lets_them(light, zones):
     """By the audit's own measure; and they reach all of a plate 2 m long."""
     plate = grid(2.0, 0.5, divisions=(6, 4))
-    scene, template, offset = readied(plate, light, 50.0, **zones)
+    scene, template = readied(plate, light, 50.0, **zones)
     space = scene.requirements.workspace
     site = scene.site("projector", template.device)
-    found = projector_candidates(template, space, 40, ring_offset=offset, site=site)
+    found = Candidates(template, space, site).over(40)
     places = np.stack([p.world_from_device for p in found])[:, :3, 3]
     assert outside_by(places, space.projector_radius_m, space).max() <= 1e-9
     if not ("box" in zones or "mounting" in zones):
@@ -315,7 +306,7 @@ def test_tiles_hold_the_plate_from_each_direction_and_none_is_offered_from_behin
     Seen along its normal it takes 3 or 4 tiles, at 30 degrees (1.73 m) 3 either way, at
     48 (1.34 m) 2 or 3; and once more one more.
     """
-    scene, template, _ = readied(askew(2.0, 0.5), "parallel", 50.0)
+    scene, template = readied(askew(2.0, 0.5), "parallel", 50.0)
     site = scene.site("projector", template.device)
     tilts = np.radians([0.0, 30.0, 48.0, 180.0])
     along = np.column_stack([np.sin(tilts), 0.0 * tilts, np.cos(tilts)])
@@ -324,7 +315,7 @@ def test_tiles_hold_the_plate_from_each_direction_and_none_is_offered_from_behin
     assert np.bincount(owner).tolist() == [3 + 4 + 4 + 5, 2 * (3 + 4), 2 + 3 + 3 + 4]
     points = site.samples.points
     space = scene.requirements.workspace
-    many = projector_candidates(template, space, 300, ring_offset=(0.1, 0), site=site)
+    many = Candidates(template, space, site).over(300)
     assert 300 < len(many) <= 5 * 300
     for k in range(3):
         held = np.zeros(len(points), dtype=bool)
@@ -346,7 +337,7 @@ def test_a_farther_set_of_tiles_stays_below_the_top_of_the_shell():
     At 1 m the image holds 592 x 423 mm of it: 2 x 2 tiles, and 3 x 3; at 1.4 m, the
     farthest from the centre, 829 mm: 1 x 2.
     """
-    scene, template, _ = readied(sphere(0.4, subdivisions=3), "diverging", 60.0)
+    scene, template = readied(sphere(0.4, subdivisions=3), "diverging", 60.0)
     site = scene.site("projector", template.device)
     poses, _ = tiled_poses(site, np.array([[0.0, 0.0, 1.0]]), (0.0,))
     assert len(poses) == 4 + 9 + 2
@@ -356,7 +347,7 @@ def test_a_farther_set_of_tiles_stays_below_the_top_of_the_shell():
 
 @pytest.mark.parametrize("light", ["parallel", "diverging"])
 def test_poses_around_one_keep_its_aim_or_its_direction(light):
-    scene, template, _ = readied(grid(2.0, 0.5, divisions=(6, 4)), light, 50.0)
+    scene, template = readied(grid(2.0, 0.5, divisions=(6, 4)), light, 50.0)
     site = scene.site("projector", template.device)
     pose = tiled_poses(site, np.array([[0.0, 0.0, 1.0]]), (0.0,))[0][0]
     middle = template.device.middle_ray

@@ -21,7 +21,7 @@ from planning.scene.workspace.admissible import (
     may_stand,
     stands,
 )
-from planning.scene.workspace.candidates import camera_candidates, projectors_around
+from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.shell_positions import along_rays, shell_positions
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.devices.zone_claims import zone_excess
@@ -180,7 +180,7 @@ def test_no_admissible_position_is_in_a_cell_that_was_dropped(workspace_of, name
 def test_candidates_fill_what_is_left(workspace_of, name):
     space = workspace_of(ZONES[name])
     template = PlannedCamera("", np.eye(4), load_rig().camera_device())
-    found = camera_candidates(template, space, 500)
+    found = Candidates(template, space).over(500)
     positions = np.stack([c.world_from_device[:3, 3] for c in found]) - CENTRE
     assert 500 <= len(found) < 900
     assert np.all(kept_by_hand(name, positions))
@@ -222,7 +222,7 @@ def test_candidates_around_a_chosen_one_keep_the_zones(workspace_of):
     pose[:3, 3] = CENTRE + [0.2, 0.1, 1.0]
     device = rig.projector_device()
     chosen = PlannedProjector("", "diverging", pose, pose, device, np.array([0.1, 0.2]))
-    found = projectors_around([chosen], space, 600, ring_offset=(0.1, 0.0))
+    found = Candidates(chosen, space).around([chosen], 600)
     offsets = np.stack([p.world_from_device[:3, 3] for p in found]) - CENTRE
     assert len(found) > 10
     assert np.all(kept_by_hand("planes", offsets))
@@ -316,7 +316,7 @@ def test_the_zone_that_leaves_no_position_is_named(
     space = workspace_of(text)
     template = PlannedCamera("", np.eye(4), load_rig().camera_device())
     with pytest.raises(InfeasibleLimitsError) as caught:
-        camera_candidates(template, space, 100)
+        Candidates(template, space).over(100)
     said = str(caught.value)
     assert all(words in said for words in blamed), said
     assert innocent not in said

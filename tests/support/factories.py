@@ -6,6 +6,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from planning import Rig, load_rig
+from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements, Workspace
 from planning.rig.wishes import Wishes
@@ -64,10 +65,14 @@ def make_workspace(object_radius: float, away: float, **changes: Any) -> Workspa
     return Workspace(**(values | changes))
 
 
-def make_projector(rig: Rig, radii: Any, **changes: Any) -> PlannedProjector:
+def make_projector(
+    rig: Rig, radii: Any, ring_offset: tuple[float, float] = (0.0, 0.0), **changes: Any
+) -> PlannedProjector:
     """The rig's projector at the origin, with rings of these radii."""
-    pose = {"world_from_device": np.eye(4), "world_from_ring": np.eye(4)}
-    device = {"device": rig.projector_device(), "ring_radii": np.asarray(radii)}
+    optics = rig.projector_device()
+    ring = ring_frame(np.eye(4), optics, *ring_offset)
+    pose = {"world_from_device": np.eye(4), "world_from_ring": ring}
+    device = {"device": optics, "ring_radii": np.asarray(radii)}
     return PlannedProjector(
         **({"id": "", "light": rig.light} | pose | device | changes)
     )

@@ -27,13 +27,12 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection, required_samples
 from planning.scene.bodies.clearance import with_clearance
-from planning.scene.bodies.existing import movable
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.placed_bodies import movable
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import cameras_towards
-from planning.scene.workspace.offered_poses import middle_radius_m
+from planning.scene.workspace.candidates import Candidates
 from solvers import solve_cover
 
 from .paper_route import PaperRoute, paper_route
@@ -176,7 +175,7 @@ def _route_problem(
 ) -> RouteProblem:
     scene, space = on.scene, on.scene.safe_workspace
     template = movable(candidates.cameras)[-1]
-    site = scene.site("camera", template.device)
+    offer = Candidates(template, space, scene.site("camera", template.device))
     fixed = candidates.cameras[: n_fixed(scene)]
     least_lit = on.count_lit(fixed)
     none = np.zeros((len(on.lit.target), 0), dtype=bool)
@@ -185,7 +184,7 @@ def _route_problem(
         return measured_by(scene, cameras, on.lit) if cameras else none
 
     def stand(directions: NDArray[np.float64]) -> Cameras:
-        return with_clearance(scene, cameras_towards(template, space, directions, site))
+        return with_clearance(scene, offer.towards(directions))
 
     return RouteProblem(
         on.surface,
@@ -196,7 +195,7 @@ def _route_problem(
             on, cameras, max_evaluations=_EVALUATIONS, max_programs=_PROGRAMS
         ),
         template.device,
-        middle_radius_m(space.camera_radius_m, site),
+        offer.middle_radius_m,
         baseline_limits(scene),
         required,
         fixed,

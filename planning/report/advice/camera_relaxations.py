@@ -28,7 +28,7 @@ from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, lit_samples, taken
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import camera_candidates
+from planning.scene.workspace.candidates import Candidates
 
 from .demands import Demands, demands
 from .least_changes import (
@@ -72,11 +72,9 @@ def out_of_reach(
     if whole != required.workspace and share.wanted > 0:
         camera = devices.reference_cameras[0]
         site = scene.site("camera", camera.device)
-        anywhere = camera_candidates(
-            camera,
-            whole,
-            required.workspace.n_reference_cameras,
-            None if site is None else replace(site, workspace=whole),
+        site_there = None if site is None else replace(site, workspace=whole)
+        anywhere = Candidates(camera, whole, site_there).over(
+            required.workspace.n_reference_cameras
         )
         changes[ANYWHERE] = int(measured_by_any(among, anywhere, unmeasured).sum())
     counts = np.bincount(asked.furthest[out], minlength=MEASURED)

@@ -20,7 +20,7 @@ from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import projector_candidates
+from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.view_tiles import Site
 
 from .demands import light_demands
@@ -40,14 +40,12 @@ _OFFERED = 150
 
 
 def reachability_relaxations(
-    scene: Scene,
-    reference: Sequence[PlannedProjector],
-    ring_offset: tuple[float, float],
+    scene: Scene, reference: Sequence[PlannedProjector]
 ) -> tuple[Relaxation, ...]:
     """Return the share of the target that each single relaxation would make reachable.
 
     The smallest gain first. A limit gives way as far as `min_reachable` needs, or else
-    as far as it helps. `ring_offset` is tilt and azimuth of the reference's ring axes.
+    as far as it helps.
     """
     target = scene.target_samples(DRAWS.relaxations)
     dark = target.take(furthest_lit(scene, reference, target) < LIT)
@@ -60,12 +58,9 @@ def reachability_relaxations(
     whole = workspace.whole_shell
     if whole != workspace:
         site = scene.site("projector", reference[0].device)
-        anywhere = projector_candidates(
-            reference[0],
-            whole,
-            len(reference) if site is None else workspace.n_reference_projectors,
-            ring_offset=ring_offset,
-            site=None if site is None else replace(site, workspace=whole),
+        site_there = None if site is None else replace(site, workspace=whole)
+        anywhere = Candidates(reference[0], whole, site_there).over(
+            len(reference) if site is None else workspace.n_reference_projectors
         )
         still_dark = furthest_lit(scene, anywhere, target) < LIT
         gained[ANYWHERE] = len(dark) - int(still_dark.sum())
@@ -127,12 +122,7 @@ def _over_larger_tiles(
 ) -> Iterator[PlannedProjector]:
     for times in _TIMES:
         device = template.device.widened(times)
-        offered = projector_candidates(
-            replace(template, device=device),
-            site.workspace,
-            _OFFERED,
-            ring_offset=(0.0, 0.0),
-            site=replace(site, device=device),
-        )
-        for projector in offered:
+        wide = replace(template, device=device)
+        over = replace(site, device=device)
+        for projector in Candidates(wide, site.workspace, over).over(_OFFERED):
             yield replace(projector, device=template.device)

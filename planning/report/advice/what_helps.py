@@ -21,7 +21,7 @@ def with_relaxations(
     if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
             relaxations = reachability_relaxations(
-                partial.scene, devices.reference_projectors, (partial.ready.tilt, 0.0)
+                partial.scene, devices.reference_projectors
             )
         coverage = coverage.changed(relaxations=relaxations)
     if falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least):

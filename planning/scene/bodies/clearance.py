@@ -8,11 +8,15 @@ import numpy as np
 from geometry.shapes.boxes import OrientedBox, triangles_touch
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene.placed_bodies import CLEARANCE_M, Device, collide, placed_box
+from planning.scene.placed_bodies import (
+    CLEARANCE_M,
+    Device,
+    collide,
+    existing_devices,
+    placed_box,
+)
 from planning.scene.scene import Scene
 from planning.scene.workspace.admissible import broken_by_body
-
-from .existing import existing_cameras, existing_projectors
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 # Poses that are tried for each wanted, at most.
@@ -90,8 +94,8 @@ def check_existing_clearance(
     """
     required = scene.requirements
     devices = (
-        *existing_projectors(required, projector, (0.0, 0.0)),
-        *existing_cameras(required, camera),
+        *existing_devices(required, projector),
+        *existing_devices(required, camera),
     )
     for device in devices:
         if what := lacks_clearance(scene, device):
