@@ -33,12 +33,9 @@ def pack_rows(serves: NDArray[np.bool_]) -> NDArray[np.uint64]:
 
 
 def pack_shuffled(sets: NDArray[np.bool_]) -> NDArray[np.uint64]:
-    """Return sets as bit rows, shape (n_sets, n_words), elements in random order.
+    """Return sets (n_sets, n_elements) as bit rows, elements in one random order.
 
-    The order is the same for all, and the first words are a fair sketch of a set.
-
-    Args:
-        sets: Whether element i is in set k, shape (n_sets, n_elements).
+    So the first words are a fair sketch of a set.
     """
     order = np.random.default_rng(0).permutation(sets.shape[1])
     return pack_rows(sets[:, order])
@@ -48,9 +45,6 @@ def sparse_rows(dense: NDArray[np.bool_]) -> sparse.csr_array:
     """Return what `scipy.sparse.csr_array` does, in a third of the time.
 
     Numpy finds what isn't zero in one dimension five times as fast as in two.
-
-    Args:
-        dense: Matrix of booleans, in any layout.
     """
     n_rows, n_columns = dense.shape
     places = np.flatnonzero(np.ascontiguousarray(dense).ravel())

@@ -7,14 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 # A required weight is lowered by this share, against rounding.
 WEIGHT_SLACK = 1e-12
+# Sums within this and its inverse neither vanish nor overflow.
+_LEAST_TOTAL = 1e-250
 
 
 def real_numbers(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
-    """Return a copy in float64.
-
-    Raises:
-        ValueError: If they aren't real numbers.
-    """
+    """Return a copy in float64, or raise ValueError if they aren't real numbers."""
     try:
         values = np.array(numbers)
         if values.dtype.kind in "biuf":
@@ -25,11 +23,7 @@ def real_numbers(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
 
 
 def whole_numbers(name: str, numbers: ArrayLike) -> NDArray[np.int64]:
-    """Return a copy in int64.
-
-    Raises:
-        ValueError: If they aren't whole numbers of at most 52 bits.
-    """
+    """Return a copy in int64, or raise ValueError beyond whole numbers of 52 bits."""
     values = (
         real_numbers(name, numbers) if np.size(numbers) else np.empty(np.shape(numbers))
     )
@@ -39,11 +33,7 @@ def whole_numbers(name: str, numbers: ArrayLike) -> NDArray[np.int64]:
 
 
 def whole_number(name: str, numbers: object, *, least: int) -> int:
-    """Return an integer.
-
-    Raises:
-        ValueError: If it isn't one, or less than the least.
-    """
+    """Return an integer, or raise ValueError if it isn't one, or below the least."""
     try:
         value = operator.index(numbers)  # type: ignore[arg-type]
     except TypeError:
@@ -65,6 +55,19 @@ def set_names(name: str, numbers: ArrayLike, n: int) -> NDArray[np.int64]:
     if not np.all((names >= 0) & (names < n)):
         raise ValueError(f"{name} must name sets from 0 to {n - 1}")
     return names
+
+
+def check_weights(weights: NDArray[np.float64]) -> None:
+    """Raise ValueError if a weight or their sum is negative, tiny or not finite."""
+    if not np.all((weights >= 0.0) & np.isfinite(weights)):
+        raise ValueError("weights must be finite and at least 0")
+    with np.errstate(over="ignore"):
+        total = float(weights.sum())
+    if not (total == 0.0 or _LEAST_TOTAL <= total <= 1.0 / _LEAST_TOTAL):
+        raise ValueError(
+            f"weights must have a finite sum, 0 or from {_LEAST_TOTAL:g} to "
+            f"{1.0 / _LEAST_TOTAL:g}, got {total:g}"
+        )
 
 
 def whole_weights(

@@ -27,7 +27,6 @@ _MAX_NODES = 20_000
 # Of `scipy.optimize.milp`.
 _INFEASIBLE = 2
 
-
 Proof = Literal["clique", "exhaustion", "none"]
 
 

@@ -33,10 +33,6 @@ class WorkBudget:
 
     One unit is one matrix entry touched (about 1 ns). The clock only cuts: an answer
     that it cut says so and is exempt from being reproducible.
-
-    Attributes:
-        units: Work allowed.
-        spent: Work done so far.
     """
 
     def __init__(self, units: float, *, time_limit: float = float("inf")) -> None:

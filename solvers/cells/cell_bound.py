@@ -1,8 +1,7 @@
 """How many poses are needed at least, wherever in their cells they stand.
 
-First multipliers (``cell_multipliers``), one count after the other from below; then the
-search over multisets of cells (``cell_tuples``) for the counts that multipliers don't
-refute. Each spends counted work; cut short, the bound is lower but true.
+First multipliers (``cell_multipliers``), one count after the other; then the search
+over multisets of cells (``cell_tuples``). Cut short, the bound is lower but true.
 """
 
 import enum
@@ -50,9 +49,8 @@ class CellBound:
             ``lower_bound`` poses may be enough: where a better cover may be. Else None.
         multipliers: Of the rows, integers, shape (n_rows,).
         largest_cost: No pose serves rows of more than this cost by the multipliers.
-        by_multipliers: The part of the bound that multipliers prove.
-        most_weight: Weight that ``count`` - 1 poses can serve at most, by the
-            multipliers, in the problem's unit.
+        by_multipliers: The part of the bound that they prove.
+        most_weight: Weight that ``count`` - 1 poses serve at most, by them.
         cells_used: Cells that the tree was asked for.
         tuples_met: Multisets of cells that were weighed.
     """
@@ -104,8 +102,6 @@ def bound_count(
 
 
 class _Proof:
-    """One run; gathers what the answer says."""
-
     def __init__(
         self, problem: CellProblem, tree: CellTree, count: int, budget: WorkBudget
     ) -> None:
@@ -119,7 +115,6 @@ class _Proof:
         self.met = 0
 
     def run(self) -> CellBound:
-        """Raise the bound by one until nothing refutes the next count."""
         if not _reachable(self.whole, self.store):
             proof = "all cells together serve less than is required"
             return self._answer(CellStatus.INFEASIBLE, float("inf"), proof)
@@ -185,7 +180,6 @@ class _Proof:
 
 
 def _reachable(whole: WholeRows, store: CellStore) -> bool:
-    """Whether poses without number, anywhere, serve enough."""
     served = np.bitwise_or.reduce(store.rows[: store.n_roots], axis=0)
     served |= pack_rows((whole.needs == 0)[None])[0]
     weights = [

@@ -113,7 +113,7 @@ class MultiplierSearch:
     def _record(
         self, proposed: NDArray[np.float64], frontier: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Evaluate multipliers, keep them if they are the best; return the costs."""
+        """Keep multipliers if they are the best; return the costs."""
         multipliers = self._whole.multipliers(proposed)
         costs = self._store.costs(frontier, multipliers)
         need = self._whole.least_cost(multipliers)
@@ -125,13 +125,12 @@ class MultiplierSearch:
         return costs
 
     def _measure(self, largest_cost: int) -> None:
-        """Say what the best multipliers prove, by the largest cost of the frontier."""
         self.largest_cost = largest_cost
         self.ratio = self._need / max(1, largest_cost)
         self.bound = self._whole.count_bound(self.multipliers, largest_cost)
 
     def _take(self, frontier: NDArray[np.int64], costs: NDArray[np.int64]) -> bool:
-        """Take in hand the costliest cells that break the program; say if any did."""
+        """Take in hand the costliest cells that break the program, if any does."""
         in_hand = np.isin(frontier, self._program.cells)
         known = int(costs[in_hand].max(initial=0))
         order = np.argsort(-np.where(in_hand, -1, costs), kind="stable")[:_TAKEN]

@@ -32,7 +32,7 @@ class Proposal:
 
     Attributes:
         multipliers: Shape (n_rows,), at least 0.
-        value: The program's optimum over the cells in hand.
+        value: The optimum over the cells in hand.
         used: Cells in hand that the fractional cover uses.
     """
 

@@ -23,9 +23,7 @@ _ASKED = 1024
 class CellStore:
     """Cells in the order in which they came; children come after their parents.
 
-    Attributes:
-        tree: Where they come from.
-        full: Whether a split was refused, because of ``MAX_BYTES``.
+    It is full once a split was refused because of ``MAX_BYTES``.
     """
 
     def __init__(self, tree: CellTree, budget: WorkBudget) -> None:
@@ -83,8 +81,7 @@ class CellStore:
     def split(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
         """Ask the tree for the children of cells; return those that came.
 
-        Nothing comes of cells that can't be split, that were asked about before, or
-        that there is no room for.
+        Nothing comes of cells that were asked about before, or once the store is full.
 
         Raises:
             ValueError: If a child serves a row that its parent misses.
@@ -99,7 +96,7 @@ class CellStore:
         if self.full:
             return
         batch = self.tree.children(self.names[parents])
-        if not self._room(batch.cells.size):
+        if (self.size + batch.cells.size) * self._words * 8 > MAX_BYTES:
             self.full = True
             return
         self._check(parents, batch)
@@ -118,9 +115,6 @@ class CellStore:
         for part in parts(cells.size):
             sums[part] = cost(self.rows[cells[part]])
         return sums
-
-    def _room(self, n: int) -> bool:
-        return (self.size + n) * self._words * 8 <= MAX_BYTES
 
     def _check(self, parents: NDArray[np.int64], batch: CellBatch) -> None:
         if not np.all(np.diff(batch.parents) >= 0):

@@ -102,7 +102,6 @@ class Subtrees:
         return [group[:middle], group[middle:]]
 
     def _make(self, groups: list[NDArray[np.int64]]) -> list[int]:
-        """Add a subtree for each group that isn't empty."""
         filled = [g for g in groups if g.size]
         first = len(self._groups)
         self._groups += filled
@@ -119,7 +118,6 @@ class Subtrees:
         return [next(numbers) if g.size else VOID for g in groups]
 
     def _ask(self, cells: NDArray[np.int64]) -> None:
-        """Split cells that the tree hasn't been asked about."""
         new = self._store.split(cells)
         if new.size:
             costs = self._store.costs(new, self._multipliers)

@@ -20,11 +20,7 @@ MAX_BYTES = 2_000_000_000
 
 
 def check_size(n_cells: int, n_rows: int) -> None:
-    """Refuse bit rows that take more than ``MAX_BYTES``, before they are allocated.
-
-    Raises:
-        ValueError: With the size, the limit and what to do.
-    """
+    """Raise ValueError on bit rows of more than ``MAX_BYTES``, yet to be allocated."""
     size = n_cells * words_for(n_rows) * 8
     if not size <= MAX_BYTES:
         raise ValueError(

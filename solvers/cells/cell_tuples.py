@@ -56,7 +56,7 @@ def refute_tuples(
         whole: What must be served.
         store: The cells known so far; more are asked for where needed.
         n_poses: K, at least 1.
-        multipliers: Any non-negative integers of the store's rows; good ones prune.
+        multipliers: Any non-negative integers, shape (n_rows,); good ones prune.
         budget: Counted work.
     """
     subtrees = Subtrees(whole, store, n_poses, multipliers)

@@ -32,7 +32,7 @@ DEFAULT_BUDGET = 2e9
 
 @dataclass(frozen=True, eq=False)
 class CoverSolution:
-    """Answer to a :class:`CoverProblem`.
+    """Answer to a problem.
 
     Attributes:
         problem: The problem this answers.
@@ -67,10 +67,7 @@ class CoverSolution:
         return self.problem.covered_weights(self.selected)
 
     def shortfall(self) -> float:
-        """Return the missing share of a row set's weight, recomputed; 0 if met.
-
-        Of several row sets it is the largest.
-        """
+        """Return the largest missing share of a row set's weight; 0 if all are met."""
         required, totals = self.problem.required_weight, self.problem.total_weights
         missing = required - self.covered_weights
         missing[missing <= forgiven(self.problem)] = 0.0

@@ -20,7 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from solvers.checked_numbers import real_numbers, set_names, whole_numbers
+from solvers.checked_numbers import (
+    check_weights,
+    real_numbers,
+    set_names,
+    whole_numbers,
+)
 
 # Limits of one problem, checked before anything is allocated.
 MAX_ENTRIES = 200_000_000
@@ -30,9 +35,8 @@ MAX_SETS = 100_000
 # Beyond this a need can't be told from a mistake, and labels would fill the memory.
 _MAX_NEED = 1_000
 _MAX_ROW_SETS = 10_000
-# What is within these and their inverses neither vanishes nor overflows.
+# What is within this and its inverse neither vanishes nor overflows.
 _LEAST_COST = 1e-100
-_LEAST_TOTAL = 1e-250
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,20 +78,12 @@ class CoverProblem:
         covers = _boolean(self.covers)
         n_e, n_s = cast("tuple[int, int]", covers.shape)
         weights = _vector("weights", self.weights, n_e)
-        if not np.all((weights >= 0.0) & np.isfinite(weights)):
-            raise ValueError("weights must be finite and at least 0")
+        check_weights(weights)
         costs = _vector("costs", self.costs, n_s)
         if not np.all((costs >= _LEAST_COST) & (costs <= 1.0 / _LEAST_COST)):
             raise ValueError(
                 "costs must be finite and positive, from "
                 f"{_LEAST_COST:g} to {1.0 / _LEAST_COST:g}"
-            )
-        with np.errstate(over="ignore"):
-            total = float(weights.sum())
-        if not (total == 0.0 or _LEAST_TOTAL <= total <= 1.0 / _LEAST_TOTAL):
-            raise ValueError(
-                f"weights must have a finite sum, 0 or from {_LEAST_TOTAL:g} to "
-                f"{1.0 / _LEAST_TOTAL:g}, got {total:g}"
             )
         row_sets = _row_sets(self.row_sets, n_e)
         totals = _sums(weights, row_sets)
@@ -132,11 +128,7 @@ class CoverProblem:
         return bool(np.all(self.costs == self.costs[:1]))
 
     def covered_weights(self, selected: ArrayLike) -> NDArray[np.float64]:
-        """Return the weight that a selection covers in each row set, shape (n_g,).
-
-        Raises:
-            ValueError: If a set is unknown.
-        """
+        """Return the weight that known sets cover in each row set, shape (n_g,)."""
         index = set_names("selected", selected, self.costs.size)
         # A selection is a set: a name given twice counts once.
         served = np.asarray(self.covers[:, index].sum(axis=1)).ravel()
@@ -155,7 +147,6 @@ def _sums(
 
 
 def _boolean(numbers: object) -> sparse.csr_array:
-    """Return a boolean CSR matrix, or say what is wrong with the one given."""
     matrix = numbers if sparse.issparse(numbers) else np.asarray(numbers)
     shape = matrix.shape  # type: ignore[union-attr]
     if len(shape) != 2:
@@ -219,7 +210,6 @@ def _row_sets(numbers: ArrayLike | None, n: int) -> NDArray[np.int64]:
 def _required(
     numbers: ArrayLike | None, share: ArrayLike, totals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the weight that each row set asks for, shape (n_g,)."""
     if numbers is None:
         shares = real_numbers("min_coverage", share)
         if not np.all((shares > 0.0) & (shares <= 1.0)):

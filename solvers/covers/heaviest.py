@@ -16,7 +16,7 @@ from solvers.covers.bounds.mixed_integer import TOLERANCE, branch_and_bound, fit
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.covers.bounds.relaxation import coverage_bounds, rounding
 from solvers.covers.exact.group_branching import best_by_groups
-from solvers.covers.exact.pairs import best_pair, pair_proof
+from solvers.covers.exact.pairs import best_pair
 from solvers.covers.search.neighbourhood import (
     FIRST_MOVES,
     greedy,
@@ -54,9 +54,10 @@ def most_weight(
 
 def exact_search(n_sets: int) -> tuple[Callable[..., ExactSearch], str]:
     """Return the search that exhausts K sets of a simple cover, and its proof."""
-    if n_sets < _LEAST_GROUPED:
-        return best_pair, pair_proof(n_sets)
-    return best_by_groups, f"sets of {n_sets} by branching on groups of alike sets"
+    if n_sets >= _LEAST_GROUPED:
+        return best_by_groups, f"sets of {n_sets} by branching on groups of alike sets"
+    sets = "single sets" if n_sets == 1 else "pairs"
+    return best_pair, f"{sets} by exhaustion"
 
 
 def _of_simple(

@@ -10,7 +10,6 @@ from .compiled import Light, check_program
 # The largest ring is kept by this share, well above IPOPT's tolerance.
 INSET = 1e-6
 
-
 # Pitch limits count little until they are near: error shares to this power of k.
 PITCH_POWER = 4
 

@@ -18,8 +18,8 @@ make a smooth count of what is measured::
 
 The gap damps what is inside the innermost ring, where m turns through all directions.
 The max over cameras is that of the best at the current axis, which touches the true
-sum from below: no round makes it less. ``axis_nlp`` states a round in CasADi; this
-module assigns cameras and checks answers in numpy, with its own formulas.
+sum from below: no round makes it less. ``axis_nlp`` states a round in CasADi; answers
+are checked here in numpy, with formulas of their own.
 """
 
 from dataclasses import dataclass
@@ -118,15 +118,7 @@ def axis_slack(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSolution:
-    """Move an axis to where cameras measure most, near its start.
-
-    Args:
-        program: Samples, cameras and where to start.
-        max_iterations: Limit of each IPOPT run.
-
-    Returns:
-        An axis that is never worse than the start; the status says which it is.
-    """
+    """Move an axis to where cameras measure most, near its start; never a worse one."""
     from .axis_nlp import run_ipopt
 
     best = np.array(program.start, dtype=np.float64)
@@ -169,8 +161,7 @@ def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSoluti
 def better_starts(program: AxisProgram) -> list[NDArray[np.float64]]:
     """Return the axes of a polar grid that are better than the start, best first.
 
-    Blind curves make the program many-peaked, and its two variables cheap to look
-    through.
+    Blind curves make the program many-peaked.
     """
     angle = 2.0 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
     ways = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -192,7 +183,7 @@ def _figures(program: AxisProgram, axis: NDArray[np.float64]) -> tuple[float, fl
 
 
 def _assigned(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Rows (sample, camera): the best camera of each sample that this projector has."""
+    """Return the best camera of each sample that this projector has, shape (m, 2)."""
     scores = pair_scores(program, axis)
     camera = (
         np.argmax(scores, axis=1)
@@ -206,7 +197,6 @@ def _assigned(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.int
 
 
 def _outermost(program: AxisProgram) -> NDArray[np.int64]:
-    """Held points that reach farthest in each of some directions across the axis."""
     held = program.held
     if not len(held):
         return np.zeros(0, dtype=np.int64)

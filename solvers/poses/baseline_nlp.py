@@ -38,7 +38,7 @@ class BaselineProgram:
 
 
 def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
-    """State the program of a problem."""
+    """State the program."""
     k = len(problem.centres)
     x = ca.SX.sym("x", 3 * k + 1)
     centres = ca.reshape(x[: 3 * k], 3, k).T
@@ -70,8 +70,6 @@ def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
 
 @dataclass
 class _Stated:
-    """Constraints gathered so far."""
-
     g: list[ca.SX] = field(default_factory=list)
     low: list[_Array] = field(default_factory=list)
     high: list[_Array] = field(default_factory=list)

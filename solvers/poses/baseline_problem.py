@@ -1,7 +1,4 @@
-"""Data of the program that slides cameras apart; `baseline_program` solves it.
-
-Arrays only: what a point, a seam or a ring is, the caller knows.
-"""
+"""Data of the program that maximises baselines; `baseline_program` solves it."""
 
 from dataclasses import dataclass
 
@@ -34,7 +31,7 @@ class PositionShell:
 
 @dataclass(frozen=True, eq=False)
 class HalfSpaces:
-    """Half-spaces that hold camera centres, n.(O_c - centre) >= d; one row each.
+    """Half-spaces n.(O_c - centre) >= d that hold camera centres; one row each.
 
     Attributes:
         camera: Index of the camera, shape (h,).

@@ -10,10 +10,8 @@ and cos of its half angle is t*. t* = 0 (reached by L = 0) means that no directi
 all of them. Multipliers a >= 0 of sum 1 prove it: no L faces all normals by more than
 |sum a_i N_i|, which is t* at the optimum.
 
-The program is stated once for each number of slots, with the normals as a parameter
-(disciplined parametrised programming). Measured on two cores: 0.5 to 0.9 s to import
-cvxpy, 10 to 25 ms to state and compile a program, 1 to 12 ms a solve of 64 to 2,048
-normals; so it is imported where parallel light is planned, and nowhere else.
+The program is stated once for each number of slots, with the normals as a parameter.
+Importing cvxpy takes 0.5 to 0.9 s, stating a program 10 to 25 ms, a solve 1 to 12 ms.
 """
 
 from dataclasses import dataclass
@@ -62,10 +60,7 @@ class DirectionSolution:
 
 
 def max_margin_direction(normals: NDArray[np.float64]) -> DirectionSolution:
-    """Solve the cone program for one direction of parallel light.
-
-    Args:
-        normals: Unit normals, shape (n, 3), n at least 1.
+    """Solve the cone program over unit normals, shape (n, 3), n at least 1.
 
     Raises:
         ValueError: If the normals aren't such an array.

@@ -68,13 +68,10 @@ class PoseSolution:
 def pose_slack(
     program: PoseProgram, world_from_device: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the least slack of each sample's other limits, and the device's last.
+    """Return the least slack of each sample's other limits, the device last, (n + 1,).
 
     Lengths count in [m], image coordinates as tangents, angles in [rad]; at least 0
     where every limit holds.
-
-    Returns:
-        Shape (n + 1,).
     """
     rotation, position = world_from_device[:3, :3], world_from_device[:3, 3]
     local = (program.points - position) @ rotation
@@ -139,12 +136,9 @@ def solve_pose(
     """Move a projector to the largest margin: of all poses, or near its start.
 
     Args:
-        program: What to serve, from where to start.
+        program: What to serve, from where to start; no worse pose is returned.
         max_points: Tightest samples that IPOPT starts with; violated ones join.
         max_iterations: Limit of each IPOPT run.
-
-    Returns:
-        A pose that is never worse than the start; the status says which it is.
     """
     if program.light == "parallel" and (proved := _globally_best(program)):
         return proved
@@ -216,7 +210,7 @@ def _improves(margin: float, slack: float, than: float, than_slack: float) -> bo
 def _tightest(
     program: PoseProgram, pose: NDArray[np.float64], n: int
 ) -> NDArray[np.int64]:
-    """Samples of least margin, and of least slack, half of each."""
+    """Return samples of least margin, and of least slack, half of each."""
     margins, slack = pose_margins(program, pose), pose_slack(program, pose)[:-1]
     half = max(1, n // 2)
     return np.union1d(

@@ -152,18 +152,19 @@ def reduce_problem(
     done = problem.by_row_set(np.where(needs <= 0, whole, 0.0))
     servers = np.diff(problem.covers.indptr) - already
     live = (whole > 0) & (needs > 0) & (servers >= needs)
-    rows = _merge_rows(problem, live, needs)
-    dense = np.unpackbits(rows.bits, axis=1, count=costs.size).astype(bool)
-    merged = rows.sum(whole[live])
-    kept, stand_in = _undominated(dense, merged, needs[live][rows.first], costs)
+    bits, first, inverse = _merge_rows(problem, live, needs)
+    dense = np.unpackbits(bits, axis=1, count=costs.size).astype(bool)
+    merged = np.bincount(inverse, weights=whole[live], minlength=first.size)
+    merged, needs = merged.astype(np.float64), needs[live][first]
+    kept, stand_in = _undominated(dense, merged, needs, costs)
     by_row = sparse.csr_array(sparse_rows(dense[:, kept]), dtype=np.float64)
     return ReducedCover(
         problem=problem,
         by_set=sparse.csr_array(by_row.T),
         by_row=by_row,
         weights=merged,
-        needs=needs[live][rows.first],
-        row_sets=problem.row_sets[live][rows.first],
+        needs=needs,
+        row_sets=problem.row_sets[live][first],
         quotas=np.maximum(quotas - done, 0.0),
         costs=costs[kept],
         unit=float(np.ldexp(1.0, -exponent)),
@@ -187,10 +188,9 @@ def _quotas(
 
 
 def forgiven(problem: CoverProblem) -> NDArray[np.float64]:
-    """Return the weight that each row set may lack and count as served, shape (n_g,).
+    """Return the weight that each row set may lack by rounding, shape (n_g,).
 
-    That of rounding: of the requirement, of each weight to a whole number of units, and
-    of the sums.
+    Of the requirement, of each weight to a whole number of units, and of the sums.
     """
     total = problem.total_weight
     exponent, _, inexact = _whole_weights(problem)
@@ -209,38 +209,20 @@ def _whole_weights(
     return exponent, whole, problem.by_row_set(inexact.astype(np.float64))
 
 
-@dataclass(frozen=True, eq=False)
-class _DistinctRows:
-    """Rows that differ in what serves them, in their need or their row set.
-
-    Attributes:
-        bits: Packed rows, shape (n, bytes).
-        first: First of the rows given that is like it, shape (n,).
-        inverse: Which of these each row given is, shape (n_given,).
-    """
-
-    bits: NDArray[np.uint8]
-    first: NDArray[np.int64]
-    inverse: NDArray[np.int64]
-
-    def sum(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Add up what belongs to like rows."""
-        return np.bincount(
-            self.inverse, weights=values, minlength=self.first.size
-        ).astype(np.float64)
-
-
 def _merge_rows(
     problem: CoverProblem, live: NDArray[np.bool_], needs: NDArray[np.int64]
-) -> _DistinctRows:
-    """Return the distinct rows among the live ones, without the fixed sets."""
+) -> tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the live rows that differ in sets that aren't fixed, need or row set.
+
+    Packed, shape (n, bytes); the first live row like each; which each live row is like.
+    """
     covers = problem.covers[live]
     dense = covers.toarray()
     dense[:, problem.fixed] = False
     packed = np.packbits(dense, axis=1)
     if packed.shape[0] == 0 or packed.shape[1] == 0:
         none = np.empty(0, dtype=np.int64)
-        return _DistinctRows(packed[:0], none, none)
+        return packed[:0], none, none
     labels = np.stack([needs[live], problem.row_sets[live]], axis=1)
     marked = np.ascontiguousarray(np.hstack([labels.view(np.uint8), packed]))
     key = marked.view(f"V{marked.shape[1]}").ravel()
@@ -248,7 +230,7 @@ def _merge_rows(
     order = np.argsort(first, kind="stable")
     rank = np.empty(order.size, dtype=np.int64)
     rank[order] = np.arange(order.size)
-    return _DistinctRows(packed[first[order]], first[order], rank[inverse.ravel()])
+    return packed[first[order]], first[order], rank[inverse.ravel()]
 
 
 def _undominated(

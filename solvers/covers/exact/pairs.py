@@ -26,11 +26,6 @@ _DENSE_UNIT = 1.0 / 8.0
 _CALL_UNITS = 1e5
 
 
-def pair_proof(n_sets: int) -> str:
-    """Return what an exhaustion of one or two sets proves."""
-    return "single sets by exhaustion" if n_sets == 1 else "pairs by exhaustion"
-
-
 def best_pair(
     cover: ReducedCover,
     n_sets: int,

@@ -153,7 +153,7 @@ def test_a_bad_tree_is_refused(change, words):
     [
         ({"weights": [1.0, np.nan]}, "weights must be finite"),
         ({"weights": [1.0, -1.0]}, "weights must be finite"),
-        ({"weights": [1e308, 1e308]}, "of a finite sum"),
+        ({"weights": [1e308, 1e308]}, "have a finite sum"),
         ({"weights": np.ones((2, 2))}, "vector of 1 to"),
         ({"weights": []}, "vector of 1 to"),
         ({"weights": [1j, 1.0]}, "weights must be real numbers"),
