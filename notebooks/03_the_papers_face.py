@@ -27,7 +27,6 @@ from pathlib import Path
 
 from planning import RequirementError, load_mesh, load_rig, plan_rig
 from planning.cli.other_commands import write_sample
-from planning.experiments.ground_truth import Prior
 from planning.experiments.paper_figures import (
     draw_camera_images,
     draw_errors,
@@ -93,8 +92,7 @@ draw_errors(outcome, stage)
 # out.
 
 # %%
-prior = Prior.moved(outcome.experiment.mesh, 6e-3)
-shot = run_experiment(outcome.experiment, prior=prior)
+shot = run_experiment(outcome.experiment, tolerance_m=6e-3)
 print(label_line(shot.labels))
 print("\n".join(cloud_lines(shot.clouds)))
 

@@ -23,8 +23,8 @@ from geometry.files.readers import load_mesh
 from planning.experiments.ground_truth import (
     Errors,
     MeasuredErrors,
-    Prior,
     judged_labels,
+    prior_mesh,
 )
 from planning.experiments.run import DARK, Outcome, double_density, run_experiment
 from planning.experiments.setups import (
@@ -151,9 +151,9 @@ def prior_labels() -> None:
         experiment = face_experiment(variant="fits", radii_m=radii)
         plan = single(experiment)
         for tolerance in (0.0012, 0.0024, 0.006, 0.012, 0.024):
-            prior = Prior.moved(experiment.mesh, tolerance)
+            prior = prior_mesh(experiment.mesh, tolerance)
             shots = shoot_rig(
-                plan, prior.mesh, tolerance_m=tolerance, photometry=DARK, seed=0
+                plan, prior, tolerance_m=tolerance, photometry=DARK, seed=0
             )
             count = judged_labels(plan, shots)
             cloud = Cloud.join([Cloud.empty(), *(s.decoded.cloud for s in shots)])

@@ -13,7 +13,7 @@ from typing import Any
 import click
 from PIL import Image
 
-from planning.experiments.ground_truth import MeasuredErrors, Prior
+from planning.experiments.ground_truth import MeasuredErrors
 from planning.experiments.paper_figures import (
     draw_camera_images,
     draw_densities,
@@ -44,10 +44,7 @@ def experiment_command(options: Mapping[str, Any]) -> int:
     photometry = replace(DARK, ambient=options["ambient"] or 0.0)
     seed, threads = options["seed"] or 0, options["threads"] or 2
     report = reporter(quiet=options["quiet"])
-    prior = None
-    if options["single_shot"]:
-        near = 1e-3 * (options["prior_mm"] or _PRIOR_MM)
-        prior = Prior.moved(experiment.mesh, near)
+    near_mm = options["prior_mm"] or _PRIOR_MM
 
     with writable(folder):
         outcome = run_experiment(
@@ -55,7 +52,7 @@ def experiment_command(options: Mapping[str, Any]) -> int:
             photometry=photometry,
             seed=seed,
             threads=threads,
-            prior=prior,
+            tolerance_m=1e-3 * near_mm if options["single_shot"] else None,
             progress=lambda done, total: report(f"pair {done} of {total}"),
         )
         both = None

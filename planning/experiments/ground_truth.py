@@ -116,23 +116,10 @@ class LabelCount:
     ambiguous: int = 0
 
 
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """What is known of an object before it is measured.
-
-    Attributes:
-        mesh: That it lies near.
-        tolerance_m: How near [m].
-    """
-
-    mesh: TriangleMesh
-    tolerance_m: float
-
-    @classmethod
-    def moved(cls, mesh: TriangleMesh, tolerance_m: float) -> "Prior":
-        """Return a mesh that is moved back, along +y, by 5/6 of the tolerance."""
-        move = np.array([0.0, tolerance_m / 1.2, 0.0])
-        return cls(TriangleMesh(mesh.vertices + move, mesh.faces), tolerance_m)
+def prior_mesh(mesh: TriangleMesh, tolerance_m: float) -> TriangleMesh:
+    """Return a mesh that is moved back, along +y, by 5/6 of a tolerance."""
+    move = np.array([0.0, tolerance_m / 1.2, 0.0])
+    return TriangleMesh(mesh.vertices + move, mesh.faces)
 
 
 def judged_labels(scanner: Scanner, shots: Sequence[Shot]) -> LabelCount:

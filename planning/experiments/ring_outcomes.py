@@ -78,12 +78,9 @@ def lit_and_seen(scanner: Scanner, points: Array, normals: Array) -> Mask:
     and a camera, neither hidden.
     """
     caster = RayCaster(scanner.mesh, threads=1)
-    lit, seen = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-    for projector in scanner.projectors:
-        lit |= _lights(projector, points, normals, caster)
-    for camera in scanner.cameras:
-        seen |= _shows(camera, points, normals, caster)
-    return lit & seen
+    lit = [_lights(one, points, normals, caster) for one in scanner.projectors]
+    seen = [_shows(one, points, normals, caster) for one in scanner.cameras]
+    return np.any(lit, axis=0) & np.any(seen, axis=0)
 
 
 def _landed(

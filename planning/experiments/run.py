@@ -20,9 +20,9 @@ from .ground_truth import (
     Errors,
     LabelCount,
     MeasuredErrors,
-    Prior,
     judged_labels,
     measured,
+    prior_mesh,
 )
 from .ring_outcomes import RingOutcome, lit_and_seen, ring_outcomes
 from .setups import Experiment
@@ -81,16 +81,16 @@ def run_experiment(
     photometry: Photometry = DARK,
     seed: int = 0,
     threads: int = 2,
-    prior: Prior | None = None,
+    tolerance_m: float | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
     """Render, decode, triangulate and merge an experiment, and hold it to the truth.
 
-    With a prior, what is known of the object, rings are labelled by it in a single
-    image of each camera under each projector; without one, by a coded sequence.
+    With a tolerance [m], rings are labelled in a single image of each camera under each
+    projector, by a mesh that is off by no more; without one, by a coded sequence.
     """
     scanner, labels = experiment.scanner, None
-    if prior is None:
+    if tolerance_m is None:
         result = reconstruct(
             scanner,
             seed=seed,
@@ -101,8 +101,8 @@ def run_experiment(
     else:
         shots = shoot_rig(
             scanner,
-            prior.mesh,
-            tolerance_m=prior.tolerance_m,
+            prior_mesh(experiment.mesh, tolerance_m),
+            tolerance_m=tolerance_m,
             photometry=photometry,
             seed=seed,
             progress=progress,

@@ -16,7 +16,12 @@ from support.reconstruction_rigs import single
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.experiments.ground_truth import Errors, Prior, judged_labels, true_labels
+from planning.experiments.ground_truth import (
+    Errors,
+    judged_labels,
+    prior_mesh,
+    true_labels,
+)
 from planning.experiments.paper_devices import (
     CAMERA_PX,
     PRINTED,
@@ -365,11 +370,11 @@ def test_distortion_and_ambient_light_are_switches(of_box):
 
 def test_single_images_are_labelled_by_a_prior_that_is_roughly_right(of_face):
     experiment = of_face.experiment
-    prior = Prior.moved(experiment.mesh, 6e-3)
-    moved = prior.mesh.vertices - experiment.mesh.vertices
+    prior = prior_mesh(experiment.mesh, 6e-3)
+    moved = prior.vertices - experiment.mesh.vertices
     np.testing.assert_allclose(moved, [[0.0, 5e-3, 0.0]] * len(moved), atol=1e-12)
     plan = single(experiment)
-    shots = shoot_rig(plan, prior.mesh, tolerance_m=6e-3, photometry=SOFT, seed=0)
+    shots = shoot_rig(plan, prior, tolerance_m=6e-3, photometry=SOFT, seed=0)
     labels = judged_labels(plan, shots)
     assert labels.n == sum(
         (
@@ -393,8 +398,7 @@ def test_single_images_are_labelled_by_a_prior_that_is_roughly_right(of_face):
 
 def test_an_experiment_of_single_images_says_so():
     experiment = box_experiment(variant="fits")
-    prior = Prior.moved(experiment.mesh, 2e-3)
-    shot = run_experiment(experiment, photometry=SOFT, prior=prior)
+    shot = run_experiment(experiment, photometry=SOFT, tolerance_m=2e-3)
     assert shot.labels is not None
     assert shot.labels.right > 0.85 * shot.labels.n
     assert "labels by the prior mesh" in outcome_lines(shot)[-1]

@@ -71,16 +71,8 @@ class Cloud(Columns):
     def empty() -> "Cloud":
         """Return a cloud of no points."""
         vectors, numbers = np.zeros((0, 3)), np.zeros(0)
-        index = np.zeros(0, dtype=np.int16)
+        pixels, index = np.zeros((0, 2)), np.zeros(0, dtype=np.int16)
+        devices = index, index, index
         return Cloud(
-            points=vectors,
-            rays=vectors,
-            beams=vectors,
-            pixels=np.zeros((0, 2)),
-            camera=index,
-            projector=index,
-            ring=index,
-            conditioning=numbers,
-            shift=vectors,
-            noise_px=numbers,
+            vectors, vectors, vectors, pixels, *devices, numbers, vectors, numbers
         )

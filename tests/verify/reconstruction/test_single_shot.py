@@ -78,9 +78,6 @@ def test_lines_alternate_with_gaps_and_must_fit_between_rings():
     patterns = RingsForCamera(LIGHTS["parallel"], np.array([0.02, 0.05]), np.zeros(3))
     lines = patterns.lines(0.002)
     np.testing.assert_allclose(lines.radii, [0.019, 0.021, 0.049, 0.051])
-    for width in (0.0, np.nan, 0.031, 0.041):
-        with pytest.raises(ValueError, match="narrower than the least gap"):
-            patterns.lines(width)
 
 
 def rig(light: str) -> PairCalibration:

@@ -129,13 +129,8 @@ class DrawnRings:
     def blurred(self, rho: Array, spread: Array) -> tuple[Indices, Array, Array, Array]:
         """Return how blurred light falls where |p| is rho, shape (n,) each.
 
-        Args:
-            rho: |p|, shape (n,).
-            spread: Standard deviation of the blur, in the unit of rho, shape (n,).
-
-        Returns:
-            Annulus; share of the light from the next one inwards, and outwards; share
-            that is drawn at all.
+        The annulus; the share of the light from the next one inwards, and outwards; and
+        the share that is drawn at all. `spread` is the blur's standard deviation.
         """
         annulus = np.searchsorted(self.radii, rho)
         edges = np.concatenate([[-np.inf], self.radii, [np.inf]])
@@ -146,21 +141,10 @@ class DrawnRings:
     def lines(self, width: float) -> Self:
         """Return rings whose odd annuli are bright lines on these.
 
-        Args:
-            width: Of a line, in the unit of the radii.
-
-        Raises:
-            ValueError: If lines would touch each other or the centre.
+        The width is in the unit of the radii and less than `least_gap`.
         """
-        half = 0.5 * width
-        radii = (self.radii[:, None] + np.array([-half, half])).ravel()
-        if not (width > 0.0 and np.all(np.diff(radii, prepend=0.0) > 0.0)):
-            raise ValueError(
-                f"lines of width {width:.4g} must be positive and narrower than the "
-                f"least gap between rings, {self.least_gap:.4g}, in the unit of the "
-                f"radii"
-            )
-        return replace(self, radii=radii)
+        sides = 0.5 * width * np.array([-1.0, 1.0])
+        return replace(self, radii=(self.radii[:, None] + sides).ravel())
 
     @property
     def least_gap(self) -> float:

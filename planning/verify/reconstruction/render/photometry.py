@@ -62,8 +62,6 @@ class Photometry:
 
     def albedo(self, points: Array) -> Grey:
         """Return the albedo of world points (n, 3): a solid texture about 1."""
-        if self.albedo_variation == 0.0:
-            return np.ones(len(points), dtype=np.float32)
         waves = np.zeros(len(points), dtype=np.float32)
         for axis, length in enumerate(_WAVELENGTHS_M):
             along = points[:, axis] + 0.5 * points[:, (axis + 1) % 3]
@@ -81,8 +79,9 @@ class Photometry:
         blurred = np.empty_like(image)
         for first in range(0, len(image), _STRIP):
             last = min(first + _STRIP, len(image))
-            strip = _smooth_columns(image, taps, first, last)
-            _smooth_rows(strip, taps, blurred[first:last])
+            strip = np.empty_like(image[first:last])
+            _smooth(image, taps, first, last, strip)
+            _smooth(strip.T, taps, 0, image.shape[1], blurred[first:last].T)
         return blurred
 
     def capture(self, grey: Grey, key: tuple[int, ...], gain: float) -> Images:
@@ -110,22 +109,13 @@ class Photometry:
         return np.clip(level, 0.0, 255.0, out=level).astype(np.uint8)
 
 
-def _smooth_columns(image: Grey, taps: Grey, first: int, last: int) -> Grey:
+def _smooth(image: Grey, taps: Grey, first: int, last: int, out: Grey) -> None:
     """Convolve rows first to last along axis 0; beyond the border it is dark."""
     n = len(image)
-    result = image[first:last] * taps[0]
+    np.multiply(image[first:last], taps[0], out=out)
     for k in range(1, min(len(taps), n)):
         low, high = max(first, k), min(last, n - k)
         if low < last:
-            result[low - first :] += taps[k] * image[low - k : last - k]
+            out[low - first :] += taps[k] * image[low - k : last - k]
         if high > first:
-            result[: high - first] += taps[k] * image[first + k : high + k]
-    return result
-
-
-def _smooth_rows(image: Grey, taps: Grey, out: Grey) -> None:
-    """Convolve along axis 1 into `out`; beyond the border it is dark."""
-    np.multiply(image, taps[0], out=out)
-    for k in range(1, min(len(taps), image.shape[1])):
-        out[:, k:] += taps[k] * image[:, :-k]
-        out[:, :-k] += taps[k] * image[:, k:]
+            out[: high - first] += taps[k] * image[first + k : high + k]

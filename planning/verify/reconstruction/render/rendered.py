@@ -30,13 +30,7 @@ Develop = Callable[[int, int, Frames], Frames | None]
 class RenderedScene:
     """What really stands there while the patterns of a plan are shown.
 
-    Args:
-        plan: For which the patterns are drawn.
-        truth: What really stands there, devices matched by id.
-        photometry: Simulated light and sensor.
-
-    Attributes:
-        lenses: Light and sensor behind each camera's lens, focused as it is.
+    Devices are matched by id; `lenses` are light and sensor behind each camera's lens.
     """
 
     def __init__(self, plan: Scanner, truth: Scanner, photometry: Photometry) -> None:
@@ -138,14 +132,7 @@ def over_pairs(
     threads: int,
     progress: Progress | None,
 ) -> Pairs:
-    """Measure every pair, in any order, and report how many are done.
-
-    Args:
-        scanner: Whose pairs of projector and camera are measured.
-        measure: Called with the indices of each pair, in any thread.
-        threads: Worker threads.
-        progress: Called with the pairs done and their total.
-    """
+    """Measure every pair, in any order and thread, and report how many are done."""
     keys = [pair for pair, _ in scanner.pairs()]
     measured: Pairs = []
     with ThreadPoolExecutor(threads) as pool:
@@ -157,10 +144,8 @@ def over_pairs(
 
 
 def _on_at_once(plan: Scanner, truth: Scanner) -> list[list[int]]:
-    """Return for each projector those that are on at the same time, by mistake.
-
-    What the plan itself exposes together lights apart, and is rendered one by one.
-    """
+    """Return for each projector those that are on at the same time, by mistake."""
+    # What the plan itself exposes together lights apart, and is rendered one by one.
     names = [projector.id for projector in plan.projectors]
     wrong = [truth.shining_with(name) - plan.shining_with(name) for name in names]
     return [[k for k, one in enumerate(names) if one in others] for others in wrong]

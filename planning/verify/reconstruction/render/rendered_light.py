@@ -26,7 +26,8 @@ class RenderedLight(Columns):
 
     `annulus` is where a sample lies; `inner` and `outer` the shares of blurred light
     from the next annulus inwards and outwards; `root` the share of the root disc's
-    outside; `white` the irradiance under the white frame times the albedo.
+    outside; `white` the irradiance under the white frame times the albedo; `depth` z
+    before the projector [m].
     """
 
     samples: Indices
@@ -35,6 +36,7 @@ class RenderedLight(Columns):
     inner: Grey
     outer: Grey
     root: Grey
+    depth: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,21 +63,19 @@ class Shown:
         facing = self.projector.light.faces(pose, seen.points, seen.normals)
         samples = np.flatnonzero(facing)
         # In parts, so that what is between stays in the cache.
-        parts = [
-            self._light_on(seen, samples[part], in_focus_m)
-            for part in equal_parts(len(samples), CHUNK) or [slice(0)]
-        ]
-        light = RenderedLight.join([light for light, _ in parts])
+        parts = equal_parts(len(samples), CHUNK) or [slice(0)]
+        light = RenderedLight.join(
+            [self._light_on(seen, samples[some], in_focus_m) for some in parts]
+        )
         if not len(light.samples):
             return light
-        depth = np.concatenate([depth for _, depth in parts])
-        falloff = self.projector.light.falloff(depth)
+        falloff = self.projector.light.falloff(light.depth)
         return replace(light, white=(light.white * falloff).astype(np.float32))
 
     def _light_on(
         self, seen: RenderedView, samples: Indices, in_focus_m: float
-    ) -> tuple[RenderedLight, Array]:
-        """Light on those of some samples that it reaches, before falloff; depths."""
+    ) -> RenderedLight:
+        """Light on those of some samples that it reaches, before falloff."""
         law, patterns = self.projector.light, self.patterns
         lit, cosine, pixels, depth = self._reached(seen, samples)
         rays, normals = seen.rays[lit], seen.normals[lit]
@@ -94,15 +94,15 @@ class Shown:
         blur = np.sqrt(square + pixel**2 * np.maximum(stretch, 0.0))
         spread = blur / law.across_m(np.ones_like(rho), rho, depth)
         annulus, inner, outer, drawn = patterns.blurred(rho, spread)
-        light = RenderedLight(
+        return RenderedLight(
             lit,
             (seen.albedo[lit] * cosine * drawn).astype(np.float32),
             annulus,
             inner.astype(np.float32),
             outer.astype(np.float32),
             ndtr(patterns.root_side(plane) / spread).astype(np.float32),
+            depth,
         )
-        return light, depth
 
     def _reached(
         self, seen: RenderedView, samples: Indices
