@@ -53,12 +53,6 @@ class CurvatureField:
     valid: Mask
 
     @cached_property
-    def steep(self) -> Array:
-        """Unit direction T1 of the curvature of larger magnitude, shape (n_v, 3)."""
-        larger = np.abs(self.k_max) >= np.abs(self.k_min)
-        return np.where(larger[:, None], self.direction_max, self.direction_min)
-
-    @cached_property
     def curvedness(self) -> Array:
         """sqrt((k_max^2 + k_min^2) / 2) in [1/m], shape (n_v,)."""
         return np.sqrt(0.5 * (self.k_max**2 + self.k_min**2))

@@ -60,7 +60,9 @@ class _Cursor:
         self._at = 0
 
     def fill(self, element: PlyElement) -> None:
-        lengths = self._first_lengths(element) if element.count else {}
+        places = self._places(element, self._at)[0] if element.count else {}
+        lists = (p.name for p in element.properties if p.count_dtype is not None)
+        lengths = {name: places[name][1] for name in lists if places}
         dtype = self._row_type(element, lengths)
         table = np.empty(0, dtype)
         if self._left() >= element.count * dtype.itemsize:
@@ -105,11 +107,6 @@ class _Cursor:
                 columns.append((f"n {p.name}", self._type(p.count_dtype)))
                 columns.append((p.name, self._type(p.dtype), (n,)))
         return np.dtype(columns)
-
-    def _first_lengths(self, element: PlyElement) -> dict[str, int]:
-        places, _ = self._places(element, self._at)
-        lists = (p for p in element.properties if p.count_dtype is not None)
-        return {p.name: places[p.name][1] for p in lists}
 
     def _places(
         self, element: PlyElement, at: int

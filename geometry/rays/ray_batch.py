@@ -147,7 +147,7 @@ class RayBatch:
             # ball about the shrunk origin, which the ball of the mesh can't reach.
             longest = source.distance + 0.5 * back
             kept = np.float32(min(1.0, back / longest))
-            _fill(ray, source.origin)
+            ray[:] = np.append(source.origin, np.float32(0.0))
             np.subtract(start, ray, out=ray)
             ray *= kept
             slack = self._slack / kept
@@ -156,7 +156,7 @@ class RayBatch:
             depth += (start[:, 1] - source.origin[1]) * source.along[1]
             depth += (start[:, 2] - source.origin[2]) * source.along[2]
             np.minimum(depth, np.float32(back), out=depth)
-            _fill(ray, source.along)
+            ray[:] = np.append(source.along, np.float32(0.0))
             ray *= depth[:, None]
             rise *= np.abs(depth)
             longest, slack = back, self._slack
@@ -166,10 +166,3 @@ class RayBatch:
         rise += np.float32(1.0)
         start -= ray
         self.filled = fresh.stop
-
-
-def _fill(rows: Single, vector: Single) -> None:
-    """Set every row to a vector and a zero."""
-    whole = np.append(vector, np.float32(0.0)).view(np.complex128)
-    # As one item of 16 bytes, not four to a row in an inner loop of length four.
-    rows.view(np.complex128)[:] = whole

@@ -134,18 +134,14 @@ class Visibility:
                 f"origin must be 3 finite metres, got {origin.tolist()}; "
                 f"at most {_FARTHEST:g} times the mesh away"
             )
-        if along is None:
-            return Source(local.astype(np.float32), None, float(np.linalg.norm(local)))
-        along = np.asarray(along, dtype=np.float64)
-        if along.shape != (3,) or not abs(np.linalg.norm(along) - 1.0) < 1e-6:
-            raise ValueError(f"along must be a unit vector, got {along.tolist()}")
-        # The plane's own point nearest to the mesh keeps float32 from losing digits.
-        local = (local @ along) * along
-        return Source(
-            local.astype(np.float32),
-            along.astype(np.float32),
-            float(np.linalg.norm(local)),
-        )
+        if along is not None:
+            along = np.asarray(along, dtype=np.float64)
+            if along.shape != (3,) or not abs(np.linalg.norm(along) - 1.0) < 1e-6:
+                raise ValueError(f"along must be a unit vector, got {along.tolist()}")
+            # The plane's own point nearest to the mesh keeps float32 from losing
+            # digits.
+            local, along = (local @ along) * along, along.astype(np.float32)
+        return Source(local.astype(np.float32), along, float(np.linalg.norm(local)))
 
 
 def morton_order(points: Single) -> Ints:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from geometry.arrays import Array, Ints
-from geometry.mesh.tensors import unit
+from geometry.mesh.tensors import summed, unit
 from geometry.mesh.topology import components, grouped
 
 # Share of a piece's area whose normals must lie in its cone: while it is cut and
@@ -40,16 +40,12 @@ class Patch:
         """Return area-weighted sums of normals (k, 3) and areas (k,) of pieces."""
         count = max(count, int(piece.max(initial=-1)) + 1)
         # What is in no piece is counted too, before the first.
-        of = piece + 1
-        sums = [
-            np.bincount(of, values, count + 1)[1:].astype(np.float64)
-            for values in (*self._weighted, self.areas)
-        ]
-        return np.stack(sums[:3], axis=1), sums[3]
+        sums = summed(self._weighted, piece + 1, count + 1)[1:]
+        return sums[:, :3].copy(), sums[:, 3].copy()
 
     @cached_property
     def _weighted(self) -> Array:
-        return np.ascontiguousarray((self.normals * self.areas[:, None]).T)
+        return np.column_stack([self.normals * self.areas[:, None], self.areas])
 
     def connected(self, part: Ints) -> Ints:
         """Number the connected faces of parts; -1 stays."""

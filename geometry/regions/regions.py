@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints
 from geometry.curvature.curvature import CurvatureField
 from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
@@ -46,14 +46,12 @@ class DominantRegions:
         steep: Unit direction T1 of largest |curvature| in each face's plane, (n_f, 3);
             zero where it is arbitrary or not trusted, in a region or not.
         dominant_share: Area of the regions over the area of the mesh.
-        trusted: Whether the curvature of each face is trusted, shape (n_f,).
     """
 
     regions: tuple[Region, ...]
     face_region: Ints
     steep: Array
     dominant_share: float
-    trusted: Mask
 
     def __iter__(self) -> Iterator[Region]:
         return iter(self.regions)
@@ -105,15 +103,11 @@ def dominant_regions(
     whole = bool(dominant.all())
     pieces = cone_pieces(mesh, dominant, pairs, least, cone_half_angle, keep_all=whole)
     steep = steep_directions(mesh, field)
-    return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
+    return regions_of_pieces(mesh, pieces, curvedness, steep)
 
 
 def regions_of_pieces(
-    mesh: TriangleMesh,
-    pieces: Sequence[Ints],
-    curvedness: Array,
-    steep: Array,
-    trusted: Mask,
+    mesh: TriangleMesh, pieces: Sequence[Ints], curvedness: Array, steep: Array
 ) -> DominantRegions:
     """Return pieces (each the ascending indices of its faces) as numbered regions."""
     regions = tuple(
@@ -123,9 +117,9 @@ def regions_of_pieces(
     for region in regions:
         face_region[region.faces] = region.id
     share = float(mesh.face_areas[face_region >= 0].sum() / mesh.area)
-    for values in (face_region, steep, trusted):
+    for values in (face_region, steep):
         values.setflags(write=False)
-    return DominantRegions(regions, face_region, steep, share, trusted)
+    return DominantRegions(regions, face_region, steep, share)
 
 
 def _region(number: int, mesh: TriangleMesh, faces: Ints, curvedness: Array) -> Region:

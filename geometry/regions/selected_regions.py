@@ -49,12 +49,12 @@ def regions_of_faces(
     if not faces.any():
         raise ValueError("chosen must hold at least one face, holds none")
     check_cone_options(min_region_share, cone_half_angle)
-    curvedness, trusted = face_curvedness(mesh, field)
+    curvedness, _ = face_curvedness(mesh, field)
     pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     least = min_region_share * float(mesh.face_areas[faces].sum())
     pieces = cone_pieces(mesh, faces, pairs, least, cone_half_angle, keep_all=True)
     steep = steep_directions(mesh, field)
-    return regions_of_pieces(mesh, pieces, curvedness, steep, trusted)
+    return regions_of_pieces(mesh, pieces, curvedness, steep)
 
 
 def heaviest_faces(

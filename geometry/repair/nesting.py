@@ -60,8 +60,7 @@ def _in_some_box(mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask) ->
     """Whether the box of each asked patch lies in that of another that may hold it."""
     order = np.argsort(patch, kind="stable")
     start = np.searchsorted(patch[order], np.arange(len(holding)))
-    a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    low, high = mesh.corners.min(axis=1), mesh.corners.max(axis=1)
     low = np.minimum.reduceat(low[order], start)
     high = np.maximum.reduceat(high[order], start)
     outer, rows = np.flatnonzero(holding), np.flatnonzero(asked)

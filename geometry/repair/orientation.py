@@ -11,6 +11,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import Repair, TriangleMesh
+from geometry.mesh.tensors import summed
 from geometry.mesh.topology import MeshEdges, components, face_pairs
 from geometry.rays.rays import RayCaster
 
@@ -121,10 +122,7 @@ def _alike(faces: Ints, edges: MeshEdges) -> Mask:
 def _volumes(mesh: TriangleMesh, patch: Ints, area: Array) -> Array:
     """Signed volume of each patch in [m³]; it means something for closed ones."""
     weight = mesh.face_areas
-    middle = np.stack(
-        [np.bincount(patch, weight * mesh.face_centroids[:, k]) for k in range(3)],
-        axis=1,
-    )
+    middle = summed(weight[:, None] * mesh.face_centroids, patch, len(area))
     middle /= np.maximum(area, 1e-300)[:, None]
     # A face, its centroid and its area normal make the volume to the middle.
     arm = mesh.face_centroids - middle[patch]
