@@ -1,6 +1,6 @@
 """From mesh to checked plan, read top to bottom like the paper's III to VI."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -30,6 +30,8 @@ from .stages import (
     polished,
 )
 
+Keep = Callable[[RigPlan], None]
+
 
 def plan_rig(
     mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
@@ -53,6 +55,7 @@ def plan_rig(
     time_limit: float | None = None,
     progress: Report | None = None,
     command: Sequence[str] = (),
+    keep: Keep | None = None,
 ) -> RigPlan:
     """Plan the projectors and cameras that measure a surface, and check the plan.
 
@@ -82,6 +85,7 @@ def plan_rig(
         time_limit: Wall time in [s] that cuts the run; the plan is then `truncated`.
         progress: Receives a line when a stage begins.
         command: Words of the command line, for the record.
+        keep: Receives the plan when it is made and not yet checked.
 
     Returns:
         The plan, every requirement met.
@@ -113,7 +117,9 @@ def plan_rig(
     )
     # BLAS must not split sums differently with another number of threads.
     with threadpool_limits(1):
-        plan = _planned(request, clock, check=check)
+        plan, partial = _planned(request, clock)
+        if check and not plan.document.truncated:
+            plan = _checked(plan, partial, clock, keep)
     missed = shortfalls(plan)
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
@@ -122,7 +128,7 @@ def plan_rig(
     return plan
 
 
-def _planned(request: PlanRequest, clock: Stopwatch, *, check: bool) -> RigPlan:
+def _planned(request: PlanRequest, clock: Stopwatch) -> tuple[RigPlan, PartialPlan]:
     """Devices, rings and proofs; one device more where fresh samples fall short."""
     partial = larger = _first_plan(request, clock)
     try:
@@ -132,9 +138,9 @@ def _planned(request: PlanRequest, clock: Stopwatch, *, check: bool) -> RigPlan:
             plan = write_plan(partial, clock)
             larger = one_device_more(partial, plan, clock)
             if larger is None:
-                return _checked(plan, partial, clock) if check else plan
+                return plan, partial
     except (KeyboardInterrupt, TimeLimitError) as cut:
-        return _interrupted(partial, clock, cut)
+        return _interrupted(partial, clock, cut), partial
 
 
 def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
@@ -144,12 +150,27 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
     return placed(ready, stage, clock)
 
 
-def _checked(plan: RigPlan, partial: PartialPlan, clock: Stopwatch) -> RigPlan:
-    """Audit the written plan and reconstruct it from pixels, with foreign code."""
-    with clock.stage("check", "check: audit, then reconstruction from pixels"):
-        verification = verify_plan(
-            plan, threads=partial.request.threads, progress=clock.say_in_time
-        )
+def _checked(
+    plan: RigPlan, partial: PartialPlan, clock: Stopwatch, keep: Keep | None
+) -> RigPlan:
+    """Audit the kept plan and reconstruct it from pixels, with foreign code.
+
+    Raises:
+        InterruptedPlanError: If the check is interrupted; it carries the plan as it is.
+    """
+    cut = RigPlan(plan.document.changed(truncated=True), plan.surface)
+    clock.extend()
+    try:
+        if keep is not None:
+            keep(plan)
+        with clock.stage("check", "check: audit, then reconstruction from pixels"):
+            verification = verify_plan(
+                plan, threads=partial.request.threads, progress=clock.say_in_time
+            )
+    except KeyboardInterrupt:
+        raise InterruptedPlanError(cut) from None
+    except TimeLimitError:
+        return cut
     check, seconds, record = verification.reconstruction, clock.processor, None
     if check is not None:
         false = verification.audit.failures

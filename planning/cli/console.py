@@ -120,7 +120,8 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
     from planning.model.errors import PlanningError
 
     try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler)
         sys.exit(command())
     except KeyboardInterrupt:
         stop("interrupted before a first plan stood; nothing was written", 130)

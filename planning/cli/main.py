@@ -95,7 +95,8 @@ def main() -> None:
     # and IPOPT are loaded. Rays have threads of their own.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
-    before = signal.signal(signal.SIGINT, _quit)
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, _quit) for number in numbers]
     try:
         sys.exit(commands.main(prog_name="plan", standalone_mode=False))
     except click.exceptions.NoArgsIsHelpError as error:
@@ -106,7 +107,8 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         stop("interrupted", 130)
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def _quit(number: int, frame: object) -> NoReturn:

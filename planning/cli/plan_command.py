@@ -1,8 +1,8 @@
 """What `plan --mesh` and `plan --ranges` do."""
 
-import signal
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,11 @@ from planning.report.summary.summary import summary
 from planning.rig.rig import load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import read_ranges
-from planning.verify.reconstruction.pattern_files import remove_patterns, write_patterns
+from planning.verify.reconstruction.pattern_files import write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 
 from .console import cores, print_json, reporter, writable
+from .output_folder import OWNED, exchanged, uninterrupted
 
 # Options that `plan_rig` takes as they are.
 _ASKED = (
@@ -63,6 +64,14 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
             report(line)
         missed: tuple[str, ...] = ()
         code = 0
+        saved: list[RigPlan] = []
+
+        def keep(plan: RigPlan) -> None:
+            with uninterrupted():
+                _save(plan, folder, report, patterns=not options["no_patterns"])
+            saved.append(plan)
+            report(f"written to {folder}, NOT CHECKED yet")
+
         try:
             plan = plan_rig(
                 surface,
@@ -73,15 +82,20 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 time_limit=_remaining(options["time_limit"], begin),
                 progress=report,
                 command=("plan", *command),
+                keep=keep,
                 **{name: options[name] for name in _ASKED},
             )
         except RequirementError as error:
             plan, missed, code = error.plan, error.shortfalls, error.exit_code
         except InterruptedPlanError as error:
             plan, code = error.plan, error.exit_code
-        # From here on the work is done; a second Ctrl-C must not lose it.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        files = _save(plan, folder, report, patterns=not options["no_patterns"])
+        # The work is done: a second Ctrl-C must not lose it.
+        with suppress(KeyboardInterrupt), uninterrupted():
+            if saved:
+                plan.save(folder / "plan.json")
+            else:
+                _save(plan, folder, report, patterns=not options["no_patterns"])
+    files = [str(folder / name) for name in OWNED if (folder / name).exists()]
     if options["as_json"]:
         print_json(plan.to_document() | {"files": files, "missed": list(missed)})
     else:
@@ -128,14 +142,12 @@ def _size_lines(mesh: TriangleMesh) -> list[str]:
     ]
 
 
-def _save(plan: RigPlan, folder: Path, report: Report, *, patterns: bool) -> list[str]:
-    names = [folder / name for name in ("plan.json", "surface.npz", "rig.png")]
-    plan.save(names[0])
-    report("drawing")
-    save_picture(draw_rig(plan, face_status=face_status(plan)), names[2])
-    if patterns:
-        names.append(write_patterns(Scanner.of(plan), folder))
-    else:
-        # Those of an earlier plan in this folder aren't of this one.
-        remove_patterns(folder)
-    return [str(name) for name in names]
+def _save(plan: RigPlan, folder: Path, report: Report, *, patterns: bool) -> None:
+    """Write all files of a plan; those of an older plan in the folder go."""
+    with exchanged(folder) as fresh:
+        plan.save(fresh / "plan.json")
+        report("drawing")
+        picture = draw_rig(plan, face_status=face_status(plan))
+        save_picture(picture, fresh / "rig.png", plan.digest)
+        if patterns:
+            write_patterns(Scanner.of(plan), fresh)

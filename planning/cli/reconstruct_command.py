@@ -30,6 +30,7 @@ from planning.verify.reconstruction.cloud_file import (
     LengthUnit,
     remove_cloud,
 )
+from planning.verify.reconstruction.pattern_files import check_patterns
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
@@ -51,6 +52,8 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
     folder = Path(options["output"] or path.parent)
     if options["captures"] is not None:
         CaptureFolder(options["captures"], scanner).require()
+        for place in (path.parent, options["captures"]):
+            check_patterns(scanner, place)
     with ExitStack() as folders:
         for place in (folder, options["save_captures"]):
             if place is not None:

@@ -1,5 +1,6 @@
 """The plan: its document and surface, and the errors that carry one."""
 
+import hashlib
 import json
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,11 @@ from .planned import PlannedCamera, PlannedProjector
 from .requirements import Requirements
 from .surface import Surface
 
+# Keys that tell how a plan came about and how its check ended.
+_NOT_PLANNED = {
+    *("created", "command", "truncated", "members", "reconstruction"),
+    *("cost", "timings_s"),
+}
 # So many faults of a file are told; a file of another kind has hundreds.
 _MOST_FAULTS = 3
 
@@ -52,6 +58,16 @@ class RigPlan:
     def coverage(self) -> Coverage:
         """Areas of the surface and the target, and what isn't covered, by cause."""
         return self.document.coverage
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of what was planned, whether or not it was checked, hexadecimal.
+
+        Every file that a plan is used with carries it: patterns, picture and cloud.
+        """
+        document = self.to_document()
+        planned = {key: document[key] for key in document if key not in _NOT_PLANNED}
+        return hashlib.sha256(json.dumps(planned).encode()).hexdigest()
 
     def save(self, path: str | Path) -> None:
         """Write the plan, and `surface.npz` beside it.

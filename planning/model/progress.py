@@ -8,6 +8,9 @@ from .errors import TimeLimitError
 
 Report = Callable[[str], None]
 
+# What planning may take of a time limit; the rest is for writing what was planned.
+_PLANNING = 0.8
+
 
 class Stopwatch:
     """Times stages and tells whoever listens which one runs.
@@ -26,7 +29,7 @@ class Stopwatch:
     ) -> None:
         self._report = report
         self._begin = time.monotonic()
-        self._limit = time_limit
+        self._limit = None if time_limit is None else _PLANNING * time_limit
         self.seconds: dict[str, float] = {}
         self.processor: dict[str, float] = {}
 
@@ -67,6 +70,11 @@ class Stopwatch:
                 f"the time limit came before a first plan stood, after {spent:.1f} s "
                 f"of planning; allow more (--time-limit)"
             )
+
+    def extend(self) -> None:
+        """Give all of the time limit: what was planned is written."""
+        if self._limit is not None:
+            self._limit /= _PLANNING
 
     def lift(self) -> None:
         """Let the rest run whatever the time: a plan is being saved."""

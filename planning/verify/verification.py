@@ -1,5 +1,7 @@
 """`plan verify`: the audit of every claim, then the simulated reconstruction."""
 
+import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -204,7 +206,7 @@ def _reconstruct(
         threads=threads,
         truth=standing,
         expected=Expected(_bare(inside), predicted),
-        progress=lambda done, total: say(f"pixels: pair {done} of {total}"),
+        progress=_countdown(say),
     )
     samples = audit.samples
     prediction = PredictedSamples(
@@ -221,6 +223,18 @@ def _reconstruct(
     return replace(
         pixels, comparison=compare(prediction, cloud, accuracy, regions, tau_m)
     )
+
+
+def _countdown(say: Callable[[str], None]) -> Callable[[int, int], None]:
+    """Say how many pairs are done, and how long the others will take."""
+    begin = time.monotonic()
+
+    def pair_done(done: int, total: int) -> None:
+        left = (time.monotonic() - begin) * (total - done) / done
+        more = f", about {math.ceil(left)} s more" if done < total else ""
+        say(f"pixels: pair {done} of {total}{more}")
+
+    return pair_done
 
 
 def _bare(samples: AuditSamples) -> SurfaceSamples:

@@ -16,6 +16,7 @@ from planning import RequirementError, load_rig, plan_rig
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
+from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.rig_picture import draw_rig
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
@@ -253,9 +254,12 @@ def test_what_they_cost_is_told_by_name(planned, rig_of, with_few_samples):
 
 
 def test_they_are_drawn(planned):
-    with_them = np.asarray(draw_rig(planned, size=(800, 500)))
     bare = RigPlan(planned.document, replace(planned.surface, obstacles=()))
-    assert not np.array_equal(with_them, np.asarray(draw_rig(bare, size=(800, 500))))
+    with_them, without = (
+        np.asarray(draw_rig(plan, face_status=face_status(planned), size=(800, 500)))
+        for plan in (planned, bare)
+    )
+    assert not np.array_equal(with_them, without)
 
 
 def test_surface_files_hold_them(planned, tmp_path):

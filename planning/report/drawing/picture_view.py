@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from planning.model.files import write_atomically
 
@@ -19,9 +20,12 @@ BACKGROUND: Colour = (255, 255, 255)
 CLAY: Colour = (214, 205, 196)
 
 
-def save_picture(picture: Image.Image, path: Path) -> None:
-    """Write a picture as a PNG, the same bytes every time."""
-    write_atomically(path, lambda file: picture.save(file, format="PNG"))
+def save_picture(picture: Image.Image, path: Path, plan: str = "") -> None:
+    """Write a picture as a PNG, the same bytes every time, with a plan's digest."""
+    text = PngInfo()
+    if plan:
+        text.add_text("ringrig-plan", plan)
+    write_atomically(path, lambda file: picture.save(file, format="PNG", pnginfo=text))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,19 @@ from planning.model.plan import RigPlan
 from planning.model.words import count_words, error_words, labelled, percent
 
 
+def unchecked(plan: RigPlan) -> str:
+    """Return that a plan wasn't checked, and why; nothing of one that was."""
+    if plan.document.reconstruction is not None:
+        return ""
+    why = "the run was cut" if plan.document.truncated else "--no-check"
+    return f"NOT CHECKED ({why})"
+
+
 def check_lines(plan: RigPlan) -> list[str]:
     """Return the verdict, errors, completeness, and how far the prediction held."""
     check = plan.document.reconstruction
     if check is None:
-        why = "the run was cut" if plan.document.truncated else "--no-check"
-        return ["", f"NOT CHECKED ({why}): no reconstruction from pixels was made"]
+        return ["", f"{unchecked(plan)}: no reconstruction from pixels was made"]
     rms, p95, bias = check.accuracy_rms_m, check.accuracy_p95_m, check.accuracy_bias_m
     if rms is None or p95 is None or bias is None:
         return ["", "CHECK    FAILED: no point was measured in the rendered pixels"]

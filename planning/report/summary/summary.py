@@ -9,7 +9,7 @@ from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.model.words import count_words, labelled, percent
 
-from .check_lines import check_lines, cost_lines
+from .check_lines import check_lines, cost_lines, unchecked
 from .coverage_lines import coverage_lines, marginal_lines
 from .device_lines import axis_name, device_lines
 from .proof_lines import proof_lines
@@ -45,6 +45,7 @@ def _head(plan: RigPlan) -> str:
     mesh = document.meshes[0]
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = "; TRUNCATED, not the best that could be found" if document.truncated else ""
+    cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
     return (
         f"PLAN     {count_words(len(plan.projectors), 'projector')}, "
         f"{count_words(len(plan.cameras), 'camera')} for "

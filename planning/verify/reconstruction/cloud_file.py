@@ -64,14 +64,16 @@ class CloudFile:
         rows: Points, normals, sigma and colours, one a row.
         unit: Of positions and sigma.
         limits: Sigma at both ends of the colour scale, in that unit.
+        digest: Of the plan by which it was measured.
     """
 
     rows: NDArray[np.void]
     unit: LengthUnit
     limits: tuple[float, float]
+    digest: str = ""
 
     @classmethod
-    def of(cls, merged: Merged, unit: LengthUnit) -> "CloudFile":
+    def of(cls, merged: Merged, unit: LengthUnit, digest: str = "") -> "CloudFile":
         """Lay out a merged cloud.
 
         Where the normal isn't known it is 0 0 0, and sigma is the largest that any
@@ -92,7 +94,7 @@ class CloudFile:
         shades = np.rint(ramp(_VIRIDIS, (sigma - low) / max(high - low, 1e-300)))
         for channel, name in enumerate(("red", "green", "blue")):
             rows[name] = shades[:, channel]
-        return cls(rows, unit, (low, high))
+        return cls(rows, unit, (low, high), digest)
 
     @property
     def legend(self) -> str:
@@ -118,6 +120,7 @@ class CloudFile:
             "format binary_little_endian 1.0",
             _GENERATOR,
             f"comment unit {self.unit.name}, {self.unit.in_m!r} m; axes of the mesh",
+            *([f"comment plan {self.digest}"] if self.digest else []),
             "comment sigma: standard deviation along the normal, same unit",
             f"comment colour viridis by sigma, {low:.6g} to {high:.6g}: {self.legend}",
             f"element vertex {len(self.rows)}",

@@ -7,6 +7,7 @@ from typing import Any, BinaryIO
 
 from PIL import Image
 
+from planning.model.errors import CapturesError
 from planning.model.files import write_together
 from planning.verify.reconstruction.patterns.pattern_images import PatternCanvas, canvas
 from planning.verify.reconstruction.patterns.ring_patterns import Frame
@@ -35,15 +36,12 @@ _NOTES = {
 def write_patterns(scanner: Scanner, folder: Path) -> Path:
     """Write `patterns/` into a plan's folder: PNG images and `sequence.json`.
 
-    No file is moved into place before all are complete, and the manifest is the last.
-    Files that an earlier manifest lists and this one doesn't are removed. Returns the
-    folder of the patterns.
+    Returns the folder of the patterns.
 
     Raises:
         OSError: If it can't be written.
     """
     place = folder / FOLDER
-    before = _listed(place)
     files: dict[Path, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
     for p, projector in enumerate(scanner.projectors):
@@ -64,19 +62,39 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
                 ],
             }
         )
-    manifest = {"format": _SECTION, "version": 1, **_NOTES, "projectors": entries}
+    manifest = {
+        "format": _SECTION,
+        "version": 1,
+        "plan": scanner.digest,
+        **_NOTES,
+        "projectors": entries,
+    }
     text = json.dumps(manifest, indent=1, allow_nan=False) + "\n"
     files[place / _MANIFEST] = lambda file: file.write(text.encode())
     write_together(files)
-    _remove(before - set(files))
     return place
 
 
-def remove_patterns(folder: Path) -> None:
-    """Remove the patterns of an earlier plan: those that its manifest lists."""
-    place = folder / FOLDER
-    listed = _listed(place)
-    _remove(listed | ({place / _MANIFEST} if listed else set()))
+def check_patterns(scanner: Scanner, folder: Path) -> None:
+    """Refuse patterns of another plan: what was projected isn't what is decoded.
+
+    Args:
+        scanner: Devices as planned.
+        folder: Holds `patterns/`, or the manifest itself; neither is needed.
+
+    Raises:
+        CapturesError: If they carry another plan's digest.
+    """
+    for place in (folder / FOLDER / _MANIFEST, folder / _MANIFEST):
+        try:
+            carried = json.loads(place.read_text(encoding="utf-8")).get("plan")
+        except (OSError, ValueError, AttributeError):
+            continue
+        if carried not in (None, "", scanner.digest):
+            raise CapturesError(
+                f"{place}: the patterns of another plan; project those of this one, or "
+                f"give the plan whose patterns were projected"
+            )
 
 
 def _png_writer(drawn: PatternCanvas, frame: Frame) -> Callable[[BinaryIO], object]:
@@ -84,32 +102,3 @@ def _png_writer(drawn: PatternCanvas, frame: Frame) -> Callable[[BinaryIO], obje
     return lambda file: Image.fromarray(drawn.image(frame)).save(
         file, format="PNG", compress_level=1
     )
-
-
-def _listed(place: Path) -> set[Path]:
-    """Files that the manifest in a folder lists; none without a manifest of ours."""
-    try:
-        manifest = json.loads((place / _MANIFEST).read_text(encoding="utf-8"))
-        if manifest["format"] != _SECTION:
-            return set()
-        names = [
-            frame["png"]
-            for projector in manifest["projectors"]
-            for frame in projector["frames"]
-        ]
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
-    inside = (Path(name) for name in names if isinstance(name, str))
-    return {
-        place / path
-        for path in inside
-        if len(path.parts) == 2 and ".." not in path.parts and not path.is_absolute()
-    }
-
-
-def _remove(files: set[Path]) -> None:
-    for path in files:
-        path.unlink(missing_ok=True)
-    for folder in {path.parent for path in files}:
-        if folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()

@@ -112,6 +112,7 @@ class Scanner:
         groups: Ids of the projectors that shine at the same time.
         baselines: Of pairs of cameras that eq. (10) limits.
         obstacles: What stands about the object and isn't a device.
+        digest: Of the plan; empty where there is none.
     """
 
     projectors: tuple[ProjectorCalibration, ...]
@@ -125,6 +126,7 @@ class Scanner:
     groups: tuple[frozenset[str], ...] = ()
     baselines: tuple[BaselineLimit, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
+    digest: str = ""
 
     @classmethod
     def of(cls, plan: RigPlan) -> Self:
@@ -152,6 +154,7 @@ class Scanner:
                 if row.d_max is not None
             ),
             plan.surface.obstacles,
+            plan.digest,
         )
 
     def pairs(self) -> Iterator[tuple[tuple[int, int], PairCalibration]]:

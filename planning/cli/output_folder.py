@@ -1,0 +1,136 @@
+"""The folder of a plan, changed as a whole: a kill leaves the old one or the new one.
+
+The new folder is written beside the old one; then both change places in one step of the
+file system. What others put into the old folder is moved along.
+"""
+
+import ctypes
+import os
+import shutil
+import signal
+import sys
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+# What a run writes, and what of an older plan doesn't stay beside a new one.
+OWNED = ("plan.json", "surface.npz", "rig.png", "patterns", "cloud.ply")
+# `renameat2` and `renamex_np` exchange two entries under these flags.
+_EXCHANGE, _SWAP, _HERE = 2, 2, -100
+
+
+@contextmanager
+def exchanged(folder: Path) -> Generator[Path]:
+    """Give an empty folder; what is written into it takes the place of `folder`'s.
+
+    Where a folder can't be moved (the current one, or a mount), its entries are, one
+    after the other, the plan last; readers refuse what is left of two plans.
+
+    Args:
+        folder: Where the plan is to be; it needn't exist.
+
+    Raises:
+        OSError: If nothing can be written.
+    """
+    folder = folder.resolve()
+    movable = not Path.cwd().is_relative_to(folder) and not folder.is_mount()
+    beside = folder.parent if movable else folder
+    if movable:
+        _recover(folder)
+    fresh = Path(tempfile.mkdtemp(dir=beside, prefix=_prefix(folder)))
+    try:
+        umask = os.umask(0)
+        os.umask(umask)
+        fresh.chmod(folder.stat().st_mode if folder.exists() else 0o777 & ~umask)
+        yield fresh
+        with uninterrupted():
+            if movable:
+                _swap(fresh, folder)
+                _bring_others(fresh, folder)
+            else:
+                _move_entries(fresh, folder)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+@contextmanager
+def uninterrupted() -> Generator[None]:
+    """Put off Ctrl-C and SIGTERM until this is done.
+
+    Raises:
+        KeyboardInterrupt: Afterwards, if one came.
+    """
+    numbers, came = (signal.SIGINT, signal.SIGTERM), []
+    before = [
+        signal.signal(number, lambda number, _: came.append(number))
+        for number in numbers
+    ]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+    if came:
+        raise KeyboardInterrupt
+
+
+def _prefix(folder: Path) -> str:
+    return f".{folder.name}.ringrig-"
+
+
+def _swap(fresh: Path, folder: Path) -> None:
+    """Let two folders change places; without an old one the new one is just moved."""
+    if not folder.exists():
+        fresh.rename(folder)
+        return
+    if not _exchange(fresh, folder):
+        # Two steps: a kill between them leaves both, and `_recover` finds them.
+        aside = Path(f"{fresh}-old")
+        folder.rename(aside)
+        fresh.rename(folder)
+        aside.rename(fresh)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Exchange two entries in one step; say whether this system can."""
+    library = ctypes.CDLL(None, use_errno=True)
+    paths = os.fsencode(one), os.fsencode(other)
+    with suppress(AttributeError):
+        if sys.platform == "darwin":
+            return library.renamex_np(*paths, _SWAP) == 0
+        return library.renameat2(_HERE, paths[0], _HERE, paths[1], _EXCHANGE) == 0
+    return False
+
+
+def _bring_others(old: Path, folder: Path) -> None:
+    """Move what others put into the old folder to the new one."""
+    if not old.exists():
+        return
+    for entry in old.iterdir():
+        if entry.name not in OWNED and not (folder / entry.name).exists():
+            entry.rename(folder / entry.name)
+
+
+def _move_entries(fresh: Path, folder: Path) -> None:
+    """Put new entries in the place of old ones; the plan goes first and comes last."""
+    for name in OWNED:
+        old = folder / name
+        if old.is_dir():
+            shutil.rmtree(old)
+        else:
+            old.unlink(missing_ok=True)
+    for name in reversed(OWNED):
+        if (fresh / name).exists():
+            (fresh / name).rename(folder / name)
+
+
+def _recover(folder: Path) -> None:
+    """Clean up behind a run that was killed while folders changed places."""
+    for left in folder.parent.glob(f"{_prefix(folder)}*"):
+        if left.name.endswith("-old") and not folder.exists():
+            left.rename(folder)
+            continue
+        if folder.exists():
+            _bring_others(left, folder)
+        shutil.rmtree(left, ignore_errors=True)
