@@ -14,6 +14,9 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from planning.verify.reconstruction.cloud_file import is_cloud
+from planning.verify.reconstruction.pattern_files import is_patterns
+
 # What a run writes, and what of an older plan doesn't stay beside a new one.
 OWNED = ("plan.json", "surface.npz", "rig.png", "patterns", "cloud.ply")
 # `renameat2` and `renamex_np` exchange two entries under these flags.
@@ -31,9 +34,14 @@ def exchanged(folder: Path) -> Generator[Path]:
         folder: Where the plan is to be; it needn't exist.
 
     Raises:
-        OSError: If nothing can be written.
+        OSError: If nothing can be written, or `patterns` is another maker's.
     """
     folder = folder.resolve()
+    if (folder / "patterns").exists() and not _is_ours(folder / "patterns"):
+        raise FileExistsError(
+            f"{folder / 'patterns'} isn't of a plan; move it, or choose another folder "
+            f"with -o"
+        )
     movable = not Path.cwd().is_relative_to(folder) and not folder.is_mount()
     beside = folder.parent if movable else folder
     if movable:
@@ -108,14 +116,25 @@ def _bring_others(old: Path, folder: Path) -> None:
     if not old.exists():
         return
     for entry in old.iterdir():
-        if entry.name not in OWNED and not (folder / entry.name).exists():
+        if not _is_ours(entry) and not (folder / entry.name).exists():
             entry.rename(folder / entry.name)
+
+
+def _is_ours(entry: Path) -> bool:
+    """Whether an earlier run wrote an entry of a folder."""
+    if entry.name == "cloud.ply":
+        return is_cloud(entry)
+    if entry.name == "patterns":
+        return is_patterns(entry)
+    return entry.name in OWNED
 
 
 def _move_entries(fresh: Path, folder: Path) -> None:
     """Put new entries in the place of old ones; the plan goes first and comes last."""
     for name in OWNED:
         old = folder / name
+        if not _is_ours(old):
+            continue
         if old.is_dir():
             shutil.rmtree(old)
         else:

@@ -131,16 +131,19 @@ class CloudFile:
         file.write(self.rows.tobytes())
 
 
-def remove_cloud(path: Path) -> bool:
-    """Remove a cloud that was written here before, and nothing else; say if it was."""
+def is_cloud(path: Path) -> bool:
+    """Return whether a file is a cloud that was written here."""
     try:
         with path.open("rb") as file:
-            ours = file.read(512).split(b"\n")[2:3] == [_GENERATOR.encode()]
+            return file.read(512).split(b"\n")[2:3] == [_GENERATOR.encode()]
     except OSError:
         return False
-    if ours:
+
+
+def remove_cloud(path: Path) -> None:
+    """Remove a cloud that was written here before, and nothing else."""
+    if is_cloud(path):
         path.unlink()
-    return ours
 
 
 def ramp(palette: str, shares: Array) -> Array:

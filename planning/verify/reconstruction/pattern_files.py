@@ -75,6 +75,11 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
     return place
 
 
+def is_patterns(folder: Path) -> bool:
+    """Return whether a folder holds patterns that were written here."""
+    return _manifest(folder).get("format") == _SECTION
+
+
 def check_patterns(scanner: Scanner, folder: Path) -> None:
     """Refuse patterns of another plan: what was projected isn't what is decoded.
 
@@ -85,16 +90,21 @@ def check_patterns(scanner: Scanner, folder: Path) -> None:
     Raises:
         CapturesError: If they carry another plan's digest.
     """
-    for place in (folder / FOLDER / _MANIFEST, folder / _MANIFEST):
-        try:
-            carried = json.loads(place.read_text(encoding="utf-8")).get("plan")
-        except (OSError, ValueError, AttributeError):
-            continue
-        if carried not in (None, "", scanner.digest):
+    for place in (folder / FOLDER, folder):
+        if _manifest(place).get("plan", scanner.digest) != scanner.digest:
             raise CapturesError(
                 f"{place}: the patterns of another plan; project those of this one, or "
                 f"give the plan whose patterns were projected"
             )
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    """Return what the manifest in a folder says; nothing without one."""
+    try:
+        manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return manifest if isinstance(manifest, dict) else {}
 
 
 def _png_writer(drawn: PatternCanvas, frame: Frame) -> Callable[[BinaryIO], object]:

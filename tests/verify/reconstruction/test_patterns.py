@@ -1,16 +1,15 @@
 """Pattern files: decoded, from the files alone, by code of this test's own."""
 
 import json
-from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from planning.model.errors import CapturesError
 from planning.model.plan import RigPlan
-from planning.verify.reconstruction.pattern_files import remove_patterns, write_patterns
+from planning.verify.reconstruction.pattern_files import check_patterns, write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 
 
@@ -23,7 +22,7 @@ def written(request, rigs, tmp_path_factory):
 
 
 def _plan(rigs, light) -> RigPlan:
-    project = rigs.diverging if light == "diverging" else rigs.parallel
+    project = rigs.parallel if light == "parallel" else rigs.diverging
     entry = project("P1", 1.0 * rigs.direction(0.0, 10.0), 0.11, 0.004)
     if light == "parallel":
         entry |= {"resolution": [640, 600], "pixel_pitch_m": 0.65e-3}
@@ -192,27 +191,14 @@ def test_the_same_plan_gives_the_same_bytes(written, tmp_path):
         assert (folder / name).read_bytes() == (again / name).read_bytes()
 
 
-def test_what_an_earlier_plan_left_is_removed_and_nothing_else(rigs, tmp_path):
-    plan = _plan(rigs, "parallel")
-    place = write_patterns(Scanner.of(plan), tmp_path)
-    mine = place / "P1" / "note.txt"
-    mine.write_text("kept")
-    document = plan.document.changed(cameras=plan.document.cameras[:1])
-    write_patterns(Scanner.of(replace(plan, document=document)), tmp_path)
-    assert not (place / "P1" / "18-root-C2.png").exists()
-    assert not list(place.rglob("*root-C2*"))
-    remove_patterns(tmp_path)
-    assert [p for p in place.rglob("*") if p.is_file()] == [mine]
-
-
-def test_a_manifest_of_another_maker_removes_nothing(tmp_path):
-    place = tmp_path / "patterns"
-    place.mkdir()
-    victim = tmp_path / "victim.png"
-    victim.write_text("kept")
-    frames = [{"png": "../victim.png"}, {"png": "/etc/none"}]
-    manifest = {"format": "ringrig-patterns", "projectors": [{"frames": frames}]}
-    (place / "sequence.json").write_text(json.dumps(manifest))
-    remove_patterns(tmp_path)
-    assert victim.exists()
-    assert Path(place / "sequence.json").exists()
+def test_patterns_of_another_plan_are_refused(written, rigs, tmp_path):
+    plan, place = written
+    check_patterns(Scanner.of(plan), place.parent)
+    check_patterns(Scanner.of(plan), place)
+    check_patterns(Scanner.of(plan), tmp_path)
+    other = _plan(rigs, "parallel" if plan.projectors[0].light != "parallel" else "x")
+    with pytest.raises(CapturesError, match="patterns of another plan"):
+        check_patterns(Scanner.of(other), place.parent)
+    # Checked or not, it is the same plan.
+    record = plan.document.changed(truncated=True, command=("plan", "again"))
+    check_patterns(Scanner.of(RigPlan(record, plan.surface)), place)

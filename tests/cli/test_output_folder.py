@@ -1,0 +1,129 @@
+"""A plan's folder changes as a whole, whatever comes in between."""
+
+import os
+import signal
+import sys
+
+import pytest
+
+from planning.cli import output_folder
+from planning.cli.output_folder import exchanged, uninterrupted
+
+MANIFEST = '{"format": "ringrig-patterns"}'
+
+
+def fill(folder, text):
+    (folder / "plan.json").write_text(text)
+    (folder / "patterns").mkdir()
+    (folder / "patterns" / "sequence.json").write_text(MANIFEST)
+    (folder / "patterns" / f"{text}.png").write_text(text)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    place = tmp_path / "out"
+    with exchanged(place) as fresh:
+        fill(fresh, "old")
+    (place / "cloud.ply").write_text("ply\nformat\ncomment ringrig cloud\n")
+    (place / "captures").mkdir()
+    (place / "captures" / "mine.txt").write_text("mine")
+    return place
+
+
+def contents(folder):
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+
+
+NEW = ["captures/mine.txt", "patterns/new.png", "patterns/sequence.json", "plan.json"]
+
+
+@pytest.mark.parametrize("exchange", [True, False])
+def test_the_new_plan_replaces_the_old_and_leaves_what_others_put_there(
+    folder, exchange, monkeypatch
+):
+    if not exchange:
+        monkeypatch.setattr(output_folder, "_exchange", lambda one, other: False)
+    with exchanged(folder) as fresh:
+        fill(fresh, "new")
+        # Until the end the old plan stands.
+        assert (folder / "plan.json").read_text() == "old"
+    assert contents(folder) == NEW
+    assert [p.name for p in folder.parent.iterdir()] == ["out"]
+    assert oct(folder.stat().st_mode)[-3:] == oct(0o777 & ~umask())[-3:]
+
+
+def umask():
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def test_the_current_folder_keeps_its_place(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    with exchanged(folder) as fresh:
+        fill(fresh, "new")
+    assert contents(folder) == NEW
+    assert os.path.samefile(folder, ".")
+
+
+def test_an_error_leaves_the_old_plan(folder):
+    before = contents(folder)
+
+    def fails():
+        with exchanged(folder) as fresh:
+            fill(fresh, "new")
+            raise ValueError("full")
+
+    with pytest.raises(ValueError, match="full"):
+        fails()
+    assert contents(folder) == before
+    assert [p.name for p in folder.parent.iterdir()] == ["out"]
+
+
+def test_patterns_and_clouds_of_others_are_safe(folder):
+    (folder / "cloud.ply").write_text("ply of mine")
+    with exchanged(folder) as fresh:
+        fill(fresh, "new")
+    assert (folder / "cloud.ply").read_text() == "ply of mine"
+    (folder / "patterns" / "sequence.json").unlink()
+    with pytest.raises(FileExistsError, match="isn't of a plan"), exchanged(folder):
+        raise AssertionError("nothing is written")
+    assert (folder / "patterns" / "new.png").exists()
+
+
+def test_what_a_killed_run_left_is_cleaned_up(folder):
+    """A kill after folders changed places, and one between two moves."""
+    left = folder.with_name(".out.ringrig-abc")
+    folder.rename(left)
+    left.with_name(".out.ringrig-abc-old").mkdir()
+    left.rename(left.with_name(".out.ringrig-def-old"))
+    left.with_name(".out.ringrig-abc-old").rmdir()
+    with exchanged(folder) as fresh:
+        # The old plan is back while the new one is made.
+        assert (folder / "plan.json").read_text() == "old"
+        fill(fresh, "new")
+    assert contents(folder) == NEW
+    assert [p.name for p in folder.parent.iterdir()] == ["out"]
+
+
+def test_a_signal_waits_until_all_is_written():
+    done = []
+
+    def interrupted():
+        with uninterrupted():
+            os.kill(os.getpid(), signal.SIGTERM)
+            done.append(True)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert done == [True]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such call there")
+def test_this_system_exchanges_folders_in_one_step(tmp_path):
+    one, other = tmp_path / "one", tmp_path / "other"
+    for place in (one, other):
+        place.mkdir()
+        (place / "name").write_text(place.name)
+    assert output_folder._exchange(one, other)
+    assert (one / "name").read_text() == "other"
