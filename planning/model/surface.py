@@ -95,13 +95,13 @@ class Surface:
     def content(self) -> bytes:
         """What `surface.npz` holds, the same bytes for equal values."""
         buffer = BytesIO()
-        np.savez_compressed(
-            buffer,
-            vertices=self.mesh.vertices,
-            faces=self.mesh.faces,
+        arrays: dict[str, Any] = {
+            "vertices": self.mesh.vertices,
+            "faces": self.mesh.faces,
             **{name: getattr(self, name) for name in list(_ARRAYS)[2:]},
             **_packed(self.obstacles),
-        )
+        }
+        np.savez_compressed(buffer, **arrays)
         return buffer.getvalue()
 
     @classmethod
