@@ -83,46 +83,48 @@ def calibrated(plan: Scanner, path: Path) -> Scanner:
     Raises:
         CalibrationError: If the file can't be read, or doesn't fit the plan.
     """
-    cameras = {camera.id: camera for camera in plan.cameras}
-    projectors = {projector.id: projector for projector in plan.projectors}
-    seen: set[str] = set()
+    planned = {device.id: device for device in (*plan.projectors, *plan.cameras)}
+    mounted: dict[str, DeviceCalibration] = {}
     for device in _read(path).devices:
-        if device.id not in cameras and device.id not in projectors:
-            known = ", ".join((*projectors, *cameras))
+        if device.id not in planned:
             raise CalibrationError(
-                f"{path}: device {device.id!r} isn't in the plan, which has {known}"
+                f"{path}: device {device.id!r} isn't in the plan, which has "
+                f"{', '.join(planned)}"
             )
-        if device.id in seen:
+        if device.id in mounted:
             raise CalibrationError(f"{path}: device {device.id!r} twice; keep one")
-        seen.add(device.id)
         try:
-            if device.id in cameras:
-                cameras[device.id] = _camera(device, cameras[device.id], plan)
-            else:
-                projectors[device.id] = _projector(device, projectors[device.id], plan)
+            mounted[device.id] = _mounted(device, planned[device.id], plan)
         except ValueError as error:
             raise CalibrationError(f"{path}: {device.id}: {error}") from None
     return replace(
-        plan, cameras=tuple(cameras.values()), projectors=tuple(projectors.values())
+        plan,
+        cameras=tuple(mounted.get(one.id, one) for one in plan.cameras),
+        projectors=tuple(mounted.get(one.id, one) for one in plan.projectors),
     )
 
 
-def _camera(
-    device: _Device, camera: CameraCalibration, plan: Scanner
-) -> CameraCalibration:
+def _mounted(
+    device: _Device, planned: DeviceCalibration, plan: Scanner
+) -> DeviceCalibration:
+    pose = _measured_pose(device, planned, plan)
+    if isinstance(planned, ProjectorCalibration):
+        _require_drawn(device, planned)
+        # The rings move with their projector.
+        ring = np.linalg.inv(planned.world_from_device) @ planned.world_from_ring
+        return replace(planned, world_from_device=pose, world_from_ring=pose @ ring)
+    assert isinstance(planned, CameraCalibration)
     return replace(
-        camera,
-        world_from_device=_measured_pose(device, camera, plan),
-        matrix=camera.matrix if device.K is None else np.array(device.K),
-        distortion=tuple(device.distortion or camera.distortion),
+        planned,
+        world_from_device=pose,
+        matrix=planned.matrix if device.K is None else np.array(device.K),
+        distortion=tuple(device.distortion or planned.distortion),
     )
 
 
-def _projector(
-    device: _Device, projector: ProjectorCalibration, plan: Scanner
-) -> ProjectorCalibration:
-    """Put a projector where it was measured, and its rings with it."""
-    drawn = projector.matrix.tolist() if projector.light.name == "diverging" else None
+def _require_drawn(device: _Device, planned: ProjectorCalibration) -> None:
+    """Refuse optics of a projector that its patterns aren't drawn for."""
+    drawn = planned.matrix.tolist() if planned.light.name == "diverging" else None
     if device.K is not None and (
         drawn is None or not np.allclose(device.K, drawn, rtol=0.0, atol=_SAME_PX)
     ):
@@ -135,9 +137,6 @@ def _projector(
             f"distortion = {device.distortion} of a projector isn't known to the "
             f"decoder; correct the images that it shows for its lens"
         )
-    pose = _measured_pose(device, projector, plan)
-    ring = np.linalg.inv(projector.world_from_device) @ projector.world_from_ring
-    return replace(projector, world_from_device=pose, world_from_ring=pose @ ring)
 
 
 def _measured_pose(device: _Device, planned: DeviceCalibration, plan: Scanner) -> Array:

@@ -4,12 +4,12 @@ Images that were mixed up among cameras or projectors can decode without a fault
 every point is wrong. No cloud is made of what nothing confirms.
 """
 
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
@@ -77,7 +77,7 @@ def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
         pairs: What each pair gave.
         plan: What is known of devices and object, and the limit on the rms distance.
     """
-    limit, cameras = plan.limits.check.max_rms_m, plan.cameras
+    limit = plan.limits.check.max_rms_m
     clouds = {key: pair.cloud for key, pair in pairs if len(pair.cloud)}
     errors = {
         key: _distances(plan.mesh, cloud.thinned(_LOOKED_AT))
@@ -86,14 +86,14 @@ def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
     medians = {key: float(np.median(error)) for key, error in errors.items()}
     good = {key for key, median in medians.items() if median <= limit}
     off = medians.keys() - good
-    apart = _disagreements(clouds, cameras) if off else {}
-    if off and not good and _agree(off, apart, _APART * limit):
+    witnesses = _Witnesses(clouds, plan.cameras, _APART * limit)
+    if not good and witnesses.agree_all():
         return Confirmed(pairs, {}, _OTHER_OBJECT)
     kept: Pairs = []
     reasons: dict[PairIndex, str] = {}
     for key, pair in pairs:
         unconfirmed = np.zeros(len(pair.cloud), dtype=bool)
-        if key in off and not _seen_by(good, key, apart, _APART * limit):
+        if key in off and not witnesses.confirm(key, good):
             unconfirmed[:] = True
             reasons[key] = (
                 f"left out: its points lie {_MM * medians[key]:.3g} mm off the mesh "
@@ -103,9 +103,8 @@ def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
             )
         if key in good and np.mean(errors[key] > _STRAY * limit) > _FEW_STRAYS:
             far = _distances(plan.mesh, pair.cloud) > _STRAY * limit
-            others = {one: clouds[one] for one in sorted(good - {key})}
-            strays, camera = pair.cloud.take(far), cameras[key[1]]
-            if not _seen_too(key, strays, others, camera, _APART * limit):
+            strays = pair.cloud.take(far)
+            if not witnesses.saw(strays, key, good):
                 unconfirmed = far
                 reasons[key] = (
                     f"{len(strays)} of its {len(pair.cloud)} points are left out: far "
@@ -129,93 +128,83 @@ def _without(pair: Decoded, unconfirmed: Mask) -> Decoded:
     return replace(pair, cloud=cloud, rejected=why, outcomes=outcomes)
 
 
-def _seen_by(
-    good: set[PairIndex],
-    key: PairIndex,
-    apart: dict[frozenset[PairIndex], float],
-    tolerance: float,
-) -> bool:
-    """Whether a pair agrees with every confirmed one that saw the same spots."""
-    both = [frozenset((key, other)) for other in good]
-    differences = [apart[one] for one in both if one in apart]
-    return bool(differences) and max(differences) <= tolerance
+@dataclass(frozen=True, eq=False)
+class _Witnesses:
+    """Clouds of pairs, held against each other where they show the same spots."""
 
+    clouds: dict[PairIndex, Cloud]
+    cameras: Sequence[CameraCalibration]
+    tolerance_m: float
 
-def _seen_too(
-    key: PairIndex,
-    strays: Cloud,
-    others: dict[PairIndex, Cloud],
-    camera: CameraCalibration,
-    tolerance: float,
-) -> bool:
-    """Whether other pairs measured stray points alike."""
-    differences = [
-        _difference(strays, other, camera, same=one[0] == key[0])
-        for one, other in others.items()
-    ]
-    every = np.concatenate([*differences, np.zeros(0)])
-    return len(every) >= _FEWEST_STRAYS and bool(np.median(every) <= tolerance)
+    @cached_property
+    def agree(self) -> dict[frozenset[PairIndex], bool]:
+        """Whether each two pairs that saw the same spots agree on them."""
+        agree: dict[frozenset[PairIndex], bool] = {}
+        for one, other in combinations(sorted(self.clouds), 2):
+            differences = np.concatenate(
+                [
+                    self._differences(a, self.clouds[a], b)
+                    for a, b in ((one, other), (other, one))
+                ]
+            )
+            if len(differences) >= _FEWEST:
+                median = float(np.median(differences))
+                agree[frozenset((one, other))] = median <= self.tolerance_m
+        return agree
 
+    def agree_all(self) -> bool:
+        """Whether several cameras and projectors agree, each pair with some other."""
+        keys = sorted(self.clouds)
+        if len({p for p, _ in keys}) < 2 or len({c for _, c in keys}) < 2:
+            return False
+        links = np.array(
+            [[frozenset((a, b)) in self.agree for b in keys] for a in keys]
+        )
+        connected = connected_components(links, directed=False)[0] == 1
+        return connected and all(self.agree.values())
 
-def _disagreements(
-    clouds: dict[PairIndex, Cloud], cameras: Sequence[CameraCalibration]
-) -> dict[frozenset[PairIndex], float]:
-    """Median difference [m] of each two pairs where both saw one spot."""
-    apart: dict[frozenset[PairIndex], float] = {}
-    for one, other in combinations(sorted(clouds), 2):
-        same = one[0] == other[0]
+    def confirm(self, key: PairIndex, good: set[PairIndex]) -> bool:
+        """Whether a pair agrees with every confirmed one that saw the same spots."""
+        both = [frozenset((key, other)) for other in good]
+        verdicts = [self.agree[one] for one in both if one in self.agree]
+        return bool(verdicts) and all(verdicts)
+
+    def saw(self, strays: Cloud, key: PairIndex, good: set[PairIndex]) -> bool:
+        """Whether other confirmed pairs measured stray points of a pair alike."""
         differences = np.concatenate(
             [
-                _difference(clouds[a], clouds[b], cameras[a[1]], same=same)
-                for a, b in ((one, other), (other, one))
+                np.zeros(0),
+                *(self._differences(key, strays, k) for k in sorted(good - {key})),
             ]
         )
-        if len(differences) >= _FEWEST:
-            apart[frozenset((one, other))] = float(np.median(differences))
-    return apart
+        enough = len(differences) >= _FEWEST_STRAYS
+        return enough and bool(np.median(differences) <= self.tolerance_m)
 
+    def _differences(self, key: PairIndex, seen: Cloud, other: PairIndex) -> Array:
+        """How far points of a pair are from another's, as its camera sees them [m].
 
-def _difference(
-    seen: Cloud, other: Cloud, camera: CameraCalibration, *, same: bool
-) -> Array:
-    """How far points of a pair are from those of another, as its camera sees them [m].
-
-    Where the other's show on an edge, the difference of distance. On an edge of the
-    same ring of one projector that is no news, since both lie on its surface: there
-    counts how far beside the edge they show.
-    """
-    pixels = camera.project(other.points)
-    shown = np.flatnonzero(np.isfinite(pixels[:, 0]))
-    if len(shown) == 0:
-        return np.zeros(0)
-    beside, nearest = KDTree(_place(pixels[shown], other.ring[shown], same)).query(
-        _place(seen.pixels, seen.ring, same),
-        distance_upper_bound=_BESIDE_PX if same else _SAME_SPOT_PX,
-    )
-    hit = np.isfinite(beside)
-    beside, others = np.asarray(beside)[hit], shown[np.asarray(nearest)[hit]]
-    reach, further = (
-        np.sqrt(np.sum((points - camera.centre) ** 2, axis=1))
-        for points in (seen.points[hit], other.points[others])
-    )
-    deep = np.where(beside <= _SAME_SPOT_PX, np.abs(reach - further), 0.0)
-    return np.maximum(deep, beside * reach / camera.focal_px) if same else deep
-
-
-def _place(pixels: Array, rings: NDArray[np.int16], by_ring: bool) -> Array:
-    """Return pixels with a third coordinate that keeps rings apart, if asked for."""
-    apart = _RING_APART_PX * float(by_ring)
-    return np.column_stack([pixels, apart * rings.astype(np.float64)])
-
-
-def _agree(
-    keys: Set[PairIndex], apart: dict[frozenset[PairIndex], float], tolerance: float
-) -> bool:
-    """Whether pairs of several cameras and projectors agree, each with some other."""
-    if len({p for p, _ in keys}) < 2 or len({c for _, c in keys}) < 2:
-        return False
-    if not apart or max(apart.values()) > tolerance:
-        return False
-    order = sorted(keys)
-    links = np.array([[frozenset((a, b)) in apart for b in order] for a in order])
-    return connected_components(links, directed=False)[0] == 1
+        Where the other's show on an edge, the difference of distance. On an edge of the
+        same ring of one projector that is no news, since both lie on its surface: there
+        counts how far beside the edge they show.
+        """
+        cloud, camera = self.clouds[other], self.cameras[key[1]]
+        same = key[0] == other[0]
+        pixels = camera.project(cloud.points)
+        shown = np.flatnonzero(np.isfinite(pixels[:, 0]))
+        if len(shown) == 0:
+            return np.zeros(0)
+        # A third coordinate keeps rings of one projector apart.
+        apart = _RING_APART_PX * same
+        tree = KDTree(np.column_stack([pixels[shown], apart * cloud.ring[shown]]))
+        beside, nearest = tree.query(
+            np.column_stack([seen.pixels, apart * seen.ring]),
+            distance_upper_bound=_BESIDE_PX if same else _SAME_SPOT_PX,
+        )
+        hit = np.isfinite(beside)
+        beside, others = np.asarray(beside)[hit], shown[np.asarray(nearest)[hit]]
+        reach, further = (
+            np.sqrt(np.sum((points - camera.centre) ** 2, axis=1))
+            for points in (seen.points[hit], cloud.points[others])
+        )
+        deep = np.where(beside <= _SAME_SPOT_PX, np.abs(reach - further), 0.0)
+        return np.maximum(deep, beside * reach / camera.focal_px) if same else deep

@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import DeviceCalibration
 
 from .corrections import Correction, Move, far_poses, turns_aside
@@ -37,6 +37,9 @@ _OBJECT_MOVES: tuple[tuple[Move, ...], ...] = (
     ("turn", "shift"),
     ("turn", "shift", "zoom"),
 )
+_FAR_MOVES: tuple[Move, ...] = ("afar", "turn", "shift")
+# A change and its parameters.
+Start = tuple[Correction, Array]
 # Starts are compared on every fourth edge, the best few are fitted.
 _THIN = 4
 _FITTED_FAR = 12
@@ -82,19 +85,18 @@ class State:
     def explanations(self) -> list["Explanation"]:
         """Fit every change to the edges that it bears on."""
         off = self._off()
-        tried = [
-            self._fitted(Correction(role, two, ("swap",)))
+        changes = [
+            Correction(role, two, ("swap",))
             for role in _ROLES
             for two in combinations(off[role], 2)
         ]
-        if all(
-            len(off[role]) == len(np.unique(self.evidence.index(role)))
-            for role in _ROLES
-        ):
-            tried += [
-                self._fitted(Correction.of(self.supposed, "objects", 0, moves))
+        every = {role: len(np.unique(self.evidence.index(role))) for role in _ROLES}
+        if all(len(off[role]) == every[role] for role in _ROLES):
+            changes += [
+                Correction.of(self.supposed, "objects", 0, moves)
                 for moves in _OBJECT_MOVES
             ]
+        tried = [self._fitted(one, np.zeros(one.n_parameters)) for one in changes]
         several = all(len(off[role]) > 1 for role in _ROLES)
         if several and any(e.remaining_m <= self.fine_m for e in tried):
             # No change of one device would do as well.
@@ -129,63 +131,53 @@ class State:
 
     def _nearby(self, role: Role, index: int) -> list["Explanation"]:
         """Fit the changes of one device that begin where it should stand."""
-        changes = [
+        zoom, aim, place, pose = (
             Correction.of(self.supposed, role, index, moves) for moves in _DEVICE_MOVES
-        ]
+        )
         device: DeviceCalibration = getattr(self.supposed, role)[index]
         aside = turns_aside(device.world_from_device)
-        turn = aside[self._nearest([changes[1]] * len(aside), aside)[0]]
-        starts = (None, turn, None, np.append(turn, np.zeros(3)))
-        return [self._fitted(*one) for one in zip(changes, starts, strict=True)]
+        _, turn = self._nearest([(aim, x) for x in aside])[0]
+        return [
+            self._fitted(zoom, np.zeros(1)),
+            self._fitted(aim, turn),
+            self._fitted(place, np.zeros(3)),
+            self._fitted(pose, np.append(turn, np.zeros(3))),
+        ]
 
     def _afar(self, role: Role, index: int) -> "Explanation":
         """Fit a device's pose from all about the object."""
         device: DeviceCalibration = getattr(self.supposed, role)[index]
-        moves: tuple[Move, ...] = ("afar", "turn", "shift")
-        changes = [
-            Correction.of(self.supposed, role, index, moves, pose)
-            for pose in far_poses(
-                device.world_from_device, self.supposed.objects[0].centre
-            )
-        ]
-        start = np.zeros(6)
-        nearest = self._nearest(changes, [start] * len(changes))[:_FITTED_FAR]
-        tried = [changes[k] for k in nearest]
-        thin = self._thin(tried[0])
+        middle, begin = self.supposed.objects[0].centre, np.zeros(6)
         starts = [
-            fit(lambda x, one=one: self._changed(one, x, thin), start) for one in tried
+            (Correction.of(self.supposed, role, index, _FAR_MOVES, pose), begin)
+            for pose in far_poses(device.world_from_device, middle)
         ]
-        k = self._nearest(tried, starts)[0]
-        return self._fitted(tried[k], starts[k])
-
-    def _nearest(self, changes: list[Correction], starts: list[Array]) -> list[int]:
-        """Return which changes leave least at their starts, the best first."""
-        thin = self._thin(changes[0])
-        remaining = [
-            capped(self._changed(one, x, thin), _FAR_CAP_M).mean()
-            for one, x in zip(changes, starts, strict=True)
+        fitted = [
+            (one, fit(lambda x, one=one: self._changed(one, x, _THIN), begin))
+            for one, begin in self._nearest(starts)[:_FITTED_FAR]
         ]
-        return np.argsort(remaining, kind="stable").tolist()
+        return self._fitted(*self._nearest(fitted)[0])
 
-    def _thin(self, correction: Correction) -> Indices:
-        return np.flatnonzero(correction.concerns(self.evidence))[::_THIN]
+    def _nearest(self, starts: list[Start]) -> list[Start]:
+        """Return changes and their parameters, those that leave least first."""
+        return sorted(
+            starts,
+            key=lambda one: capped(self._changed(*one, _THIN), _FAR_CAP_M).mean(),
+        )
 
-    def _changed(self, correction: Correction, x: Array, chosen: Indices) -> Array:
-        """Mismatch of some edges [m] after a change of given parameters."""
-        after = correction.apply(self.supposed, x)
-        some = self.evidence.take(chosen)
+    def _changed(self, correction: Correction, x: Array, step: int = 1) -> Array:
+        """Mismatch [m] of every so many edges that a change bears on, after it."""
+        chosen = np.flatnonzero(correction.concerns(self.evidence))[::step]
+        after, some = correction.apply(self.supposed, x), self.evidence.take(chosen)
         if correction.role == "projectors":
             points, normals = self._places
             return mismatches(some, after, (points[chosen], normals[chosen]))
         return mismatches(some, after, places(some, after))
 
-    def _fitted(
-        self, correction: Correction, start: Array | None = None
-    ) -> "Explanation":
-        concerned = np.flatnonzero(correction.concerns(self.evidence))
-        x = np.zeros(correction.n_parameters) if start is None else start
+    def _fitted(self, correction: Correction, start: Array) -> "Explanation":
+        x = start
         if len(x):
-            x = fit(lambda x: self._changed(correction, x, concerned), x)
+            x = fit(lambda x: self._changed(correction, x), start)
         after = State(self.evidence, correction.apply(self.supposed, x), self.fine_m)
         return Explanation(correction, self, after)
 
