@@ -68,29 +68,21 @@ def interest_of(
     """
     if select is not None and weight is not None:
         raise InputError("a selection and a weight both fix the target: give one")
-    if isinstance(select, Interest) or isinstance(weight, Interest):
-        found = select if isinstance(select, Interest) else weight
-        assert isinstance(found, Interest)
-        if len(found.chosen) != len(mesh.faces):
+    given = weight if select is None else select
+    if given is None:
+        return None
+    if isinstance(given, Interest):
+        if len(given.chosen) != len(mesh.faces):
             raise InputError(
-                f"the selection is of {len(found.chosen)} faces, the mesh has "
+                f"the selection is of {len(given.chosen)} faces, the mesh has "
                 f"{len(mesh.faces)}: read it for this mesh"
             )
-        return found
-    if select is not None:
-        values = np.asarray(select)
-        chosen = _mask(values, len(mesh.faces), "the selection")
-        return Interest("faces", chosen)
-    if weight is not None:
-        values = np.asarray(weight)
-        if values.shape != (len(mesh.vertices),):
-            raise InputError(
-                f"weight: holds {_count(values)}, must hold {len(mesh.vertices)}, one "
-                "for each vertex"
-            )
-        chosen = _weighted(mesh, values, mesh.faces, "weight")
+        return given
+    values, origin = np.asarray(given), _in_memory(mesh)
+    if select is None:
+        chosen = _weighted(mesh, values, origin, "weight", "vertex")
         return Interest("vertex_weight", chosen)
-    return None
+    return Interest("faces", _mask(values, origin.n_faces, "the selection"))
 
 
 def read_selection(where: str, mesh: TriangleMesh) -> Interest:
@@ -106,30 +98,24 @@ def read_selection(where: str, mesh: TriangleMesh) -> Interest:
     Raises:
         InputError: If it can't be read, names what isn't there, or chooses nothing.
     """
-    origin = _origin(mesh)
-    sha256 = None
-    if where.startswith(_PROPERTY):
-        name = where.removeprefix(_PROPERTY)
-        if name not in origin.face_properties and name in origin.vertex_properties:
-            values = _finite(origin.vertex_properties[name], where)
-            chosen = np.all(values[origin.corners] != 0, axis=1)
-            if not chosen.any():
-                raise InputError(
-                    f"{where}: no face has three corners where the property isn't "
-                    "zero; paint whole faces"
-                )
-            return Interest("faces", chosen, where)
-        values = _property(origin, name, faces=True)
-        polygons = _mask(_finite(values, where) != 0, origin.n_faces, where)
-    else:
-        data = _bytes_of(where)
-        sha256 = hashlib.sha256(data).hexdigest()
-        values = _values(data, where, _indices)
-        polygons = _mask(values, origin.n_faces, where)
+    origin = mesh.origin or _in_memory(mesh)
+    named = where.startswith(_PROPERTY)
+    name = where.removeprefix(_PROPERTY)
+    if named and name in origin.vertex_properties.keys() - origin.face_properties:
+        values = _finite(origin.vertex_properties[name], where)
+        chosen = np.all(values[origin.corners] != 0, axis=1)
+        if not chosen.any():
+            raise InputError(
+                f"{where}: no face has three corners where the property isn't "
+                "zero; paint whole faces"
+            )
+        return Interest("faces", chosen, where)
+    values, sha256 = _given(where, origin, _index, faces=True)
+    if named:
+        values = _finite(values, where) != 0
+    polygons = _mask(values, origin.n_faces, where)
     chosen = polygons[origin.face]
-    left = np.zeros(origin.n_faces, dtype=bool)
-    left[origin.face] = True
-    removed = int((polygons & ~left).sum())
+    removed = len(np.setdiff1d(np.flatnonzero(polygons), origin.face))
     if not chosen.any():
         raise InputError(
             f"{where}: all {removed} faces that it chooses were removed by repair "
@@ -150,37 +136,27 @@ def read_weight(where: str, mesh: TriangleMesh) -> Interest:
         InputError: If it can't be read, holds another number of weights, or one that is
             negative or not finite, or none above zero.
     """
-    origin = _origin(mesh)
-    sha256 = None
-    if where.startswith(_PROPERTY):
-        values = _property(origin, where.removeprefix(_PROPERTY), faces=False)
-    else:
-        data = _bytes_of(where)
-        sha256 = hashlib.sha256(data).hexdigest()
-        values = _values(data, where, _decimals)
-        if values.shape != (origin.n_vertices,):
-            raise InputError(
-                f"{where}: holds {_count(values)} weights, must hold "
-                f"{origin.n_vertices}, one for each vertex of the mesh file"
-            )
-    chosen = _weighted(mesh, values, origin.corners, where)
+    origin = mesh.origin or _in_memory(mesh)
+    values, sha256 = _given(where, origin, _weight, faces=False)
+    chosen = _weighted(mesh, values, origin, where, "vertex of the mesh file")
     return Interest("vertex_weight", chosen, where, sha256)
 
 
-def _origin(mesh: TriangleMesh) -> FileOrigin:
-    """Return the file's numbering; a mesh made in memory has its own."""
-    return mesh.origin or FileOrigin.of_itself(mesh.faces, len(mesh.vertices))
+def _in_memory(mesh: TriangleMesh) -> FileOrigin:
+    n = len(mesh.faces)
+    return FileOrigin(np.arange(n), mesh.faces, n, len(mesh.vertices))
 
 
 def _mask(values: NDArray[Any], n: int, name: str) -> NDArray[np.bool_]:
     """Return bools or indices as one bool for each of n faces."""
+    mask = np.zeros(n, dtype=bool)
     if values.dtype == np.bool_:
         if values.shape != (n,):
             raise InputError(
                 f"{name}: holds {_count(values)} bools, must hold {n}, one for each "
                 "face"
             )
-        mask = values.copy()
+        mask |= values
     else:
         if values.ndim != 1 or (len(values) and values.dtype.kind not in "iu"):
             raise InputError(
@@ -193,7 +169,6 @@ def _mask(values: NDArray[Any], n: int, name: str) -> NDArray[np.bool_]:
                 f"{name}: face {values[outside][0]} isn't there, indices must lie in "
                 f"0..{n - 1}; the first face counts as 0"
             )
-        mask = np.zeros(n, dtype=bool)
         mask[values.astype(np.int64)] = True
     if not mask.any():
         raise InputError(f"{name}: chooses no face; name at least one")
@@ -201,34 +176,50 @@ def _mask(values: NDArray[Any], n: int, name: str) -> NDArray[np.bool_]:
 
 
 def _weighted(
-    mesh: TriangleMesh,
-    values: NDArray[Any],
-    corners: NDArray[np.integer],
-    name: str,
+    mesh: TriangleMesh, values: NDArray[Any], origin: FileOrigin, name: str, one: str
 ) -> NDArray[np.bool_]:
+    if values.shape != (origin.n_vertices,):
+        raise InputError(
+            f"{name}: holds {_count(values)} weights, must hold {origin.n_vertices}, "
+            f"one for each {one}"
+        )
     if values.dtype.kind not in "biuf":
         raise InputError(f"{name}: holds {values.dtype}, must hold numbers")
     try:
-        return heaviest_faces(mesh, values, corners)
+        return heaviest_faces(mesh, values, origin.corners)
     except ValueError as error:
         raise InputError(f"{name}: {error}") from None
 
 
+def _given(
+    where: str, origin: FileOrigin, parse: Callable[[str], float], *, faces: bool
+) -> tuple[NDArray[Any], str | None]:
+    """Return the numbers of a property or a file, and the digest of the file."""
+    if where.startswith(_PROPERTY):
+        return _property(origin, where.removeprefix(_PROPERTY), faces=faces), None
+    try:
+        data = Path(where).read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{where}: can't be read ({reason}); check the path") from None
+    return _values(data, where, parse), hashlib.sha256(data).hexdigest()
+
+
 def _property(origin: FileOrigin, name: str, *, faces: bool) -> NDArray[Any]:
-    own, other = origin.face_properties, origin.vertex_properties
+    wanted, other = origin.face_properties, origin.vertex_properties
     kind, remedy = "face", ""
     if not faces:
-        own, other, kind = other, own, "vertex"
+        wanted, other, kind = other, wanted, "vertex"
         if name in other:
             remedy = f"; '{name}' is one of faces: use --select ply:{name}"
-    if name in own:
-        return own[name]
-    if not own and not other:
+    if name in wanted:
+        return wanted[name]
+    if not wanted and not other:
         raise InputError(
             f"{_PROPERTY}{name}: the mesh file has no properties, only PLY files with "
             "further columns do; give a file instead"
         )
-    held = ", ".join(own) or "none"
+    held = ", ".join(wanted) or "none"
     if faces:
         held += f"; of vertices: {', '.join(other) or 'none'}"
     raise InputError(
@@ -244,46 +235,34 @@ def _finite(values: NDArray[Any], name: str) -> NDArray[Any]:
     return values
 
 
-def _bytes_of(where: str) -> bytes:
-    try:
-        return Path(where).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{where}: can't be read ({reason}); check the path") from None
-
-
-def _values(
-    data: bytes, where: str, parse: Callable[[list[str]], NDArray[Any]]
-) -> NDArray[Any]:
+def _values(data: bytes, where: str, parse: Callable[[str], float]) -> NDArray[Any]:
     """Return the numbers of a .npy file, or of text by a parser of its words."""
     if data.startswith(_NUMPY):
         try:
             return np.load(io.BytesIO(data), allow_pickle=False)
         except (ValueError, EOFError, OSError, MemoryError) as error:
             raise InputError(f"{where}: isn't a usable .npy file ({error})") from None
-    words: list[str] = []
     try:
-        for line in data.decode("utf-8-sig").splitlines():
-            words += [w for w in _SEPARATORS.split(line.split("#", 1)[0]) if w]
-        return parse(words)
+        lines = [line.split("#")[0] for line in data.decode("utf-8-sig").splitlines()]
+        words = _SEPARATORS.split(" ".join(lines))
+        return np.array([parse(word) for word in words if word])
     except UnicodeDecodeError:
         raise InputError(f"{where}: isn't text, nor .npy; give numbers") from None
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None
 
 
-def _indices(words: list[str]) -> NDArray[np.int64]:
-    for word in words:
-        if _WHOLE.fullmatch(word) is None:
-            raise ValueError(
-                f"'{word[:40]}' isn't a face index, must be a whole number from 0"
-            )
-    return np.array([int(word) for word in words], dtype=np.int64)
+def _index(word: str) -> int:
+    if _WHOLE.fullmatch(word) is None:
+        raise ValueError(
+            f"'{word[:40]}' isn't a face index, must be a whole number from 0"
+        )
+    return int(word)
 
 
-def _decimals(words: list[str]) -> NDArray[np.float64]:
+def _weight(word: str) -> float:
     try:
-        return np.array([float(word) for word in words], dtype=np.float64)
+        return float(word)
     except ValueError as error:
         raise ValueError(f"{error}; a weight must be a number") from None
 

@@ -279,7 +279,7 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
         ({"select": [n]}, f"face {n} isn't there"),
         ({"select": []}, "chooses no face"),
         ({"select": np.ones(n + 1, bool)}, f"holds {n + 1} bools, must hold {n}"),
-        ({"weight": np.ones(n)}, f"weight: holds {n}, must hold {n_vertices}"),
+        ({"weight": np.ones(n)}, f"weight: holds {n} weights, must hold {n_vertices}"),
         ({"weight": np.full(n_vertices, np.nan)}, "is nan, must be a finite"),
         (
             {"select": interest_of(box((1.0, 1.0, 1.0)), [0], None)},
