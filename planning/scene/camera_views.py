@@ -1,6 +1,6 @@
 """What each camera sees of samples, apart from the light that falls on them.
 
-Sights don't depend on the projectors, so they are kept while ring axes turn.
+Views don't depend on the projectors, so they are kept while ring axes turn.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from planning.model.planned import PlannedCamera
 from planning.scene.limits.camera_limits import ViewedSamples
 
 from . import measurability
-from .placed_bodies import Blocker, blocked_by
+from .placed_bodies import blocked_by
 from .samples import Target
 from .scene import Scene
 
@@ -24,12 +24,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """What one camera sees.
-
-    Attributes:
-        samples: Those seen, within every limit and with nothing in between, shape (k,).
-        view: How it sees them.
-    """
+    """Samples that one camera sees, with nothing in between, (k,), and how."""
 
     samples: NDArray[np.int64]
     view: ViewedSamples
@@ -71,23 +66,19 @@ def camera_views(
         sight.take(np.flatnonzero(free[column, sight.samples]))
         for column, sight in enumerate(offered)
     )
+    if not scene.bodies:
+        return tuple(clear)
     return tuple(
-        unblocked(sight, camera, samples.points, scene.bodies)
+        sight.take(np.flatnonzero(~_blocked(scene, camera, target, sight.samples)))
         for sight, camera in zip(clear, cameras, strict=True)
     )
 
 
-def unblocked(
-    sight: CameraView,
-    camera: PlannedCamera,
-    points: NDArray[np.float64],
-    bodies: Sequence[Blocker],
-) -> CameraView:
-    """Return what is left of a sight of points (n, 3) with bodies in the way."""
-    if not bodies:
-        return sight
-    blocked = blocked_by(bodies, camera, points[sight.samples]).any(axis=1)
-    return sight.take(np.flatnonzero(~blocked))
+def _blocked(
+    scene: Scene, camera: PlannedCamera, target: Target, some: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    points = target.samples.points[some]
+    return blocked_by(scene.bodies, camera, points).any(axis=1)
 
 
 def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> ViewedSamples:
@@ -97,12 +88,7 @@ def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> ViewedSample
 
 
 class CandidateViews:
-    """Sights of the same cameras on sets of samples, each looked at once.
-
-    Args:
-        scene: Surface and requirements.
-        cameras: Whose sights they are.
-    """
+    """Views that the same cameras have of sets of samples, each looked at once."""
 
     def __init__(self, scene: Scene, cameras: Sequence[PlannedCamera]) -> None:
         self._scene, self.cameras = scene, tuple(cameras)
@@ -110,7 +96,7 @@ class CandidateViews:
         self._first: CandidateViews | None = None
 
     def joined(self, more: Sequence[PlannedCamera]) -> "CandidateViews":
-        """Return the sights of these cameras, then of more; what is known is kept."""
+        """Return the views of these cameras, then of more; what is known is kept."""
         both = CandidateViews(self._scene, (*self.cameras, *more))
         both._first = self
         return both

@@ -9,12 +9,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Draw:
-    """Area-true samples of the target, or of the whole surface.
-
-    Attributes:
-        count: Samples.
-        stream: Of the target's; the whole surface has the next one.
-    """
+    """So many area-true samples, of a stream; the whole surface has the next one."""
 
     count: int
     stream: int

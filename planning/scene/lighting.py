@@ -40,15 +40,7 @@ def first_failure(
 ) -> NDArray[np.int8]:
     """Return the index in `CAUSES` of the first limit that fails; `LIT` if none does.
 
-    Args:
-        projector: Pose, optics and pattern.
-        target: Samples.
-        limits: Margins of eq. (2).
-        visibility: Occlusion; None: it is left out.
-        bodies: All else that stands in the way of light.
-
-    Returns:
-        Shape (n,).
+    Shape (n,). Without `visibility`, occlusion by the mesh is left out.
     """
     first = _ignoring_occlusion(projector, SampleColumns.of(target), limits)
     if visibility is not None:
@@ -193,12 +185,7 @@ def assigned_projectors(
 ) -> NDArray[np.int64]:
     """Return the projector that each sample is assigned to, -1 where none lights it.
 
-    Args:
-        lit: Shape (n, n_projectors).
-        margin: Smaller margin of each pair in [rad], same shape.
-
-    Returns:
-        Shape (n,); the lower index on ties.
+    Of both arrays, shape (n, n_projectors), the larger margin; the lower index on ties.
     """
     ranked = np.where(lit, margin, -np.inf)
     return np.where(lit.any(axis=1), np.argmax(ranked, axis=1), -1)

@@ -43,15 +43,7 @@ def view(
     visibility: Visibility | None,
     bodies: Sequence[Blocker] = (),
 ) -> ViewedSamples:
-    """Return how a camera sees samples; without `visibility`, occlusion is left out.
-
-    Args:
-        camera: Pose and optics.
-        target: Samples.
-        limits: Of incidence and sampling distance.
-        visibility: Occlusion by the mesh.
-        bodies: All else that stands in the way.
-    """
+    """Return how a camera sees samples; without `visibility`, the mesh hides none."""
     rays = CameraRays.of(camera, target)
     first = first_violated(CAMERA_LIMITS, rays, limits, len(target))
     near = np.flatnonzero(first >= OCCLUDED)

@@ -95,8 +95,7 @@ class Pair:
         places: Where the samples stand in the camera's view, shape (k,).
         samples: Which of the lit samples they are, shape (k,).
         quality: How well they are triangulated.
-        first_violated: Index in `CAUSES` of the first limit that fails, or `MEASURED`,
-            shape (k,).
+        first_violated: Index in `CAUSES`, or `MEASURED`, shape (k,).
     """
 
     projector: int
@@ -125,7 +124,7 @@ def pairs_of(
     Args:
         limits: Of pairs.
         lit: Lit samples.
-        view: How the camera sees them, or `samples` of them.
+        view: How the camera sees them.
         samples: Which of the lit samples are in view; None: all.
         wanted: Which places of the view to look at; it is read anew for each projector
             and may change in between. None: those that are seen.
@@ -154,14 +153,7 @@ def least_sigma(
     views: Sequence[ViewedSamples],
     p: int,
 ) -> NDArray[np.float64]:
-    """Return the least s_N of projector p over cameras in [m], (n,); inf for none.
-
-    Args:
-        limits: Of pairs.
-        samples: Lit samples.
-        views: How each camera sees them.
-        p: Index of the projector.
-    """
+    """Return the least s_N of projector p over cameras in [m], (n,); inf for none."""
     least = np.full(len(samples.target), np.inf)
     for seen in views:
         for pair in pairs_of(limits, samples, seen, projectors=[p]):
@@ -179,11 +171,7 @@ def measured_by(
 ) -> NDArray[np.bool_]:
     """Return which camera measures which sample with any projector, (n, n_cameras).
 
-    Args:
-        scene: Surface and requirements.
-        cameras: As they stand.
-        lit: Lit samples.
-        views: Of these cameras on these samples, where they are at hand.
+    `views` are those of the cameras on the lit samples, where they are at hand.
     """
     if views is None:
         views = camera_views(scene, cameras, lit.target)
@@ -219,10 +207,7 @@ def _chunks(views: Sequence[CameraView]) -> Iterator[tuple[int, int]]:
 def furthest_failure(
     scene: Scene, cameras: Sequence[PlannedCamera], lit: LitSamples
 ) -> NDArray[np.int8]:
-    """Return how far each sample comes over all pairs: an index in `CAUSES`.
-
-    It is `MEASURED` where some pair measures the sample.
-    """
+    """Return how far samples come over all pairs: index in `CAUSES`, or `MEASURED`."""
     furthest = np.zeros(len(lit.target), dtype=np.int8)
     for camera in cameras:
         scene.check_cancelled()

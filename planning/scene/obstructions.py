@@ -19,13 +19,7 @@ _CONTACT = 2e-6
 
 @dataclass(frozen=True, eq=False)
 class Obstruction:
-    """An obstacle that light and views meet.
-
-    Attributes:
-        name: As in the rig file.
-        mesh: Where it stands [m].
-        contact_m: What is nearer to a sample isn't met [m].
-    """
+    """An obstacle that light and views meet, unless within `contact_m` of a sample."""
 
     name: str
     mesh: TriangleMesh
@@ -52,12 +46,7 @@ class Obstruction:
     def crossed(
         self, starts: NDArray[np.float64], points: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
-        """Return which straight lines to points (n, 3) meet it, shape (n,).
-
-        Args:
-            starts: Where light leaves or views end, shape (n, 3) or (3,) [m].
-            points: Samples, shape (n, 3) [m].
-        """
+        """Return which lines from starts, (n, 3) or (3,), to points meet it, (n,)."""
         ways = starts - points
         lengths = np.linalg.norm(ways, axis=1)
         along = ways / np.where(lengths > 0.0, lengths, 1.0)[:, None]
@@ -67,13 +56,15 @@ class Obstruction:
 
     def touches(self, box: OrientedBox) -> bool:
         """Return whether a box shares a point with its surface."""
-        low, high = self.mesh.bounds
-        if np.any(box.centre - box.radius > high) or np.any(
-            box.centre + box.radius < low
-        ):
-            return False
-        return bool(triangles_touch(box, self.mesh.corners).any())
+        return touches_mesh(box, self.mesh)
 
     @cached_property
     def _caster(self) -> RayCaster:
         return RayCaster(self.mesh)
+
+
+def touches_mesh(box: OrientedBox, mesh: TriangleMesh) -> bool:
+    """Return whether a box shares a point with a surface."""
+    low, high = mesh.bounds
+    near = (box.centre - box.radius <= high) & (box.centre + box.radius >= low)
+    return bool(near.all() and triangles_touch(box, mesh.corners).any())

@@ -130,15 +130,9 @@ def existing_bodies(required: Requirements) -> tuple[PlacedBody, ...]:
 def blocked_by(
     bodies: Sequence[Blocker], device: Device, points: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return what stands between a device and points; its own body never does.
+    """Return what stands between a device and points, shape (n, n_bodies).
 
-    Args:
-        bodies: Bodies and obstacles in the world.
-        device: Where light leaves, or views end.
-        points: Shape (n, 3) [m].
-
-    Returns:
-        Shape (n, n_bodies).
+    The device's own body never does.
     """
     pose = device.world_from_device
     local = transform(inverse(pose), points)
@@ -157,14 +151,10 @@ def first_blocked(
     limits: tuple[int, int],
     none: int,
 ) -> NDArray[np.int8]:
-    """Return which limit points between them and a device violate first, shape (n,).
+    """Return which limit points violate first by what is between, shape (n,).
 
-    Args:
-        bodies: Bodies and obstacles in the world.
-        device: Where light leaves, or views end.
-        points: Shape (n, 3) [m].
-        limits: Indices of the limits that bodies, and that obstacles decide.
-        none: Where nothing stands between.
+    `limits` are the indices of those that bodies, and that obstacles decide; `none`
+    stands where nothing is between.
     """
     first = np.full(len(points), none, dtype=np.int8)
     if bodies:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel, PinholeModel
+from geometry.devices import DeviceModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.rays.visibility import Visibility
@@ -38,7 +38,7 @@ class Scene:
         requirements: What is asked.
         seed: Of every random draw.
         threads: Worker threads; no result depends on it.
-        pulse: Called between pieces of work; raises when the run is to be cut.
+        check_cancelled: Called between pieces of work; raises when the run is cut.
         placed: Bodies of devices that were chosen, beside those that stand already.
         obstructions: What stands about the object and isn't a device.
     """
@@ -105,13 +105,8 @@ class Scene:
         """Return area-true samples of the whole surface, by the draw's next stream."""
         return self._samples(draw.later(1), None)
 
-    def site(self, kind: Kind, device: PinholeModel | ParallelModel) -> Site | None:
-        """Return what devices stand over side by side; None where the object fits.
-
-        Args:
-            kind: Of the device.
-            device: Its optics.
-        """
+    def site(self, kind: Kind, device: DeviceModel) -> Site | None:
+        """Return what devices stand over side by side; None where the object fits."""
         required, space = self.requirements, self.requirements.workspace
         radius, standoff, limits = (
             (space.projector_radius_m, space.projector_standoff_m, required.projector)

@@ -5,9 +5,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from geometry.shapes.boxes import OrientedBox, triangles_touch
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.scene.obstructions import touches_mesh
 from planning.scene.placed_bodies import (
     CLEARANCE_M,
     Device,
@@ -34,7 +34,7 @@ def lacks_clearance(scene: Scene, device: Device) -> str:
     if device.body is None:
         return ""
     box = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
-    if _touches_object(scene, box):
+    if touches_mesh(box, scene.mesh):
         return "the object"
     workspace = scene.requirements.workspace
     if not device.existing and (broken := broken_by_body(workspace, box)):
@@ -58,11 +58,6 @@ def candidates_with_clearance(
 ) -> tuple[_D, ...]:
     """Return at least n candidates that have room, if a finer lattice has as many.
 
-    Args:
-        scene: Surface and requirements.
-        n: Candidates wanted.
-        offer: Gives a number of candidates over the workspace.
-
     Raises:
         InfeasibleLimitsError: If no candidate's body has room.
     """
@@ -83,11 +78,6 @@ def check_existing_clearance(
     scene: Scene, projector: PlannedProjector, camera: PlannedCamera
 ) -> None:
     """Refuse existing devices whose bodies touch each other or the object.
-
-    Args:
-        scene: Surface and requirements.
-        projector: A projector of the rig.
-        camera: A camera of the rig.
 
     Raises:
         InfeasibleLimitsError: It names both and what to do.
@@ -128,10 +118,3 @@ def _remedy(causes: set[str]) -> str:
     if "the object" in causes:
         return "move or widen the others, or change placement.standoff_mm"
     return "or move or widen what is in its way"
-
-
-def _touches_object(scene: Scene, box: OrientedBox) -> bool:
-    mesh = scene.mesh
-    if np.linalg.norm(box.centre - mesh.centre) > box.radius + mesh.reach:
-        return False
-    return bool(triangles_touch(box, mesh.corners).any())

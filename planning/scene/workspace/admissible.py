@@ -34,16 +34,21 @@ def depth(box: Box, offsets: _Array) -> _Array:
     return np.where(outside > 0.0, -outside, -beyond.max(axis=1))
 
 
-def stands(workspace: Workspace, offsets: _Array) -> NDArray[np.bool_]:
-    """Return whether zones let devices stand at positions (n, 3), shape (n,)."""
+def stands(
+    workspace: Workspace, offsets: _Array, reach: _Array | float = _ROUNDING
+) -> NDArray[np.bool_]:
+    """Return whether zones let devices stand at positions (n, 3), shape (n,).
+
+    Of balls of radius `reach` [m]: whether no single zone forbids all of it.
+    """
     allowed = np.ones(len(offsets), dtype=bool)
     if workspace.box is not None:
-        allowed &= depth(workspace.box, offsets) >= -_ROUNDING
+        allowed &= depth(workspace.box, offsets) >= -reach
     if workspace.mounting:
-        on = [depth(plane, offsets) >= -_ROUNDING for plane in workspace.mounting]
-        allowed &= np.any(on, axis=0)
+        near = [depth(plane, offsets) >= -reach for plane in workspace.mounting]
+        allowed &= np.any(near, axis=0)
     for zone in workspace.keep_out:
-        allowed &= depth(zone, offsets) <= _ROUNDING
+        allowed &= depth(zone, offsets) <= reach
     return allowed
 
 
@@ -54,13 +59,9 @@ def admissible(
     *,
     slack: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """Return whether positions keep shell, cone, floor and zones, shape (n,).
+    """Return whether positions (n, 3) keep shell, cone, floor and zones, shape (n,).
 
-    Args:
-        workspace: Where devices may stand.
-        radius_m: Least and largest distance of this kind of device.
-        offsets: Positions, shape (n, 3).
-        slack: Of radii, as a share; of cosines; of heights in [m].
+    `slack` is of radii, as a share; of cosines; of heights in [m].
     """
     distance = np.linalg.norm(offsets, axis=1)
     low, high = radius_m[0] * (1.0 - slack), radius_m[1] * (1.0 + slack)
@@ -125,30 +126,14 @@ def may_stand(
 ) -> NDArray[np.bool_]:
     """Return which cells of the shell may hold a position that zones allow.
 
-    A cell has the directions within `angle` of `outwards` and the radii from `low_m` to
-    `high_m`. All of it lies in a ball about its middle, of radius ``(high - low) / 2 +
-    2 high sin(angle / 2)``. Cells are left out only if all of that ball is forbidden by
-    one limit.
-
-    Args:
-        workspace: Its zones alone count.
-        outwards: Unit directions, shape (n, 3).
-        angle: Angle about them [rad], shape (n,) or one number.
-        low_m: Least radius [m], shape (n,) or one number.
-        high_m: Largest radius [m], likewise.
+    A cell has the directions within `angle` [rad] of the unit `outwards`, shape (n, 3),
+    and the radii from `low_m` to `high_m` [m]; (n,) or one number each. All of it lies
+    in a ball about its middle, of radius ``(high - low) / 2 + 2 high sin(angle / 2)``.
     """
     middles = np.asarray(0.5 * (low_m + high_m))[..., None] * outwards
     half_turn = np.minimum(0.5 * np.asarray(angle), 0.5 * np.pi)
     reach = 0.5 * (high_m - low_m) + 2.0 * high_m * np.sin(half_turn) + _ROUNDING
-    allowed = np.ones(len(outwards), dtype=bool)
-    if workspace.box is not None:
-        allowed &= depth(workspace.box, middles) >= -reach
-    if workspace.mounting:
-        near = [depth(plane, middles) >= -reach for plane in workspace.mounting]
-        allowed &= np.any(near, axis=0)
-    for zone in workspace.keep_out:
-        allowed &= depth(zone, middles) <= reach
-    return allowed
+    return stands(workspace, middles, reach)
 
 
 def half_spaces(workspace: Workspace, offset: _Array) -> tuple[_Array, _Array]:
@@ -156,14 +141,8 @@ def half_spaces(workspace: Workspace, offset: _Array) -> tuple[_Array, _Array]:
 
     x is in it iff ``normals @ x >= offsets``: the box of the workspace, the mounting
     plane that holds the position, and for each keep-out volume the far side of the face
-    that the position is farthest beyond.
-
-    Args:
-        workspace: Its zones alone count.
-        offset: The position, shape (3,).
-
-    Returns:
-        Unit normals, shape (k, 3), and offsets in [m], shape (k,).
+    that the position, shape (3,), is farthest beyond. Unit normals, (k, 3), and offsets
+    in [m], (k,).
     """
     held = [] if workspace.box is None else [workspace.box]
     if workspace.mounting:

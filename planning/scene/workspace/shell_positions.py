@@ -34,11 +34,6 @@ def shell_positions(workspace: Workspace, radius_m: Range, n: int) -> _Array:
     In the middle of the shell; where zones cut it, as near to the middle as they allow,
     or on the mounting planes. The lattice is refined until n positions are left, so
     that a small workspace is searched as densely as a large one is.
-
-    Args:
-        workspace: Where devices may stand.
-        radius_m: Least and largest distance of this kind of device.
-        n: Positions wanted.
     """
     offered = n
     while True:
@@ -46,7 +41,10 @@ def shell_positions(workspace: Workspace, radius_m: Range, n: int) -> _Array:
             laid = np.concatenate(_laid(workspace.mounting, offered))
             offsets = laid[admissible(workspace, radius_m, laid)]
         else:
-            offsets = towards(workspace, radius_m, _lattice(workspace, offered))
+            start = None if workspace.bearing is None else np.array(workspace.bearing)
+            axis, half_angle = np.array(workspace.axis), workspace.half_angle
+            cone = fibonacci_cap(offered, axis, half_angle, start=start)
+            offsets = towards(workspace, radius_m, cone)
         if len(offsets) >= n or offered >= _MOST_OFFERED * n:
             return np.array(workspace.centre) + offsets
         wanted = np.ceil(1.1 * offered * n / max(len(offsets), 1))
@@ -62,22 +60,10 @@ def towards(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array
     return offsets[admissible(workspace, (radius, radius), offsets)]
 
 
-def _lattice(workspace: Workspace, n: int) -> _Array:
-    """Unit vectors spread evenly over the cone, shape (n, 3)."""
-    start = None if workspace.bearing is None else np.array(workspace.bearing)
-    return fibonacci_cap(n, np.array(workspace.axis), workspace.half_angle, start=start)
-
-
 def along_rays(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
     """Return a position on each ray that has one, nearest to the middle of the shell.
 
-    Args:
-        workspace: Where devices may stand.
-        radius_m: Least and largest distance of this kind of device.
-        directions: Unit vectors, shape (n, 3).
-
-    Returns:
-        Offsets from the centre, shape (m, 3), m <= n, in the order of the rays.
+    Of unit directions (n, 3): offsets from the centre, in their order, shape (m, 3).
     """
     parts = [
         _on_rays(workspace, radius_m, directions[start : start + _BATCH])

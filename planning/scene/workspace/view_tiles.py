@@ -57,16 +57,13 @@ class Site:
 def tiled_poses(
     site: Site, directions: _Array, rolls: Sequence[float]
 ) -> tuple[_Array, NDArray[np.int64]]:
-    """Return admissible ``world_from_device`` over the tiles of each direction.
+    """Return admissible ``world_from_device`` over tiles, and the direction of each.
 
     Args:
         site: What is looked at.
         directions: Unit vectors from the object to the device, shape (n, 3).
         rolls: Turns of the device about its line of sight, against the upright or, if
             that is clearly smaller, the smallest rectangle [rad].
-
-    Returns:
-        Poses, shape (m, 4, 4), and the direction of each, shape (m,).
     """
     frames, anchors, depths, owner = [], [], [], []
     upright = look_at(directions, np.zeros(3), np.array(site.workspace.up))
@@ -92,14 +89,10 @@ def tiled_poses(
 
 
 def poses_beside(site: Site, poses: _Array, n: int, *, reach: float) -> _Array:
-    """Return poses around others: turned about their aim, and moved with it, (m, 4, 4).
+    """Return poses around others: n each turned about their aim, and moved with it.
 
-    Args:
-        site: What is looked at.
-        poses: ``world_from_device``, shape (k, 4, 4).
-        n: Poses of either sort around each.
-        reach: How far they are turned [rad]. They are moved by as great a share of half
-            the field as this is of a radian's third.
+    They are turned by `reach` [rad] at most, and moved by as great a share of half the
+    field as this is of a radian's third.
     """
     near = site.standoff_m
     aside = min(1.0, 3.0 * reach) * float(site.device.half_rectangle(near).min())
@@ -124,16 +117,13 @@ def poses_beside(site: Site, poses: _Array, n: int, *, reach: float) -> _Array:
 
 
 def _facing(site: Site, outwards: _Array) -> _Array:
-    """Return what can be of use from a direction, from the centre, shape (n, 3)."""
+    """Points that can be of use from a direction, from the centre, shape (n, 3)."""
     facing = site.samples.normals @ outwards >= np.cos(site.max_incidence)
     return site.samples.points[facing] - np.array(site.workspace.centre)
 
 
 def _smallest_rectangle(flat: _Array) -> float:
-    """Return the turn of the smallest rectangle about points (n, 2); 0 if it's as good.
-
-    From +x towards +y, less than a right angle.
-    """
+    """Turn from +x towards +y of the smallest rectangle about points (n, 2), or 0."""
     turns = np.arange(_TURNS) * (0.5 * np.pi / _TURNS)
     axes = np.stack([np.cos(turns), np.sin(turns)])
     x, y = flat @ axes, flat @ np.stack([-axes[1], axes[0]])
@@ -189,10 +179,10 @@ def _distances(site: Site) -> Iterator[tuple[float, int]]:
 def _placed(
     site: Site, anchors: _Array, outwards: _Array, depths: _Array
 ) -> tuple[_Array, NDArray[np.bool_]]:
-    """Return offsets from the centre, and which of them the workspace allows.
+    """Offsets from the centre on the lines through anchors, and which are allowed.
 
-    A device stands on the line through its anchor, as far out as asked or as the shell
-    allows; where zones cut the line, as near to that as they let it.
+    As far out as asked or as the shell allows; where zones cut the line, as near to
+    that as they let it.
     """
     along = np.einsum("ij,ij->i", anchors, outwards)
     across = anchors - along[:, None] * outwards

@@ -39,12 +39,7 @@ def check_zones(workspace: Workspace) -> None:
 
 
 def no_position(workspace: Workspace, radius_m: tuple[float, float]) -> str:
-    """Return why the workspace holds no position: each limit that is to blame alone.
-
-    Args:
-        workspace: Where no position was found.
-        radius_m: Least and largest distance of this kind of device.
-    """
+    """Return why the workspace holds no position: each limit that is to blame alone."""
     if not is_zoned(workspace):
         return (
             "the workspace holds no position: its floor, cone and shell exclude each "
@@ -68,37 +63,42 @@ def no_position(workspace: Workspace, radius_m: tuple[float, float]) -> str:
 def _limits(workspace: Workspace) -> list[tuple[str, Workspace]]:
     """Every limit with its value and a remedy, and the workspace without it."""
     found: list[tuple[str, Workspace]] = []
+
+    def blame(text: str, without: Workspace) -> None:
+        found.append((f"workspace.{text}", without))
+
     for k, zone in enumerate(workspace.keep_out):
+        size = " x ".join(f"{2e3 * half:g}" for half in zone.half_m)
         rest = workspace.keep_out[:k] + workspace.keep_out[k + 1 :]
-        text = (
-            f"workspace.keep_out {zone.name!r} ({_size(zone)} mm about "
-            f"{_mm(zone.centre_m)} mm; make it smaller or move it)"
+        blame(
+            f"keep_out {zone.name!r} ({size} mm about {_mm(zone.centre_m)} mm; make "
+            f"it smaller or move it)",
+            replace(workspace, keep_out=rest),
         )
-        found.append((text, replace(workspace, keep_out=rest)))
     if workspace.box is not None:
-        text = (
-            f"workspace.min_mm = {_corner(workspace.box, -1)}, max_mm = "
-            f"{_corner(workspace.box, 1)} (widen it)"
-        )
-        found.append((text, replace(workspace, box=None)))
+        low, high = (_corner(workspace.box, side) for side in (-1, 1))
+        text = f"min_mm = {low}, max_mm = {high} (widen it)"
+        blame(text, replace(workspace, box=None))
     if workspace.mounting:
         names = " and ".join(repr(plane.name) for plane in workspace.mounting)
-        text = f"workspace.mounting {names} (move or extend it)"
-        found.append((text, replace(workspace, mounting=())))
+        text = f"mounting {names} (move or extend it)"
+        blame(text, replace(workspace, mounting=()))
     if workspace.floor_m is not None:
-        text = f"workspace.floor_mm = {1e3 * workspace.floor_m:g} (lower it)"
-        found.append((text, replace(workspace, floor_m=None)))
+        text = f"floor_mm = {1e3 * workspace.floor_m:g} (lower it)"
+        blame(text, replace(workspace, floor_m=None))
     if workspace.half_angle < np.pi:
         degrees = np.degrees(workspace.half_angle)
-        text = f"workspace.half_angle_deg = {degrees:g} (widen it)"
-        found.append((text, replace(workspace, half_angle=float(np.pi))))
+        text = f"half_angle_deg = {degrees:g} (widen it)"
+        blame(text, replace(workspace, half_angle=float(np.pi)))
     return found
 
 
 def _out_of_reach(box: Box, workspace: Workspace) -> str | None:
     """Say how a box misses the shell or the floor; None if it may meet both."""
     low, high = workspace.projector_radius_m
-    near, far = _distances(box)
+    local, half = np.abs(np.array(box.axes) @ np.array(box.centre_m)), box.half_m
+    near = np.linalg.norm(np.maximum(local - half, 0.0))
+    far = np.linalg.norm(local + half)
     begins, ends = f"{1e3 * near:.0f} mm", f"{1e3 * far:.0f} mm"
     ball = f" + the object's radius of {1e3 * workspace.object_radius_m:.0f}"
     # Side by side, devices stand that near to any part.
@@ -127,20 +127,8 @@ def _out_of_reach(box: Box, workspace: Workspace) -> str | None:
     return None
 
 
-def _distances(box: Box) -> tuple[float, float]:
-    """Return the least and largest distance of a box from the workspace's centre."""
-    local = np.abs(np.array(box.axes) @ np.array(box.centre_m))
-    half = np.array(box.half_m)
-    near = np.linalg.norm(np.maximum(local - half, 0.0))
-    return float(near), float(np.linalg.norm(local + half))
-
-
 def _corner(box: Box, side: int) -> str:
     return _mm(np.array(box.centre_m) + side * np.array(box.half_m))
-
-
-def _size(box: Box) -> str:
-    return " x ".join(f"{2e3 * half:g}" for half in box.half_m)
 
 
 def _mm(lengths_m: NDArray[np.float64] | tuple[float, ...]) -> str:
