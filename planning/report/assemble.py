@@ -25,6 +25,7 @@ from planning.report.advice.what_helps import with_fewer_needed, with_relaxation
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.rings.ring_pitch import widest_gap
+from planning.scene.scene import Scene
 
 from .claims import Claims, Devices, make_claims
 from .entries import device_entries as entries
@@ -40,14 +41,11 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         claims = make_claims(scene, devices)
         marginal = marginal_records(partial, devices, claims)
     among = scene.among((*devices.projectors, *devices.cameras))
-    standing = replace(partial, ready=replace(partial.ready, scene=among))
     coverage = with_relaxations(partial, devices, claims, clock)
     regions = entries.region_records(partial.ready.regions, claims)
-    overlaps, schedule = overlap_records(standing.scene, devices.projectors)
-    surface, requirements = (
-        _surface(partial, devices),
-        _final_requirements(standing, claims, devices),
-    )
+    overlaps, schedule = overlap_records(among, devices.projectors)
+    surface = _surface(scene, devices)
+    requirements = _final_requirements(among, claims, devices)
     certificates = with_fewer_needed(_certificates(partial), partial, clock)
     document = PlanDocument(
         format=FORMAT,
@@ -62,9 +60,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         rig=RigRecord(**partial.request.rig.to_document()),
         requirements=requirements,
         regions=regions,
-        projectors=entries.projector_records(
-            standing.scene, devices, partial.rings, claims
-        ),
+        projectors=entries.projector_records(among, devices, partial.rings, claims),
         cameras=entries.camera_records(devices.cameras, claims),
         coverage=coverage,
         overlaps=overlaps,
@@ -72,7 +68,10 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         marginal=marginal,
         certificates=certificates,
         baselines=_baselines(partial, devices, claims, requirements),
-        camera_groups=_camera_groups(devices, claims),
+        camera_groups=tuple(
+            tuple(devices.cameras[c].id for c in group)
+            for group in overlap_components(claims.measured_by)
+        ),
         cost=entries.cost_record(
             devices.cameras, certificates.cameras.greedy_count, clock.processor
         ),
@@ -105,8 +104,8 @@ def _rounded_devices(partial: PartialPlan) -> Devices:
     )
 
 
-def _surface(partial: PartialPlan, devices: Devices) -> Surface:
-    scene, reference = partial.scene, devices.reference_projectors
+def _surface(scene: Scene, devices: Devices) -> Surface:
+    reference = devices.reference_projectors
     return Surface(
         scene.mesh,
         np.zeros(len(scene.mesh.faces), dtype=np.int64),
@@ -131,17 +130,15 @@ def _surface_record(partial: PartialPlan, surface: Surface) -> SurfaceRecord:
     )
 
 
-def _final_requirements(
-    partial: PartialPlan, claims: Claims, devices: Devices
-) -> Requirements:
+def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requirements:
     """State tau, one ring gap, and the reference sets as they are."""
-    requirements = partial.scene.requirements
+    requirements = scene.requirements
     workspace = replace(
         requirements.workspace,
         n_reference_projectors=len(devices.reference_projectors),
         n_reference_cameras=len(devices.reference_cameras),
     )
-    gap = widest_gap(partial.scene, devices.projectors, claims.target_samples)
+    gap = widest_gap(scene, devices.projectors, claims.target_samples)
     check = replace(requirements.check, tau_m=round(gap, 6))
     return replace(requirements, workspace=workspace, check=check)
 
@@ -167,10 +164,3 @@ def _baselines(
         return tuple(rows)
     body, guard = partial.request.ranges
     return with_spread(rows, devices.cameras, body.ball, guard)
-
-
-def _camera_groups(devices: Devices, claims: Claims) -> tuple[tuple[str, ...], ...]:
-    return tuple(
-        tuple(devices.cameras[c].id for c in group)
-        for group in overlap_components(claims.measured_by)
-    )

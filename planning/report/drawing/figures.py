@@ -1,7 +1,7 @@
 """Devices and zones as polylines in the world, ready to be drawn."""
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,8 @@ ZONES: dict[str, Colour] = {
 _REACH = 1.03
 # Seen along a device's axis, that many points make a beam's circle.
 _CIRCLE = 48
-# Turns of a three-quarter view in degrees: none runs along a world axis.
+# Three-quarter views in degrees: none runs along a world axis.
+_HEIGHTS = (20, 30, 40)
 _TURNS = (30, 45, 60, 120, 135, 150, 210, 225, 240, 300, 315, 330)
 
 _Lines = list[NDArray[np.float64]]
@@ -174,21 +175,16 @@ def best_direction(
     spots = np.concatenate([positions, centre[None]]) - centre
     side = spots.mean(axis=0)
     side = side / max(float(np.linalg.norm(side)), 1e-12)
-    best, best_score = ahead, -np.inf
-    for height in np.deg2rad((20.0, 30.0, 40.0)):
-        for turn in np.deg2rad(_TURNS):
-            back = np.sin(height) * up + np.cos(height) * (
-                np.cos(turn) * right + np.sin(turn) * ahead
-            )
-            flat = spots - (spots @ back)[:, None] * back
-            gaps = np.linalg.norm(flat[:, None] - flat[None], axis=2)
-            size = max(float(gaps.max()), 1e-12)
-            least = float(np.min(gaps + np.eye(len(gaps)) * size)) / size
-            # Rounded, so that the last bit doesn't choose between mirror images.
-            score = round(min(least, 0.12) + 0.10 * float(back @ side), 9)
-            if score > best_score:
-                best, best_score = back, score
-    return best
+    height, turn = np.deg2rad(list(product(_HEIGHTS, _TURNS))).T[:, :, None]
+    level = np.cos(turn) * right + np.sin(turn) * ahead
+    backs = np.sin(height) * up + np.cos(height) * level
+    ways = np.array([one - other for one, other in combinations(spots, 2)])
+    along = backs @ ways.T
+    gaps = np.sqrt(np.maximum(np.sum(ways**2, axis=1) - along**2, 0.0))
+    least = gaps.min(axis=1) / np.maximum(gaps.max(axis=1), 1e-12)
+    # Rounded, so that the last bits don't choose between mirror images.
+    score = np.round(np.minimum(least, 0.12) + 0.10 * backs @ side, 6)
+    return backs[np.argmax(score)]
 
 
 def close_directions(

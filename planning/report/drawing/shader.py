@@ -70,20 +70,10 @@ class Shader:
         self, faces: NDArray[np.int64], points: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Unit normals at points of faces, interpolated between the faces' corners."""
-        mesh, (slope_b, slope_c) = self.caster.mesh, self._slopes
-        from_a = points - mesh.corners[faces, 0]
-        b = np.einsum("ij,ij->i", slope_b[faces], from_a)
-        c = np.einsum("ij,ij->i", slope_c[faces], from_a)
-        flat = mesh.face_normals[faces]
-        smooth = np.zeros_like(flat)
-        for weight, corner in zip(
-            (1.0 - b - c, b, c), mesh.faces[faces].T, strict=True
-        ):
-            normal = self._vertex_normals[corner]
-            crease = np.einsum("ij,ij->i", normal, flat) < _CREASE
-            normal[crease] = flat[crease]
-            smooth += weight[:, None] * normal
-        return unit(smooth)
+        from_a = points - self.caster.mesh.corners[faces, 0]
+        b, c = (np.einsum("ij,ij->i", slope[faces], from_a) for slope in self._slopes)
+        weights = np.stack([1.0 - b - c, b, c], axis=1)
+        return unit(np.einsum("nk,nkj->nj", weights, self._corner_normals[faces]))
 
     @cached_property
     def _slopes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -95,16 +85,22 @@ class Shader:
         return np.cross(normals, a - c), np.cross(normals, b - a)
 
     @cached_property
-    def _vertex_normals(self) -> NDArray[np.float64]:
-        """Mean normals weighted by angle, so that how a face is cut doesn't count."""
+    def _corner_normals(self) -> NDArray[np.float64]:
+        """Mean normals at corners of faces, or a face's own on a crease, (n_f, 3, 3).
+
+        Weighted by angle, so that how a face is cut doesn't count.
+        """
         mesh = self.caster.mesh
         edges = np.roll(mesh.corners, -1, axis=1) - mesh.corners
         to_next = unit(edges.reshape(-1, 3)).reshape(edges.shape)
         cosine = -np.einsum("nkj,nkj->nk", to_next, np.roll(to_next, 1, axis=1))
         angles = np.arccos(np.clip(cosine, -1.0, 1.0))
         weighted = angles[:, :, None] * mesh.face_normals[:, None]
-        corners = mesh.faces.ravel()
-        return unit(summed(weighted.reshape(-1, 3), corners, len(mesh.vertices)))
+        flat = mesh.face_normals[:, None]
+        total = summed(weighted.reshape(-1, 3), mesh.faces.ravel(), len(mesh.vertices))
+        mean = unit(total)[mesh.faces]
+        crease = np.sum(mean * flat, axis=2) < _CREASE
+        return np.where(crease[:, :, None], flat, mean)
 
 
 def draw_mesh(

@@ -54,15 +54,8 @@ def overlap_records(
     )
     conflicts = (on_target > 0.0) | (on_surface > 0.0)
     np.fill_diagonal(conflicts, val=False)
-    return overlaps, exposure_schedule(names, conflicts)
-
-
-def exposure_schedule(
-    names: Sequence[str], conflicts: NDArray[np.bool_]
-) -> ExposureSchedule:
-    """Return the plan's `firing_schedule`: the fewest groups without an overlap."""
     colouring = fewest_colours(conflicts)
-    return ExposureSchedule(
+    return overlaps, ExposureSchedule(
         groups=tuple(tuple(names[i] for i in group) for group in colouring.groups),
         n_groups=colouring.n_colours,
         lower_bound=colouring.lower_bound,

@@ -19,10 +19,11 @@ _EXCLUDED = {
 def proof_lines(plan: RigPlan) -> list[str]:
     """Return what was proved of both counts, and over what."""
     requirements, proofs = plan.requirements, plan.document.certificates
+    parallel = plan.projectors[0].light == "parallel"
     return [
         "",
         _proof("projector", proofs.projectors, requirements.dominant_coverage, "light"),
-        _continuous(proofs.projectors, _freedom(plan)),
+        _continuous(proofs.projectors, "direction" if parallel else "position and aim"),
         _proof("camera", proofs.cameras, requirements.coverage, "measure")
         + " (given these projectors)",
         _continuous(proofs.cameras, "position, aim and roll"),
@@ -103,23 +104,14 @@ def _proof(kind: str, proof: Certificate, share: float, verb: str) -> str:
             enough += " but for their bodies"
         return f"PROVED   {have}, {enough}, {scope}"
     if proof.status == "optimal":
-        one = count == 1
-        return (
-            f"PROVED   {count} {kind if one else name} {'is' if one else 'are'} the "
-            f"fewest {scope}"
-        )
+        are = "is" if count == 1 else "are"
+        return f"PROVED   {count_words(count, kind)} {are} the fewest {scope}"
     least = candidates.lower_bound
     return f"BOUND    {count} {name}; at least {least} are needed {scope}"
 
 
 def _given(proof: Certificate) -> str:
     return f", given {proof.given} existing" if proof.given else ""
-
-
-def _freedom(plan: RigPlan) -> str:
-    """Return what of a projector's pose counts for its light."""
-    parallel = plan.projectors[0].light == "parallel"
-    return "direction" if parallel else "position and aim"
 
 
 def _continuous(proof: Certificate, poses: str) -> str:
