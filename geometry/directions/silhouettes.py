@@ -24,6 +24,7 @@ from geometry.arrays import Array, Ints, Mask, Words
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import lengths
 from geometry.mesh.topology import MeshEdges, face_pairs
+from geometry.rays.proximity import triangle_distances
 
 from .product_signs import WORD, ProductSigns, packed, unpacked
 
@@ -178,8 +179,6 @@ class Silhouettes:
         points' sides mustn't be less than the reach [m]; only faces `among` come near
         to the points that their bits name, None: every face may to every point.
         """
-        from trimesh.triangles import closest_point
-
         local = sides.local
         close = sides.close if among is None else sides.close & among
         owner, face = unpacked(close, len(local))
@@ -190,7 +189,7 @@ class Silhouettes:
         close = away <= self._radii[face] + reach
         face, owner = face[close], owner[close]
         corners = self._vertices[self._faces[face]]
-        near = lengths(local[owner] - closest_point(corners, local[owner])) <= reach
+        near = triangle_distances(local[owner], corners) <= reach
         face, owner = face[near], owner[near]
         own = faces[owner]
         normals = self._normals
