@@ -65,12 +65,8 @@ def placed_projector(
 ) -> ProjectorCalibration:
     """Return a projector whose rings are centred on a point of the object.
 
-    Args:
-        name: Its id.
-        light: Kind of light.
-        direction: From the target to the device, unit, shape (3,).
-        target: Where the ring axis goes through [m], shape (3,).
-        radii_m: Of the rings on the object or, in diverging light, at the standoff.
+    Direction from the target to the device, unit, (3,); target [m], (3,). Radii [m] are
+    those on the object or, in diverging light, at the standoff.
     """
     width, height = PROJECTOR_PX
     pose = look_at(target + STANDOFF_M * direction, target, UP)

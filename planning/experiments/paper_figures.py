@@ -84,7 +84,7 @@ def draw_camera_images(outcome: Outcome) -> Image.Image:
 
 def draw_viewpoints(outcome: Outcome, stage: PanelStage) -> Image.Image:
     """Return the points of each viewpoint, coloured by ring: the paper's Fig. 7."""
-    clouds = (outcome.single, *outcome.viewpoints)
+    clouds = outcome.clouds[:-2]
     legend = [
         (f"{_MM * radius:.4g} mm", RINGS[k % len(RINGS)])
         for k, radius in enumerate(outcome.experiment.radii_m)
@@ -119,7 +119,7 @@ def draw_redundancy(outcome: Outcome, stage: PanelStage) -> Image.Image:
 def draw_errors(outcome: Outcome, stage: PanelStage) -> Image.Image:
     """Return signed errors of one viewpoint and of the merged cloud, and a scale."""
     panels: list[Image.Image] = []
-    for one in (outcome.single, outcome.merged):
+    for one in (outcome.clouds[0], outcome.merged):
         p95 = one.errors.p95_m
         far = "no point" if p95 is None else f"95 % within {_MM * p95:.3f} mm"
         colours = signed_colours(_MM * one.distances, _ERROR_MM)

@@ -42,10 +42,8 @@ class Outcome:
         reconstruction: From rendered images, all pairs of devices.
         samples: Of the surface that could be measured.
         visible: Share of the whole surface that these are.
-        single: The first projector and the first camera alone.
-        viewpoints: Each camera alone, under all projectors.
-        union: All points.
-        merged: Those that stay where redundancy is removed.
+        clouds: Held to the truth: of the first projector and the first camera alone; of
+            each camera, under all projectors; all points; those that stay merged.
         outcomes: What became of each ring.
         labels: Of single images; None: rings were told apart by a sequence.
     """
@@ -55,17 +53,19 @@ class Outcome:
     reconstruction: Reconstruction
     samples: SurfaceSamples
     visible: float
-    single: MeasuredErrors
-    viewpoints: tuple[MeasuredErrors, ...]
-    union: MeasuredErrors
-    merged: MeasuredErrors
+    clouds: tuple[MeasuredErrors, ...]
     outcomes: tuple[RingOutcome, ...]
     labels: LabelCount | None
 
     @property
-    def clouds(self) -> tuple[MeasuredErrors, ...]:
-        """Every cloud that was held to the truth, from few devices to all."""
-        return (self.single, *self.viewpoints, self.union, self.merged)
+    def union(self) -> MeasuredErrors:
+        """All points."""
+        return self.clouds[-2]
+
+    @property
+    def merged(self) -> MeasuredErrors:
+        """Those that stay where redundancy is removed."""
+        return self.clouds[-1]
 
     def errors_of(self, ring: RingOutcome) -> Errors:
         """Return the errors of all points of a ring."""
@@ -115,26 +115,22 @@ def run_experiment(
     samples = samples.take(able)
     everything = result.everything
 
-    def held(name: str, cloud: Cloud) -> MeasuredErrors:
-        return measured(name, cloud, experiment.mesh, samples, experiment.gap_m)
-
     first = f"{scanner.projectors[0].id} with {scanner.cameras[0].id}"
     by_one = (everything.camera == 0) & (everything.projector == 0)
+    clouds = {first: everything.take(by_one)}
+    for c, camera in enumerate(scanner.cameras):
+        clouds[f"{camera.id}, all projectors"] = everything.take(everything.camera == c)
+    clouds |= {"all points": everything, "merged": result.merged.cloud}
     return Outcome(
         experiment,
         photometry,
         result,
         samples,
         float(np.mean(able)),
-        held(first, everything.take(by_one)),
         tuple(
-            held(
-                f"{camera.id}, all projectors", everything.take(everything.camera == c)
-            )
-            for c, camera in enumerate(scanner.cameras)
+            measured(name, cloud, experiment.mesh, samples, experiment.gap_m)
+            for name, cloud in clouds.items()
         ),
-        held("all points", everything),
-        held("merged", result.merged.cloud),
         ring_outcomes(scanner, everything),
         labels,
     )
@@ -162,14 +158,8 @@ def double_density(
     The paper's future work: "sampling density determination given the density of
     previous light sources". Finer rings in one sequence would come too near each other
     in the images; a second sequence doubles the density and keeps their distance.
-
-    Args:
-        outcome: What the first sequence gave.
-        seed: Of the first sequence; the second's noise is another.
-        threads: Worker threads; the result doesn't depend on them.
-
-    Returns:
-        All points of both; rings are numbered outwards through both sequences.
+    Returns all points of both; rings are numbered outwards through both sequences. The
+    seed is the first sequence's; the second's noise is another.
     """
     experiment = outcome.experiment
     second = reconstruct(

@@ -364,7 +364,7 @@ def test_distortion_and_ambient_light_are_switches(of_box):
     assert unknown.accuracy.rms_m > 0.1e-3
     bright = replace(SOFT, ambient=1.0)
     lit = reconstruct(straight, seed=0, photometry=bright).accuracy.rms_m
-    dark = of_box.single.errors.rms_m
+    dark = of_box.clouds[0].errors.rms_m
     assert 1.3 * dark < lit < 5.0 * dark
 
 
@@ -390,10 +390,12 @@ def test_single_images_are_labelled_by_a_prior_that_is_roughly_right(of_face):
     assert labels.wrong <= 0.001 * labels.n
     assert labels.stray < 0.01 * labels.n
     (shot,) = shots
-    assert len(shot.decoded.cloud) == pytest.approx(len(of_face.single.cloud), rel=0.15)
+    assert len(shot.decoded.cloud) == pytest.approx(
+        len(of_face.clouds[0].cloud), rel=0.15
+    )
     far = measure_accuracy(shot.decoded.cloud, experiment.mesh).distances
     # Lines aren't edges: fewer steps of depth look like one.
-    assert Errors.of(far).outliers < 0.6 * of_face.single.errors.outliers
+    assert Errors.of(far).outliers < 0.6 * of_face.clouds[0].errors.outliers
 
 
 def test_an_experiment_of_single_images_says_so():

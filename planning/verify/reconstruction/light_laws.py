@@ -56,10 +56,6 @@ class LightLaw:
         """Return the brightness at depths, 1 at their median, shape (n,)."""
         return 1.0
 
-    def tilt(self, rho: Array) -> Array:
-        """Return the slope of ring surfaces against their axis: 0, or R, shape (n,)."""
-        return np.zeros_like(rho)
-
     def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
         """Return steps of |p| at rho and depth z as lengths across the beam [m].
 
@@ -88,9 +84,7 @@ class LightLaw:
 
         At |p| = rho (n,), in unit directions (n, 2) away from the axis.
         """
-        tilt = self.tilt(rho)
-        slope = np.sqrt(1.0 + tilt * tilt)[:, None]
-        return np.column_stack([outward, -tilt]) / slope
+        return np.column_stack([outward, np.zeros_like(rho)])
 
 
 class _Diverging(LightLaw):
@@ -125,8 +119,9 @@ class _Diverging(LightLaw):
     def falloff(self, depth: Array) -> Array | float:
         return (float(np.median(depth)) / depth) ** 2
 
-    def tilt(self, rho: Array) -> Array:
-        return rho
+    def ring_normals(self, outward: Array, rho: Array) -> Array:
+        slope = np.sqrt(1.0 + rho * rho)[:, None]
+        return np.column_stack([outward, -rho]) / slope
 
     def across_m(self, step: Array, rho: Array, depth: Array) -> Array:
         return step * depth / np.sqrt(1.0 + rho * rho)

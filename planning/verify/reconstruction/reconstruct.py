@@ -65,12 +65,7 @@ def reconstruct(
         spent=spent,
     )
     return conclude(
-        plan,
-        decoded,
-        seed=seed,
-        expected=expected,
-        photometry=light,
-        spent=spent,
+        plan, decoded, seed=seed, expected=expected, photometry=light, spent=spent
     )
 
 
@@ -83,15 +78,9 @@ def conclude(
     photometry: Photometry | None = None,
     spent: Spent | None = None,
 ) -> Reconstruction:
-    """Merge what the pairs of a rig measured, and judge it.
+    """Merge what the pairs of a rig measured, and judge it, as `reconstruct` does.
 
-    Args:
-        plan: As in `reconstruct`.
-        decoded: What every pair gave.
-        seed: Of the samples, where none are given.
-        expected: As in `reconstruct`.
-        photometry: Of the simulation; None: the images were taken.
-        spent: Processor time so far; that of `merge` is added.
+    Without photometry the images were taken. The time of merging is added to `spent`.
     """
     if expected is None:
         mesh, target = plan.mesh, plan.target

@@ -139,28 +139,25 @@ def confusion(
         measured: Those within tau of a point, (n,).
         weights: Area of each [m²], (n,).
     """
-    total = float(weights.sum())
-    far = ~predicted & ~near
-    both, missing, unexpected, neither, beside = (0.0, 0.0, 0.0, 1.0, 0.0)
+    total, far = float(weights.sum()), ~predicted & ~near
+    cells = {
+        "both": predicted & measured,
+        "missing": predicted & ~measured,
+        "unexpected": far & measured,
+        "neither": far & ~measured,
+        "beside": ~predicted & near,
+    }
     if total > 0.0:
-        both, missing, unexpected, neither, beside = (
-            float(weights[cell].sum()) / total
-            for cell in (
-                predicted & measured,
-                predicted & ~measured,
-                far & measured,
-                far & ~measured,
-                ~predicted & near,
-            )
-        )
+        shares = {
+            name: float(weights[cell].sum()) / total for name, cell in cells.items()
+        }
+    else:
+        shares = dict.fromkeys(cells, 0.0) | {"neither": 1.0}
+    both, missing, unexpected, neither, _ = shares.values()
     right, wrong = both + neither, missing + unexpected
     yes, no = both + unexpected, missing + neither
     return ConfusionRecord(
-        both=both,
-        missing=missing,
-        unexpected=unexpected,
-        neither=neither,
-        beside=beside,
+        **shares,
         agreement=right / (right + wrong) if right > 0.0 else 0.0,
         trivial_agreement=max(yes, no) / (yes + no) if yes + no > 0.0 else 0.0,
     )

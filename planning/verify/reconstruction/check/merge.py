@@ -42,13 +42,7 @@ class Merged:
 
 
 def merge(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Merged:
-    """Remove redundant points.
-
-    Args:
-        cloud: Points of every pair of devices.
-        gap_m: Distance of neighbouring rings on the object [m].
-        pitch_px: The same in the images [px].
-    """
+    """Remove redundant points, of rings so far apart on the object and in images."""
     side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
     normals = np.full((len(cloud), 3), np.nan)
     square = np.zeros(len(cloud), dtype=bool)

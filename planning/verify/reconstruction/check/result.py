@@ -19,16 +19,7 @@ from .merge import Merged
 
 @dataclass(frozen=True)
 class PairCount:
-    """What one pair of devices gave.
-
-    Attributes:
-        projector: Id of the projector.
-        camera: Id of the camera.
-        lit_pixels: Pixels with enough contrast.
-        n_edges: Ring edges found.
-        n_points: Points triangulated.
-        rejected: Edges without a point, by cause.
-    """
+    """What one pair of devices, named by their ids, gave; see `Decoded`."""
 
     projector: str
     camera: str

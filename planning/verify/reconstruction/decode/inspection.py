@@ -36,15 +36,13 @@ def inspect(
 ) -> tuple[Frames, tuple[str, ...]]:
     """Hold the images of a camera under a projector against each other.
 
+    Returns their lit part, where pixels that can't be trusted are dark; and a clause
+    for each reason for which pixels were left out.
+
     Args:
-        stack: White, black, bits and root disc with their inverses, (n_frames, h, w),
-            levels 0 to 255, of the camera's whole image.
+        stack: As of `Frames`, but of the camera's whole image.
         patterns: What the projector drew.
         names: Of the frames.
-
-    Returns:
-        The lit part, where pixels that can't be trusted are dark; and a clause for each
-        reason for which pixels were left out.
 
     Raises:
         CapturesError: If the images contradict each other or the patterns.
@@ -53,25 +51,27 @@ def inspect(
     window, corner = _lit_part(stack)
     lit = _lit(window)
     clipped = _clipped(window, lit, names)
-    notes: list[str] = []
-    share = _share(clipped, lit)
-    if share > _WORTH_A_WORD:
-        notes.append(f"{share:.1%} of the lit pixels are clipped and left out")
     _require_different(window, names)
     good = lit & ~clipped
     broken = broken_pixels(window, good, names)
     _require_codes(window, good & ~broken, patterns)
-    share = _share(broken, good)
-    if share > _WORTH_A_WORD:
-        notes.append(
-            f"{share:.1%} of the lit pixels are left out: frames and inverses there "
-            f"don't add up to white and black"
-        )
+    reasons = (
+        (_share(clipped, lit), "are clipped and left out"),
+        (
+            _share(broken, good),
+            "are left out: frames and inverses there don't add up to white and black",
+        ),
+    )
+    notes = tuple(
+        f"{share:.1%} of the lit pixels {why}"
+        for share, why in reasons
+        if share > _WORTH_A_WORD
+    )
     frames = window.copy()
     # Without contrast nothing is decoded; what is clipped stays so for all to see.
     frames[:, broken] = 0
     frames[:, clipped] = 255
-    return Frames(frames, corner), tuple(notes)
+    return Frames(frames, corner), notes
 
 
 def _lit(stack: Images) -> Mask:

@@ -5,7 +5,6 @@ nothing.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -21,25 +20,20 @@ _QUADS = np.array(
 )
 
 
-class Occluder(Protocol):
-    """Whatever answers, as `RayCaster` does, whether rays are blocked."""
-
-    def occluded(self, origins: Array, directions: Array, distances: Array) -> Mask:
-        """Return whether each ray is blocked within its distance, shape (n,)."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Both:
     """The object and what stands before it."""
 
-    surface: Occluder
-    obstacles: Occluder
+    surface: RayCaster
+    obstacles: RayCaster
 
     def occluded(self, origins: Array, directions: Array, distances: Array) -> Mask:
         """Return whether either blocks each ray within its distance, shape (n,)."""
         ray = origins, directions, distances
         return self.surface.occluded(*ray) | self.obstacles.occluded(*ray)
+
+
+Occluder = RayCaster | Both
 
 
 def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:

@@ -81,17 +81,9 @@ def decode_rendered(
 ) -> Pairs:
     """Render and decode every pair; the order, and every number, is always the same.
 
-    Args:
-        plan: For which the patterns are drawn.
-        truth: What really stands there, devices matched by id.
-        photometry: Simulated light and sensor.
-        seed: Of the pixel noise.
-        threads: Worker threads.
-        spent: Receives the processor time.
-        progress: Called with the pairs done and their total.
-        believed: What the decoder knows of poses and optics; the plan by default.
-        develop: Called with the indices of projector and camera and the frames of each
-            pair, in any thread; returns those that are decoded.
+    Patterns are drawn for the plan, which is also what the decoder knows of poses and
+    optics, unless something else is `believed`. `develop` is called in any thread with
+    the frames of each pair, and returns those that are decoded.
     """
     scene = RenderedScene(plan, truth, photometry)
     known = dict((believed or plan).pairs())

@@ -25,7 +25,7 @@ class RenderedView:
     A cell is a pixel, or a quarter of one where drawn edges are sharper than that.
 
     Attributes:
-        camera: The camera that looks.
+        camera: That looks.
         corner: Pixel (u, v) of the window's top-left pixel.
         shape: Rows and columns of the window, in pixels.
         fold: Cells along a pixel, 1 or 2.
@@ -58,14 +58,9 @@ def view(
     photometry: Photometry,
     obstacles: RayCaster | None = None,
 ) -> RenderedView | None:
-    """Cast a camera's pixels against the mesh; None if it sees nothing of it.
+    """Cast a camera's pixels against a mesh and what stands before it (`obstacles`).
 
-    Args:
-        camera: That looks.
-        mesh: What it looks at.
-        caster: Over the mesh.
-        photometry: Albedo of the mesh.
-        obstacles: Over what stands before it.
+    None if it sees nothing of the mesh.
     """
     window = _window(camera, mesh)
     if window is None:
