@@ -178,14 +178,13 @@ def _near_border(vertices: Array, edges: MeshEdges, reach: float, rings: int) ->
     if len(rim) == 0:
         return near
     count, loop = components(rim, n)
-    ends = vertices[rim]
-    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-    long = np.bincount(loop[rim[:, 0]], lengths, count) > 2.0 * np.pi * reach
+    a, b = edges.ends.T
+    lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    around = np.bincount(loop[rim[:, 0]], lengths[edges.border], count)
+    long = around > 2.0 * np.pi * reach
     sources = np.unique(rim[long[loop[rim[:, 0]]]])
     if len(sources) == 0:
         return near
-    a, b = edges.ends.T
-    lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
     graph = coo_array((lengths, (a, b)), (n, n)).tocsr()
     distance = dijkstra(
         graph, directed=False, indices=sources, min_only=True, limit=reach

@@ -8,12 +8,9 @@ through x_f::
     h_f(p) = N_f . (p - x_f),    edge of f, g is a silhouette iff h_f h_g <= 0
 
 (with the sign turned where f and g run along the edge in the same sense). What is too
-near to 0 to call counts as a silhouette.
-
-The border of some of the faces is a silhouette of these alone: what they hide, they
-hide whatever else stands there.
-
-A bit for each of 64 points, so that edges are compared for all of them at once.
+near to 0 to call counts as a silhouette. The border of some of the faces is one of
+these alone: what they hide, they hide whatever else stands there. There is a bit for
+each of 64 points, so that edges are compared for all of them at once.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,4 @@
-"""Strict reader of PLY: every element is walked, every byte or word used up.
-
-General readers take the first list length for all of an element's rows, or give points
-where a file stores strips; a mesh whose rows don't fit its header is refused here.
-"""
+"""Strict reader of PLY: every element is walked, every byte or word used up."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,9 +162,9 @@ def _store(
     element: PlyElement, p: PlyProperty, values: NDArray[np.generic], lengths: Ints
 ) -> None:
     """Keep a column, in the widest type of its kind."""
+    integer = p.count_dtype is not None and values.dtype.kind != "f"
+    wide = values.astype(np.int64 if integer else np.float64)
     if p.count_dtype is None:
-        element.scalars[p.name] = values.astype(np.float64)
-    elif values.dtype.kind == "f":
-        element.lists[p.name] = PlyLists(values.astype(np.float64), lengths)
+        element.scalars[p.name] = wide
     else:
-        element.lists[p.name] = PlyLists(values.astype(np.int64), lengths)
+        element.lists[p.name] = PlyLists(wide, lengths)

@@ -1,9 +1,4 @@
-"""Strict readers of OBJ and OFF: a line that can't be understood is an error.
-
-The reader library splits OBJ vertices along texture seams and reads past malformed
-lines, which shifts or drops faces without a word; of an OFF file with wrapped lines it
-keeps no face at all.
-"""
+"""Strict readers of OBJ and OFF: a line that can't be understood is an error."""
 
 import re
 from collections.abc import Iterator, Sequence

@@ -1,9 +1,9 @@
 """Rays of several devices, prepared in place and given to embree in one call.
 
-Preparing rays costs a tenth of tracing them if it is done well. Three things matter:
-buffers are reused (fresh ones cost page faults, in which threads wait for each other),
-a point is one item of 16 bytes (gathered in one piece), and many rays go to embree at a
-time, since rays and tree drive each other out of the cache at every change.
+Preparing rays costs a tenth of tracing them if buffers are reused (fresh ones cost page
+faults, in which threads wait for each other), a point is one item of 16 bytes (gathered
+in one piece), and many rays go to embree at a time, since rays and tree drive each
+other out of the cache at every change.
 """
 
 from dataclasses import dataclass
@@ -58,11 +58,8 @@ class SampleSet:
 class RayBatch:
     """Buffers of one thread, filled with rays, traced, and filled again.
 
-    Args:
-        caster: The occluder.
-        slack: Height above a sample's face at which its ray ends, in its own frame.
-        capacity: Rays that fit.
-        block: Samples that may be offered at a time.
+    `capacity` rays fit, `block` samples may be offered at a time, and a ray ends
+    `slack` above its sample's face, in the caster's own frame.
     """
 
     def __init__(

@@ -135,10 +135,7 @@ class RayCaster:
         return faces, distances
 
     def chunks(self, n: int) -> list[slice]:
-        """Return n rays in equal parts of at most `CHUNK`, the threads evenly loaded.
-
-        The parts bound memory and spread work; no answer depends on them.
-        """
+        """Return n rays in equal parts of at most `CHUNK`, threads evenly loaded."""
         return equal_parts(n, CHUNK, self.threads if n >= 1024 * self.threads else 1)
 
     def share(self, work: Callable[[slice], None], parts: Iterable[slice]) -> None:

@@ -63,13 +63,15 @@ class Visibility:
         Raises:
             ValueError: If shapes disagree or a number isn't finite.
         """
-        points = _finite("points", points)
-        normals = _finite("normals", normals)
+        points, normals = np.asarray(points, float), np.asarray(normals, float)
         if points.ndim != 2 or points.shape[1] != 3 or normals.shape != points.shape:
             raise ValueError(
                 "points and normals must both be (n, 3), got "
                 f"{points.shape} and {normals.shape}"
             )
+        for name, values in (("points", points), ("normals", normals)):
+            if not np.all(np.isfinite(values)):
+                raise ValueError(f"{name} must be finite numbers")
         local = self.caster.local(points)
         order = morton_order(local) if sort else np.arange(len(local))
         if sort:
@@ -172,10 +174,3 @@ def _dot(a: Single, b: Single) -> Single:
 
 def _columns(rows: NDArray[np.floating]) -> Single:
     return np.ascontiguousarray(rows.T, dtype=np.float32)
-
-
-def _finite(name: str, values: Array) -> Array:
-    values = np.asarray(values, dtype=np.float64)
-    if not np.all(np.isfinite(values)):
-        raise ValueError(f"{name} must be finite numbers")
-    return values

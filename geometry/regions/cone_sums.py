@@ -55,12 +55,8 @@ class Patch:
 
     def cosines(self, piece: Ints, axis: Array) -> Array:
         """Return each face's normal times the axis (k, 3) of its piece, or 0, (n,)."""
-        cosines = np.zeros(self.n)
-        held = np.flatnonzero(piece >= 0)
-        if len(axis):
-            normals, axes = self.normals[held], axis[piece[held]]
-            cosines[held] = np.einsum("ij,ij->i", normals, axes)
-        return cosines
+        axes = np.append(axis, np.zeros((1, 3)), axis=0)[piece]
+        return np.einsum("ij,ij->i", self.normals, axes)
 
     def shares(self, piece: Ints) -> Array:
         """Return the share of each piece's area in the cone about its mean, (k,)."""

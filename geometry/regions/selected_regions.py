@@ -22,19 +22,13 @@ def regions_of_faces(
     min_region_share: float = 0.002,
     cone_half_angle: float = float(np.deg2rad(50.0)),
 ) -> DominantRegions:
-    """Return exactly the chosen faces, in regions that one projector can serve.
+    """Return exactly the chosen faces, bool (n_f,), in regions for one projector each.
 
     Nothing is added and nothing left out: not at an open border, where curvature isn't
     trusted, nor small pieces. Steep directions come from the curvature as in
-    `dominant_regions`; where it isn't trusted they are zero and bind nothing.
-
-    Args:
-        mesh: The surface.
-        field: Its curvatures.
-        chosen: Whether each face is chosen, bool, shape (n_f,).
-        min_region_share: Pieces below this share of the chosen area are joined to a
-            neighbour if one cone holds both, in [0, 1).
-        cone_half_angle: Half angle in [rad] that a region's normals must fit.
+    `dominant_regions`; where it isn't trusted they are zero and bind nothing. Pieces
+    below ``min_region_share`` of the chosen area, in [0, 1), are joined to a neighbour
+    if one cone of the half angle [rad] holds both.
 
     Raises:
         ValueError: If `chosen` isn't one bool a face or chooses none, or an option is
@@ -66,16 +60,11 @@ def heaviest_faces(
 ) -> Mask:
     """Return the faces of highest weight, a share of the area, shape (n_f,).
 
-    A face has the least weight of its corners, which takes the place of the curvedness
-    in `dominant_regions`. Faces of equal weight are taken all or none, so that the
-    share may be exceeded; a face of weight 0 is never taken, so that it may be missed:
-    weights of 1 and 0 choose what has 1.
-
-    Args:
-        mesh: The surface.
-        weight: Of each vertex, at least 0, shape (n,).
-        corners: Vertices of each face, in the numbering of `weight`, shape (n_f, 3).
-        area_share: Share of the mesh's area, in (0, 1].
+    A face (its corners are vertices in the numbering of `weight`, (n_f, 3)) has the
+    least weight of its corners, which takes the place of the curvedness in
+    `dominant_regions`. Faces of equal weight are taken all or none, so that the share,
+    in (0, 1], may be exceeded; a face of weight 0 is never taken, so that it may be
+    missed: weights of 1 and 0 choose what has 1.
 
     Raises:
         ValueError: If the weight of a corner is negative or not finite, no face has one

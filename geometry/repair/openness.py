@@ -3,11 +3,9 @@
 A face of area A whose side is seen over the share f of its cosine-weighted hemisphere
 has, averaged over all directions, the visible projected area A f / 4 (Cauchy). So the
 rays that leave a surface and escape count what an observer who walks all around would
-see of it, without an observer: no view has to be chosen.
-
-Points and directions are laid out in the frame of each face (its corners in the order
-of their indices), so that they move with a mesh that is turned, moved or scaled, and
-don't depend on which way a face is wound.
+see of it. Points and directions are laid out in the frame of each face (its corners in
+the order of their indices), so that they move with a mesh that is turned, moved or
+scaled, and don't depend on which way a face is wound.
 """
 
 from dataclasses import dataclass
