@@ -72,9 +72,7 @@ class _Judged:
     """What becomes of n samples.
 
     Attributes:
-        target: The samples.
-        first: First limit that each projector violates, `LIT`, (n, n_projectors).
-        measured_by: Which camera measures which, (n, n_cameras).
+        first: First limit that each projector violates, or `LIT`, (n, n_projectors).
         furthest: Of those that aren't lit, how far they come over the reference set.
     """
 

@@ -76,17 +76,18 @@ class Panel:
         self, point: NDArray[np.float64], colour: Colour, *, radius: float
     ) -> None:
         """Draw a square about a point of the world; the radius is in final pixels."""
-        x, y = self.view.project(point)
-        r = radius * SUPERSAMPLING
-        box = (x - r, y - r, x + r, y + r)
+        box = self._about(point, radius)
         self._draw.rectangle(box, outline=(*colour, 255), width=2 * SUPERSAMPLING)
         self.taken.append(box)
 
     def dot(self, point: NDArray[np.float64], colour: Colour, *, radius: float) -> None:
         """Draw a filled dot at a point of the world; the radius is in final pixels."""
-        x, y = self.view.project(point)
+        self._draw.ellipse(self._about(point, radius), fill=(*colour, 255))
+
+    def _about(self, point: NDArray[np.float64], radius: float) -> _Box:
+        x, y = self.view.project(point).tolist()
         r = radius * SUPERSAMPLING
-        self._draw.ellipse((x - r, y - r, x + r, y + r), fill=(*colour, 255))
+        return x - r, y - r, x + r, y + r
 
     def keep_clear(self, points: NDArray[np.float64]) -> None:
         """Keep labels off the box about points of the world, shape (n, 3)."""
@@ -148,19 +149,16 @@ class Panel:
         length_mm = round_length(room_mm)
         pixels = length_mm * 1e-3 / self.view.m_per_px
         left, base = 16.0 * SUPERSAMPLING, height - 16.0 * SUPERSAMPLING
-        tick, draw = 4 * SUPERSAMPLING, self._draw
+        right, tick, draw = left + pixels, 4 * SUPERSAMPLING, self._draw
         for ends in (
-            [(left, base), (left + pixels, base)],
-            [(left, base - tick), (left, base + tick)],
-            [(left + pixels, base - tick), (left + pixels, base + tick)],
+            [(left, base), (right, base)],
+            *([(x, base - tick), (x, base + tick)] for x in (left, right)),
         ):
             draw.line(ends, fill=INK, width=round(1.5 * SUPERSAMPLING))
-        text = f"{length_mm:g} mm"
-        draw.text(
-            (left, base - 8 * SUPERSAMPLING), text, INK, font=font(size), anchor="ls"
-        )
+        spot, text = (left, base - 8 * SUPERSAMPLING), f"{length_mm:g} mm"
+        draw.text(spot, text, INK, font=font(size), anchor="ls")
         top = base - (12 + size) * SUPERSAMPLING
-        self.taken.append((left, top, left + pixels + tick, float(height)))
+        self.taken.append((left, top, right + tick, float(height)))
 
     def axes(self, *, size: float) -> None:
         """Draw the directions of the mesh file's axes in the lower right corner.
@@ -196,10 +194,8 @@ def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 def round_length(room: float) -> float:
     """Return the largest of 1, 2, 5, 10, ... (any decade) that is at most `room`."""
-    decade = 10.0 ** np.floor(np.log10(room))
-    return float(
-        max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= room)
-    )
+    lengths = 10.0 ** np.floor(np.log10(room)) * np.array([1.0, 2.0, 5.0])
+    return float(lengths[lengths <= room].max())
 
 
 def _overlaps(

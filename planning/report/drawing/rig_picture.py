@@ -190,7 +190,7 @@ def _draw_legend(
     rows: Sequence[tuple[str, Colour]],
     origin: tuple[int, int],
 ) -> None:
-    """Write text beside a square of its colour, in two columns from a top [fine px]."""
+    """Text beside a square of its colour, in two columns from a top [fine px]."""
     width, top = origin
     unit = SUPERSAMPLING
     for k, (text, colour) in enumerate(rows):
