@@ -19,17 +19,7 @@ from planning.scene.workspace.candidates import aimed_poses
 class ExistingTable(Table):
     """A projector or camera of the rig's own model, `[[existing]]`.
 
-    Its pose comes in one of two ways. Places are relative to the object's centre, in
-    the axes of the mesh file.
-
-    Attributes:
-        name: What plan and messages call it.
-        kind: Which of the rig's models it is.
-        position_mm: Optical centre (parallel light: middle of the panel).
-        aim_mm: What the middle of the image looks at.
-        roll_deg: Turn of the image about that line, clockwise as the device sees it.
-        pose_mm: ``world_from_device``, 4 x 4, its last column in millimetres.
-        body: Its own body; absent: that of its kind.
+    Its pose comes in one of two ways; without a body of its own it has its kind's.
     """
 
     name: Name
@@ -62,10 +52,7 @@ class ExistingTable(Table):
         return {key: v for key, v in document.items() if key != "body" or v}
 
     def pose(self, workspace: Workspace, device: DeviceModel) -> NDArray[np.float64]:
-        """Return ``world_from_device`` of the rig's model about the workspace's centre.
-
-        Shape (4, 4), its last column in metres.
-        """
+        """Return ``world_from_device`` of the rig's model in the world [m]."""
         centre = np.array(workspace.centre)
         if self.pose_mm is not None:
             pose = read_pose(self.pose_mm, "pose_mm")
@@ -84,10 +71,7 @@ def build_existing(
 ) -> tuple[Existing, ...]:
     """Return the devices of `[[existing]]` in the world, as the plan will hold them.
 
-    Args:
-        tables: As written.
-        workspace: Its centre is where their places count from.
-        devices: The rig's model of each kind, and its body.
+    `devices` are the rig's model of each kind, and its body.
     """
     existing: list[Existing] = []
     for table in tables:

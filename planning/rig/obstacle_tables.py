@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.spatial.transform import Rotation
 
 from geometry.files.readers import UNITS, load_mesh
 from geometry.mesh.mesh import MeshError, TriangleMesh
@@ -22,7 +21,7 @@ from planning.model.obstacles import Obstacle
 from planning.model.requirements import Workspace
 from planning.model.table_types import Axis, Name, Positive, Sides, Table
 
-from .workspace_tables import WorkspaceTable
+from .workspace_tables import WorkspaceTable, turned
 
 # What each shape is told by, beside its place.
 _KEYS = {
@@ -38,18 +37,8 @@ _SWALLOWED = 0.5
 class ObstacleTable(Table):
     """What stands in the way of light and views, `[[obstacle]]`.
 
-    Attributes:
-        name: What plan and messages call it.
-        shape: `box`; `cylinder`, along its own z; `table`, whose middle of the top is
-            its place; `mesh`, a file whose origin is its place.
-        centre_mm: Its place. A table's may be left out: the top then touches the
-            object's lowest point, under the object's centre.
-        turn_deg: Turns about the x, then the y, then the z axis of the mesh file.
-        size_mm: Sides of a box; width, depth and thickness of a table.
-        radius_mm: Of a cylinder.
-        height_mm: Of a cylinder.
-        file: Of a mesh, relative to the rig file.
-        unit: Of the file's numbers; absent: as the format states, or mm.
+    The place of a cylinder is its middle, of a table the middle of its top, of a mesh
+    the origin of its file. A table without one is right under the object.
     """
 
     name: Name
@@ -84,18 +73,14 @@ class ObstacleTable(Table):
         return self.model_dump(mode="json", exclude_none=True)
 
     def placed(self, workspace: Workspace, lowest_m: float, folder: Path) -> Obstacle:
-        """Return where it stands.
+        """Return where it stands; tables lie square to up.
 
-        Args:
-            workspace: Its centre is where places count from; tables lie square to up.
-            lowest_m: Height of the object's lowest point over the centre [m].
-            folder: Where relative files are looked for.
+        `lowest_m` is the height of the object's lowest point over the centre [m].
 
         Raises:
-            RigError: If its file can't be read.
+            RigError: If its file can't be read in `folder`.
         """
-        # Lower-case letters turn about the fixed axes, in this order.
-        turn = Rotation.from_euler("xyz", self.turn_deg, degrees=True).as_matrix()
+        turn = turned(self.turn_deg)
         up = np.array(workspace.up)
         place = lowest_m * up
         if self.centre_mm is not None:
@@ -128,33 +113,22 @@ def obstacles_of(
 ) -> tuple[Obstacle, ...]:
     """Return what stands about the object: obstacles, then keep-out zones that block.
 
-    Args:
-        tables: Obstacles as written.
-        zones: The workspace as written: which of its zones block.
-        workspace: The same in the world.
-        mesh: The object.
-        folder: Where relative files are looked for.
-
     Raises:
         RigError: If a file can't be read.
         InfeasibleLimitsError: If a zone that blocks holds the object.
     """
     offsets = mesh.corners.reshape(-1, 3) - np.array(workspace.centre)
     lowest = float((offsets @ np.array(workspace.up)).min())
-    solid = [
-        zone
-        for table, zone in zip(zones.keep_out, workspace.keep_out, strict=True)
-        if table.blocks
-    ]
-    for zone in solid:
-        _check_apart(zone, offsets)
+    zoned = zip(zones.keep_out, workspace.keep_out, strict=True)
     return (
         *(table.placed(workspace, lowest, folder) for table in tables),
-        *(_of_zone(zone, np.array(workspace.centre)) for zone in solid),
+        *(_of_zone(zone, workspace, offsets) for table, zone in zoned if table.blocks),
     )
 
 
-def _of_zone(zone: Box, centre: NDArray[np.float64]) -> Obstacle:
+def _of_zone(zone: Box, workspace: Workspace, offsets: NDArray[np.float64]) -> Obstacle:
+    _check_apart(zone, offsets)
+    centre = np.array(workspace.centre)
     x, y, z = (2.0 * half for half in zone.half_m)
     plain = primitives.box((x, y, z))
     vertices = centre + np.array(zone.centre_m) + plain.vertices @ np.array(zone.axes)

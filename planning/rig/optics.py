@@ -24,37 +24,9 @@ def principal_row(height_px: int, offset_percent: float) -> float:
         c_y = (h - 1) / 2 + (offset / 100) h / 2
 
     A maker that counts percent of the *whole* height (Vidikron, Runco) publishes half
-    this number.
-
-    Args:
-        height_px: h, native image height in [px].
-        offset_percent: Positive with the lens below the image centre.
+    this number. The offset is positive with the lens below the image centre.
     """
     return 0.5 * (height_px - 1) + 0.005 * offset_percent * height_px
-
-
-def hyperfocal_distance(focal_m: float, f_number: float, blur_m: float) -> float:
-    """Return the hyperfocal distance of a thin lens.
-
-    ::
-
-        H = f^2 / (N c) + f
-
-    Focused at H, everything from H / 2 to infinity images within the circle c.
-
-    Args:
-        focal_m: Focal length f in [m].
-        f_number: N, focal length over diameter of the aperture.
-        blur_m: c, diameter of the circle of confusion on the panel or sensor in [m].
-
-    Raises:
-        ValueError: If any isn't positive.
-    """
-    if not (focal_m > 0.0 and f_number > 0.0 and blur_m > 0.0):
-        raise ValueError(
-            f"focal {focal_m} m, f/{f_number} and blur {blur_m} m must be positive"
-        )
-    return focal_m * focal_m / (f_number * blur_m) + focal_m
 
 
 def depth_of_field(
@@ -62,8 +34,10 @@ def depth_of_field(
 ) -> tuple[float, float]:
     """Return the nearest and farthest distance that a focused lens renders sharp.
 
-    With focus distance s and hyperfocal distance H::
+    With focus distance s and hyperfocal distance H, focused at which everything from
+    H / 2 to infinity images within the circle c::
 
+        H = f^2 / (N c) + f
         near = s (H - f) / (H + s - 2 f)
         far  = s (H - f) / (H - s)             infinite for s >= H
 
@@ -73,14 +47,18 @@ def depth_of_field(
 
     Args:
         focal_m: Focal length f in [m].
-        f_number: N.
+        f_number: N, focal length over diameter of the aperture.
         blur_m: c, diameter of the circle of confusion on the panel or sensor in [m].
         focus_m: Distance s of the plane in focus from the optical centre in [m].
 
     Raises:
         ValueError: If an argument isn't positive or s <= f, where no image forms.
     """
-    h = hyperfocal_distance(focal_m, f_number, blur_m)
+    if not (focal_m > 0.0 and f_number > 0.0 and blur_m > 0.0):
+        raise ValueError(
+            f"focal {focal_m} m, f/{f_number} and blur {blur_m} m must be positive"
+        )
+    h = focal_m * focal_m / (f_number * blur_m) + focal_m
     if not focus_m > focal_m:
         raise ValueError(
             f"focus {focus_m} m must lie beyond the focal length {focal_m} m"
@@ -93,18 +71,12 @@ def depth_of_field(
 def blur_diameter(
     focal_m: float, f_number: float, focus_m: float, distance_m: _Length
 ) -> _Length:
-    """Return the diameter of the blur circle of a point out of focus in [m].
+    """Return the diameter of the blur circle of points out of focus in [m].
 
     With focus distance s, point distance d, aperture f / N and magnification
     f / (s - f)::
 
         c = (f / N) (f / (s - f)) |d - s| / d
-
-    Args:
-        focal_m: Focal length f in [m].
-        f_number: N.
-        focus_m: s in [m].
-        distance_m: d in [m], one or many.
     """
     aperture = focal_m / f_number
     magnification = focal_m / (focus_m - focal_m)
@@ -122,13 +94,7 @@ def largest_corner_tangent(
 
         R = tan(max_corner angle + turn)
 
-    Args:
-        camera_matrix: K, shape (3, 3), no distortion.
-        resolution: Width and height in [px].
-        turn: Angle between ring axis and optical axis in [rad].
-
-    Returns:
-        R; infinite where the cone would open to a half space or more.
+    Without distortion; infinite where the cone would open to a half space or more.
     """
     width, height = resolution
     u = np.array([-0.5, width - 0.5])

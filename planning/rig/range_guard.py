@@ -21,17 +21,10 @@ _SOURCE = "distances that are sharp, less two standard deviations of --ranges"
 
 @dataclass(frozen=True)
 class Guard:
-    """What was kept free, and of which limits.
-
-    Attributes:
-        sigma_m: Standard deviation of the surface, in any direction [m].
-        length_m: 2 sigma [m].
-        angle_rad: What a surface moved by 2 sigma changes of an incidence at most,
-            ``asin(2 sigma / (standoff - play))``.
-        stated: Limits as the rig states them, by name, in metres and radians.
-    """
+    """What was kept free, and limits as the rig states them, in metres and radians."""
 
     sigma_m: float
+    # Two sigma, and what a surface moved by it changes of an incidence at most.
     length_m: float
     angle_rad: float
     stated: dict[str, Any]
@@ -78,9 +71,7 @@ def _tightened(rig: Rig, body: RangedBody, length: float, angle_deg: float) -> R
     play = table.placement.standoff_play_mm - 1e3 * length
     devices = {
         "camera": rig.camera_device(),
-        "projector" if rig.light == "diverging" else "parallel_projector": (
-            rig.projector_device()
-        ),
+        rig.projector_key: rig.projector_device(),
     }
     update: dict[str, Any] = {
         "placement": table.placement.model_copy(update={"standoff_play_mm": play}),

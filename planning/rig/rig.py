@@ -25,12 +25,10 @@ from . import optics
 from .existing_tables import build_existing, check_existing
 from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
-from .rig_files import Figure, Preset, list_presets, read_rig, rig_folder
+from .rig_files import read_rig, rig_folder
 from .rig_requirements import build_requirements
 from .rig_tables import ParallelTable, PinholeTable, RigTable
 from .wishes import Wishes
-
-__all__ = ["Figure", "Preset", "Rig", "list_presets", "load_rig"]
 
 Light = Literal["diverging", "parallel"]
 
@@ -38,11 +36,7 @@ _WARN_INCIDENCE_DEG = 70.0
 
 
 def load_rig(name: str | Path = "default", light: Light | None = None) -> "Rig":
-    """Load a preset or a rig file.
-
-    Args:
-        name: Name of a preset, or path of a TOML file.
-        light: `diverging` or `parallel`; None: what the rig says.
+    """Load a preset by its name, or a rig file by its path; None: the rig's light.
 
     Raises:
         RigError: One line for each fault: where it is, the value, the rule, what to do.
@@ -60,10 +54,8 @@ def load_rig(name: str | Path = "default", light: Light | None = None) -> "Rig":
 class Rig:
     """Devices, placement and limits of one rig, in metres and radians.
 
-    Attributes:
-        table: The rig as written, in millimetres and degrees.
-        light: `diverging` or `parallel`.
-        folder: Where files that the rig names are looked for.
+    The table is as written, in millimetres and degrees; files that it names are looked
+    for in the folder.
     """
 
     table: RigTable
@@ -159,9 +151,7 @@ class Rig:
     def notes(self, object_radius_m: float | None = None) -> tuple[str, ...]:
         """Return what a user should know of these limits, a sentence each.
 
-        Args:
-            object_radius_m: Radius of the ball that holds the object in [m]; given,
-                the depth that is sharp is compared with it.
+        The depth that is sharp is compared with an object's radius [m], if given.
         """
         limits = self.table.limits
         theta, tau = limits.projector_max_incidence_deg, limits.min_tangent_angle_deg
@@ -207,11 +197,8 @@ class Rig:
     ) -> Requirements:
         """Return what a plan of this rig must reach for one object.
 
-        Args:
-            mesh_centre: Centre of the smallest ball that holds the object in [m], (3,).
-            object_radius_m: Radius of that ball in [m].
-            wishes: What is asked beside what the rig says.
-            tau_m: Distance within which a sample must have a measured point in [m].
+        Centre and radius are those of the smallest ball that holds it [m]; within
+        `tau_m` [m] a sample must have a measured point.
 
         Raises:
             InputError: If an argument isn't usable.
@@ -246,10 +233,6 @@ class Rig:
     ) -> tuple[Obstacle, ...]:
         """Return what stands about an object, and isn't a device.
 
-        Args:
-            workspace: Of the requirements for this object.
-            mesh: The object.
-
         Raises:
             RigError: If the file of an obstacle can't be read.
             InfeasibleLimitsError: If a keep-out zone that blocks holds the object.
@@ -267,12 +250,9 @@ class Rig:
         table, parallel = self.table, self.light == "parallel"
         # No key where there are none.
         listed = {
-            key: [entry.to_document() for entry in entries]
-            for key, entries in (
-                ("existing", table.existing),
-                ("obstacle", table.obstacle),
-            )
-            if entries
+            key: [entry.to_document() for entry in getattr(table, key)]
+            for key in ("existing", "obstacle")
+            if getattr(table, key)
         }
         return {
             "name": self.name,
@@ -314,13 +294,18 @@ class Rig:
         return pinhole_device(table, "projector")
 
     @property
+    def projector_key(self) -> str:
+        """Table of the projector of this light."""
+        return "projector" if self.light == "diverging" else "parallel_projector"
+
+    @property
     def _projector_table(self) -> PinholeTable | ParallelTable:
         """The projector of this light as written."""
-        key = "projector" if self.light == "diverging" else "parallel_projector"
-        table: PinholeTable | ParallelTable | None = getattr(self.table, key)
+        table = getattr(self.table, self.projector_key)
         if table is None:
             raise RigError(
-                f"rig {self.name}: light '{self.light}' needs a table [{key}]; "
+                f"rig {self.name}: light '{self.light}' needs a table "
+                f"[{self.projector_key}]; "
                 f'add it, or lay the file over one that has it: base = "default"'
             )
         return table

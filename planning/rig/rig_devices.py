@@ -16,11 +16,7 @@ _UNSAID = "stated in the rig file, without a source"
 
 
 def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
-    """Return the model of a camera or a diverging projector.
-
-    Args:
-        table: Its figures.
-        role: Name of the table, for messages.
+    """Return the model of a camera or a diverging projector, `role` in messages.
 
     Raises:
         RigError: If no distance is sharp, or sharpness has no far end.

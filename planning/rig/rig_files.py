@@ -29,14 +29,7 @@ _SAME = (
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure of a device and where it was read.
-
-    Attributes:
-        device: Table that holds it, such as `camera`.
-        key: Dotted key in that table.
-        value: As written in the file.
-        source: What was read where, or `assumed`.
-    """
+    """One figure of a device, by its dotted key, and where it was read."""
 
     device: str
     key: str
@@ -46,14 +39,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Preset:
-    """A rig that comes with the program.
-
-    Attributes:
-        name: What `--rig` takes.
-        description: One line.
-        devices: Name of each device, by table.
-        figures: Every figure with its source.
-    """
+    """A rig that comes with the program; its devices' names are by table."""
 
     name: str
     description: str
@@ -74,11 +60,7 @@ def preset_names() -> tuple[str, ...]:
 
 
 def read_rig(name_or_path: str | Path) -> RigTable:
-    """Read and check a preset or a rig file.
-
-    Args:
-        name_or_path: Name of a preset, or a path: a `Path`, or text that ends in
-            `.toml` or holds a separator.
+    """Read and check a preset, or a file: text with `.toml` or a separator is a path.
 
     Raises:
         RigError: One line for each fault.
@@ -98,7 +80,8 @@ def read_rig(name_or_path: str | Path) -> RigTable:
     try:
         return RigTable.model_validate(tables)
     except ValidationError as error:
-        raise RigError("\n".join(_faults(where, error))) from None
+        faults = [f"{where}: {_fault(e)}" for e in error.errors(include_url=False)]
+        raise RigError("\n".join(faults)) from None
 
 
 def rig_folder(name_or_path: str | Path) -> Path:
@@ -190,11 +173,6 @@ def _preset(name: str) -> Preset:
                 value = getattr(value, part)
             figures.append(Figure(role, key, value, device.sources.get(key, "assumed")))
     return Preset(name, table.description, devices, tuple(figures))
-
-
-def _faults(where: str, error: ValidationError) -> list[str]:
-    entries = error.errors(include_url=False)
-    return [f"{where}: {_fault(entry)}" for entry in entries]
 
 
 def _fault(entry: ErrorDetails) -> str:

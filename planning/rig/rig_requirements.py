@@ -58,17 +58,13 @@ def build_requirements(
         if most is not None and not most >= 1:
             raise InputError(f"{name} = {most} must be 1 or more")
     _check_positive("tau_m", tau_m)
-    workspace = _workspace(
-        table,
-        reference_ring_radius,
-        mesh_centre,
-        object_radius_m,
-        wishes.up,
-        overflowing,
-    )
-    written = table.check.model_dump()
+    triangulation = _limits_of(TriangulationLimits, table.limits)
+    if wishes.accuracy_mm is not None:
+        _check_positive("accuracy_mm", wishes.accuracy_mm)
+        triangulation = replace(triangulation, max_sigma_m=wishes.accuracy_mm * 1e-3)
     checked: dict[str, Any] = {
-        key.replace("_mm", "_m"): _si(key, written[key]) for key in written
+        key.replace("_mm", "_m"): _si(key, value)
+        for key, value in table.check.model_dump().items()
     }
     return Requirements(
         max_projectors=wishes.max_projectors,
@@ -80,9 +76,16 @@ def build_requirements(
         pattern=wishes.pattern,
         projector=_limits_of(ProjectorLimits, table.limits, "projector_"),
         camera=_limits_of(CameraLimits, table.limits, "camera_"),
-        triangulation=_triangulation_limits(table.limits, wishes.accuracy_mm),
+        triangulation=triangulation,
         check=CheckLimits(**checked, tau_m=tau_m),
-        workspace=workspace,
+        workspace=_workspace(
+            table,
+            reference_ring_radius,
+            mesh_centre,
+            object_radius_m,
+            wishes.up,
+            overflowing,
+        ),
     )
 
 
@@ -175,16 +178,6 @@ def _si(key: str, value: float | None) -> float | None:
     if key.endswith("_deg"):
         return math.radians(value)
     return value * 1e-3 if key.endswith("_mm") else value
-
-
-def _triangulation_limits(
-    table: LimitsTable, accuracy_mm: float | None
-) -> TriangulationLimits:
-    limits = _limits_of(TriangulationLimits, table)
-    if accuracy_mm is None:
-        return limits
-    _check_positive("accuracy_mm", accuracy_mm)
-    return replace(limits, max_sigma_m=accuracy_mm * 1e-3)
 
 
 def _three(

@@ -1,7 +1,7 @@
 """The schema of rig files: TOML tables in millimetres and degrees, checked by pydantic.
 
-Unknown keys, numbers out of range, text for numbers and NaN are refused. The tables
-say what was written; `planning.rig.rig` turns them into devices and requirements.
+Unknown keys, numbers out of range, text for numbers and NaN are refused. What each key
+means: `docs/reference/rig-files.md`.
 """
 
 from typing import Annotated, Literal, Self
@@ -34,13 +34,7 @@ Five = Annotated[list[float], Field(min_length=5, max_length=5)]
 
 
 class FocusTable(Table):
-    """A lens set to one distance, `[projector.focus]` or `[camera.focus]`.
-
-    Attributes:
-        distance_mm: Plane in focus, from the optical centre.
-        f_number: Focal length over aperture.
-        blur_px: Largest blur circle that counts as sharp.
-    """
+    """A lens set to one distance, `[projector.focus]` or `[camera.focus]`."""
 
     distance_mm: Positive
     f_number: Positive
@@ -77,11 +71,7 @@ class SourcedTable(Table):
 
 
 class PinholeTable(SourcedTable):
-    """A camera or a diverging projector, `[camera]` or `[projector]`.
-
-    The focal length comes in exactly one of three ways; `docs/reference/rig-files.md`
-    defines each key.
-    """
+    """A camera or a diverging projector, `[camera]` or `[projector]`."""
 
     resolution_px: Resolution
     focal_px: PositivePair | None = None
@@ -117,14 +107,7 @@ class PinholeTable(SourcedTable):
 
 
 class ParallelTable(SourcedTable):
-    """A projector of parallel light, `[parallel_projector]`.
-
-    Attributes:
-        resolution_px: Width and height of the panel.
-        pixel_pitch_mm: Side of a pixel, on the panel and on the object.
-        range_mm: Depths from the panel's plane that are sharp.
-        beam_radius_mm: Radius of the beam about the panel's centre.
-    """
+    """A projector of parallel light, `[parallel_projector]`."""
 
     resolution_px: Resolution
     pixel_pitch_mm: Positive
@@ -165,15 +148,7 @@ class PlacementTable(Table):
 
 
 class RingsTable(Table):
-    """The ring pattern, `[rings]`.
-
-    Attributes:
-        tilt_deg: Turn of the ring axis against the device's axis; in parallel light
-            the axis is shifted by standoff x tan(tilt) instead.
-        gap_mm: Distance of neighbouring rings on a plane at the standoff; absent: the
-            planner chooses.
-        spacing: `uniform`, or `curvature`: finer where the surface bends.
-    """
+    """The ring pattern, `[rings]`; without a gap the planner chooses it."""
 
     tilt_deg: Annotated[float, Field(ge=0.0, lt=45.0)] = 8.0
     gap_mm: Annotated[float, Field(ge=0.01)] | None = None

@@ -9,19 +9,10 @@ TargetName = Literal["dominant", "surface"]
 
 @dataclass(frozen=True)
 class Wishes:
-    """What is asked of a plan beside what its rig says.
+    """What is asked of a plan beside what its rig says; None: as the rig has it.
 
-    Attributes:
-        max_projectors: Projectors at most.
-        max_cameras: Cameras at most; None: as many as needed.
-        target: `dominant` regions or the whole `surface`; None: the former, and the
-            latter of a body known by its ranges.
-        pattern: `rings`, `dense` or `none`.
-        dominant_coverage: Lit over reachable; None: what the rig says.
-        coverage: Measured over reachable; None: what the rig says.
-        min_reachable: Reachable over target; None: what the rig says.
-        accuracy_mm: Largest s_N in [mm]; None: what the rig says.
-        up: x, y, z, -x, -y or -z; None: what the rig says.
+    As many cameras as needed where `max_cameras` is None. The target is then that of
+    dominant regions, and the whole surface of a body known by its ranges.
     """
 
     max_projectors: int

@@ -24,15 +24,7 @@ _IDENTITY: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class KeepOutTable(Table):
     """A box in which no optical centre may stand, `[[workspace.keep_out]]`.
 
-    Something solid stands there, unless `blocks` says otherwise.
-
-    Attributes:
-        name: What messages call it.
-        centre_mm: Its middle.
-        size_mm: Its three sides.
-        turn_deg: Turns about the x, then the y, then the z axis of the mesh file.
-        blocks: Whether it stands in the way of light and views; a zone that is only
-            forbidden ground doesn't.
+    Something solid stands there, unless `blocks` says that it is only forbidden ground.
     """
 
     name: Name
@@ -43,23 +35,15 @@ class KeepOutTable(Table):
 
     def box(self) -> Box:
         """Return the box in metres."""
-        # Lower-case letters turn about the fixed axes, in this order.
-        turn = Rotation.from_euler("xyz", self.turn_deg, degrees=True).as_matrix()
-        return _box(self.name, self.centre_mm, self.size_mm, _rows(turn.T))
+        axes = _rows(turned(self.turn_deg).T)
+        return _box(self.name, self.centre_mm, self.size_mm, axes)
 
 
 class MountingTable(Table):
     """A rectangle on which optical centres may lie, `[[workspace.mounting]]`.
 
-    Attributes:
-        name: What messages call it.
-        centre_mm: Its middle.
-        normal: Direction square to it.
-        extent_mm: Its two sides.
-        along: Direction of the first side, as far as it lies in the plane; absent:
-            level, or where the plane itself is level the x axis (y if up is x).
-        thickness_mm: How far apart the outermost admissible positions lie along the
-            normal; half of it on either side.
+    Its first side runs `along`, as far as that lies in the plane; absent: level, or
+    where the plane itself is level along x (y if up is x).
     """
 
     name: Name
@@ -149,8 +133,7 @@ class WorkspaceTable(Table):
     def zones(self, up: Triple) -> dict[str, Any]:
         """Return `box`, `keep_out` and `mounting` of `Workspace`, in metres.
 
-        Args:
-            up: Unit vector that points up, for planes that don't say where they run.
+        `up` is for planes that don't say where they run.
         """
         room = None
         if self.min_mm is not None and self.max_mm is not None:
@@ -161,6 +144,12 @@ class WorkspaceTable(Table):
             "keep_out": tuple(zone.box() for zone in self.keep_out),
             "mounting": tuple(plane.box(up) for plane in self.mounting),
         }
+
+
+def turned(turn_deg: list[float]) -> NDArray[np.float64]:
+    """Return the rotation about the x, then the y, then the z axis of the world."""
+    # Lower-case letters turn about the fixed axes, in this order.
+    return Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
 
 
 def check_names(key: str, names: list[str]) -> None:

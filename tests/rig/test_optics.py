@@ -31,7 +31,7 @@ def test_blur_is_the_circle_of_confusion_at_both_ends(focal, f_number, blur, foc
 
 
 def test_focused_at_the_hyperfocal_distance_everything_beyond_half_is_sharp():
-    h = optics.hyperfocal_distance(0.012, 11.0, 3.45e-6)
+    h = 0.012**2 / (11.0 * 3.45e-6) + 0.012
     near, far = optics.depth_of_field(0.012, 11.0, 3.45e-6, h)
     assert near == pytest.approx(h / 2)
     assert far == math.inf
@@ -56,7 +56,7 @@ def test_arguments_must_be_positive(bad):
         arguments = [0.012, 11.0, 3.45e-6]
         arguments[place] = bad
         with pytest.raises(ValueError, match="must be positive"):
-            optics.hyperfocal_distance(*arguments)
+            optics.depth_of_field(*arguments, 1.0)
     with pytest.raises(ValueError, match="beyond the focal length"):
         optics.depth_of_field(0.012, 11.0, 3.45e-6, min(bad, 0.012))
 

@@ -11,8 +11,8 @@ from support.written import requirements_of
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.errors import InfeasibleLimitsError, InputError, RigError
-from planning.rig.rig import list_presets, load_rig
-from planning.rig.rig_files import lay_over, preset_names, read_rig
+from planning.rig.rig import load_rig
+from planning.rig.rig_files import lay_over, list_presets, preset_names, read_rig
 from planning.rig.rig_tables import RigTable
 from planning.rig.wishes import Wishes
 

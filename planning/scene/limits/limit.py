@@ -30,11 +30,7 @@ WIDEST = 3
 class Focus:
     """How the range of a camera follows from its lens.
 
-    Attributes:
-        blur_px: What counts as sharp.
-        f_number: Of the lens.
-        allowed_m: Range that the rig file allows beside it.
-        circle_px: Blur at distances in [m].
+    Beside the range that the rig file allows; `circle_px` gives the blur at distances.
     """
 
     blur_px: float
@@ -47,12 +43,8 @@ class Focus:
 class RigFacts:
     """What relaxations are told of the rig file.
 
-    Attributes:
-        required: The limits.
-        device: DeviceModel of the projectors, or of the cameras.
-        focus: Of a camera whose range follows from it; else None.
-        ring_gap_m: Distance of neighbouring rings at the standoff [m].
-        ring_gap_chosen: Whether the planner chose it.
+    The focus is of a camera whose range follows from it; `ring_gap_chosen` says whether
+    the planner chose the distance of neighbouring rings at the standoff.
     """
 
     required: Requirements
@@ -83,11 +75,8 @@ class LimitRelaxation:
 class Limit(Generic[View, Cell, Rules]):
     """One limit; a view holds samples as a device or a pair of them meets them.
 
-    A cell holds the best that any pose in a cell of poses may have of them.
-
-    Attributes:
-        name: Cause in plan and summary.
-        words: The same as a phrase, of samples that it forbids.
+    A cell holds the best that any pose in a cell of poses may have of them. The name is
+    the cause in plan and summary, the words say it of samples that it forbids.
     """
 
     name: str
@@ -118,11 +107,11 @@ class InBetween(Limit[object, object, object]):
 
 
 class RangedView(Protocol):
-    """What a range asks of a view: optics, and how far off samples are [m]."""
+    """What a range asks of a view."""
 
     @property
     def device(self) -> DeviceModel:
-        """Of a camera or a projector."""
+        """Optics of a camera or a projector."""
         ...
 
     @property
@@ -143,13 +132,7 @@ class InRange(Limit[RangedView, Any, Any]):
 def wider_angle(
     name: str, limit: float, cosines: Callable[[Any], Array]
 ) -> LimitRelaxation:
-    """Return a larger angle of incidence.
-
-    Args:
-        name: Of the limit, to which `_max` and a unit make the rig file's key.
-        limit: As it is [rad].
-        cosines: Of the angles in a view.
-    """
+    """Return a larger angle of incidence than the limit [rad], by a view's cosines."""
     least, key = np.cos(max(limit, STEEPEST)), name.replace("_", "_max_")
     return LimitRelaxation(
         name,
@@ -167,14 +150,7 @@ def causes(limits: Sequence[Limit[Any, Any, Any]]) -> tuple[str, ...]:
 def first_violated(
     limits: Sequence[Limit[View, Any, Rules]], view: View, rules: Rules, n: int
 ) -> NDArray[np.int8]:
-    """Return the index of the first limit that fails, their number where none does.
-
-    Args:
-        limits: In their order.
-        view: Of n samples.
-        rules: Values of the limits.
-        n: Samples.
-    """
+    """Return the index of the first limit that fails, their number where none does."""
     first = np.full(n, len(limits), dtype=np.int8)
     for index in range(len(limits) - 1, -1, -1):
         holds = limits[index].holds(view, rules)
@@ -212,13 +188,8 @@ def range_ends(
 ) -> Iterator[LimitRelaxation]:
     """Yield relaxations of a range's near end, its far end, and both at once.
 
-    Each is left out where that end isn't what binds. Views have `distances` in [m].
-
-    Args:
-        cause: Name of the limit.
-        device: `camera` or `projector`.
-        ends: The range, where a rig file may change it [m].
-        sharp: The range that holds [m].
+    Each is left out where that end isn't what binds: `ends` are those that a rig file
+    may change, `sharp` those that hold [m].
     """
     near, far = ends
     low, high = 1e3 * sharp[0], 1e3 * sharp[1]
@@ -275,11 +246,6 @@ def to_digits(digits: int) -> Callable[[Array], Array]:
 
 
 def off_axis(device: DeviceModel, local: Array) -> Array:
-    """Return how far samples are off the middle, inf beyond the widest field, (n,).
-
-    Args:
-        device: Optics of a camera or a projector.
-        local: Samples in its frame, shape (n, 3) [m].
-    """
+    """Return how far samples (n, 3) are off the middle, inf beyond the widest field."""
     wide = device.widened(WIDEST)
     return np.where(wide.in_field(local), light_of(wide).off_axis(local), np.inf)

@@ -51,14 +51,9 @@ class PairQuality:
 
 @dataclass(frozen=True, eq=False)
 class PairCell:
-    """The best of one projector with a camera anywhere in a cell of poses.
+    """The best of one projector with a camera anywhere in a cell of poses, (k,) each.
 
-    Attributes:
-        conditioning: |r.m| at most, shape (k,).
-        facing: |N.r| at most, shape (k,).
-        shift: t |g| at least, shape (k,).
-        noise: s_px in [px], shape (k,).
-        spacing: h in [m], shape (k,).
+    |r.m| and |N.r| at most, t |g| at least; s_px in [px] and h in [m].
     """
 
     conditioning: Array

@@ -28,14 +28,7 @@ _FARTHEST = 1e9
 class Observation:
     """A direction in which a point was seen, and the distance if one was measured.
 
-    Attributes:
-        line: In the file, from 1.
-        point: Name of the point.
-        origin_m: Viewpoint O.
-        direction: Unit vector from it to the point.
-        sigma_rad: Standard deviation of the direction about either axis across it.
-        range_m: Distance measured along it; None: none.
-        range_sigma_m: Its standard deviation; None likewise.
+    The line counts from 1; `sigma_rad` is about either axis across the unit direction.
     """
 
     line: int
@@ -49,13 +42,7 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class RangeFile:
-    """What a file of observations holds.
-
-    Attributes:
-        path: As it was given.
-        sha256: Digest of its bytes, hexadecimal.
-        observations: Its rows, in their order.
-    """
+    """The rows of a file of observations, in their order, and its digest."""
 
     path: str
     sha256: str
@@ -87,16 +74,10 @@ def read_range_file(path: str | Path) -> RangeFile:
 
 def sight_lines(observations: list[Observation]) -> SightLines:
     """Return observations of one point as arrays."""
-    nan = math.nan
-    return SightLines(
-        np.array([o.origin_m for o in observations]),
-        np.array([o.direction for o in observations]),
-        np.array([o.sigma_rad for o in observations]),
-        np.array([nan if o.range_m is None else o.range_m for o in observations]),
-        np.array(
-            [nan if o.range_sigma_m is None else o.range_sigma_m for o in observations]
-        ),
-    )
+    names = "origin_m", "direction", "sigma_rad", "range_m", "range_sigma_m"
+    columns = ([getattr(o, name) for o in observations] for name in names)
+    # None becomes NaN.
+    return SightLines(*(np.array(column, dtype=np.float64) for column in columns))
 
 
 def _rows(text: str, path: str) -> Iterator[tuple[int, list[str]]]:

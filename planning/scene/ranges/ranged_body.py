@@ -29,13 +29,7 @@ _SUBDIVISIONS = 4
 
 @dataclass(frozen=True, eq=False)
 class RangedPoint:
-    """A point of the object.
-
-    Attributes:
-        name: As in the file.
-        lines: Rows that it was located from.
-        estimate: Where it is, and how well that is known.
-    """
+    """A point of the object, from some rows of the file."""
 
     name: str
     lines: tuple[int, ...]
@@ -44,13 +38,7 @@ class RangedPoint:
 
 @dataclass(frozen=True)
 class Refused:
-    """Observations that were left out.
-
-    Attributes:
-        name: Of the point.
-        lines: Rows of the file.
-        reason: Why.
-    """
+    """Rows of a point that were left out, and why."""
 
     name: str
     lines: tuple[int, ...]
@@ -59,14 +47,7 @@ class Refused:
 
 @dataclass(frozen=True, eq=False)
 class RangedBody:
-    """The least-squares body of observations: what is planned for without a mesh.
-
-    Attributes:
-        file: What was observed.
-        points: Located.
-        refused: Left out.
-        ball: The least-squares sphere through the points.
-    """
+    """The least-squares sphere of observations: what is planned for without a mesh."""
 
     file: RangeFile
     points: tuple[RangedPoint, ...]
@@ -89,23 +70,20 @@ class RangedBody:
         The root of the largest eigenvalue of [I u] C [I u]^T + tau^2 u u^T over the
         directions u of the mesh's vertices.
         """
-        return position_sigma(self.ball, self._outward)
+        return float(np.sqrt(self._largest.max()))
 
     @cached_property
     def least_known(self) -> NDArray[np.float64]:
         """Direction from the centre to the surface that is known worst, shape (3,)."""
-        largest = np.linalg.eigvalsh(self.ball.point_covariances(self._outward))[:, 2]
-        return self._outward[int(np.argmax(largest))]
+        return self._outward[int(np.argmax(self._largest))]
 
     @property
     def _outward(self) -> NDArray[np.float64]:
         return (self.mesh.vertices - self.ball.centre) / self.ball.radius
 
-
-def position_sigma(ball: BestSphere, outward: NDArray[np.float64]) -> float:
-    """Return the largest standard deviation of points c + rho u of a sphere [m]."""
-    largest = np.linalg.eigvalsh(ball.point_covariances(outward))[:, 2].max()
-    return float(np.sqrt(largest))
+    @cached_property
+    def _largest(self) -> NDArray[np.float64]:
+        return np.linalg.eigvalsh(self.ball.point_covariances(self._outward))[:, 2]
 
 
 def read_ranges(path: str | Path) -> RangedBody:
