@@ -156,11 +156,9 @@ class ProjectorCalibration(DeviceCalibration):
         return self.light.aim(self.world_from_device, points, depth)
 
     def incidence_cosine(self, points: Array, normals: Array) -> Array:
-        """Return the cosine of the incidence of its light, shadows left aside, (n,).
+        """Return cosines of the incidence of its light, shadows left aside, (n,).
 
-        Args:
-            points: Of the surface [m], shape (n, 3).
-            normals: Unit normals there, shape (n, 3).
+        Points of the surface [m] and unit normals there have shape (n, 3).
         """
         return -np.einsum("ij,ij->i", self.aim(points)[1], normals)
 

@@ -6,6 +6,7 @@ are paired with what was projected by name, never by their order.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +28,7 @@ _LISTED = 4
 
 @dataclass(frozen=True, eq=False)
 class CaptureFolder:
-    """Where the images of every pair of a plan's devices are.
-
-    Attributes:
-        path: The folder.
-        plan: For which the patterns were drawn.
-    """
+    """Where images of every pair of a plan's devices are; its patterns were shown."""
 
     path: Path
     plan: Scanner
@@ -42,18 +38,14 @@ class CaptureFolder:
         return self.path / self.plan.cameras[c].id / self.plan.projectors[p].id
 
     def require(self) -> None:
-        """Refuse a folder that holds none of the cameras.
-
-        Raises:
-            CapturesError: It says what the folder holds, and what it should.
-        """
+        """Refuse a folder that holds none of the cameras (CapturesError)."""
         if not self.path.is_dir():
             raise CapturesError(f"{self.path}: no such folder; give that of the images")
         ids = [camera.id for camera in self.plan.cameras]
         if not any((self.path / name).is_dir() for name in ids):
             raise CapturesError(
                 f"{self.path}: has no folder of a camera; they must be called "
-                f"{_some(ids)}, it holds {_some(_contents(self.path))}"
+                f"{_some(ids)}, it holds {_holding(self.path)}"
             )
 
     def read(self, p: int, c: int) -> Images:
@@ -75,19 +67,15 @@ class CaptureFolder:
         return _scaled(np.stack(levels))
 
     def write(self, p: int, c: int, stack: NDArray[np.uint8]) -> None:
-        """Write the images of a pair as 8-bit PNG.
-
-        Raises:
-            OSError: If they can't be written.
-        """
+        """Write the images of a pair as 8-bit PNG."""
         place = self.place(p, c)
         place.mkdir(parents=True, exist_ok=True)
-        pictures = [Image.fromarray(image) for image in stack]
+        pictures = map(Image.fromarray, stack)
         names = self.plan.frame_names(p, c)
         write_together(
             {
-                place / f"{name}.png": lambda file, picture=picture: picture.save(
-                    file, format="PNG", compress_level=1
+                place / f"{name}.png": partial(
+                    picture.save, format="PNG", compress_level=1
                 )
                 for name, picture in zip(names, pictures, strict=True)
             }
@@ -96,33 +84,35 @@ class CaptureFolder:
     def _files(self, p: int, c: int) -> list[Path]:
         place, names = self.place(p, c), self.plan.frame_names(p, c)
         if not place.is_dir():
-            near = _contents(place.parent) if place.parent.is_dir() else ()
-            holds = f"; {place.parent} holds {_some(near)}" if near else ""
+            above = place.parent
+            near = above.is_dir() and _entries(above)
+            holds = f"; {above} holds {_holding(above)}" if near else ""
             raise CapturesError(f"{place}: no such folder{holds}")
-        found: dict[str, list[Path]] = {}
-        for file in _entries(place):
+        entries = _entries(place)
+        images: dict[str, list[Path]] = {}
+        for file in entries:
             if file.suffix.lower() in SUFFIXES:
-                found.setdefault(file.stem, []).append(file)
-        missing = [name for name in names if name not in found]
+                images.setdefault(file.stem, []).append(file)
+        missing = [name for name in names if name not in images]
         if missing:
             known = {frame.name for frame in self.plan.frames(p)}
-            others = [file.name for file in _entries(place) if file.stem not in known]
+            others = [file.name for file in entries if file.stem not in known]
             also = f"; holds {_some(others)}, no frame's name" if others else ""
             raise CapturesError(f"{place}: lacks {_some(missing)}{also}")
         for name in names:
-            if len(found[name]) > 1:
-                twice = _some([file.name for file in found[name]])
+            if len(images[name]) > 1:
+                twice = _some([file.name for file in images[name]])
                 raise CapturesError(f"{place}: {twice} are one frame; keep one")
-        return [found[name][0] for name in names]
+        return [images[name][0] for name in names]
 
 
 def whole_image(frames: Frames, resolution: tuple[int, int]) -> Images:
     """Return windows of rendered frames as images of a camera's own size."""
     width, height = resolution
     left, top = frames.corner
-    n, rows, columns = frames.stack.shape
+    n, tall, wide = frames.stack.shape
     stack = np.zeros((n, height, width), dtype=frames.stack.dtype)
-    stack[:, top : top + rows, left : left + columns] = frames.stack
+    stack[:, top : top + tall, left : left + wide] = frames.stack
     return stack
 
 
@@ -144,8 +134,8 @@ def _entries(folder: Path) -> list[Path]:
         ) from None
 
 
-def _contents(folder: Path) -> list[str]:
-    return [entry.name for entry in _entries(folder)]
+def _holding(folder: Path) -> str:
+    return _some([entry.name for entry in _entries(folder)])
 
 
 def _some(names: Sequence[str]) -> str:

@@ -72,10 +72,6 @@ def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
     a dent. If the mesh confirms none, but all pairs agree with each other, the object
     isn't the mesh; two pairs at least, of other cameras and other projectors. Where a
     confirmed pair has many points far from the mesh, these too need another pair.
-
-    Args:
-        pairs: What each pair gave.
-        plan: What is known of devices and object, and the limit on the rms distance.
     """
     limit = plan.limits.check.max_rms_m
     clouds = {key: pair.cloud for key, pair in pairs if len(pair.cloud)}

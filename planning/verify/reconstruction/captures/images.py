@@ -21,11 +21,8 @@ _CLIPPED = 250
 def read_grey(path: Path, resolution: tuple[int, int]) -> NDArray[np.uint8 | np.uint16]:
     """Return the grey levels of an image file, shape (h, w), 8 or 16 bits as stored.
 
-    Of colours the mean is taken; where one of them is clipped the pixel is.
-
-    Args:
-        path: Of the file.
-        resolution: Width and height that it must have [px].
+    Of colours the mean is taken; where one of them is clipped the pixel is. Its width
+    and height must be the resolution [px].
 
     Raises:
         CapturesError: If it can't be read whole, loses detail, or isn't of that size.

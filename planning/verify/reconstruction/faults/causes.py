@@ -20,10 +20,6 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
     devices, labels that contradict each other, wrong roots, a changed pose, optics or
     size. What is missing is looked at where it is missing; and what is inaccurate,
     nothing being wrong as a whole, where the points are off.
-
-    Args:
-        failures: One clause for each limit that isn't kept.
-        measured: What the check found.
     """
     plan, decoded = measured.plan, measured.decoded
     # Edges of disordered frames, or of two projectors at once, are no evidence.

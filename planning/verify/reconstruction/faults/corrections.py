@@ -123,10 +123,6 @@ def far_poses(pose: Array, middle: Array) -> list[Array]:
     """Return poses all about the object at the same distance, in several rolls.
 
     The directions are a Fibonacci lattice on the sphere; the aim at the object stays.
-
-    Args:
-        pose: ``world_from_device``, shape (4, 4).
-        middle: Of the object in the world [m], shape (3,).
     """
     k = np.arange(_PLACES) + 0.5
     z = 1.0 - 2.0 * k / _PLACES

@@ -27,12 +27,7 @@ Cause = tuple[Explanation, ...]
 
 
 def diagnose(plan: Scanner, evidence: Evidence) -> tuple[Cause, ...]:
-    """Return the changes that edges ask for, what explains most first.
-
-    Args:
-        plan: How everything should stand.
-        evidence: Labelled edges of the pairs of devices.
-    """
+    """Return the changes of a plan that edges ask for, what explains most first."""
     if len(evidence) == 0:
         return ()
     supposed = Supposed.of(plan)
@@ -42,7 +37,7 @@ def diagnose(plan: Scanner, evidence: Evidence) -> tuple[Cause, ...]:
     causes: list[Cause] = []
     while len(causes) < _MOST_CAUSES and state.misfit() > fine:
         good = _equally_good(state.explanations())
-        if not good or not _helps(good[0]):
+        if not (good and _helps(good[0])):
             break
         causes.append(good)
         state = good[0].after

@@ -49,10 +49,7 @@ _FITTED_FAR = 12
 class State:
     """How the edges lie, were everything as it is supposed.
 
-    Attributes:
-        evidence: The edges.
-        supposed: How everything is supposed to stand.
-        fine_m: Mismatch that nothing is wrong with [m].
+    Up to a mismatch of `fine_m` [m] nothing is wrong.
     """
 
     evidence: Evidence

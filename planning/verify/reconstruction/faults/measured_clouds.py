@@ -43,12 +43,9 @@ class MeasuredClouds:
     """What a check found, for the search for causes.
 
     Attributes:
-        plan: Of the rig.
-        decoded: What each pair gave, by indices of projector and camera.
-        counts: The same in numbers.
+        counts: What was decoded, in numbers.
         cloud: All points, before redundancy was removed.
-        expected: Samples of the target, and what the plan claims of them.
-        missing: Which of those have no point, shape (n,).
+        missing: Which of the expected samples have no point, shape (n,).
     """
 
     plan: Scanner

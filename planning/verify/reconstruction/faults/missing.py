@@ -155,13 +155,9 @@ def _no_edges(supposed: Supposed, points: Array, normals: Array) -> str:
 def light_falls(
     projector: ProjectorCalibration, caster: Occluder, points: Array, normals: Array
 ) -> Mask:
-    """Return whether a projector's rings light points of the surface, by ray casting.
+    """Return whether a projector's rings light points [m] of the surface, shape (n,).
 
-    Args:
-        projector: As it stands.
-        caster: What stands in the way.
-        points: On the surface in [m], shape (n, 3).
-        normals: Unit normals there, shape (n, 3).
+    By ray casting; points and unit normals have shape (n, 3).
     """
     pixels, depth = projector.panel(points)
     starts, beams, reach = projector.aim(points)

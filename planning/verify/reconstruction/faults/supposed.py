@@ -25,7 +25,7 @@ Role = Literal["cameras", "projectors", "objects"]
 # Points in the world [m] and unit normals there, shape (n, 3), NaN where rays miss.
 Places = tuple[Array, Array]
 # Edges of each pair of devices that are looked at.
-EDGES_A_PAIR = 240
+_EDGES_A_PAIR = 240
 # Incidence of light beyond which edges smear: formulation.md section 2 [rad].
 GRAZING = np.deg2rad(70.0)
 # Pairs with fewer edges say nothing.
@@ -36,11 +36,7 @@ _LEAST_EDGES = 60
 class Object:
     """The mesh, and where and how large the object is supposed to be against it.
 
-    Attributes:
-        mesh: Of the plan.
-        caster: Casts rays against it.
-        world_from_device: Pose as of a device, its origin the mesh's centre, (4, 4).
-        scale: Size over that of the mesh.
+    Its pose, (4, 4), is named as a device's; the origin is the centre of the mesh.
     """
 
     mesh: TriangleMesh
@@ -64,14 +60,7 @@ class Object:
 
 @dataclass(frozen=True, eq=False)
 class Supposed:
-    """How everything is supposed to stand; devices in the order of the plan.
-
-    Attributes:
-        plan: For which the patterns were drawn.
-        cameras: Supposed ones.
-        projectors: Likewise.
-        objects: The one object.
-    """
+    """How everything is supposed to stand; devices in the order of the plan."""
 
     plan: Scanner
     cameras: tuple[CameraCalibration, ...]
@@ -138,7 +127,7 @@ class Evidence(Columns):
             edges = pair.edges
             if len(edges) < _LEAST_EDGES or pair.rejected.get("labels", 0):
                 continue
-            some = np.linspace(0, len(edges) - 1, min(EDGES_A_PAIR, len(edges)))
+            some = np.linspace(0, len(edges) - 1, min(_EDGES_A_PAIR, len(edges)))
             some = some.astype(np.int64)
             radii = plan.projectors[p].pattern.radii[edges.rings[some]]
             at = cls.at(edges.pixels[some], p, c)

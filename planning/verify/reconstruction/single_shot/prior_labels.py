@@ -40,7 +40,7 @@ def label_by_prior(
         radii: Of the rings, rising, shape (n_rings,).
         pair: Calibration of both devices.
         prior: What the object is known to lie near.
-        tolerance_m: How near [m].
+        tolerance_m: How near.
 
     Returns:
         The lines, ring -1 and root 0 where none is sure; and how many of these are

@@ -5,7 +5,7 @@ PAMI 20(2), 1998: where the image, smoothed at the scale of the line, has a ridg
 """
 
 import numpy as np
-from scipy.ndimage import convolve, gaussian_filter1d, map_coordinates
+from scipy.ndimage import convolve, gaussian_filter, map_coordinates
 
 from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.decode.edges import ImageEdges
@@ -38,7 +38,7 @@ def find_lines(frames: Frames, width_px: float) -> ImageEdges:
     image = frames.stack[0].astype(np.float64)
     scale = max(_MIN_SCALE_PX, width_px / (2.0 * np.sqrt(3.0)))
     along_v, along_u, vv, uv, uu = (
-        _derivative(image, scale, order)
+        gaussian_filter(image, scale, order)  # pyright: ignore[reportArgumentType]
         for order in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
     )
     # The eigenvalue of the Hessian that is most negative across a bright line.
@@ -54,7 +54,7 @@ def find_lines(frames: Frames, width_px: float) -> ImageEdges:
     inside = np.all(np.abs(step) <= 0.5, axis=1)
     places = np.column_stack([j, i]) + step
     reach = np.sqrt(12.0) * scale * across
-    smooth = _derivative(image, scale, (0, 0))
+    smooth = gaussian_filter(image, scale)
     inside &= _falls(smooth, places, reach, _MIN_FALL * contrast[i, j])
     # A derivative of white noise, smoothed, varies by 1 / (8 pi scale^4).
     spread = noise / (np.sqrt(8.0 * np.pi) * scale * scale * np.abs(curve[inside]))
@@ -72,14 +72,6 @@ def _falls(smooth: Array, places: Array, reach: Array, least: Array) -> Mask:
         for side in (0.0, -1.0, 1.0)
     )
     return (here - before >= least) & (here - after >= least)
-
-
-def _derivative(image: Array, scale: float, order: tuple[int, int]) -> Array:
-    """Derivative of a smoothed image, of some order down and across."""
-    smooth = np.empty_like(image)
-    gaussian_filter1d(image, scale, axis=0, order=order[0], output=smooth)
-    gaussian_filter1d(smooth, scale, axis=1, order=order[1], output=smooth)
-    return smooth
 
 
 def _direction(a: Array, c: Array, b: Array) -> Array:

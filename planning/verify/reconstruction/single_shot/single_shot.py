@@ -67,7 +67,6 @@ def reconstruct_single_shot(
     *,
     tolerance_m: float,
     seed: int,
-    photometry: Photometry | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
     """Measure the object of a plan from one image of each pair of devices.
@@ -77,11 +76,9 @@ def reconstruct_single_shot(
         expected: As in `reconstruct`; what sequences would measure.
         tolerance_m: How near the object is taken to lie to the mesh [m].
         seed: Of the pixel noise.
-        photometry: Simulated light and sensor.
         progress: Called with the pairs done and their total.
     """
-    light = photometry or Photometry()
-    spent = Spent()
+    light, spent = Photometry(), Spent()
     with spent.on("decode"):
         shots = shoot_rig(
             plan,
