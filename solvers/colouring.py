@@ -20,8 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .status import SolveStatus
-
 _LISTED = 8
 _MAX_NODES = 20_000
 # Of `scipy.optimize.milp`.
@@ -42,7 +40,6 @@ class Colouring:
         clique: Vertices that conflict pairwise, rising: the largest set found.
         proof: `clique`: there are as many in it as colours. `exhaustion`: no colouring
             with one colour fewer exists, all were tried. `none`: the work ran out.
-        status: `OPTIMAL` if `n_colours` is the least, else `FEASIBLE`.
     """
 
     colour: NDArray[np.int64]
@@ -50,7 +47,6 @@ class Colouring:
     lower_bound: int
     clique: tuple[int, ...]
     proof: Proof
-    status: SolveStatus
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -94,10 +90,9 @@ def fewest_colours(
     proof: Proof = (
         "clique" if count == len(clique) else "exhaustion" if proved else "none"
     )
-    status = SolveStatus.OPTIMAL if count == least else SolveStatus.FEASIBLE
     _, first, same = np.unique(colours, return_index=True, return_inverse=True)
     named = np.argsort(np.argsort(first))[same.reshape(n)]
-    return Colouring(named.astype(np.int64), count, least, clique, proof, status)
+    return Colouring(named.astype(np.int64), count, least, clique, proof)
 
 
 def _largest_clique(conflicts: NDArray[np.bool_]) -> tuple[int, ...]:
@@ -128,7 +123,6 @@ def _listed_colouring(
 
 
 def _clique(conflicts: NDArray[np.bool_], max_nodes: int) -> tuple[int, ...]:
-    """Return the largest clique that HiGHS finds."""
     n = len(conflicts)
     pairs = np.argwhere(np.triu(~conflicts, 1))
     x, _ = _binaries(np.ones(n), pairs, np.ones(n), max_nodes)
@@ -139,7 +133,6 @@ def _clique(conflicts: NDArray[np.bool_], max_nodes: int) -> tuple[int, ...]:
 def _colouring(
     conflicts: NDArray[np.bool_], clique: tuple[int, ...], count: int, max_nodes: int
 ) -> tuple[NDArray[np.int64] | None, bool]:
-    """Return a colouring or None, and whether that is proved."""
     n = len(conflicts)
     edges = np.argwhere(np.triu(conflicts))
     pairs = np.concatenate([edges + n * c for c in range(count)])

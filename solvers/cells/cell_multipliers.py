@@ -65,7 +65,6 @@ class MultiplierSearch:
         return self.bound > n_poses
 
     def _drill(self, n_poses: int) -> None:
-        """Split the costliest cells by the best multipliers, while that pays."""
         if self.multipliers is self._drilled:
             return
         allowed = float(self._need) / n_poses

@@ -113,7 +113,7 @@ class WholeRows:
         return int(self.weights.sum())
 
     def multipliers(self, numbers: ArrayLike) -> NDArray[np.int64]:
-        """Return integers in proportion to any numbers; what isn't positive counts 0.
+        """Return integers in proportion to any numbers, those below 0 as 0.
 
         Integers of a small enough sum stay as they are.
         """
@@ -198,8 +198,8 @@ def _cheapest(
 ) -> Fraction:
     """Return a lower bound on min {c y : w y >= W, 0 <= y <= 1}: t W - (t w - c)+.
 
-    It holds for any price t >= 0; the marginal row's ratio makes it the minimum. What
-    all rows together can't reach costs all of them: more isn't claimed.
+    The marginal row's ratio t makes it the minimum. What all rows together can't reach
+    costs all of them.
     """
     live = weights > 0
     weights, costs = weights[live], costs[live]

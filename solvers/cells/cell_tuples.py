@@ -50,14 +50,9 @@ def refute_tuples(
     multipliers: NDArray[np.int64],
     budget: WorkBudget,
 ) -> TupleAnswer:
-    """Search all multisets of K cells, as far as the budget reaches.
+    """Search all multisets of K cells, K at least 1, as far as the budget reaches.
 
-    Args:
-        whole: What must be served.
-        store: The cells known so far; more are asked for where needed.
-        n_poses: K, at least 1.
-        multipliers: Any non-negative integers, shape (n_rows,); good ones prune.
-        budget: Counted work.
+    Multipliers are any non-negative integers, shape (n_rows,); good ones prune.
     """
     subtrees = Subtrees(whole, store, n_poses, multipliers)
     if subtrees.root == VOID:

@@ -18,12 +18,10 @@ from solvers.covers.bounds.relaxation import cost_bound
 from solvers.covers.search.neighbourhood import better, cheapest, greedy
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import INTEGER_PROOF, NONE, Answer, cut_short
-from .counts import HEAVIEST, fewest_sets
-from .heaviest import heavier, most_weight
+from .answers import INTEGER_PROOF, NONE, Answer
+from .counts import fewest_sets
+from .heaviest import SETTLED, closed
 
-# Relative to the cost; HiGHS' own tolerance is below it.
-_SETTLED = 1e-5
 _KICKS = 600
 
 
@@ -35,15 +33,10 @@ def cheapest_sets(
     max_sets: int | None = None,
     heaviest: bool = True,
 ) -> Answer:
-    """Find the cheapest sets that meet what is required, with a lower bound.
+    """Find the cheapest sets that meet what can be met, with a lower bound.
 
-    Args:
-        cover: A cover whose sets together meet the requirements.
-        budget: Counted work.
-        seed: Seed of the neighbourhood search.
-        max_sets: Sets allowed. If more are proved necessary, the selection is that of
-            most weight, the bound that of any cover.
-        heaviest: Whether to look for more weight at the same count, where all cost 1.
+    If more than ``max_sets`` are proved necessary, the selection is that of most
+    weight, the bound that of any cover. More weight is looked for where all cost 1.
     """
     counting = bool(np.all(cover.costs == 1.0))
     start, limit = greedy(cover, NONE, budget), None
@@ -57,22 +50,8 @@ def cheapest_sets(
             return replace(few, bound=_linear_bound(cover, budget, None)[0])
         if few.status is not SolveStatus.UNKNOWN:
             start = few.selected
-    selected, lower, proof = _searched(cover, start, budget, seed, limit)
-    cost = float(cover.costs[selected].sum())
-    settled = lower >= cost * (1.0 - _SETTLED)
-    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-    spare = budget.part(np.inf)
-    spare.units = HEAVIEST * budget.units
-    if max_sets is not None and selected.size > max_sets:
-        settled = counting and lower > max_sets
-        status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
-        selected = most_weight(cover, max_sets, spare, seed=seed).selected
-    elif settled:
-        lower = cost
-    if counting and heaviest and status.has_point:
-        selected = heavier(cover, selected, spare, seed)
-    proof = proof if settled else cut_short(proof, budget)
-    return Answer(status, selected, lower, proof)
+    found = _searched(cover, start, budget, seed, limit)
+    return closed(cover, found, budget, seed, max_sets, heaviest=heaviest)
 
 
 def _searched(
@@ -81,8 +60,7 @@ def _searched(
     budget: WorkBudget,
     seed: int,
     max_sets: int | None,
-) -> tuple[NDArray[np.int64], float, str]:
-    """Return the best cover found, the bound, and what proves it."""
+) -> Answer:
     selected = cheapest(
         cover,
         start,
@@ -98,17 +76,16 @@ def _searched(
             selected = better(cover, selected, answer.selected, max_sets)
         bound = 0.0 if answer.bound is None else answer.bound
         # A bound above a cover that was counted here is none.
-        if lower < bound <= cover.costs[selected].sum() * (1.0 + _SETTLED):
+        if lower < bound <= cover.costs[selected].sum() * (1.0 + SETTLED):
             lower, proof = bound, INTEGER_PROOF
     if np.all(cover.costs == 1.0):
-        lower = float(np.ceil(lower - 1e-5))
-    return selected, lower, proof
+        lower = min(float(np.ceil(lower - 1e-5)), float(selected.size))
+    return Answer(SolveStatus.FEASIBLE, selected, lower, proof)
 
 
 def _linear_bound(
     cover: ReducedCover, budget: WorkBudget, max_sets: int | None
 ) -> tuple[float, str]:
-    """Return the bound by the linear program, and its name."""
     lower, proof = float(cover.costs.min()), "a positive weight needs a set"
     multipliers = linear_multipliers(cover, budget.part(0.5 * budget.remaining))
     if multipliers is not None:

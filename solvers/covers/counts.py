@@ -24,13 +24,11 @@ from solvers.covers.search.neighbourhood import (
 )
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import INTEGER_PROOF, NONE, Answer, cut_short
-from .heaviest import exact_search, heavier, most_weight
+from .answers import INTEGER_PROOF, NONE, Answer
+from .heaviest import closed, exact_search
 
 # Work after which the first bounds are asked whether more search is worth it.
 _FIRST_UNITS = 4e8
-# Share of the budget that more weight at the same count may cost on top.
-HEAVIEST = 0.3
 
 
 def fewest_sets(
@@ -41,56 +39,55 @@ def fewest_sets(
     max_sets: int | None = None,
     heaviest: bool = True,
 ) -> Answer:
-    """Find the fewest sets that meet what is required, with a lower bound.
+    """Find the fewest sets of a simple cover of costs 1, with a lower bound.
 
-    Args:
-        cover: A simple cover of costs 1 whose sets together meet the requirement.
-        budget: Counted work.
-        seed: Seed of the searches.
-        max_sets: Sets allowed.
-        heaviest: Whether to look for more weight at the same count.
+    All sets together meet the requirement.
     """
-    whole = budget.units
-    search = _CountSearch(cover, budget, seed, max_sets)
+    search = _CountSearch(cover, budget, max_sets)
     if cover.full:
         known = search.selected
         full = fewest_full(cover, budget, seed=seed, start=known, lower=search.lower)
         search.selected = full.selected
         search.prove(int(full.bound), full.proof)
-        return search.closed(heaviest=False)
-    search.improve(budget.part(min(0.02 * whole, _FIRST_UNITS)), seed)
-    search.by_multipliers(budget.part(0.25 * whole))
-    search.improve(budget.part(0.15 * whole), seed)
-    search.by_tuples()
-    if not search.settled and fits(cover):
-        search.by_integers()
-    again = seed
-    while not search.settled and not budget.exhausted:
-        again += 1
-        search.improve(budget, again)
-    return search.closed(heaviest=heaviest)
+        # All rows are covered.
+        heaviest = False
+    else:
+        search.run(seed)
+    lower = float(search.lower)
+    found = Answer(SolveStatus.FEASIBLE, search.selected, lower, search.proof)
+    return closed(cover, found, budget, seed, max_sets, heaviest=heaviest)
 
 
 class _CountSearch:
     """Cover from above, bound from below and its proof."""
 
     def __init__(
-        self, cover: ReducedCover, budget: WorkBudget, seed: int, max_sets: int | None
+        self, cover: ReducedCover, budget: WorkBudget, max_sets: int | None
     ) -> None:
-        self.cover, self.budget, self.seed = cover, budget, seed
+        self.cover, self.budget = cover, budget
         self.selected = prune(cover, greedy(cover, NONE, budget))
         self.cap = cover.n_sets if max_sets is None else max_sets
         self.multipliers = cover.weights
         self.lower, self.proof = 1, "a positive weight needs a set"
         self.prove(count_bound(cover, self.multipliers), "sum of the largest sets")
 
+    def run(self, seed: int) -> None:
+        budget, whole = self.budget, self.budget.units
+        self.improve(budget.part(min(0.02 * whole, _FIRST_UNITS)), seed)
+        self.by_multipliers(budget.part(0.25 * whole))
+        self.improve(budget.part(0.15 * whole), seed)
+        self.by_tuples()
+        if not self.settled and fits(self.cover):
+            self.by_integers()
+        while not self.settled and not budget.exhausted:
+            seed += 1
+            self.improve(budget, seed)
+
     @property
     def settled(self) -> bool:
-        """Whether no smaller cover is left, or none that is allowed."""
         return self.lower >= min(self.selected.size, self.cap + 1)
 
     def prove(self, bound: int, proof: str) -> None:
-        """Raise the bound."""
         if bound > self.lower:
             self.lower, self.proof = bound, proof
 
@@ -138,7 +135,6 @@ class _CountSearch:
                 break
 
     def by_integers(self) -> None:
-        """Leave a small program to HiGHS."""
         answer = branch_and_bound(self.cover, self.selected, self.budget)
         if answer.selected is not None:
             self.selected = better(self.cover, self.selected, answer.selected)
@@ -147,19 +143,3 @@ class _CountSearch:
             # A bound above a cover that was counted here is none.
             if proved <= self.selected.size:
                 self.prove(proved, INTEGER_PROOF)
-
-    def closed(self, *, heaviest: bool) -> Answer:
-        """Return the answer, of most weight where that is asked for."""
-        selected, settled = self.selected, self.lower >= self.selected.size
-        status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
-        # Its own allowance, so that a hard proof doesn't cost the larger area.
-        spare = self.budget.part(np.inf)
-        spare.units = HEAVIEST * self.budget.units
-        if selected.size > self.cap:
-            settled = self.lower > self.cap
-            status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
-            selected = most_weight(self.cover, self.cap, spare, seed=self.seed).selected
-        elif heaviest and selected.size:
-            selected = heavier(self.cover, selected, spare, self.seed)
-        proof = self.proof if settled else cut_short(self.proof, self.budget)
-        return Answer(status, selected, float(self.lower), proof)

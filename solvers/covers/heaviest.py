@@ -27,6 +27,10 @@ from solvers.status import SolveStatus, WorkBudget
 
 from .answers import INTEGER_PROOF, NONE, Answer, ExactSearch, cut_short
 
+# Relative to the cost; HiGHS' own tolerance is below it.
+SETTLED = 1e-5
+# Share of the budget that more weight at the same count may cost on top.
+_HEAVIEST = 0.3
 # Pairs are exhausted by a matrix product; groups are for more sets.
 _LEAST_GROUPED = 3
 
@@ -147,3 +151,33 @@ def heavier(
     if other is None or other.size > n_sets or not cover.meets(other):
         return selected
     return max(selected, other, key=cover.weight_of)
+
+
+def closed(
+    cover: ReducedCover,
+    found: Answer,
+    budget: WorkBudget,
+    seed: int,
+    max_sets: int | None,
+    *,
+    heaviest: bool,
+) -> Answer:
+    """Return the answer about a cover found, of most weight where that is asked for."""
+    selected, lower, proof = found.selected, found.bound, found.proof
+    counting = bool(np.all(cover.costs == 1.0))
+    cost = float(cover.costs[selected].sum())
+    settled = lower >= cost * (1.0 - SETTLED)
+    status = SolveStatus.OPTIMAL if settled else SolveStatus.FEASIBLE
+    # Its own allowance, so that a hard proof doesn't cost the larger area.
+    spare = budget.part(np.inf)
+    spare.units = _HEAVIEST * budget.units
+    if max_sets is not None and selected.size > max_sets:
+        settled = counting and lower > max_sets
+        status = SolveStatus.INFEASIBLE if settled else SolveStatus.UNKNOWN
+        selected = most_weight(cover, max_sets, spare, seed=seed).selected
+    else:
+        lower = cost if settled else lower
+        if counting and heaviest and selected.size:
+            selected = heavier(cover, selected, spare, seed)
+    proof = proof if settled else cut_short(proof, budget)
+    return Answer(status, selected, lower, proof)

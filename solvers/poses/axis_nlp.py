@@ -100,18 +100,15 @@ def run_ipopt(
     reach: float,
     max_iterations: int,
 ) -> IpoptRun:
-    """Run IPOPT on one camera a sample.
+    """Run IPOPT on one camera a sample, from a; x = a/largest ring changes by a reach.
 
     Args:
         program: The program.
         pairs: Rows (sample, camera), at least one, shape (m, 2).
         held: Held points that may bind.
         start: a to start from, shape (2,).
-        reach: Largest change of each coordinate, in units of the largest ring.
+        reach: Largest change of each coordinate of x.
         max_iterations: Limit of the run.
-
-    Returns:
-        The run, of x = a/largest ring.
     """
     slots, places = slots_for(len(pairs), _SLOTS), slots_for(len(held), _HELD_SLOTS)
     solver = _solver(program.light, slots, places, max_iterations)

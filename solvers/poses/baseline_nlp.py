@@ -75,7 +75,6 @@ class _Stated:
     high: list[_Array] = field(default_factory=list)
 
     def add(self, g: _Matrix, low: float = 0.0, high: float = np.inf) -> None:
-        """Add rows low <= g <= high."""
         n = g.numel()
         self.g.append(ca.SX(g))
         self.low.append(np.full(n, low))
@@ -95,7 +94,7 @@ def _state_workspace(
 ) -> None:
     shell = problem.shell
     k = len(problem.centres)
-    every = centres - _repeated(shell.centre, k)
+    every = centres - ca.repmat(ca.DM(shell.centre).T, k, 1)
     # What stays may stand anywhere: the workspace holds the others.
     free = np.setdiff1d(np.arange(k), problem.fixed)
     offset = _rows(every, free) if problem.fixed else every
@@ -192,10 +191,6 @@ def _state_rings(
 
 def _rows(matrix: _Matrix, index: NDArray[np.int64]) -> _Matrix:
     return matrix[[int(i) for i in index], :]
-
-
-def _repeated(row: _Array, n: int) -> ca.DM:
-    return ca.repmat(ca.DM(row).T, n, 1)
 
 
 def _dot(a: _Matrix, b: _Matrix) -> _Matrix:

@@ -22,6 +22,8 @@ from .pose_problem import INSET, PoseProgram, pose_margins
 
 RIDGE = 1e-6
 _N_SCALARS = 44
+# Parameters of the device among them.
+_DEVICE = 8
 # Turns stay below 90 degrees.
 _MAX_GIBBS = 0.577
 _SLOTS = (16, 32, 64, 128, 256, 512)
@@ -113,14 +115,14 @@ def pose_parameters(
     points = (program.points[index] - start[:3, 3]) / size
     steep = program.steep[index]
     frame = np.eye(4) if program.ring_from_device is None else program.ring_from_device
-    device, finite = _device_limits(program, size)
+    device = _device_limits(program, size)
     up = np.zeros(3) if program.up is None else program.up
     scalars = np.concatenate(
         [
             start[:3, :3].ravel(order="F"),
             frame[:3, :3].T.ravel(order="F"),
             frame[:3, 3] / size,
-            device,
+            np.pad(device, (0, _DEVICE - device.size)),
             [program.max_incidence, program.min_tangent_angle],
             (start[:3, 3] - program.centre) / size,
             np.square(program.shell_m) / size**2,
@@ -140,7 +142,7 @@ def pose_parameters(
             np.zeros(n),
             bent,
             bent,
-            np.repeat(np.where(finite, INSET, -np.inf), n),
+            np.repeat(np.where(np.isfinite(device), INSET, -np.inf), n),
             np.where(last, INSET, -np.inf),
         ]
     )
@@ -166,10 +168,8 @@ def n_planes_of(program: PoseProgram) -> int:
     return -(-len(program.planes) // _PLANES) * _PLANES
 
 
-def _device_limits(
-    program: PoseProgram, size: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the eight device parameters, and which of their constraints apply."""
+def _device_limits(program: PoseProgram, size: float) -> NDArray[np.float64]:
+    """Return the device parameters; those of constraints that don't apply are inf."""
     ring = program.ring_radius
     if program.light == "diverging":
         assert program.camera_matrix is not None
@@ -183,17 +183,13 @@ def _device_limits(
             (height - 1.0 - low - k[1, 2]) / k[1, 1],
         ]
         reach = np.square(program.range_m) / size**2
-        values = [*sides, *reach, ring**2, 0.0]
-        return np.array(values), np.array([True] * 6 + [bool(np.isfinite(ring))])
+        return np.array([*sides, *reach, ring**2])
     assert program.half_panel_m is not None
     half = np.array(program.half_panel_m) / size
     reach = np.array(program.range_m) / size
     beam = program.beam_radius_m
-    values = [-half[0], half[0], -half[1], half[1], *reach]
-    values += [(ring / size) ** 2, (beam / size) ** 2]
-    return np.array(values), np.array(
-        [True] * 6 + [bool(np.isfinite(ring)), bool(np.isfinite(beam))]
-    )
+    sides = [-half[0], half[0], -half[1], half[1]]
+    return np.array([*sides, *reach, (ring / size) ** 2, (beam / size) ** 2])
 
 
 def run_ipopt(
@@ -254,7 +250,6 @@ def _solver(light: Light, slots: int, max_iterations: int, n_planes: int) -> Any
 
 
 def _gibbs(s: Any) -> Any:  # noqa: ANN401
-    """Rotation matrix of a Gibbs vector."""
     squares = ca.sumsqr(s)
     numerator = (1 - squares) * ca.MX.eye(3) + 2 * (s @ s.T) + 2 * ca.skew(s)
     return numerator / (1 + squares)

@@ -154,7 +154,7 @@ def solve_pose(
             break
         pose = pose_of(program, outcome.x)
         margin, slack = _figures(program, pose)
-        if _improves(margin, slack, best_margin, best_slack):
+        if slack >= 0.0 and (margin > best_margin or not best_slack >= 0.0):
             best, best_margin, best_slack = pose, margin, slack
         violated = _violated(program, pose, float(outcome.x[6]))
         fresh = np.setdiff1d(violated, active)[:max_points]
@@ -198,13 +198,6 @@ def _figures(program: PoseProgram, pose: NDArray[np.float64]) -> tuple[float, fl
         float(np.min(pose_margins(program, pose))),
         float(np.min(pose_slack(program, pose))),
     )
-
-
-def _improves(margin: float, slack: float, than: float, than_slack: float) -> bool:
-    """Whether limits hold and the margin is larger, or the limits hold at last."""
-    if not slack >= 0.0:
-        return False
-    return margin > than or not than_slack >= 0.0
 
 
 def _tightest(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from solvers.colouring import fewest_colours
-from solvers.status import SolveStatus
 
 
 def graph(n, edges):
@@ -54,7 +53,6 @@ def assert_proved(found, conflicts):
     )
     clique = np.ix_(found.clique, found.clique)
     assert conflicts[clique].sum() == len(found.clique) * (len(found.clique) - 1)
-    assert found.status is SolveStatus.OPTIMAL
     assert found.lower_bound == found.n_colours
     alike = len(found.clique) == found.n_colours
     assert found.proof == ("clique" if alike else "exhaustion")
@@ -108,7 +106,6 @@ def test_groups_begin_with_their_first_members_and_are_the_same_each_time():
 def test_work_that_runs_out_claims_no_proof():
     conflicts = mycielski(mycielski(cycle(5)))
     found = fewest_colours(conflicts, max_nodes=1)
-    assert found.status is SolveStatus.FEASIBLE
     assert found.proof == "none"
     assert len(found.clique) <= found.lower_bound < found.n_colours
     assert found.n_colours >= 5

@@ -36,15 +36,7 @@ def tighten(
 ) -> _Array:
     """Lower the weight that K sets cover at most, until below a target or it stalls.
 
-    Args:
-        cover: The cover.
-        n_sets: K.
-        target: Weight below which the bound need not go.
-        start: Multipliers to start from, shape (n_e,).
-        budget: Work; two matrix products a step.
-
-    Returns:
-        Multipliers in [0, w], shape (n_e,).
+    Returns multipliers in [0, w], shape (n_e,), as it takes them to start from.
     """
     weights, total, by_set = cover.weights, cover.total, cover.by_set
     if np.any(cover.needs > 1):

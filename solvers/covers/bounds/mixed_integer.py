@@ -51,10 +51,7 @@ class IntegerAnswer:
 def linear_multipliers(
     cover: ReducedCover, budget: WorkBudget
 ) -> NDArray[np.float64] | None:
-    """Return row multipliers of the linear relaxation, or None if it wasn't solved.
-
-    Shape (n_e,), in cost; safe to use in ``relaxation.cost_bound`` whatever they are.
-    """
+    """Return row multipliers of the linear relaxation, (n_e,), in cost, if any came."""
     steps = int(budget.remaining / (_UNITS_PER_ITERATION * cover.entries))
     if steps < 1:
         return None
@@ -188,11 +185,8 @@ def _model(
 def _weights(
     cover: ReducedCover,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return weights in their mean, and what was left out of each row set.
-
-    HiGHS ignores coefficients below 1e-9; such rows count as covered, so that its bound
-    is still one.
-    """
+    """Return weights in their mean, and what was left out of each row set."""
+    # HiGHS ignores coefficients below 1e-9; as covered rows they leave its bound one.
     weights = cover.weights / cover.weights.mean()
     light = weights < _LIGHT
     dropped = cover.by_row_set(np.where(light, weights, 0.0))

@@ -201,10 +201,7 @@ def forgiven(problem: CoverProblem) -> NDArray[np.float64]:
 def _whole_weights(
     problem: CoverProblem,
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
-    """Return the exponent of the unit, the weights in it, and how many were rounded.
-
-    The last in each row set, shape (n_g,).
-    """
+    """Return the unit's exponent, weights in it, and how many each row set rounds."""
     exponent, whole, inexact = whole_weights(problem.weights, bits=52)
     return exponent, whole, problem.by_row_set(inexact.astype(np.float64))
 

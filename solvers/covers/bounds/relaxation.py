@@ -94,10 +94,8 @@ def least_service(cover: ReducedCover, multipliers: NDArray[np.float64]) -> floa
 
 
 def _usable(multipliers: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return multipliers from 0 to 1, and what to multiply them by to have those given.
-
-    Near the least and the largest numbers there are, sums would lose their digits.
-    """
+    """Return multipliers from 0 to 1, and what they were divided by."""
+    # Near the least and the largest numbers there are, sums would lose their digits.
     usable = np.clip(np.nan_to_num(multipliers), 0.0, 1e200)
     _, exponent = np.frexp(usable.max(initial=0.0))
     return np.ldexp(usable, -exponent), float(np.ldexp(1.0, exponent))

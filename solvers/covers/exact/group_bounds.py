@@ -146,7 +146,6 @@ class PartBounds:
     def _bounds(
         self, parts: list[GroupPart], shares: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
-        """Return the bound of each part by its multipliers, and what is costliest."""
         steps = np.floor(shares * (self._weights / self._grid))
         payments = steps.astype(np.float32) @ self.covers.T
         self._budget.spend(

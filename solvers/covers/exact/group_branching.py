@@ -144,10 +144,7 @@ class _Tree(Incumbent):
         return [replace(part, groups=(*others, group)), fewer]
 
     def _group(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
-        """Return sets to branch on, and the group of the part that holds them, or -1.
-
-        Half of a set, by the running mean, splits evenly.
-        """
+        """Return the group that holds the sets to branch on, or -1, and the sets."""
         home = np.full(part.closed.size, -1)
         for i, group in enumerate(part.groups):
             home[group] = i if group.size > 1 else -2
@@ -168,11 +165,10 @@ class _Tree(Incumbent):
                 worth = min(share, 1.0 - share)
                 if worth > best:
                     best, chosen = worth, (int(home[centre]), group)
-        return chosen if chosen[1].size else self._halves(part)
-
-    def _halves(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
-        i = int(np.argmax([group.size for group in part.groups]))
-        return i, part.groups[i][: part.groups[i].size // 2]
+        if chosen[1].size:
+            return chosen
+        largest = int(np.argmax([group.size for group in part.groups]))
+        return largest, part.groups[largest][: part.groups[largest].size // 2]
 
 
 def _table_units(cover: ReducedCover) -> float:

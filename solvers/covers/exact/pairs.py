@@ -41,7 +41,7 @@ def best_pair(
         cover: A simple cover.
         n_sets: K, 1 or 2.
         target: Integer-valued weight below which nothing is of interest.
-        multipliers: Row multipliers in [0, w] that leave sets out, shape (n_e,).
+        multipliers: Of the rows, in [0, w], that leave sets out, shape (n_e,).
         budget: Work.
         first: Whether any selection that reaches the target will do.
     """
@@ -114,8 +114,7 @@ class _Pairs:
     ) -> tuple[int, int, float | None]:
         """Return the pair that leaves the least weight, if that is little enough.
 
-        What a pair leaves open only grows with the rows looked at, so most pairs are
-        refuted by the rows that fewest sets cover, which come first.
+        Rows that fewest sets cover come first and refute most pairs.
         """
         weights, allowed = self._weights, self.cover.total - self.best.target
         missing = np.zeros((len(ones), len(others)))

@@ -15,10 +15,10 @@ from solvers.covers.answers import Answer
 from solvers.covers.bounds.reductions import ReducedCover
 from solvers.status import SolveStatus, WorkBudget
 
+from .node_program import linear_cover
 from .orbital_branching import OrbitalTree
 from .row_branching import RowTree
 from .row_dominance import essential, separate
-from .row_generation import linear_cover
 from .row_weighting import RowWeighting
 from .symmetry import may_be_symmetric
 
@@ -113,8 +113,6 @@ def _of_parts(
 
 
 class _Search:
-    """Cover, bound and critical rows under search."""
-
     def __init__(
         self, covers: NDArray[np.bool_], budget: WorkBudget, seed: int, size: int
     ) -> None:
@@ -130,7 +128,6 @@ class _Search:
         self._offer(self._known)
 
     def run(self) -> None:
-        """Search, bound, refute, and search on with what is left."""
         whole = self.budget.units
         self._search_over(_spread_rows(self.covers))
         if self.covers.size > _CHEAP:
@@ -170,10 +167,9 @@ class _Search:
             self.lower, self.proof = bound, proof
 
     def _take_in(self, selected: NDArray[np.int64]) -> bool:
-        """Add some rows that a selection misses, those of fewest sets first.
+        """Add some rows that a selection misses, if it misses any.
 
-        None shares half of its sets with one taken just before. Return whether any was
-        missed.
+        Those of fewest sets first; none shares half of its sets with one before.
         """
         missed = np.flatnonzero(~self.covers[:, selected].any(axis=1))
         self.budget.spend(float(len(self.covers) * selected.size))
@@ -192,7 +188,7 @@ class _Search:
     def _search_over(self, rows: NDArray[np.int64]) -> None:
         new = np.setdiff1d(rows, self._rows)
         self._rows = np.concatenate([self._rows, new])
-        self._search.add_rows(self.covers[new], np.ones(new.size))
+        self._search.add_rows(self.covers[new])
         self.budget.spend(4.0 * new.size * self.covers.shape[1])
 
     def _improve(self, max_steps: int, budget: WorkBudget) -> None:

@@ -23,6 +23,12 @@ _UNITS_PER_ITERATION = 4.0
 # A call, and each row and column that its basis is handed over for.
 _CALL_UNITS = 3e5
 _BASIS_UNITS = 1e3
+# Of the relaxation of a whole cover: rows at first, and more at a time.
+_FIRST_ROWS = 200
+_MISSED_ROWS = 100
+_VIOLATED = 1e-6
+# Rounding of sums of multipliers.
+_ROUNDING = 1e-7
 
 Basis = tuple[list[Any], list[Any], list[Any]]
 
@@ -179,3 +185,55 @@ def needed_sets(
     """Return the bound by multipliers and the reduced costs of the sets allowed."""
     bound = float(multipliers.sum() + np.minimum(reduced, 0.0).sum())
     return bound * (1.0 - 1e-9)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearCover:
+    """Linear relaxation of a full cover, as far as the budget lasted.
+
+    Attributes:
+        needed: Sets that any cover needs at least, by the multipliers, not rounded up.
+        reduced: Sets that a cover with set j needs beyond these, shape (n_s,).
+        rows: Rows that the solution meets without slack, increasing.
+        primal: Share of each set, shape (n_s,).
+    """
+
+    needed: float
+    reduced: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    primal: NDArray[np.float64]
+
+    @property
+    def lower_bound(self) -> int:
+        """Sets that any cover needs at least."""
+        return max(0, int(np.ceil(self.needed - _ROUNDING)))
+
+
+def linear_cover(covers: NDArray[np.bool_], budget: WorkBudget) -> LinearCover:
+    """Solve the linear relaxation over few rows, taking in those that it violates.
+
+    What holds from below for a subset of the rows holds for the whole.
+    """
+    n_rows, n_sets = covers.shape
+    rows = np.argsort(covers.sum(axis=1), kind="stable")[:_FIRST_ROWS]
+    program = NodeProgram(covers[rows], budget)
+    primal, tight = np.zeros(n_sets), np.sort(rows)
+    needed, reduced = 0.0, np.ones(n_sets)
+    taken = np.zeros(n_rows, dtype=bool)
+    taken[rows] = True
+    while (node := program.root()) is not None:
+        budget.spend(2.0 * covers.size)
+        if node.bound > needed:
+            needed, reduced = node.bound, node.reduced
+        primal = node.primal
+        support = np.flatnonzero(primal > 0)
+        reached = covers[:, support] @ primal[support]
+        tight = np.sort(rows[reached[rows] < 1.0 + _VIOLATED])
+        missed = np.flatnonzero((reached < 1.0 - _VIOLATED) & ~taken)
+        if missed.size == 0 or budget.exhausted:
+            break
+        missed = missed[np.argsort(reached[missed], kind="stable")][:_MISSED_ROWS]
+        program.take_in(covers[missed])
+        rows = np.concatenate([rows, missed])
+        taken[missed] = True
+    return LinearCover(needed, reduced, tight, primal)

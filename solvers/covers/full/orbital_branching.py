@@ -86,6 +86,5 @@ class OrbitalTree(Tree):
         )
 
     def _solved(self, node: Node, *parts: NodePart) -> list[Node] | None:
-        """Return parts of a node bounded, or None where the budget ended before."""
         nodes = [self.linear.solve(part, node.basis) for part in parts]
         return None if None in nodes else [n for n in nodes if n is not None]

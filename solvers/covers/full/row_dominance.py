@@ -29,9 +29,7 @@ def essential(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return rows and columns, increasing, of a smaller cover with the same optimum.
 
-    Args:
-        covers: Whether column s covers row e, shape (n_e, n_s).
-        budget: Work; where it ends, what wasn't compared is kept.
+    Where the budget ends, what wasn't compared is kept.
     """
     rows, columns = (np.arange(n, dtype=np.int64) for n in covers.shape)
     smaller = covers
@@ -50,11 +48,7 @@ def essential(
 def separate(
     covers: NDArray[np.bool_],
 ) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Return the rows and columns of each part that shares none with the others.
-
-    Args:
-        covers: Whether column s covers row e, shape (n_e, n_s); every row is covered.
-    """
+    """Return the rows and columns of each part that shares none with the others."""
     links = sparse.csr_array(covers)
     both = sparse.block_array([[None, links], [links.T, None]])
     labels = connected_components(both, directed=False)[1]
@@ -66,11 +60,9 @@ def separate(
 
 
 def minimal(sets: NDArray[np.bool_], budget: WorkBudget) -> NDArray[np.int64]:
-    """Return the sets that include no other, and the first of equal ones, increasing.
+    """Return the sets (n_sets, n_elements) that include no other, the first of equals.
 
-    Args:
-        sets: Shape (n_sets, n_elements).
-        budget: Work; where it ends, sets that weren't compared are kept.
+    Where the budget ends, sets that weren't compared are kept.
     """
     if len(sets) <= _FEW:
         return _minimal_of_few(sets, budget)

@@ -43,7 +43,6 @@ class RowWeighting:
         chosen: NDArray[np.int64],
         *,
         seed: int,
-        weights: NDArray[np.float64] | None = None,
     ) -> None:
         n_sets = covers.shape[1]
         self._rng = np.random.default_rng(seed)
@@ -57,10 +56,10 @@ class RowWeighting:
         self._rows = [np.empty(0, dtype=np.int64)] * n_sets
         self._sets: list[NDArray[np.int64]] = []
         self.chosen = np.array(chosen, dtype=np.int64)
-        self.add_rows(covers, np.ones(len(covers)) if weights is None else weights)
+        self.add_rows(covers)
 
-    def add_rows(self, covers: NDArray[np.bool_], weights: NDArray[np.float64]) -> None:
-        """Take in rows, shape (n, n_s), with their weights, shape (n,)."""
+    def add_rows(self, covers: NDArray[np.bool_]) -> None:
+        """Take in rows, shape (n, n_s), of weight 1."""
         before, after = len(self._sets), len(self._sets) + len(covers)
         if after > len(self._dense):
             # Room for as many again: rows come few at a time.
@@ -72,7 +71,7 @@ class RowWeighting:
         for s in np.flatnonzero(covers.any(axis=0)):
             rows = before + np.flatnonzero(covers[:, s])
             self._rows[s] = np.concatenate([self._rows[s], rows])
-        self.weights = np.concatenate([self.weights, weights])
+        self.weights = np.concatenate([self.weights, np.ones(len(covers))])
         self._changed = np.concatenate(
             [self._changed, np.full(len(covers), self._step)]
         )

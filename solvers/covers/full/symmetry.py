@@ -39,9 +39,7 @@ def may_be_symmetric(covers: NDArray[np.bool_], budget: WorkBudget) -> bool:
 def column_colours(covers: NDArray[np.bool_], budget: WorkBudget) -> Colours:
     """Return a colour of each column, equal for all that some symmetry exchanges.
 
-    Args:
-        covers: Whether set s covers row e, shape (n_e, n_s).
-        budget: Work; where it ends, colours are coarser.
+    Where the budget ends, colours are coarser.
     """
     refinement = _Refinement(covers, budget)
     return refinement.refined(np.zeros(covers.shape[1], dtype=np.uint64))

@@ -135,10 +135,7 @@ class Swaps:
 
 
 def _exact_unit(weights: NDArray[np.float64]) -> float | None:
-    """Return a power of two in which sums of weights are exact in single precision.
-
-    None where there is none: weights are integers, but may be as large as 2^52.
-    """
+    """Return a power of two in which sums are exact in single precision, or None."""
     unit = float(np.gcd.reduce(weights.astype(np.int64), initial=0)) or 1.0
     unit = float(np.gcd(int(unit), 1 << 62))
     return unit if float(weights.sum()) / unit < 2.0**24 else None

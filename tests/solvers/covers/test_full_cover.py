@@ -11,10 +11,9 @@ from scipy import sparse
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.full.full_cover import fewest_full
-from solvers.covers.full.node_program import needed_sets
+from solvers.covers.full.node_program import linear_cover, needed_sets
 from solvers.covers.full.row_branching import RowTree
 from solvers.covers.full.row_dominance import essential, minimal, separate
-from solvers.covers.full.row_generation import linear_cover
 from solvers.covers.full.row_weighting import RowWeighting
 from solvers.status import SolveStatus, WorkBudget
 
@@ -180,10 +179,11 @@ def test_rows_taken_in_later_count_as_if_they_had_been_there():
         rng = np.random.default_rng(seed)
         chosen = rng.permutation(covers.shape[1])[:3]
         weights = rng.integers(1, 9, len(covers)).astype(float)
-        whole = RowWeighting(covers, chosen, seed=seed, weights=weights)
+        whole = RowWeighting(covers, chosen, seed=seed)
         grown = RowWeighting(covers[:0], chosen, seed=seed)
         for part in np.array_split(np.arange(len(covers)), 4):
-            grown.add_rows(covers[part], weights[part])
+            grown.add_rows(covers[part])
+        whole.weights[:] = grown.weights[:] = weights
         for _ in range(30):
             assert grown.search(1, WorkBudget(PLENTY)) == whole.search(
                 1, WorkBudget(PLENTY)
