@@ -34,6 +34,9 @@ class Body:
     Attributes:
         centre_m: Its middle [m].
         half_m: Half of its extent along x, y and z [m].
+
+    Raises:
+        ValueError: If a side isn't positive.
     """
 
     centre_m: Triple
@@ -49,11 +52,6 @@ class Body:
         return cls((x, y, z), (width, height, depth))
 
     def __post_init__(self) -> None:
-        """Refuse what has no extent.
-
-        Raises:
-            ValueError: If a side isn't positive.
-        """
         if not min(self.half_m) > 0.0:
             raise ValueError(f"body: half_m = {self.half_m} must be positive")
 
@@ -69,8 +67,8 @@ def body_entry(body: Body | None) -> dict[str, Any]:
 class Box:
     """A box, of any turn. A mounting plane is a thin one.
 
-    A position Q is in it iff ``|a_i . (Q - centre of the workspace - centre_m)| <=
-    half_m_i`` for its three directions a_i.
+    Position Q is in it iff |a_i . (Q - workspace centre - centre_m)| <= half_m_i for
+    its three directions a_i.
 
     Attributes:
         name: What messages call it.

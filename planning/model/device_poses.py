@@ -4,8 +4,8 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse
 
@@ -17,7 +17,7 @@ _POSITION_DECIMALS = 5
 DECIMALS = 12
 
 
-def rounded_pose(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+def rounded_pose(pose: Array) -> Array:
     """Return a pose as it will be written: positions to 0.01 mm."""
     result = np.round(pose, DECIMALS)
     result[:3, 3] = np.round(pose[:3, 3], _POSITION_DECIMALS)
@@ -25,11 +25,11 @@ def rounded_pose(pose: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def ring_frame(
-    world_from_device: NDArray[np.float64],
+    world_from_device: Array,
     device: PinholeModel | ParallelModel,
     tilt: float,
     azimuth: float,
-) -> NDArray[np.float64]:
+) -> Array:
     """Return ``world_from_ring``.
 
     Args:
@@ -50,14 +50,14 @@ def ring_frame(
     return world_from_device @ frame_along(np.cos(tilt) * middle + np.sin(tilt) * aside)
 
 
-def shifted_frame(shift: NDArray[np.float64]) -> NDArray[np.float64]:
+def shifted_frame(shift: Array) -> Array:
     """Return a frame moved in its x-y plane by a shift, shape (2,) [m]."""
     frame = np.eye(4)
     frame[:2, 3] = shift
     return frame
 
 
-def frame_along(z: NDArray[np.float64]) -> NDArray[np.float64]:
+def frame_along(z: Array) -> Array:
     """Return a frame whose z is a unit vector and whose x lies across +y."""
     x = np.cross([0.0, 1.0, 0.0], z)
     x /= np.linalg.norm(x)
@@ -66,7 +66,7 @@ def frame_along(z: NDArray[np.float64]) -> NDArray[np.float64]:
     return frame
 
 
-def moved_to(device: _D, world_from_device: NDArray[np.float64]) -> _D:
+def moved_to(device: _D, world_from_device: Array) -> _D:
     """Return a device at another pose; the ring frame of a projector moves along."""
     moved = replace(device, world_from_device=world_from_device)
     if isinstance(moved, PlannedCamera):

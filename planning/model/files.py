@@ -1,6 +1,5 @@
 """Outputs are written beside their place under a temporary name, then moved into it."""
 
-import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -39,9 +38,3 @@ def write_together(files: Mapping[Path, Callable[[BinaryIO], object]]) -> None:
             complete.append((name, path))
         for name, path in complete:
             os.replace(name, path)
-
-
-def sha256_of(path: Path) -> str:
-    """Return the hexadecimal SHA-256 digest of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from geometry.arrays import Array
 from geometry.devices import ParallelModel, PinholeModel
 
 from .bodies import Body
@@ -30,10 +28,10 @@ class PlannedProjector:
 
     id: str
     light: Literal["diverging", "parallel"]
-    world_from_device: NDArray[np.float64]
-    world_from_ring: NDArray[np.float64]
+    world_from_device: Array
+    world_from_ring: Array
     device: PinholeModel | ParallelModel
-    ring_radii: NDArray[np.float64]
+    ring_radii: Array
     existing: str = ""
     body: Body | None = None
     pattern: Literal["rings", "dense", "none"] = "rings"
@@ -52,7 +50,7 @@ class PlannedCamera:
     """
 
     id: str
-    world_from_device: NDArray[np.float64]
+    world_from_device: Array
     device: PinholeModel
     existing: str = ""
     body: Body | None = None

@@ -12,13 +12,8 @@ from typing import Any, Literal
 from .bodies import Body, Box
 
 # Of a workspace: zones and standoffs that aren't given have no key.
-_LEFT_OUT = (
-    "box",
-    "keep_out",
-    "mounting",
-    "projector_standoff_m",
-    "camera_standoff_m",
-)
+_ZONES = ("box", "keep_out", "mounting")
+_LEFT_OUT = (*_ZONES, "projector_standoff_m", "camera_standoff_m")
 
 
 @dataclass(frozen=True)
@@ -116,14 +111,13 @@ class Workspace:
         n_reference_cameras: Poses in the cameras' reference set.
         reference_ring_radius: Outermost ring of the reference projectors: its tangent
             R (diverging) or its radius in [m] (parallel).
-        bearing: Unit vector across `axis`, turning with the object, from which the
-            lattice of offered poses starts; None: a world axis decides.
+        bearing: Unit vector across `axis`, turning with the object, from which
+            candidates are laid out; None: a world axis decides.
         box: Room that holds every device; None: no room.
         keep_out: Volumes in which no optical centre stands.
         mounting: Planes on which optical centres lie; none: anywhere.
-        projector_standoff_m: Where the object overflows a projector's field, so that
-            projectors stand side by side: their distance from the surface [m]; else
-            None.
+        projector_standoff_m: Of tiled placement, where the object overflows their
+            field: distance of projectors from the surface [m]; else None.
         camera_standoff_m: The same of cameras.
     """
 
@@ -185,6 +179,9 @@ class Existing:
         kind: `projector` or `camera`.
         world_from_device: Its pose, rows of a 4 x 4 matrix [m].
         body: Its own, or that of its kind; None: it has none.
+
+    Raises:
+        ValueError: If the pose isn't 4 x 4.
     """
 
     name: str
@@ -193,11 +190,6 @@ class Existing:
     body: Body | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no pose.
-
-        Raises:
-            ValueError: If it isn't 4 x 4.
-        """
         if [len(row) for row in self.world_from_device] != [4] * 4:
             raise ValueError("existing: world_from_device must be 4 x 4")
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
@@ -14,29 +14,31 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import MeshError, TriangleMesh
 
 from .errors import PlanFileError
 from .obstacles import Obstacle
 
-# Kinds of numbers and the shape of each array; n faces, any number of poses.
-_ARRAYS: dict[str, tuple[str, tuple[int | None, ...]]] = {
-    "vertices": ("f", (None, 3)),
-    "faces": ("iu", (None, 3)),
-    "member": ("iu", (None,)),
-    "region": ("iu", (None,)),
-    "steep": ("f", (None, 3)),
-    "reference_projectors": ("f", (None, 4, 4)),
-    "reference_rings": ("f", (None, 4, 4)),
-    "reference_cameras": ("f", (None, 4, 4)),
+# Kinds of numbers and the shape of each array; any number n.
+_ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
+    "vertices": ("f", ("n", 3)),
+    "faces": ("iu", ("n", 3)),
+    "member": ("iu", ("n faces",)),
+    "region": ("iu", ("n faces",)),
+    "steep": ("f", ("n faces", 3)),
+    "reference_projectors": ("f", ("n", 4, 4)),
+    "reference_rings": ("f", ("n projectors", 4, 4)),
+    "reference_cameras": ("f", ("n", 4, 4)),
 }
 # Of all obstacles, one after the other; no array where there are none.
-_OBSTACLES: dict[str, tuple[str, tuple[int | None, ...]]] = {
-    "obstacle_names": ("U", (None,)),
-    "obstacle_vertices": ("f", (None, 3)),
-    "obstacle_faces": ("iu", (None, 3)),
-    "obstacle_of_face": ("iu", (None,)),
+_OBSTACLES: dict[str, tuple[str, tuple[int | str, ...]]] = {
+    "obstacle_names": ("U", ("n",)),
+    "obstacle_vertices": ("f", ("n", 3)),
+    "obstacle_faces": ("iu", ("n", 3)),
+    "obstacle_of_face": ("iu", ("n",)),
 }
+_BESIDE_MESH = list(_ARRAYS)[2:]
 # What numpy and zipfile raise on damaged archives, beside OSError and ValueError.
 _DAMAGED = (
     BadZipFile,
@@ -65,23 +67,33 @@ class Surface:
         reference_rings: ``world_from_ring`` of the same poses, shape (n, 4, 4).
         reference_cameras: ``world_from_device`` of the reference set, (n, 4, 4).
         obstacles: What stands about the object and isn't a device.
+
+    Raises:
+        PlanFileError: If an array is of another kind of numbers, or of another shape.
     """
 
     mesh: TriangleMesh
-    member: NDArray[np.int64]
-    region: NDArray[np.int64]
-    steep: NDArray[np.float64]
-    reference_projectors: NDArray[np.float64]
-    reference_rings: NDArray[np.float64]
-    reference_cameras: NDArray[np.float64]
+    member: Ints
+    region: Ints
+    steep: Array
+    reference_projectors: Array
+    reference_rings: Array
+    reference_cameras: Array
     obstacles: tuple[Obstacle, ...] = ()
 
+    def __post_init__(self) -> None:
+        sizes: dict[int | str, int] = {
+            "n faces": len(self.mesh.faces),
+            "n projectors": len(self.reference_projectors),
+        }
+        _check_arrays({name: getattr(self, name) for name in _BESIDE_MESH}, sizes)
+
     @cached_property
-    def in_dominant(self) -> NDArray[np.bool_]:
+    def in_dominant(self) -> Mask:
         """Whether each face belongs to a dominant region, shape (n_f,)."""
         return self.region >= 0
 
-    def target_faces(self, target: str) -> NDArray[np.bool_]:
+    def target_faces(self, target: str) -> Mask:
         """Return whether each face is in the target, `dominant` or `surface`."""
         return (
             self.in_dominant if target == "dominant" else np.ones_like(self.in_dominant)
@@ -98,7 +110,7 @@ class Surface:
         arrays: dict[str, Any] = {
             "vertices": self.mesh.vertices,
             "faces": self.mesh.faces,
-            **{name: getattr(self, name) for name in list(_ARRAYS)[2:]},
+            **{name: getattr(self, name) for name in _BESIDE_MESH},
             **_packed(self.obstacles),
         }
         np.savez_compressed(buffer, **arrays)
@@ -140,38 +152,35 @@ class Surface:
             raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
         except (OSError, ValueError, *_DAMAGED) as error:
             raise PlanFileError(f"{path}: not a readable .npz ({error})") from None
-        _check_arrays(arrays, path)
         try:
+            apart = ("vertices", "faces", *_OBSTACLES)
+            _check_arrays({name: arrays[name] for name in apart if name in arrays}, {})
             obstacles = _unpacked(*(arrays.pop(name, None) for name in _OBSTACLES))
             mesh = TriangleMesh(arrays.pop("vertices"), arrays.pop("faces"))
-        except MeshError as error:
+            return cls(mesh, **arrays, obstacles=obstacles)
+        except (MeshError, PlanFileError) as error:
             raise PlanFileError(f"{path}: {error}") from None
-        n = len(mesh.faces)
-        for name in ("member", "region", "steep"):
-            if len(arrays[name]) != n:
-                raise PlanFileError(
-                    f"{path}: `{name}` has {len(arrays[name])} rows for {n} faces"
-                )
-        return cls(mesh, **arrays, obstacles=obstacles)
 
 
-def _check_arrays(arrays: dict[str, NDArray[Any]], path: Path) -> None:
-    """Refuse arrays of other kinds of numbers, or of other shapes."""
+def _check_arrays(
+    arrays: Mapping[str, NDArray[Any]], sizes: Mapping[int | str, int]
+) -> None:
     for name, array in arrays.items():
         kinds, shape = (_ARRAYS | _OBSTACLES)[name]
-        fits = len(array.shape) == len(shape) and all(
-            want in (None, has) for want, has in zip(shape, array.shape, strict=True)
+        wanted = [sizes.get(size, size) for size in shape]
+        fits = array.ndim == len(wanted) and all(
+            want in ("n", has) for want, has in zip(wanted, array.shape, strict=True)
         )
-        if not fits or array.dtype.kind not in kinds:
-            sizes = ", ".join("n" if size is None else str(size) for size in shape)
-            number = {"f": "floats", "iu": "integers", "U": "names"}[kinds]
+        fits &= array.dtype.kind in kinds
+        if not fits or (kinds == "f" and not np.isfinite(array).all()):
+            number = {"f": "finite floats", "iu": "integers", "U": "names"}[kinds]
             raise PlanFileError(
-                f"{path}: `{name}` must be ({sizes}) {number}, got {array.dtype} of "
-                f"shape {array.shape}; plan again"
+                f"`{name}` must be ({', '.join(map(str, wanted))}) {number}, got "
+                f"{array.dtype} of shape {array.shape}; plan again"
             )
 
 
-def _packed(obstacles: Sequence[Obstacle]) -> dict[str, NDArray[Any]]:
+def _packed(obstacles: Sequence[Obstacle]) -> dict[str, Any]:
     """Return `_OBSTACLES` of obstacles; nothing of none."""
     if not obstacles:
         return {}
@@ -187,10 +196,7 @@ def _packed(obstacles: Sequence[Obstacle]) -> dict[str, NDArray[Any]]:
 
 
 def _unpacked(
-    names: NDArray[np.str_] | None,
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    of_face: NDArray[np.int64],
+    names: NDArray[np.str_] | None, vertices: Array, faces: Ints, of_face: Ints
 ) -> tuple[Obstacle, ...]:
     """Return the obstacles that `_packed` took; None: there are none."""
     if names is None:

@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import ErrorDetails
+
+from geometry.arrays import Array
 
 Positive = Annotated[float, Field(gt=0.0)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -53,7 +54,7 @@ class Table(BaseModel):
         return self
 
 
-def read_pose(rows: list[list[float]], key: str) -> NDArray[np.float64]:
+def read_pose(rows: list[list[float]], key: str) -> Array:
     """Return a written pose with the rotation next to what was written, (4, 4).
 
     Raises:

@@ -69,7 +69,7 @@ class Verification:
             "failures": list(self.failures),
             "unmet": list(self.unmet),
             "coverage": self.coverage,
-            "samples": len(self.audit.samples),
+            "samples": len(self.audit.case.samples),
             "reconstruction": None if pixels is None else pixels.to_document(),
         }
 
@@ -148,17 +148,11 @@ def verify_plan(
 def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh) -> list[str]:
     """Return why a mesh isn't the surface of a plan; nothing if it is.
 
-    Equal vertices and faces settle it. Otherwise random points of either must lie on
-    the other within 1e-4 of its radius, and the areas agree to 1e-3: the same shape,
-    differently repaired or triangulated.
+    Random points of either must lie on the other within 1e-4 of its radius, and the
+    areas agree to 1e-3: the same shape, though it be differently repaired or
+    triangulated.
     """
     slack = 1e-4 * surface.radius
-    if mesh.faces.shape == surface.faces.shape and np.array_equal(
-        mesh.faces, surface.faces
-    ):
-        same = mesh.vertices.shape == surface.vertices.shape
-        if same and np.abs(mesh.vertices - surface.vertices).max() <= 1e-9:
-            return []
     if not np.allclose(mesh.bounds, surface.bounds, rtol=0.0, atol=slack):
         sizes = [np.round(_MM * np.ptp(m.bounds, axis=0), 2) for m in (mesh, surface)]
         return [
@@ -195,7 +189,6 @@ def _reconstruct(
     threads: int,
     say: Callable[[str], None],
 ) -> Reconstruction:
-    """Run the simulated reconstruction on the audit's own samples."""
     standing = None if truth is None and mesh is None else Scanner.of(truth or plan)
     if standing is not None and mesh is not None:
         standing = replace(standing, mesh=mesh)
@@ -208,21 +201,19 @@ def _reconstruct(
         expected=Expected(_bare(inside), predicted),
         progress=_countdown(say),
     )
-    samples = audit.samples
+    samples, actual = audit.case.samples, audit.case.actual
     prediction = PredictedSamples(
         _bare(samples),
         samples.weights,
         samples.in_target,
         samples.region,
         np.array([camera.world_from_device[:3, 3] for camera in plan.cameras]),
-        audit.predicted_by,
+        actual.measured_by,
         possible_at_floors(plan, samples, threads=threads),
     )
     tau_m, regions = plan.requirements.check.tau_m, plan.surface.region
-    cloud, accuracy = pixels.everything, pixels.accuracy
-    return replace(
-        pixels, comparison=compare(prediction, cloud, accuracy, regions, tau_m)
-    )
+    compared = compare(prediction, pixels.everything, pixels.accuracy, regions, tau_m)
+    return replace(pixels, comparison=compared)
 
 
 def _countdown(say: Callable[[str], None]) -> Callable[[int, int], None]:
@@ -238,7 +229,7 @@ def _countdown(say: Callable[[str], None]) -> Callable[[int, int], None]:
 
 
 def _bare(samples: AuditSamples) -> SurfaceSamples:
-    """Return the samples as the reconstruction takes them, of one weight."""
+    """The samples as the reconstruction takes them, of one weight."""
     weight = float(samples.weights[0]) if len(samples) else 0.0
     return SurfaceSamples(samples.points, samples.normals, samples.faces, weight)
 
@@ -254,18 +245,17 @@ def _apart(mesh: TriangleMesh, other: TriangleMesh) -> float:
 
 
 def _areas_line(name: str, areas: Mapping[str, float]) -> str:
-    """Return the recomputed areas of a part, in a line."""
+    cm2 = {key: f"{1e4 * area:.2f}" for key, area in areas.items()}
     return (
-        f"{name} {1e4 * areas['area_m2']:.2f} cm², recomputed: "
-        f"{1e4 * areas['reachable_by_projectors_m2']:.2f} reachable by projectors, "
-        f"{1e4 * areas['lit_m2']:.2f} lit, "
-        f"{1e4 * areas['reachable_by_cameras_m2']:.2f} of it reachable by cameras, "
-        f"{1e4 * areas['measured_m2']:.2f} measured"
+        f"{name} {cm2['area_m2']} cm², recomputed: "
+        f"{cm2['reachable_by_projectors_m2']} reachable by projectors, "
+        f"{cm2['lit_m2']} lit, "
+        f"{cm2['reachable_by_cameras_m2']} of it reachable by cameras, "
+        f"{cm2['measured_m2']} measured"
     )
 
 
 def _pixels_line(pixels: Reconstruction | None) -> str:
-    """Return what the simulated reconstruction says, in a line."""
     if pixels is None:
         return "pixels: NOT CHECKED"
     if pixels.accuracy is None:

@@ -42,7 +42,7 @@ from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.counts.route_claims import audit_route_counts
+from planning.verify.audit.counts.certificate_claims import audit_routes
 
 RADIUS = 0.1
 
@@ -321,7 +321,7 @@ def _failures(routes, **proof):
         **proof,
     }
     findings = AuditFindings()
-    audit_route_counts(Certificate.model_validate(table), findings)
+    audit_routes(Certificate.model_validate(table), findings)
     return findings.failures
 
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from planning.model.files import sha256_of, write_atomically, write_together
+from planning.model.files import write_atomically, write_together
 
 
 def test_a_failed_write_keeps_the_old_content_and_leaves_no_litter(tmp_path):
@@ -48,9 +48,3 @@ def test_files_are_readable_by_others_as_a_plain_open_makes_them(tmp_path):
     write_atomically(tmp_path / "a", lambda file: file.write(b"x"))
     (tmp_path / "b").write_bytes(b"x")
     assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
-
-
-def test_digest_of_a_file(tmp_path):
-    path = tmp_path / "abc"
-    path.write_bytes(b"abc")
-    assert sha256_of(path).startswith("ba7816bf8f01cfea414140de5dae2223")

@@ -236,7 +236,7 @@ def _together_and_nothing_shared(document):
         ),
         (
             lambda d: d["firing_schedule"].update(n_groups=3),
-            "n_groups: 3 is claimed for 2 groups",
+            "n_groups: claimed 3, but the number of groups is 2",
         ),
         (
             lambda d: d["firing_schedule"].update(clique=["P1"]),

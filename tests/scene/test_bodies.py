@@ -68,9 +68,7 @@ def random_box(rng, *, spread=1.0):
 
 
 def as_block(box):
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = box.axes.T, box.centre
-    return Block("", pose, box.half)
+    return Block("", box.axes.T, box.centre, box.half)
 
 
 def gap(a, b):

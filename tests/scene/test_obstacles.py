@@ -205,13 +205,12 @@ def planned(tmp_path_factory, with_few_samples):
 
 def lines_of(plan):
     """Ends of each way of light and of sight to samples that a pair measures."""
-    audit = audit_plan(plan, n_samples=3000)
-    measured = audit.predicted
+    actual = audit_plan(plan, n_samples=3000).case.actual
     for device, seen in (
-        *((p, audit.lit & measured) for p in plan.projectors),
-        *zip(plan.cameras, audit.predicted_by, strict=True),
+        *((p, actual.measured) for p in plan.projectors),
+        *zip(plan.cameras, actual.measured_by, strict=True),
     ):
-        yield device, audit.samples.points[seen]
+        yield device, actual.samples.points[seen]
 
 
 def test_no_ray_of_a_measured_sample_meets_an_obstacle(planned):

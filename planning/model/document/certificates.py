@@ -123,11 +123,6 @@ class Certificate(Part):
     n_regions: int = 0
     routes: RouteCounts | None = None
 
-    @property
-    def too_few(self) -> bool:
-        """Whether fewer devices are allowed than the requirement takes."""
-        return self.needed.count > self.count
-
 
 class Certificates(Part):
     """The two certificates of a plan."""

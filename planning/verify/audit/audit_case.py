@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
+from geometry.arrays import Array, Mask
 from planning.model.document.certificates import Certificate
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.input_records import ModelRecord
@@ -35,16 +33,14 @@ class DeviceKind:
 
     Attributes:
         name: `projector` or `camera`.
-        records: As written in the plan.
-        devices: As built from the records.
+        records: As written in the plan; `devices` are built from them.
         model: Of the rig.
         proof: Their certificate.
         most: How many are allowed; None: as many as it takes.
         covers: Whether each lights or measures each sample, shape (n_d, n).
         reachable_m2: Claimed area of the target that they could cover.
         share: Of it that must be covered.
-        poses: Of the reference set, shape (n, 4, 4).
-        n_poses: How many of these are claimed.
+        poses: Of the reference set, shape (n, 4, 4); `n_poses` are claimed.
         shell: Least and largest distance from the centre of the workspace [m].
         standoff_m: Of tiled placement; None without.
     """
@@ -55,10 +51,10 @@ class DeviceKind:
     model: ModelRecord
     proof: Certificate
     most: int | None
-    covers: NDArray[np.bool_]
+    covers: Mask
     reachable_m2: float
     share: float
-    poses: NDArray[np.float64]
+    poses: Array
     n_poses: int
     shell: tuple[float, float]
     standoff_m: float | None
@@ -69,11 +65,9 @@ class AuditCase:
     """A plan and the audit's figures of it.
 
     Attributes:
-        plan: The plan, as written.
         shadow: Its surface, as rays meet it.
         actual: What its devices do to the audit's samples.
         reachable: What reference poses could do.
-        estimator: Areas from these samples.
         seed: Of every random draw.
     """
 
@@ -86,7 +80,7 @@ class AuditCase:
 
     @property
     def samples(self) -> AuditSamples:
-        """The audit's samples."""
+        """Fresh ones."""
         return self.actual.samples
 
     @cached_property
@@ -102,53 +96,40 @@ class AuditCase:
     @cached_property
     def kinds(self) -> tuple[DeviceKind, DeviceKind]:
         """What the plan says of its projectors, then of its cameras."""
-        plan, limits = self.plan, self.plan.requirements
-        document, areas, space = plan.document, plan.coverage.target, limits.workspace
+        limits = self.plan.requirements
         return (
-            DeviceKind(
-                "projector",
-                document.projectors,
-                plan.projectors,
-                document.rig.projector,
-                document.certificates.projectors,
-                limits.max_projectors,
-                self.actual.lit_by,
-                areas.reachable_by_projectors_m2,
-                limits.dominant_coverage,
-                plan.surface.reference_projectors,
-                space.n_reference_projectors,
-                space.projector_radius_m,
-                space.projector_standoff_m,
-            ),
-            DeviceKind(
-                "camera",
-                document.cameras,
-                plan.cameras,
-                document.rig.camera,
-                document.certificates.cameras,
-                limits.max_cameras,
-                self.actual.measured_by,
-                areas.reachable_by_cameras_m2,
-                limits.coverage,
-                plan.surface.reference_cameras,
-                space.n_reference_cameras,
-                space.camera_radius_m,
-                space.camera_standoff_m,
-            ),
+            self._kind("projector", self.actual.lit_by, limits.dominant_coverage),
+            self._kind("camera", self.actual.measured_by, limits.coverage),
+        )
+
+    def _kind(self, name: str, covers: Mask, share: float) -> DeviceKind:
+        plan, document, limits = self.plan, self.plan.document, self.plan.requirements
+        return DeviceKind(
+            name=name,
+            records=getattr(document, f"{name}s"),
+            devices=getattr(plan, f"{name}s"),
+            model=getattr(document.rig, name),
+            proof=getattr(document.certificates, f"{name}s"),
+            most=getattr(limits, f"max_{name}s"),
+            covers=covers,
+            reachable_m2=getattr(plan.coverage.target, f"reachable_by_{name}s_m2"),
+            share=share,
+            poses=getattr(plan.surface, f"reference_{name}s"),
+            n_poses=getattr(limits.workspace, f"n_reference_{name}s"),
+            shell=getattr(limits.workspace, f"{name}_radius_m"),
+            standoff_m=getattr(limits.workspace, f"{name}_standoff_m"),
         )
 
 
 def examine(plan: RigPlan, *, seed: int, n_samples: int, threads: int) -> AuditCase:
     """Recompute what a plan's devices and reference poses do to fresh samples."""
-    target = plan.requirements.target
-    samples = draw_samples(plan.surface, target, n_samples, seed)
+    samples = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     shadow = Shadow.of(plan, threads=threads)
     actual = recompute(plan, samples, shadow)
     areas = plan.surface.mesh.face_areas
-    inside = plan.surface.target_faces(target)
-    claimed = plan.coverage.samples
+    target_m2 = areas[plan.surface.target_faces(plan.requirements.target)].sum()
     estimator = Estimator(
-        samples, claimed, float(areas.sum()), float(areas[inside].sum())
+        samples, plan.coverage.samples, float(areas.sum()), float(target_m2)
     )
     reachable = reachable_by(plan, actual, shadow, seed)
     return AuditCase(plan, shadow, actual, reachable, estimator, seed)

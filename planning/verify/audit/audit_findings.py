@@ -1,14 +1,28 @@
 """Audit findings: the false claims of a plan, each as a sentence."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 
 class AuditFindings:
-    """The false claims of one plan: key, what is claimed, and what is true."""
+    """The false claims of one plan: key, what is claimed, and what is true.
 
-    def __init__(self) -> None:
+    Args:
+        within: Key of the part of the plan that is looked at; keys that methods take
+            are below it, and an empty one is that part itself.
+    """
+
+    def __init__(self, within: str = "") -> None:
+        self._within = within
         self._failures: list[str] = []
+
+    def at(self, key: str) -> "AuditFindings":
+        """Return the same findings, to be told of a part of what they look at."""
+        inner = AuditFindings(self._below(key))
+        inner._failures = self._failures
+        return inner
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -17,7 +31,7 @@ class AuditFindings:
 
     def fail(self, key: str, sentence: str) -> None:
         """Note a false claim."""
-        self._failures.append(f"{key}: {sentence}")
+        self._failures.append(f"{self._below(key)}: {sentence}")
 
     def holds(self, truth: object, key: str, sentence: str) -> bool:
         """Note a false claim unless it holds; return whether it does."""
@@ -32,38 +46,58 @@ class AuditFindings:
         recomputed: float,
         tolerance: float,
         unit: str = "m²",
-    ) -> bool:
+    ) -> None:
         """Note a false claim unless a number is claimed within a tolerance."""
         if claimed is None:
             self.fail(key, f"None is claimed, recomputed {recomputed:.6g} {unit}")
-            return False
-        return self.holds(
+            return
+        self.holds(
             abs(claimed - recomputed) <= tolerance,
             key,
             f"claimed {claimed:.6g} {unit}, recomputed {recomputed:.6g} {unit}, "
             f"tolerance {tolerance:.2g} {unit}".replace(" ,", ",").rstrip(),
         )
 
-    def array(
+    def numbers(
+        self, record: object, truths: Mapping[str, float], tolerance: float, unit: str
+    ) -> None:
+        """Check the numbers of a record that have these names."""
+        for name, truth in truths.items():
+            self.number(name, getattr(record, name), truth, tolerance, unit)
+
+    def same(
         self,
         key: str,
-        claimed: object,
-        truth: ArrayLike,
-        tolerance: float,
+        claimed: ArrayLike | None,
+        truth: ArrayLike | None,
         whose: str,
+        tolerance: float = 0.0,
     ) -> bool:
-        """Note a false claim unless an array equals its source within a tolerance."""
-        expected = np.asarray(truth, dtype=np.float64)
-        try:
-            value = np.asarray(claimed, dtype=np.float64)
-        except (TypeError, ValueError):
-            value = np.full(1, np.nan)
-        same = value.shape == expected.shape and bool(
-            np.all(np.abs(value - expected) <= tolerance)
-        )
+        """Note a false claim unless it is its source: numbers within a tolerance."""
+        expected = np.asarray(truth).tolist()
+        if claimed is None or truth is None or isinstance(truth, str):
+            agrees = claimed == expected
+        else:
+            agrees = np.shape(claimed) == np.shape(truth) and np.allclose(
+                claimed, truth, rtol=0.0, atol=tolerance
+            )
         return self.holds(
-            same, key, f"claimed {claimed!r}, but {whose} is {expected.tolist()}"
+            agrees, key, f"claimed {claimed!r}, but {whose} is {expected!r}"
         )
+
+    def partition(
+        self, key: str, groups: Sequence[Sequence[str]], names: Sequence[str]
+    ) -> bool:
+        """Note a false claim unless groups, none empty, share out the names."""
+        return self.holds(
+            sorted(name for group in groups for name in group) == sorted(names)
+            and all(groups),
+            key,
+            f"{groups!r} must name each of {', '.join(names)} exactly once",
+        )
+
+    def _below(self, key: str) -> str:
+        return ".".join(filter(None, (self._within, key)))
 
 
 def square_centimetres(area_m2: float) -> str:

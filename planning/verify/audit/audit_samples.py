@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from planning.model.errors import PlanFileError
 from planning.model.surface import Surface
 
@@ -26,18 +26,18 @@ class AuditSamples:
         weights: Area that each sample stands for, in [m²], shape (n,).
     """
 
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    steep: NDArray[np.float64]
-    region: NDArray[np.int64]
-    in_target: NDArray[np.bool_]
-    weights: NDArray[np.float64]
+    points: Array
+    normals: Array
+    faces: Ints
+    steep: Array
+    region: Ints
+    in_target: Mask
+    weights: Array
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "AuditSamples":
+    def take(self, chosen: Ints | Mask) -> "AuditSamples":
         """Return some of the samples, each still standing for the same area."""
         return AuditSamples(*(column[chosen] for column in vars(self).values()))
 
@@ -46,14 +46,8 @@ def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSampl
     """Draw n points: half of them in the target, half outside, each part uniformly.
 
     Within a part, faces are drawn with probability proportional to their area, and the
-    barycentric coordinates are uniform on the simplex. Where the target is the whole
-    surface all n fall in it.
-
-    Args:
-        surface: Surface of the plan.
-        target: `dominant` or `surface`.
-        n: Number of points.
-        seed: Of the random generator, at least 0.
+    barycentric coordinates are uniform on the simplex. Where the target, `dominant` or
+    `surface`, is the whole surface all n fall in it.
 
     Raises:
         PlanFileError: If the target has no area.
@@ -74,10 +68,10 @@ def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSampl
 
 def samples_on(
     surface: Surface,
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    in_target: NDArray[np.bool_],
-    weights: NDArray[np.float64] | None = None,
+    points: Array,
+    faces: Ints,
+    in_target: Mask,
+    weights: Array | None = None,
 ) -> AuditSamples:
     """Return samples at points (n, 3) of given faces; each of weight 1 by default."""
     return AuditSamples(
@@ -91,7 +85,7 @@ def samples_on(
     )
 
 
-def samples_at_centroids(surface: Surface, within: NDArray[np.bool_]) -> AuditSamples:
+def samples_at_centroids(surface: Surface, within: Mask) -> AuditSamples:
     """Return one sample at the centroid of each chosen face, weighing its area."""
     areas = surface.mesh.face_areas
     faces = np.flatnonzero(within & (areas > 0.0))
@@ -101,13 +95,8 @@ def samples_at_centroids(surface: Surface, within: NDArray[np.bool_]) -> AuditSa
 
 
 def _draw(
-    surface: Surface,
-    within: NDArray[np.bool_],
-    in_target: bool,
-    n: int,
-    rng: np.random.Generator,
+    surface: Surface, within: Mask, in_target: bool, n: int, rng: np.random.Generator
 ) -> AuditSamples:
-    """Draw n points of some faces, uniformly by area."""
     areas = np.where(within, surface.mesh.face_areas, 0.0)
     total = float(areas.sum())
     faces = rng.choice(len(areas), size=n, p=areas / total)

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from geometry.arrays import Array, Mask
 
 from .audit_findings import AuditFindings
 from .audit_samples import AuditSamples
@@ -14,7 +15,6 @@ POINT = 0.01
 ROUNDING = 1e-6
 # A plan that states fewer samples than this earns no more tolerance for it.
 _FEWEST_SAMPLES = 2000
-_Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,6 @@ class Estimator:
     """Estimates areas from the audit's samples.
 
     Attributes:
-        samples: The samples.
         n_claimed: Samples behind the plan's claims, of the target as of the surface.
         area_m2: Area of the whole surface in [m²].
         target_m2: Area of the target in [m²].
@@ -33,14 +32,14 @@ class Estimator:
     area_m2: float
     target_m2: float
 
-    def wholes(self) -> dict[str, tuple[_Flags, float]]:
+    def wholes(self) -> dict[str, tuple[Mask, float]]:
         """Return the samples and the area of `surface` and `target`."""
         return {
             "surface": (np.ones(len(self.samples), dtype=bool), self.area_m2),
             "target": (self.samples.in_target, self.target_m2),
         }
 
-    def area(self, chosen: _Flags) -> float:
+    def area(self, chosen: Mask) -> float:
         """Return the area that the chosen samples stand for, in [m²]."""
         return float(self.samples.weights[chosen].sum())
 
@@ -48,7 +47,7 @@ class Estimator:
         self,
         key: str,
         claimed: float,
-        chosen: _Flags,
+        chosen: Mask,
         findings: AuditFindings,
         *,
         part: str = "target",
@@ -59,17 +58,13 @@ class Estimator:
         tolerance = self.tolerance(chosen, whole)
         findings.number(key, claimed, self.area(chosen), tolerance)
 
-    def tolerance(self, chosen: _Flags, whole_m2: float) -> float:
+    def tolerance(self, chosen: Mask, whole_m2: float) -> float:
         """Return how far a claimed area may lie from the recomputed one, in [m²].
 
         1 % of the whole, plus three standard errors of the difference of two
         estimates: the audit's, summed over its two parts, and the plan's. A share p of
         n samples has the variance p (1 - p)/n; one success and one failure are added to
         each count, so that an estimate of 0 or 1 isn't taken for certain.
-
-        Args:
-            chosen: Samples that make up the recomputed area, shape (n,).
-            whole_m2: Area of the part that both sample, in [m²].
         """
         variance = 0.0
         for within in (self.samples.in_target, ~self.samples.in_target):
@@ -82,23 +77,16 @@ class Estimator:
         return POINT * whole_m2 + 3.0 * float(np.sqrt(variance))
 
 
-def share_error(
-    count: NDArray[np.float64], n: int, n_claimed: int
-) -> NDArray[np.float64]:
+def share_error(count: Array, n: int, n_claimed: int) -> Array:
     """Return the standard error of the difference of two estimates of a share.
 
-    One success and one failure are added, as in `Estimator.tolerance`.
-
-    Args:
-        count: Successes among the audit's samples, of any shape.
-        n: Number of these samples.
-        n_claimed: Samples behind the plan's claims.
+    Of n samples of the audit, `count` of which are successes, and n_claimed samples of
+    the plan. One success and one failure are added, as in `Estimator.tolerance`.
     """
     p = (count + 1.0) / (n + 2.0)
     return np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / max(n_claimed, 1)))
 
 
 def _variance(share: float, n: int) -> float:
-    """Return the variance of a share of n samples."""
     p = (n * share + 1.0) / (n + 2.0)
     return max(p * (1.0 - p), 0.0) / n

@@ -3,6 +3,8 @@
 from planning.model.document.check_records import ConfusionRecord, ReconstructionRecord
 from planning.model.document.part import Part
 
+from .audit_findings import AuditFindings
+
 _MM = 1e3
 # Room between two runs with different pixel noise: a share of the figure, and a floor.
 _REPEATABLE = {
@@ -30,26 +32,29 @@ def compare_figures(
     """
     if recorded is None:
         return []
-    failures: list[str] = []
+    findings = AuditFindings("reconstruction")
     for name, (share, floor) in _REPEATABLE.items():
-        claimed, value = getattr(recorded, name), getattr(fresh, name)
+        value = getattr(fresh, name)
         slack = max(share * abs(value or 0.0), floor)
-        failures += _apart(name, claimed, value, slack)
+        _compare(name, getattr(recorded, name), value, slack, findings)
     # Plans from before have none; rows of single regions rest on few samples.
     for name in ("confusion", "dominant", "whole_surface"):
-        failures += _differing(name, getattr(recorded, name), getattr(fresh, name))
+        tables = getattr(recorded, name), getattr(fresh, name)
+        _compare_shares(*tables, findings.at(name))
     rows, key = recorded.completeness, "completeness"
     if len(rows) != len(fresh.completeness):
-        return [*failures, f"reconstruction.{key}: {len(rows)} rows are claimed"]
+        findings.fail(key, f"{len(rows)} rows are claimed")
+        return list(findings.failures)
     for row, again in zip(rows, fresh.completeness, strict=True):
         at = f"{key} at {_MM * again.threshold_m:.3g} mm"
-        failures += _apart(at, row.threshold_m, again.threshold_m, 1e-9)
-        failures += _apart(at, row.fraction, again.fraction, _FRACTION_SLACK)
-    if recorded.passed and not fresh.passed:
-        failures.append(
-            "reconstruction.passed: claimed true, the check run again fails"
-        )
-    return failures
+        _compare(at, row.threshold_m, again.threshold_m, 1e-9, findings)
+        _compare(at, row.fraction, again.fraction, _FRACTION_SLACK, findings)
+    findings.holds(
+        fresh.passed or not recorded.passed,
+        "passed",
+        "claimed true, the check run again fails",
+    )
+    return list(findings.failures)
 
 
 def contradictions(recorded: ReconstructionRecord | None) -> list[str]:
@@ -62,27 +67,29 @@ def contradictions(recorded: ReconstructionRecord | None) -> list[str]:
     ]
 
 
-def _differing(key: str, recorded: Part | None, fresh: Part | None) -> list[str]:
-    """Return which shares of a table differ; nothing where there is no table."""
+def _compare_shares(
+    recorded: Part | None, fresh: Part | None, findings: AuditFindings
+) -> None:
     if recorded is None or fresh is None:
-        return []
-    failures: list[str] = []
+        return
     for name in type(fresh).model_fields:
         claimed, value = getattr(recorded, name), getattr(fresh, name)
         if isinstance(value, Part):
-            failures += _differing(f"{key}.{name}", claimed, value)
+            _compare_shares(claimed, value, findings.at(name))
         elif name in _SHARES:
-            failures += _apart(f"{key}.{name}", claimed, value, _FRACTION_SLACK)
-    return failures
+            _compare(name, claimed, value, _FRACTION_SLACK, findings)
 
 
-def _apart(
-    key: str, claimed: float | None, value: float | None, slack: float
-) -> list[str]:
-    """Return the sentence that a figure differs from a run again, if it does."""
-    if value is None or (claimed is not None and abs(claimed - value) <= slack):
-        return []
-    return [
-        f"reconstruction.{key}: claimed {claimed}, run again {value:.6g}, "
-        f"tolerance {slack:.2g}"
-    ]
+def _compare(
+    key: str,
+    claimed: float | None,
+    value: float | None,
+    slack: float,
+    findings: AuditFindings,
+) -> None:
+    if value is not None:
+        findings.holds(
+            claimed is not None and abs(claimed - value) <= slack,
+            key,
+            f"claimed {claimed}, run again {value:.6g}, tolerance {slack:.2g}",
+        )

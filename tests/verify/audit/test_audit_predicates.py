@@ -13,8 +13,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from planning.model.requirements import ProjectorLimits
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
-from planning.verify.audit.predicates.audit_devices import AuditProjector
-from planning.verify.audit.predicates.audit_light import light_from
+from planning.verify.audit.predicates.audit_devices import AuditProjector, light_from
 from planning.verify.audit.predicates.audit_optics import pixel_gradient
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
@@ -233,8 +232,11 @@ def test_the_audit_imports_nothing_of_the_planner():
         "planning.model.errors",
         "planning.model.files",
         "geometry.mesh.mesh",
+        "geometry.mesh.topology",
         "geometry.files.readers",
+        "geometry.rays.proximity",
         "geometry.rays.rays",
+        "geometry.arrays",
         "geometry.devices",
     }
     for path in AUDIT.rglob("*.py"):

@@ -2,17 +2,13 @@
 
 import numpy as np
 
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.proximity import closest_points
 from planning.model.document.device_records import BaselineRow
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 
-from .audit_seams import (
-    SeamPlane,
-    are_normals,
-    distance_to_surface,
-    is_onward,
-    section_of,
-)
+from .audit_seams import SeamPlane, are_normals, is_onward, section_of
 
 # Room for lengths and angles written with a few digits, and for E among them.
 _LENGTH_M = 5e-5
@@ -39,88 +35,86 @@ def audit_baselines(case: AuditCase, findings: AuditFindings) -> None:
             f"has {first}, {second} but not the order {second}, {first}",
         )
         section = section_of(row, cameras)
-        _audit_row(f"baselines.{first}-{second}", row, section, case, findings)
+        below = findings.at(f"baselines.{first}-{second}")
+        if _audit_seam(row, section, case.plan.surface.mesh, below):
+            largest = case.plan.requirements.camera.max_incidence
+            _audit_row(row, section, largest, below)
+            _audit_limit(row, section, largest, below)
+
+
+def _audit_seam(
+    row: BaselineRow, section: SeamPlane, mesh: TriangleMesh, findings: AuditFindings
+) -> bool:
+    """Check E and the directions there; return whether these hold."""
+    apart = float(abs(closest_points(mesh, section.meeting[None]).distances[0]))
+    findings.holds(
+        apart <= _LENGTH_M, "E", f"lies {1e3 * apart:.3g} mm off the surface"
+    )
+    return findings.holds(
+        are_normals(section.normals, section.meeting, mesh),
+        "normals",
+        f"{row.normals!r} must be two normals of the surface",
+    ) and findings.holds(
+        is_onward(section), "onward", f"{row.onward!r} isn't along the surface"
+    )
 
 
 def _audit_row(
-    key: str,
-    row: BaselineRow,
-    section: SeamPlane,
-    case: AuditCase,
-    findings: AuditFindings,
+    row: BaselineRow, section: SeamPlane, largest: float, findings: AuditFindings
 ) -> None:
-    """Check a row: its E, its lengths, its angles, and what follows from them."""
-    mesh = case.plan.surface.mesh
-    apart = distance_to_surface(mesh, section.meeting)
-    findings.holds(
-        apart <= _LENGTH_M, f"{key}.E", f"lies {1e3 * apart:.3g} mm off the surface"
-    )
-    if not findings.holds(
-        are_normals(section.normals, section.meeting, mesh),
-        f"{key}.normals",
-        f"{row.normals!r} must be two normals of the surface",
-    ) or not findings.holds(
-        is_onward(section), f"{key}.onward", f"{row.onward!r} isn't along the surface"
-    ):
-        return
-    largest = case.plan.requirements.camera.max_incidence
-    incidence, field = section.incidence_slack(largest), section.field_slack
-    lengths = {
-        **section.lengths(),
-        "standoff1": section.standoffs[0],
-        "standoff2": section.standoffs[1],
-    }
+    standoff1, standoff2 = section.standoffs
+    standoffs = {"standoff1": standoff1, "standoff2": standoff2}
+    findings.numbers(row, section.lengths() | standoffs, _LENGTH_M, "m")
+    slack = min(section.field_slack, section.incidence_slack(largest))
     angles = {
         "phi": section.phi,
-        "phi_max": section.phi + min(field, incidence),
+        "phi_max": section.phi + slack,
         "slack": row.phi_max - section.phi,
         "delta_axes": section.phi - sum(section.beta),
         "delta_surface": section.delta_surface,
         "max_incidence": largest,
     }
-    for truths, tolerance, unit in ((lengths, _LENGTH_M, "m"), (angles, _ANGLE, "rad")):
-        for name, truth in truths.items():
-            findings.number(f"{key}.{name}", getattr(row, name), truth, tolerance, unit)
+    findings.numbers(row, angles, _ANGLE, "rad")
     for name in ("beta", "iota", "half_field"):
-        for side, (claimed, truth) in enumerate(
-            zip(getattr(row, name), getattr(section, name), strict=True)
-        ):
-            findings.number(f"{key}.{name}.{side}", claimed, truth, _ANGLE, "rad")
-    for side, claimed in enumerate((row.C1, row.C2)):
-        slope = float(np.tan(row.half_field[side]))
-        if abs(row.half_field[side]) < np.pi / 2.0:
-            extent = section.standoffs[side] * slope
-            slack = _LENGTH_M * (1.0 + abs(slope))
-            findings.number(f"{key}.C{side + 1}", claimed, extent, slack, "m")
+        for side, truth in enumerate(getattr(section, name)):
+            claimed = getattr(row, name)[side]
+            findings.number(f"{name}.{side}", claimed, truth, _ANGLE, "rad")
+    for name, half, standoff in zip(
+        ("C1", "C2"), row.half_field, section.standoffs, strict=True
+    ):
+        slope = float(np.tan(half))
+        if abs(half) < np.pi / 2.0:
+            room = _LENGTH_M * (1.0 + abs(slope))
+            findings.numbers(row, {name: standoff * slope}, room, "m")
     findings.holds(
-        row.n_seam >= 1, f"{key}.n_seam", f"{row.n_seam!r} must be a positive number"
+        row.n_seam >= 1, "n_seam", f"{row.n_seam!r} must be a positive number"
     )
+
+
+def _audit_limit(
+    row: BaselineRow, section: SeamPlane, largest: float, findings: AuditFindings
+) -> None:
+    """Check which limit binds, and covered and d_max against the row's own phi_max."""
+    incidence, field = section.incidence_slack(largest), section.field_slack
     first = _LIMITS[0] if incidence > field else _LIMITS[1]
     # Where both limits bind at once, rounding may name either.
     known = _LIMITS if abs(incidence - field) <= 2.0 * _ANGLE else (first,)
     findings.holds(
-        row.limit in known, f"{key}.limit", f"{row.limit!r} is claimed, it is {first}"
+        row.limit in known, "limit", f"{row.limit!r} is claimed, it is {first}"
     )
-    _audit_limit(key, row, section, findings)
-
-
-def _audit_limit(
-    key: str, row: BaselineRow, section: SeamPlane, findings: AuditFindings
-) -> None:
-    """Check covered and d_max against the row's own phi_max."""
     slack = row.phi_max - section.phi
     findings.holds(
         abs(slack) <= _ANGLE or row.covered is (slack > 0.0),
-        f"{key}.covered",
+        "covered",
         f"{row.covered!r} is claimed, but phi_max - phi = {slack:.6g} rad",
     )
     if not 0.0 < row.phi_max < np.pi:
         findings.holds(
             row.d_max is None,
-            f"{key}.d_max",
+            "d_max",
             f"{row.d_max!r} is claimed, must be null: phi_max {row.phi_max:.6g} rad "
             f"isn't between 0 and pi",
         )
         return
-    value = section.baseline_at(row.phi_max)
-    findings.number(f"{key}.d_max", row.d_max, value, 4 * _LENGTH_M, "m")
+    truth = {"d_max": section.baseline_at(row.phi_max)}
+    findings.numbers(row, truth, 4 * _LENGTH_M, "m")

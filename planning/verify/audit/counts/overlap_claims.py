@@ -1,12 +1,13 @@
-"""Claims about overlapping light, and which projectors may fire together."""
+"""Claims about overlaps: of light, so who fires together, and of what is measured."""
 
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
-from planning.model.document.coverage_records import ExposureSchedule, Overlap
+from geometry.arrays import Mask
+from planning.model.document.coverage_records import Overlap
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples
@@ -18,6 +19,10 @@ from planning.verify.audit.predicates.occlusion import Shadow, free_of
 # Light that grazes a face at more than this is left out.
 _GRAZING = np.cos(np.radians(89.0))
 _DEVIATIONS = 4.0
+# Parts that share so much of the target can be registered with each other.
+_OVERLAP = 0.01
+# Vertices coloured before a claim of exhaustion is taken as it is.
+_STEPS = 200_000
 
 
 def audit_overlaps(case: AuditCase, findings: AuditFindings) -> None:
@@ -43,12 +48,9 @@ def audit_overlaps(case: AuditCase, findings: AuditFindings) -> None:
         one, other = overlap.projectors
         if frozenset(overlap.projectors) in pairs:
             key, both = f"overlaps.{one} + {other}", falls[one] & falls[other]
-            claimed = overlap.target_m2
-            estimator.audit(f"{key}.target_m2", claimed, both, findings)
-            claimed = overlap.surface_m2
-            estimator.audit(
-                f"{key}.surface_m2", claimed, both, findings, part="surface"
-            )
+            for part in ("target", "surface"):
+                claimed, name = getattr(overlap, f"{part}_m2"), f"{key}.{part}_m2"
+                estimator.audit(name, claimed, both, findings, part=part)
     schedule = document.firing_schedule
     for group in () if schedule is None else schedule.groups:
         for one, other in combinations([n for n in group if n in falls], 2):
@@ -63,7 +65,7 @@ def audit_overlaps(case: AuditCase, findings: AuditFindings) -> None:
 
 def light_falls(
     projector: AuditProjector, samples: AuditSamples, shadow: Shadow
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Return on which samples any light of a projector falls, shape (n,).
 
     Its last annulus ends one gap beyond its last ring.
@@ -80,7 +82,7 @@ def light_falls(
     return falls
 
 
-def _clearly_some(both: NDArray[np.bool_], estimator: Estimator) -> bool:
+def _clearly_some(both: Mask, estimator: Estimator) -> bool:
     """Whether that many samples can't be what a set of the planner's size misses."""
     inside = estimator.samples.in_target
     for within in (inside, ~inside):
@@ -90,64 +92,41 @@ def _clearly_some(both: NDArray[np.bool_], estimator: Estimator) -> bool:
     return False
 
 
-_KEY = "firing_schedule"
-# Vertices coloured before a claim of exhaustion is taken as it is.
-_STEPS = 200_000
-
-
 def audit_schedule(case: AuditCase, findings: AuditFindings) -> None:
-    """Check `firing_schedule` against the plan's overlaps."""
-    document = case.plan.document
-    if document.firing_schedule is None:
-        findings.fail(_KEY, "is missing")
-        return
-    names = [projector.id for projector in document.projectors]
-    audit_groups_of_light(names, document.overlaps, document.firing_schedule, findings)
-
-
-def audit_groups_of_light(
-    names: list[str],
-    overlaps: tuple[Overlap, ...],
-    schedule: ExposureSchedule,
-    findings: AuditFindings,
-) -> None:
-    """Check that groups have no overlap, and are as few as is claimed.
+    """Check that groups have no claimed overlap, and are as few as is claimed.
 
     Every projector fires once; two whose claimed overlap has an area never fire
     together. The groups are the fewest if as many projectors overlap pairwise
     (`clique`), or if no assignment to one group fewer is left (`exhaustion`), which is
     tried here too.
     """
-    groups, near = schedule.groups, _overlapping(names, overlaps)
-    if not findings.holds(
-        all(groups)
-        and sorted(name for group in groups for name in group) == sorted(names),
-        f"{_KEY}.groups",
-        f"{groups!r} must name each of {', '.join(names)} exactly once",
-    ):
+    document, findings = case.plan.document, findings.at("firing_schedule")
+    schedule = document.firing_schedule
+    if schedule is None:
+        findings.fail("", "is missing")
+        return
+    names = [projector.id for projector in document.projectors]
+    groups, near = schedule.groups, _overlapping(names, document.overlaps)
+    if not findings.partition("groups", groups, names):
         return
     for group in groups:
         for one, other in combinations(group, 2):
             findings.holds(
                 other not in near[one],
-                f"{_KEY}.groups",
+                "groups",
                 f"{one} and {other} fire together, but by the plan's own overlaps "
                 f"they light a surface in common",
             )
     n, least, clique = len(groups), schedule.lower_bound, schedule.clique
-    findings.holds(
-        schedule.n_groups == n,
-        f"{_KEY}.n_groups",
-        f"{schedule.n_groups!r} is claimed for {n} groups",
-    )
+    findings.same("n_groups", schedule.n_groups, n, "the number of groups")
     findings.holds(
         len(set(clique)) == len(clique)
         and set(clique) <= set(names)
         and all(other in near[one] for one, other in combinations(clique, 2)),
-        f"{_KEY}.clique",
+        "clique",
         f"{clique!r} must be projectors that overlap pairwise",
     )
-    findings.holds(least <= n, f"{_KEY}.lower_bound", f"{least!r} for {n} groups")
+    findings.holds(least <= n, "lower_bound", f"{least!r} for {n} groups")
     proved = {
         "clique": len(clique) == n == least,
         "exhaustion": least == n and not _colourable(near, n - 1),
@@ -155,7 +134,7 @@ def audit_groups_of_light(
     }
     findings.holds(
         proved[schedule.proof],
-        f"{_KEY}.proof",
+        "proof",
         f"{schedule.proof!r} doesn't prove that {least} groups are needed",
     )
 
@@ -163,7 +142,6 @@ def audit_groups_of_light(
 def _overlapping(
     names: list[str], overlaps: tuple[Overlap, ...]
 ) -> dict[str, set[str]]:
-    """Projectors that each overlaps by the claimed areas."""
     near: dict[str, set[str]] = {name: set() for name in names}
     for overlap in overlaps:
         one, other = overlap.projectors
@@ -194,3 +172,50 @@ def _colourable(near: dict[str, set[str]], k: int) -> bool:
         return False
 
     return place(0, 0)
+
+
+def audit_groups(case: AuditCase, findings: AuditFindings) -> None:
+    """Check camera_groups: a partition, linked by overlaps of 1 % of the target.
+
+    Overlaps clearly above 1 % must not be torn apart; no group may need one that is
+    clearly below. Between the two, sampling decides and both answers are honest.
+    """
+    claimed = case.plan.document.camera_groups
+    measured = case.actual.measured_by[:, case.samples.in_target]
+    names = [camera.id for camera in case.plan.cameras]
+    audit_partition(claimed, names, measured, case.estimator.n_claimed, findings)
+
+
+def audit_partition(
+    groups: tuple[tuple[str, ...], ...],
+    names: list[str],
+    measured: Mask,
+    n_claimed: int,
+    findings: AuditFindings,
+) -> None:
+    """Check groups of cameras against what each measures of n samples, (n_c, n)."""
+    key = "camera_groups"
+    if not findings.partition(key, groups, names):
+        return
+    n = measured.shape[1]
+    shared = measured.astype(np.float64) @ measured.T
+    shares, slack = shared / n, _DEVIATIONS * share_error(shared, n, n_claimed)
+    group_of = {name: g for g, group in enumerate(groups) for name in group}
+    number = np.array([group_of[name] for name in names])
+    apart = number[:, None] != number
+    for i, j in np.argwhere(np.triu(apart & (shares >= _OVERLAP + slack))):
+        findings.fail(
+            key,
+            f"{names[i]} and {names[j]} stand in two groups, but share "
+            f"{100 * shares[i, j]:.2f} % of the target",
+        )
+    _, linked = connected_components((shares + slack >= _OVERLAP) & ~apart)
+    for group in groups:
+        first = linked[names.index(group[0])]
+        alone = [name for name in group if linked[names.index(name)] != first]
+        findings.holds(
+            not alone,
+            key,
+            f"{', '.join(alone)} stand in the group of {group[0]}, but no overlaps of "
+            f"1 % of the target link them",
+        )

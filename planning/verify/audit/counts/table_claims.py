@@ -12,12 +12,9 @@ from planning.verify.audit.estimates import POINT, ROUNDING
 
 
 def marginal_of(plan: RigPlan, kind: str, part: str) -> list[tuple[int, float]]:
-    """Return (count, area in [m²]) of projectors or cameras, by rising count.
+    """Return (count, area of `target` or `surface` in [m²]), by rising count.
 
-    Args:
-        plan: The plan.
-        kind: `projector`: what is lit; `camera`: what is measured.
-        part: `target` or `surface`.
+    What is lit by so many a `projector`, or measured by so many a `camera`.
     """
     count, area = f"n_{kind}s", f"{_verb(kind)}_{part}_m2"
     return sorted(
@@ -28,12 +25,11 @@ def marginal_of(plan: RigPlan, kind: str, part: str) -> list[tuple[int, float]]:
 
 
 def _verb(kind: str) -> str:
-    """What devices of a kind do to a sample, as keys call it."""
     return "lit" if kind == "projector" else "measured"
 
 
 def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
-    """Check the marginal table, the dominant share, mesh areas and members."""
+    """Check the marginal table."""
     for kind in case.kinds:
         verb, chosen = _verb(kind.name), np.any(kind.covers, axis=0)
         for part, (_, whole) in case.estimator.wholes().items():
@@ -54,7 +50,6 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
             chosen & case.samples.in_target, case.estimator.target_m2
         )
         _audit_rising(case.plan, kind.name, slack, findings)
-    _audit_shares(case, findings)
 
 
 def _audit_rising(
@@ -71,7 +66,7 @@ def _audit_rising(
         )
 
 
-def _audit_shares(case: AuditCase, findings: AuditFindings) -> None:
+def audit_shares(case: AuditCase, findings: AuditFindings) -> None:
     """Check the dominant share, the mesh areas, and members of a single mesh."""
     document, surface = case.plan.document, case.plan.surface
     total = surface.mesh.area
@@ -110,32 +105,18 @@ _LIMITS = (
 )
 
 
-def audit_derived(case: AuditCase, findings: AuditFindings) -> None:
-    """Check what needs no recomputation: values that others of the plan determine."""
-    _audit_limits(case, findings)
-    _audit_scales(case, findings)
-    _audit_cost(case, findings)
-
-
-def _audit_limits(case: AuditCase, findings: AuditFindings) -> None:
+def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
     """The rig's limits are those of the requirements."""
     limits = case.plan.document.rig.limits
     for name, part, wish, unit in _LIMITS:
-        stated = limits.get(name)
+        stated, whose = limits.get(name), f"rig.limits.{name}"
+        truth = None if stated is None else unit * stated
         required = getattr(getattr(case.plan.requirements, part), wish)
         key = f"requirements.{part}.{wish}"
-        if stated is None:
-            findings.holds(
-                required is None,
-                key,
-                f"claimed {required!r}, but rig.limits.{name} is {stated!r}",
-            )
-            continue
-        whose = f"(rig.limits.{name})"
-        findings.number(key, required, unit * stated, _ROUNDING, whose)
+        findings.same(key, required, truth, whose, _ROUNDING)
 
 
-def _audit_scales(case: AuditCase, findings: AuditFindings) -> None:
+def audit_scales(case: AuditCase, findings: AuditFindings) -> None:
     """Check that units and scales of the mesh files agree."""
     for place, mesh in enumerate(case.plan.document.meshes):
         key, truth = f"meshes.{place}.scale_to_m", _METRES.get(mesh.unit)
@@ -152,29 +133,24 @@ def _audit_scales(case: AuditCase, findings: AuditFindings) -> None:
             findings.number(key, mesh.scale_to_m, truth, _RELATIVE * truth, unit)
 
 
-def _audit_cost(case: AuditCase, findings: AuditFindings) -> None:
+def audit_cost(case: AuditCase, findings: AuditFindings) -> None:
     """Eq. (8): C = pixels (t1 + t2) + t3 + t4 + t5, from the entry's own times."""
-    cost, document = case.plan.document.cost, case.plan.document
-    pixels = sum(math.prod(camera.resolution) for camera in document.cameras)
-    findings.number("cost.pixels", cost.pixels, pixels, 0.0, "px")
+    document, findings = case.plan.document, findings.at("cost")
+    cost, cameras = document.cost, document.cameras
+    pixels = sum(math.prod(camera.resolution) for camera in cameras)
+    findings.number("pixels", cost.pixels, pixels, 0.0, "px")
     greedy, before = document.certificates.cameras.greedy_count, cost.n_cameras_before
-    findings.holds(
-        before == greedy,
-        "cost.n_cameras_before",
-        f"{before!r} is claimed, but certificates.cameras.greedy_count is {greedy!r}",
-    )
-    earlier = pixels * before / max(len(document.cameras), 1)
-    for name, claimed, each in (
-        ("C", cost.C, pixels),
-        ("C_before", cost.C_before, earlier),
-    ):
-        times = (cost.t1, cost.t2, cost.t3, cost.t4, cost.t5)
+    whose = "certificates.cameras.greedy_count"
+    findings.same("n_cameras_before", before, greedy, whose)
+    earlier = pixels * before / max(len(cameras), 1)
+    times = (cost.t1, cost.t2, cost.t3, cost.t4, cost.t5)
+    for name, each in (("C", pixels), ("C_before", earlier)):
+        claimed = getattr(cost, name)
         if claimed is None:
             continue
         if any(time is None or time < 0.0 for time in times):
-            findings.fail(f"cost.{name}", f"is claimed with the times {times}")
+            findings.fail(name, f"is claimed with the times {times}")
             continue
         t1, t2, t3, t4, t5 = (time or 0.0 for time in times)
         total = each * (t1 + t2) + t3 + t4 + t5
-        slack = _RELATIVE * (1.0 + total)
-        findings.number(f"cost.{name}", claimed, total, slack, "s")
+        findings.number(name, claimed, total, _RELATIVE * (1.0 + total), "s")

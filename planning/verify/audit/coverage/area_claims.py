@@ -1,11 +1,11 @@
 """Claims about areas: coverage, causes, and what each device contributes."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Ints, Mask
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import ROUNDING
@@ -27,7 +27,6 @@ from planning.verify.audit.predicates.predicates import (
 )
 
 _CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
-_Flags = NDArray[np.bool_]
 
 
 def recomputed_areas(case: AuditCase) -> dict[str, dict[str, float]]:
@@ -44,16 +43,15 @@ def recomputed_areas(case: AuditCase) -> dict[str, dict[str, float]]:
 
 def audit_areas(case: AuditCase, findings: AuditFindings) -> None:
     """Check every area of `coverage` and of devices, in both directions."""
-    samples = case.plan.coverage.samples
-    key = "coverage.samples"
-    findings.holds(samples >= 1, key, f"{samples!r} must be the number of samples")
-    _audit_wholes(case, findings)
-    _audit_causes(case, findings)
+    below, samples = findings.at("coverage"), case.plan.coverage.samples
+    below.holds(samples >= 1, "samples", f"{samples!r} must be the number of samples")
+    _audit_wholes(case, below)
+    _audit_causes(case, below)
     _audit_contributions(case, findings)
-    _audit_blocked(case, findings)
+    _audit_blocked(case, below)
 
 
-def _covered(case: AuditCase) -> dict[str, _Flags]:
+def _covered(case: AuditCase) -> dict[str, Mask]:
     """Samples of each of AREAS but the whole, from the smallest to the largest."""
     return {
         "measured_m2": case.actual.measured,
@@ -65,104 +63,64 @@ def _covered(case: AuditCase) -> dict[str, _Flags]:
 
 def _audit_wholes(case: AuditCase, findings: AuditFindings) -> None:
     """Check AREAS, and that each of them is part of the next, whatever the sampling."""
-    claims = {
-        "surface": case.plan.coverage.surface,
-        "target": case.plan.coverage.target,
-    }
+    covered = _covered(case)
     for part, (_, whole) in case.estimator.wholes().items():
-        key = f"coverage.{part}"
-        claimed = {name: getattr(claims[part], name) for name in _covered(case)}
-        claimed["area_m2"] = claims[part].area_m2
+        areas, below = getattr(case.plan.coverage, part), findings.at(part)
         slack = ROUNDING * whole
-        findings.number(f"{key}.area_m2", claims[part].area_m2, whole, slack)
-        for name, chosen in _covered(case).items():
-            case.estimator.audit(
-                f"{key}.{name}", claimed[name], chosen, findings, part=part
-            )
+        below.number("area_m2", areas.area_m2, whole, slack)
+        claimed = {name: getattr(areas, name) for name in (*covered, "area_m2")}
+        for name, chosen in covered.items():
+            case.estimator.audit(name, claimed[name], chosen, below, part=part)
         for (smaller, low), (larger, high) in pairwise(claimed.items()):
-            findings.holds(
+            below.holds(
                 0.0 <= low <= high + slack,
-                f"{key}.{smaller}",
+                smaller,
                 f"claimed {low:.6g} m², must lie between 0 and {larger} = "
                 f"{high:.6g} m²",
             )
 
 
 def _audit_causes(case: AuditCase, findings: AuditFindings) -> None:
-    """Check the split of what isn't measured, and of what no device reaches."""
+    """Check each split of an area of the target by causes, one by one and as a sum."""
     claims, actual, reachable = case.plan.coverage, case.actual, case.reachable
+    unseen, dark = ~actual.measured, ~reachable.projectors
+    beyond, sight = actual.lit & ~reachable.cameras, SIGHT_CAUSES + PAIR_CAUSES
     areas = claims.target
-    _audit_split(
-        case,
-        "uncovered_by_cause",
-        claims.uncovered_by_cause,
-        # An obstacle stands in the way of light or of a view, under one name.
-        {
-            cause: np.isin(
-                actual.cause, [k for k, c in enumerate(_CAUSES) if c == cause]
+    unseen_m2 = areas.area_m2 - areas.measured_m2
+    dark_m2 = areas.area_m2 - areas.reachable_by_projectors_m2
+    beyond_m2 = areas.lit_m2 - areas.reachable_by_cameras_m2
+    for name, flags, furthest, causes, total in (
+        ("uncovered", unseen, actual.cause, _CAUSES, unseen_m2),
+        ("unreachable", dark, reachable.furthest, LIGHT_CAUSES, dark_m2),
+        ("unmeasurable", beyond, reachable.furthest_pair, sight, beyond_m2),
+    ):
+        key = f"{name}_by_cause"
+        # Only there where it is more than the requirement allows.
+        if key not in claims.model_fields_set:
+            continue
+        split = getattr(claims, key)
+        unknown = ", ".join(sorted(set(split) - set(causes)))
+        findings.holds(not unknown, key, f"causes that there are not: {unknown}")
+        for cause in dict.fromkeys(causes):
+            # An obstacle stands in the way of light or of a view, under one name.
+            steps = [index for index, name in enumerate(causes) if name == cause]
+            chosen = flags & np.isin(furthest, steps)
+            case.estimator.audit(
+                f"{key}.{cause}", split.get(cause, 0.0), chosen, findings
             )
-            for cause in _CAUSES
-        },
-        areas.area_m2 - areas.measured_m2,
-        findings,
-    )
-    dark = ~reachable.projectors
-    _audit_split(
-        case,
-        "unreachable_by_cause",
-        claims.unreachable_by_cause,
-        {
-            cause: dark & (reachable.furthest == index)
-            for index, cause in enumerate(LIGHT_CAUSES)
-        },
-        areas.area_m2 - areas.reachable_by_projectors_m2,
-        findings,
-    )
-    # Only there where it is more than the requirement allows.
-    if "unmeasurable_by_cause" in claims.model_fields_set:
-        beyond = actual.lit & ~reachable.cameras
-        _audit_split(
-            case,
-            "unmeasurable_by_cause",
-            claims.unmeasurable_by_cause,
-            {
-                cause: beyond & (reachable.furthest_pair == index)
-                for index, cause in enumerate(SIGHT_CAUSES + PAIR_CAUSES)
-            },
-            areas.lit_m2 - areas.reachable_by_cameras_m2,
-            findings,
-        )
-
-
-def _audit_split(
-    case: AuditCase,
-    name: str,
-    split: Mapping[str, float],
-    causes: Mapping[str, _Flags],
-    total_m2: float,
-    findings: AuditFindings,
-) -> None:
-    """Check a split of an area of the target by causes, one by one and as a sum."""
-    key = f"coverage.{name}"
-    unknown = sorted(set(split) - set(causes))
-    findings.holds(not unknown, key, f"causes that there are not: {', '.join(unknown)}")
-    for cause, chosen in causes.items():
-        claimed = split.get(cause, 0.0)
-        case.estimator.audit(f"{key}.{cause}", claimed, chosen, findings)
-    slack = 1e-4 * case.estimator.target_m2
-    findings.number(f"{key} (sum)", sum(split.values()), total_m2, slack)
+        slack = 1e-4 * case.estimator.target_m2
+        findings.number(f"{key} (sum)", sum(split.values()), total, slack)
 
 
 def _audit_contributions(case: AuditCase, findings: AuditFindings) -> None:
     """Check lit_area_m2, seen_area_m2 and sole_area_m2 of every device."""
-    audit, document = case.estimator.audit, case.plan.document
-    for projector, lit in zip(document.projectors, case.actual.lit_by, strict=True):
+    audit, document, actual = case.estimator.audit, case.plan.document, case.actual
+    for projector, lit in zip(document.projectors, actual.lit_by, strict=True):
         audit(f"{projector.id}.lit_area_m2", projector.lit_area_m2, lit, findings)
-    together = case.actual.measured_by.sum(axis=0)
-    for camera, seen in zip(document.cameras, case.actual.measured_by, strict=True):
+    alone = actual.measured_by.sum(axis=0) == 1
+    for camera, seen in zip(document.cameras, actual.measured_by, strict=True):
         audit(f"{camera.id}.seen_area_m2", camera.seen_area_m2, seen, findings)
-        sole = seen & (together == 1)
-        audit(f"{camera.id}.sole_area_m2", camera.sole_area_m2, sole, findings)
+        audit(f"{camera.id}.sole_area_m2", camera.sole_area_m2, seen & alone, findings)
 
 
 def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
@@ -188,13 +146,8 @@ def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
     ]
     beyond = [*ways, *_stopped_of_reference(case, dark)] if hindrances else []
     for key, areas, solids, lines in (
-        ("coverage.blocked_by_body_m2", claims.blocked_by_body_m2, blocks, ways),
-        (
-            "coverage.blocked_by_obstacle_m2",
-            claims.blocked_by_obstacle_m2,
-            hindrances,
-            beyond,
-        ),
+        ("blocked_by_body_m2", claims.blocked_by_body_m2, blocks, ways),
+        ("blocked_by_obstacle_m2", claims.blocked_by_obstacle_m2, hindrances, beyond),
     ):
         names = set(areas)
         if not findings.holds(
@@ -211,8 +164,8 @@ def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
 
 
 def _stopped_of_reference(
-    case: AuditCase, dark: _Flags
-) -> Iterator[tuple[str, NDArray[np.int64], AuditProjector]]:
+    case: AuditCase, dark: Mask
+) -> Iterator[tuple[str, Ints, AuditProjector]]:
     """Yield each reference projector and the dark samples that obstacles keep it from.
 
     Of those that no reference projector lights.

@@ -1,8 +1,8 @@
 """Claims about what lies inside a body, by the audit's own random rays."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Mask
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples
@@ -62,7 +62,7 @@ def audit_inside(case: AuditCase, findings: AuditFindings) -> None:
 
 def _inside(
     samples: AuditSamples, shadow: Shadow, rng: np.random.Generator
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+) -> tuple[Mask, Mask]:
     """Whether each sample sees too little, and whether that is too close to tell."""
     caster = shadow.caster
     mesh = caster.mesh
@@ -85,20 +85,15 @@ def _inside(
     return inside, unsure
 
 
-def _near(
-    seen: NDArray[np.float64], limit: NDArray[np.float64] | float
-) -> NDArray[np.bool_]:
+def _near(seen: Array, limit: Array | float) -> Mask:
     """Whether a share of random rays may lie on the other side of a limit."""
     error = np.sqrt(np.maximum(limit * (1.0 - limit), 0.0) / _RAYS)
     return np.abs(seen - limit) < _SIGMAS * error
 
 
 def _free_share(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    shadow: Shadow,
-    rng: np.random.Generator,
-) -> NDArray[np.float64]:
+    points: Array, normals: Array, shadow: Shadow, rng: np.random.Generator
+) -> Array:
     """Share of random rays, dense in proportion to the cosine, that meet nothing."""
     caster = shadow.caster
     begin = points + _ABOVE * caster.mesh.radius * normals

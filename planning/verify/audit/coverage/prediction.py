@@ -1,10 +1,10 @@
 """What a plan's poses should measure: by its limits, and at all."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Mask
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
@@ -17,7 +17,7 @@ from planning.verify.audit.predicates.audit_devices import (
 from planning.verify.audit.predicates.audit_optics import dot, towards
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import MEASURED
-from planning.verify.audit.predicates.recompute import recompute
+from planning.verify.audit.predicates.recompute import Recomputed, recompute
 
 _INCIDENCE = float(np.deg2rad(85.0))
 # Below it hardly any label is right: study-reconstruction.md, section 3.2 [px].
@@ -27,48 +27,27 @@ _PITCH_PX = 3.0
 _SLANT, _SLANT_MARGIN = float(np.deg2rad(65.0)), float(np.deg2rad(5.0))
 
 
-@dataclass(frozen=True, eq=False)
-class PredictedTarget:
-    """Fresh samples of the target and what should be measured of them.
-
-    Attributes:
-        samples: Of the target, all of one weight.
-        measured: Whether any pair measures each sample, shape (n,).
-        by_pair: Share of the samples that each pair measures, shape (n_p, n_c).
-    """
-
-    samples: AuditSamples
-    measured: NDArray[np.bool_]
-    by_pair: NDArray[np.float64]
-
-
 def predict_measured(
     plan: RigPlan, *, seed: int, n_samples: int = 20_000, threads: int = 2
-) -> PredictedTarget:
-    """Return what the poses of a plan should measure, with the audit's own code.
+) -> Recomputed:
+    """Return what the poses of a plan should measure of samples of the target.
 
-    Args:
-        plan: The plan, as written.
-        seed: Of the samples, which are those of `audit_plan` with this seed.
-        n_samples: Number of samples on the whole surface.
-        threads: Worker threads of the ray caster; the result doesn't depend on them.
+    These are those of `audit_plan` with the same seed, n_samples on the whole surface.
 
     Raises:
         PlanFileError: If the target has no area.
     """
     drawn = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     samples = drawn.take(drawn.in_target)
-    actual = recompute(plan, samples, Shadow.of(plan, threads=threads))
-    by_pair = np.mean(actual.pairs == MEASURED, axis=2)
-    return PredictedTarget(samples, actual.measured, by_pair)
+    return recompute(plan, samples, Shadow.of(plan, threads=threads))
 
 
-def possible_at_floors(
-    plan: RigPlan, samples: AuditSamples, *, threads: int
-) -> NDArray[np.bool_]:
+def possible_at_floors(plan: RigPlan, samples: AuditSamples, *, threads: int) -> Mask:
     """Return whether each camera could measure each sample, shape (n_c, n)."""
     shadow = Shadow.of(plan, threads=threads)
-    pairs = recompute(plan, samples, shadow, _at_floors(plan.requirements)).pairs
+    floors = {"requirements": _at_floors(plan.requirements)}
+    relaxed = RigPlan(plan.document.model_copy(update=floors), plan.surface)
+    pairs = recompute(relaxed, samples, shadow).pairs
     steepest = plan.requirements.camera.max_incidence - _SLANT_MARGIN
     most = np.sin(max(steepest, _SLANT))
     possible = np.zeros(pairs.shape[1:], dtype=bool)
@@ -82,7 +61,7 @@ def possible_at_floors(
 
 def receding(
     projector: AuditProjector, camera: AuditCamera, samples: AuditSamples
-) -> NDArray[np.float64]:
+) -> Array:
     """Return |r.T|, T = N x m / |N x m|: the sine of the slant along a ring, (n,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         tangent = np.cross(samples.normals, projector.ring_gradient(samples.points))

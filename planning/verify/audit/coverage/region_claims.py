@@ -1,10 +1,12 @@
 """Claims about margins, and dominant regions: their size, and who lights them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Mask
 from planning.model.document.coverage_records import RegionRecord
+from planning.model.document.input_records import SelectionRecord
 from planning.model.requirements import ProjectorLimits
+from planning.model.surface import Surface
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, samples_at_centroids
@@ -14,6 +16,9 @@ from planning.verify.audit.predicates.recompute import light_of_plan
 
 # Two honest sets of samples may miss the very least margin by so much.
 MARGIN_SLACK = np.radians(2.0)
+# Room for the rounding of a written direction or angle [rad].
+_ANGLE = 1e-4
+_SELECTIONS = ("curvature", "faces", "vertex_weight")
 
 
 def audit_margins(case: AuditCase, findings: AuditFindings) -> None:
@@ -34,32 +39,27 @@ def audit_margins(case: AuditCase, findings: AuditFindings) -> None:
         both = np.concatenate([actual.margins[p, target], at_centroids[p]])
         assigned = actual.margins[p, target & (actual.primary == p)]
         lit = both[np.isfinite(both)]
-        key = f"{projector.id}.min_margin_rad"
-        _audit_margin(key, projector.min_margin_rad, assigned, lit, findings)
+        below = findings.at(f"{projector.id}.min_margin_rad")
+        _audit_margin(projector.min_margin_rad, assigned, lit, below)
 
 
 def _audit_margin(
-    key: str,
-    claimed: float | None,
-    assigned: NDArray[np.float64],
-    lit: NDArray[np.float64],
-    findings: AuditFindings,
+    claimed: float | None, assigned: Array, lit: Array, findings: AuditFindings
 ) -> None:
-    """Check one margin against assigned and all lit samples."""
     n = len(assigned)
     if claimed is None or len(lit) == 0:
         findings.holds(
             claimed is None and n == 0,
-            key,
+            "",
             f"{claimed!r} is claimed, but {n} samples of the audit are assigned to it",
         )
         return
     findings.holds(
-        claimed >= -ROUNDING, key, f"{claimed:.6g} rad: a lit sample's is 0 or more"
+        claimed >= -ROUNDING, "", f"{claimed:.6g} rad: a lit sample's is 0 or more"
     )
     findings.holds(
         claimed >= lit.min() - MARGIN_SLACK,
-        key,
+        "",
         f"claimed {claimed:.6g} rad, recomputed {lit.min():.6g} rad, "
         f"tolerance {MARGIN_SLACK:.2g} rad",
     )
@@ -69,15 +69,10 @@ def _audit_margin(
     allowed = POINT + 3.0 * float(np.sqrt(share * n + 1.0) / (n + 2.0))
     findings.holds(
         share <= allowed,
-        key,
+        "",
         f"claimed {claimed:.6g} rad, but {100 * share:.3g} % of its area has a smaller "
         f"margin (least {assigned.min():.6g} rad), {100 * allowed:.2g} % may",
     )
-
-
-# Room for the rounding of a written direction or angle [rad].
-_ANGLE = 1e-4
-_SELECTIONS = ("curvature", "faces", "vertex_weight")
 
 
 def audit_regions(case: AuditCase, findings: AuditFindings) -> None:
@@ -92,12 +87,13 @@ def audit_regions(case: AuditCase, findings: AuditFindings) -> None:
         "regions",
         f"ids {sorted(listed)}, but surface.npz has {sorted(numbers)}",
     )
-    _audit_selection(case, findings)
+    _audit_selection(case, findings.at("surface.selection"))
     for number in sorted(set(listed) & numbers):
         region, chosen = listed[number], centroids.region == number
-        _audit_size(case, region, findings)
-        _audit_fraction(case, region, findings)
-        _audit_lit_by(case, region, np.any(lightable[:, chosen], axis=1), findings)
+        below = findings.at(f"regions.{number}")
+        _audit_size(case, region, below)
+        _audit_fraction(case, region, below)
+        _audit_lit_by(case, region, np.any(lightable[:, chosen], axis=1), below)
 
 
 def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
@@ -105,20 +101,26 @@ def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
     selection, surface = case.plan.document.surface.selection, case.plan.surface
     if selection is None:
         return
-    key, chosen = "surface.selection", surface.region >= 0
-    area = float(surface.mesh.face_areas[chosen].sum())
-    findings.number(
-        f"{key}.n_faces", selection.n_faces, float(chosen.sum()), 0.0, "faces"
-    )
-    findings.number(f"{key}.area_m2", selection.area_m2, area, ROUNDING * area)
+    _audit_faces(selection, surface, surface.region >= 0, findings)
     findings.holds(
         selection.kind in _SELECTIONS,
-        f"{key}.kind",
+        "kind",
         f"is {selection.kind!r}, must be one of {_SELECTIONS}",
     )
 
 
-def _lightable(case: AuditCase, samples: AuditSamples) -> NDArray[np.bool_]:
+def _audit_faces(
+    record: SelectionRecord | RegionRecord,
+    surface: Surface,
+    chosen: Mask,
+    findings: AuditFindings,
+) -> None:
+    area = float(surface.mesh.face_areas[chosen].sum())
+    findings.number("area_m2", record.area_m2, area, ROUNDING * area)
+    findings.number("n_faces", record.n_faces, float(chosen.sum()), 0.0, "faces")
+
+
+def _lightable(case: AuditCase, samples: AuditSamples) -> Mask:
     """Whether each projector lights each sample but for shadows and 2 degrees.
 
     Where this holds nowhere in a region, no sample of it, however few, is assigned.
@@ -132,22 +134,15 @@ def _lightable(case: AuditCase, samples: AuditSamples) -> NDArray[np.bool_]:
 
 
 def _audit_size(case: AuditCase, region: RegionRecord, findings: AuditFindings) -> None:
-    """Exact sums over faces."""
-    key, mesh = f"regions.{region.id}", case.plan.surface.mesh
-    faces = case.plan.surface.region == region.id
-    area = float(mesh.face_areas[faces].sum())
-    findings.number(f"{key}.area_m2", region.area_m2, area, ROUNDING * area)
-    findings.number(f"{key}.n_faces", region.n_faces, float(faces.sum()), 0.0, "")
+    surface, mesh = case.plan.surface, case.plan.surface.mesh
+    faces = surface.region == region.id
+    _audit_faces(region, surface, faces, findings)
     mean = mesh.face_areas[faces] @ mesh.face_normals[faces]
     length = float(np.linalg.norm(mean))
-    if length > ROUNDING * area:
-        findings.array(
-            f"{key}.mean_normal",
-            region.mean_normal,
-            mean / length,
-            _ANGLE,
-            "the area-weighted mean of its faces' normals",
-        )
+    if length > ROUNDING * float(mesh.face_areas[faces].sum()):
+        whose = "the area-weighted mean of its faces' normals"
+        claimed = region.mean_normal
+        findings.same("mean_normal", claimed, mean / length, whose, _ANGLE)
 
 
 def _audit_fraction(
@@ -159,12 +154,10 @@ def _audit_fraction(
     standard error is that of the pooled share, and four of them are tolerated.
     """
     inside = case.samples.region == region.id
-    key, value = f"regions.{region.id}.lit_fraction", region.lit_fraction
-    n = int(inside.sum())
-    if (
-        not findings.holds(0.0 <= value <= 1.0, key, f"{value!r} isn't a share")
-        or not n
-    ):
+    key, value, n = "lit_fraction", region.lit_fraction, int(inside.sum())
+    if not findings.holds(0.0 <= value <= 1.0, key, f"{value!r} isn't a share"):
+        return
+    if n == 0:
         return
     fraction = float(case.actual.lit[inside].mean())
     share = case.estimator.area(inside) / case.estimator.target_m2
@@ -175,13 +168,10 @@ def _audit_fraction(
 
 
 def _audit_lit_by(
-    case: AuditCase,
-    region: RegionRecord,
-    lightable: NDArray[np.bool_],
-    findings: AuditFindings,
+    case: AuditCase, region: RegionRecord, lightable: Mask, findings: AuditFindings
 ) -> None:
-    """Primary projectors of a part must be named; who can light none of it must not."""
-    key, names = f"regions.{region.id}.lit_by", [p.id for p in case.plan.projectors]
+    """Primary projectors of a region must be named; who can light none must not."""
+    key, names = "lit_by", [p.id for p in case.plan.projectors]
     if not set(region.lit_by) <= set(names):
         findings.fail(key, f"{list(region.lit_by)!r} must list ids of projectors")
         return

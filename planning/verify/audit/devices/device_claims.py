@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array
 from geometry.devices import PinholeModel
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
+from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
@@ -23,6 +24,13 @@ from .workspace_claims import (
 )
 
 _MODEL = ("resolution", "range_m", "K", "distortion", "pixel_pitch_m", "beam_radius")
+# Positions are written to 0.01 mm, typed rotations to four digits or more.
+_POSITION_M = 1e-5
+_TYPED = 1e-3
+_PIXEL = 1e-3
+_ROLL_RAD = 1e-6
+
+_Device = PlannedProjector | PlannedCamera
 
 
 def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
@@ -37,58 +45,36 @@ def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
             f"{len(names)} devices, requirements.max_{key} allows {kind.most}",
         )
         for record in kind.records:
-            key, pose = f"{record.id}.world_from_device", record.world_from_device
-            audit_poses(key, np.array([pose]), findings)
-            _audit_model(kind, record, findings)
-            position = np.array([pose])[:, :3, 3]
+            _audit_model(kind, record, findings.at(record.id))
+            poses, below = np.array([record.world_from_device]), findings.at(record.id)
+            audit_poses("world_from_device", poses, below)
+            position = poses[:, :3, 3]
             excess = float(outside_by(position, kind.shell, space)[0])
             # An existing device stands where it stands: `audit_existing` checks that.
-            findings.holds(
+            below.holds(
                 record.existing or excess <= POSITION_M,
-                key,
+                "world_from_device",
                 f"position {np.round(position[0], 6).tolist()} m lies "
                 f"{1e3 * excess:.3g} mm outside requirements.workspace",
             )
     for record, projector in zip(document.projectors, case.projectors, strict=True):
-        key = f"{record.id}.world_from_ring"
-        audit_poses(key, np.array([record.world_from_ring]), findings)
+        below = findings.at(record.id)
+        audit_poses("world_from_ring", np.array([record.world_from_ring]), below)
         ring = projector.world_from_ring
-        audit_ring_frames(key, projector.light, ring, findings)
+        audit_ring_frames("world_from_ring", projector.light, ring, below)
         last, stated = float(projector.radii[-1]), space.reference_ring_radius
-        findings.number(f"{record.id}.ring_radii (last)", last, stated, 1e-9, "")
-        light = document.rig.light
-        findings.holds(
-            record.light == light,
-            f"{record.id}.light",
-            f"claimed {record.light!r}, but rig.light is {light!r}",
-        )
+        below.number("ring_radii (last)", last, stated, 1e-9, "")
+        below.same("light", record.light, document.rig.light, "rig.light")
 
 
 def _audit_model(
     kind: DeviceKind, record: ProjectorRecord | CameraRecord, findings: AuditFindings
 ) -> None:
-    """Check that a device's model is the rig's."""
     for name in _MODEL:
-        if name not in type(record).model_fields:
-            continue
-        key, whose = f"{record.id}.{name}", f"rig.{kind.name}.{name}"
-        claimed, truth = getattr(record, name), getattr(kind.model, name)
-        if claimed is None or truth is None:
-            findings.holds(
-                claimed is truth, key, f"claimed {claimed!r}, but {whose} is {truth!r}"
-            )
-            continue
-        slack = 1e-9 * float(np.abs(np.array(claimed)).max(initial=0.0))
-        findings.array(key, claimed, truth, slack, whose)
-
-
-# Positions are written to 0.01 mm, typed rotations to four digits or more.
-_POSITION_M = 1e-5
-_TYPED = 1e-3
-_PIXEL = 1e-3
-_ROLL_RAD = 1e-6
-
-_Device = PlannedProjector | PlannedCamera
+        if name in type(record).model_fields:
+            claimed, truth = getattr(record, name), getattr(kind.model, name)
+            slack = 1e-9 * float(np.abs(np.array(claimed or 0.0)).max(initial=0.0))
+            findings.same(name, claimed, truth, f"rig.{kind.name}.{name}", slack)
 
 
 def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
@@ -106,12 +92,12 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
         for device in stated:
             if device.name in marked:
                 planned = marked[device.name]
-                findings.array(
+                findings.same(
                     f"{planned.id}.world_from_device",
                     planned.world_from_device.tolist(),
                     device.world_from_device,
-                    SAME_POSE,
                     f"that of the existing {device.name!r}",
+                    SAME_POSE,
                 )
         findings.holds(
             kind.proof.given == len(stated),
@@ -119,12 +105,11 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
             f"{kind.proof.given} is claimed, but {len(stated)} {kind.name}s are "
             f"existing devices",
         )
-    _audit_rig(case, findings)
+    _audit_rig(case.plan, findings)
 
 
-def _audit_rig(case: AuditCase, findings: AuditFindings) -> None:
+def _audit_rig(plan: RigPlan, findings: AuditFindings) -> None:
     """Check that existing devices are those of the rig, where it has them."""
-    plan = case.plan
     stated = {str(table.get("name")): table for table in plan.document.rig.existing}
     names = sorted(device.name for device in plan.requirements.existing)
     findings.holds(
@@ -133,29 +118,30 @@ def _audit_rig(case: AuditCase, findings: AuditFindings) -> None:
         f"holds {names}, but rig.existing has {sorted(stated)}",
     )
     for device in (*plan.projectors, *plan.cameras):
-        table = stated.get(device.existing)
+        table, below = stated.get(device.existing), findings.at(device.id)
         if table is None:
             continue
         kind = "camera" if isinstance(device, PlannedCamera) else "projector"
-        findings.holds(
+        below.holds(
             table["kind"] == kind,
-            f"{device.id}.existing",
+            "existing",
             f"is a {kind}, but rig.existing {device.existing!r} is a {table['kind']}",
         )
-        _audit_pose(device, table, plan.requirements.workspace, findings)
+        space = plan.requirements.workspace
+        _audit_pose(device, table, space, below.at("world_from_device"))
 
 
 def _audit_pose(
     device: _Device, table: Mapping[str, Any], space: Workspace, findings: AuditFindings
 ) -> None:
     """Compare a pose with the one that was typed, or with position, aim and roll."""
-    key, pose = f"{device.id}.world_from_device", device.world_from_device
+    pose = device.world_from_device
     typed = None if table.get("pose_mm") is None else np.array(table["pose_mm"])
     place = np.array(table["position_mm"]) if typed is None else typed[:3, 3]
     off = float(np.linalg.norm(pose[:3, 3] - (np.array(space.centre) + 1e-3 * place)))
     findings.holds(
         off <= _POSITION_M,
-        key,
+        "",
         f"stands {1e3 * off:.3g} mm from where rig.existing has {device.existing!r}",
     )
     if typed is None:
@@ -165,20 +151,20 @@ def _audit_pose(
     turned = float(np.abs(pose[:3, :3] - typed[:3, :3]).max())
     findings.holds(
         turned <= _TYPED,
-        key,
+        "",
         f"its rotation differs from rig.existing's by {turned:.2g}",
     )
 
 
 def _audit_aim(
     device: _Device,
-    towards: NDArray[np.float64],
+    towards: Array,
     roll_deg: float,
     space: Workspace,
     findings: AuditFindings,
 ) -> None:
     """The aim is the middle of the image, and the image is turned by the roll."""
-    key, turn = f"{device.id}.world_from_device", device.world_from_device[:3, :3]
+    turn = device.world_from_device[:3, :3]
     towards = towards / np.linalg.norm(towards)
     middle = turn.T @ towards
     model = device.device
@@ -190,7 +176,7 @@ def _audit_aim(
         off, middle = float(np.linalg.norm(middle - [0.0, 0.0, 1.0])), np.eye(3)[2]
         aimed = off <= _ROLL_RAD
     if not findings.holds(
-        aimed, key, f"the aim of {device.existing!r} misses the image centre, {off:.3g}"
+        aimed, "", f"the aim of {device.existing!r} misses the image centre, {off:.3g}"
     ):
         return
     level = np.cross(towards, space.up)
@@ -204,6 +190,6 @@ def _audit_aim(
     wrong = (roll - np.radians(roll_deg) + np.pi) % (2.0 * np.pi) - np.pi
     findings.holds(
         abs(wrong) <= _ROLL_RAD,
-        key,
+        "",
         f"is rolled by {np.degrees(roll):.4g} degrees, rig.existing says {roll_deg:g}",
     )

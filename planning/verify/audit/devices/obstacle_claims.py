@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
@@ -13,7 +13,6 @@ from planning.verify.audit.audit_findings import AuditFindings
 
 from .zone_claims import turned
 
-_Array = NDArray[np.float64]
 _ROUNDING = 1e-9
 # A prism of 64 sides has that much less surface than its cylinder, about.
 _FACETED = 0.005
@@ -82,7 +81,7 @@ def _bounding(table: Mapping[str, Any]) -> list[float]:
     return [2.0 * table["radius_mm"], 2.0 * table["radius_mm"], table["height_mm"]]
 
 
-def _excess(table: Mapping[str, Any], local: _Array, half: _Array) -> _Array:
+def _excess(table: Mapping[str, Any], local: Array, half: Array) -> Array:
     """How far vertices lie off the corners of the box, or off the rims, any shape."""
     beyond = np.abs(local) - half
     if table["shape"] != "cylinder":
@@ -93,7 +92,7 @@ def _excess(table: Mapping[str, Any], local: _Array, half: _Array) -> _Array:
     return np.stack([radial, beyond[:, 2]])
 
 
-def _area(table: Mapping[str, Any], sides: _Array) -> float:
+def _area(table: Mapping[str, Any], sides: Array) -> float:
     if table["shape"] == "cylinder":
         radius, height = 0.5 * sides[0], sides[2]
         return 2.0 * np.pi * radius * (radius + height)

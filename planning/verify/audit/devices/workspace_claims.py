@@ -3,13 +3,13 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.predicates.audit_light import (
+from planning.verify.audit.predicates.audit_devices import (
     DivergingRays,
     ParallelRays,
     light_from,
@@ -28,29 +28,22 @@ SAME_POSE = 1e-9
 def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
     """Check the workspace against the surface, and the reference poses against it."""
     space, surface = case.plan.requirements.workspace, case.plan.surface
+    below = findings.at(_KEY)
     slack = _ROUNDING * max(1.0, float(np.abs(surface.mesh.bounds).max()))
-    findings.array(
-        f"{_KEY}.centre",
-        list(space.centre),
-        surface.mesh.centre,
-        slack,
-        "the centre of the smallest ball that holds the surface",
-    )
-    radius = surface.mesh.radius
-    findings.number(
-        f"{_KEY}.object_radius_m", space.object_radius_m, radius, slack, "m"
-    )
-    _audit_values(space, findings)
+    whose = "the centre of the smallest ball that holds the surface"
+    below.same("centre", list(space.centre), surface.mesh.centre, whose, slack)
+    below.numbers(space, {"object_radius_m": surface.mesh.radius}, slack, "m")
+    _audit_values(space, below)
     for kind in case.kinds:
         low, high = kind.shell
-        findings.holds(
+        below.holds(
             0.0 < low <= high,
-            f"{_KEY}.{kind.name}_radius_m",
+            f"{kind.name}_radius_m",
             f"{list(kind.shell)} m must be positive and rise",
         )
-        findings.holds(
+        below.holds(
             len(kind.poses) == kind.n_poses,
-            f"{_KEY}.n_reference_{kind.name}s",
+            f"n_reference_{kind.name}s",
             f"{kind.n_poses} reference poses are claimed, surface.npz holds "
             f"{len(kind.poses)}",
         )
@@ -73,9 +66,7 @@ def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
         audit_ring_frames(key, light, surface.reference_rings, findings)
 
 
-def outside_by(
-    positions: NDArray[np.float64], shell: tuple[float, float], space: Workspace
-) -> NDArray[np.float64]:
+def outside_by(positions: Array, shell: tuple[float, float], space: Workspace) -> Array:
     """Return how far positions (n, 3) lie outside the workspace, <= 0 inside, (n,) [m].
 
     The largest of the amounts by which |Q - c| misses its range, Q stands behind the
@@ -94,7 +85,7 @@ def outside_by(
     return np.max(excess, axis=0)
 
 
-def audit_poses(key: str, poses: NDArray[np.float64], findings: AuditFindings) -> None:
+def audit_poses(key: str, poses: Array, findings: AuditFindings) -> None:
     """Check that (n, 4, 4) are rigid: R R^T = 1, det R > 0 and 0 0 0 1 below."""
     turn = poses[:, :3, :3]
     error = np.abs(turn @ np.swapaxes(turn, 1, 2) - np.eye(3)).max(initial=0.0)
@@ -111,7 +102,7 @@ def audit_poses(key: str, poses: NDArray[np.float64], findings: AuditFindings) -
 def audit_ring_frames(
     key: str,
     light: DivergingRays | ParallelRays,
-    frames: NDArray[np.float64],
+    frames: Array,
     findings: AuditFindings,
 ) -> None:
     """Check that cones of rings share the optical centre, or cylinders the axis."""
@@ -125,22 +116,21 @@ def audit_ring_frames(
 
 
 def _audit_values(space: Workspace, findings: AuditFindings) -> None:
-    """Check that directions are unit vectors, and the cone is one."""
     for name, vector in (("up", space.up), ("axis", space.axis)):
         length = float(np.linalg.norm(vector))
         findings.holds(
             abs(length - 1.0) <= _ROUNDING,
-            f"{_KEY}.{name}",
+            name,
             f"{list(vector)} must be a unit vector, its length is {length:.6g}",
         )
     findings.holds(
         0.0 < space.half_angle <= math.pi + 1e-9,
-        f"{_KEY}.half_angle",
+        "half_angle",
         f"{space.half_angle:.6g} rad must lie in (0, pi]",
     )
 
 
-def _movable(kind: DeviceKind, plan: RigPlan) -> NDArray[np.float64]:
+def _movable(kind: DeviceKind, plan: RigPlan) -> Array:
     """The reference poses (n, 4, 4) that aren't those of existing devices."""
     movable = np.ones(len(kind.poses), dtype=bool)
     for device in plan.requirements.existing_of(kind.name):

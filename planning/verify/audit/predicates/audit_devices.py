@@ -1,38 +1,155 @@
-"""Projectors and cameras as the audit sees them: poses, optics, light and rings."""
+"""Projectors and cameras as the audit sees them: poses, optics, light and rings.
+
+Where light comes from and what surface a ring is differ by the kind of light.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Mask
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
-from .audit_light import DivergingRays, ParallelRays, light_from
-from .audit_optics import in_frame, in_world
+from .audit_optics import in_frame, in_image, in_world, pixels_of, towards
 from .occlusion import Block, bodies_but, bodies_of_reference
 
-_Array = NDArray[np.float64]
+
+@dataclass(frozen=True, eq=False)
+class DivergingRays:
+    """Light from the optical centre; rings are cones x^2 + y^2 = (c z)^2."""
+
+    device: PinholeModel
+    pose: Array
+
+    def to_points(self, points: Array) -> tuple[Array, Array]:
+        """Return L (n, 3) and the length of the light's way to each point (n,) [m]."""
+        return towards(points, self.pose[:3, 3])
+
+    def leaves(self, points: Array) -> Mask:
+        """Return whether light towards points leaves the device, shape (n,)."""
+        local = in_frame(self.pose, points)
+        ahead = np.flatnonzero(local[:, 2] > 0)
+        inside = np.zeros(len(points), dtype=bool)
+        pixels = pixels_of(self.device, local[ahead])
+        inside[ahead] = in_image(self.device.resolution, pixels)
+        return inside
+
+    def coordinate(self, ring: Array) -> Array:
+        """Return c of points in ring coordinates, (n, 3) to (n,); inf behind."""
+        ahead = ring[:, 2] > 0
+        radius = np.hypot(ring[:, 0], ring[:, 1])
+        return np.divide(
+            radius, ring[:, 2], out=np.full_like(radius, np.inf), where=ahead
+        )
+
+    def gradient(self, ring: Array) -> Array:
+        """Return the gradient of c in the ring frame, (n, 3) [1/m]."""
+        radius, z = np.hypot(ring[:, 0], ring[:, 1]), ring[:, 2]
+        outward = ring[:, :2] / radius[:, None]
+        return np.column_stack([outward / z[:, None], -radius / z**2])
+
+    def emitted(self, frame: Array, spokes: Array) -> tuple[Array, Array]:
+        """Return origins and unit directions of rays through spokes (n, 3), z = 0."""
+        along = in_world(frame, spokes + [0.0, 0.0, 1.0])
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        return np.tile(frame[:3, 3], (len(along), 1)), along
+
+    def run(self, c: Array, z: Array) -> tuple[Array, Array]:
+        """Return (s, t) of points at c and z: |dt / ds| is tan(incidence) across rings.
+
+        s is the angle of the ray to the axis, t the logarithm of its length.
+        """
+        return np.arctan(c), np.log(z * np.hypot(1.0, c))
+
+    def chord_error(self, c: Array, heights: tuple[Array, Array, Array]) -> Array:
+        """Return how far the surface at c strays from the chord over it, in [m].
+
+        Along the beam; 1/z is linear in c on a plane. Heights before, at and after c.
+        """
+        before, middle, after = heights
+        chord = 2.0 / (1.0 / before + 1.0 / after)
+        return np.abs(middle - chord) * np.hypot(1.0, c)
+
+    def ring_frame_fault(self, frame: Array) -> Array:
+        """Return how far ring frames (n, 4, 4) leave the optical centre, (n, k) [m]."""
+        return frame[..., :3, 3] - self.pose[..., :3, 3]
+
+
+@dataclass(frozen=True, eq=False)
+class ParallelRays:
+    """Light along the device's +z; rings are cylinders x^2 + y^2 = c^2."""
+
+    device: ParallelModel
+    pose: Array
+
+    def to_points(self, points: Array) -> tuple[Array, Array]:
+        """Return L (n, 3) and the length of the light's way to each point (n,) [m]."""
+        axis = self.pose[:3, 2]
+        return np.broadcast_to(axis, points.shape), (points - self.pose[:3, 3]) @ axis
+
+    def leaves(self, points: Array) -> Mask:
+        """Return whether light towards points leaves the device, shape (n,)."""
+        across = in_frame(self.pose, points)[:, :2]
+        half = 0.5 * self.device.pixel_pitch_m * np.array(self.device.resolution)
+        inside = np.all(np.abs(across) <= half, axis=1)
+        if self.device.beam_radius is not None:
+            inside &= (across**2).sum(axis=1) <= self.device.beam_radius**2
+        return inside
+
+    def coordinate(self, ring: Array) -> Array:
+        """Return c of points in ring coordinates, (n, 3) to (n,) [m]."""
+        return np.hypot(ring[:, 0], ring[:, 1])
+
+    def gradient(self, ring: Array) -> Array:
+        """Return the gradient of c in the ring frame, (n, 3)."""
+        outward = ring[:, :2] / np.hypot(ring[:, 0], ring[:, 1])[:, None]
+        return np.column_stack([outward, np.zeros(len(ring))])
+
+    def emitted(self, frame: Array, spokes: Array) -> tuple[Array, Array]:
+        """Return origins and unit directions of rays through spokes (n, 3), z = 0."""
+        origins = frame[:3, 3] + in_world(frame, spokes)
+        return origins, np.tile(frame[:3, 2], (len(origins), 1))
+
+    def run(self, c: Array, z: Array) -> tuple[Array, Array]:
+        """Return (s, t) of points at c and z: the radius and the height."""
+        return c, z
+
+    def chord_error(self, c: Array, heights: tuple[Array, Array, Array]) -> Array:
+        """Return how far the surface at c strays from the chord over it, in [m]."""
+        before, middle, after = heights
+        return np.abs(middle - 0.5 * (before + after))
+
+    def ring_frame_fault(self, frame: Array) -> Array:
+        """Return how far ring frames (n, 4, 4) leave panel plane or axis, (n, k)."""
+        axis = self.pose[..., :3, 2]
+        shift = np.sum((frame[..., :3, 3] - self.pose[..., :3, 3]) * axis, axis=-1)
+        return np.concatenate([shift[..., None], frame[..., :3, 2] - axis], axis=-1)
+
+
+def light_from(
+    device: PinholeModel | ParallelModel, pose: Array
+) -> DivergingRays | ParallelRays:
+    """Return the light of a device at a pose (or poses (n, 4, 4))."""
+    if isinstance(device, PinholeModel):
+        return DivergingRays(device, pose)
+    return ParallelRays(device, pose)
 
 
 @dataclass(frozen=True, eq=False)
 class AuditProjector:
     """A projector at a pose: the plan's, or one of the reference set.
 
-    Attributes:
-        device: Its optics.
-        world_from_device: Pose, shape (4, 4) [m].
-        world_from_ring: Pose of the ring frame, shape (4, 4) [m].
-        radii: Ring radii; of a reference pose the outermost alone.
-        blocks: Bodies of other devices, which stand in its light.
+    `radii` are of its rings, of a reference pose the outermost alone; `blocks` are the
+    bodies of other devices, which stand in its light.
     """
 
     device: PinholeModel | ParallelModel
-    world_from_device: _Array
-    world_from_ring: _Array
-    radii: _Array
+    world_from_device: Array
+    world_from_ring: Array
+    radii: Array
     blocks: tuple[Block, ...] = ()
 
     @cached_property
@@ -40,11 +157,11 @@ class AuditProjector:
         """Its kind of light."""
         return light_from(self.device, self.world_from_device)
 
-    def ring_coordinate(self, points: _Array) -> _Array:
+    def ring_coordinate(self, points: Array) -> Array:
         """Return the coordinate c that is constant on each ring surface, (n,)."""
         return self.light.coordinate(in_frame(self.world_from_ring, points))
 
-    def ring_gradient(self, points: _Array) -> _Array:
+    def ring_gradient(self, points: Array) -> Array:
         """Return grad c in the world, (n, 3) [1/m or 1].
 
         The normal of the ring surface is m = grad c / |grad c|, and rings whose
@@ -53,18 +170,18 @@ class AuditProjector:
         ring = in_frame(self.world_from_ring, points)
         return in_world(self.world_from_ring, self.light.gradient(ring))
 
-    def ring_gap(self, coordinate: _Array) -> _Array:
+    def ring_gap(self, coordinate: Array) -> Array:
         """Return radii[k] - radii[k-1], k >= 1 the first with radii[k] >= c, (n,)."""
         upper = np.searchsorted(self.radii, coordinate, side="left")
         upper = np.clip(upper, 1, len(self.radii) - 1)
         return self.radii[upper] - self.radii[upper - 1]
 
-    def ring_spacing(self, points: _Array) -> _Array:
+    def ring_spacing(self, points: Array) -> Array:
         """Return the distance along m of the rings about each point, (n,) [m]."""
         gap = self.ring_gap(self.ring_coordinate(points))
         return gap / np.linalg.norm(self.ring_gradient(points), axis=1)
 
-    def in_beam(self, points: _Array) -> NDArray[np.bool_]:
+    def in_beam(self, points: Array) -> Mask:
         """Return whether points lie in the beam and inside the last ring, (n,)."""
         return self.light.leaves(points) & (
             self.ring_coordinate(points) <= self.radii[-1]
@@ -76,7 +193,7 @@ class AuditCamera:
     """A camera at a pose, and the bodies of other devices."""
 
     device: PinholeModel
-    world_from_device: _Array
+    world_from_device: Array
     blocks: tuple[Block, ...] = ()
 
 
@@ -130,8 +247,8 @@ def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
 
 
 def light_starts(
-    device: PlannedProjector | PlannedCamera | AuditProjector, points: _Array
-) -> _Array:
+    device: PlannedProjector | PlannedCamera | AuditProjector, points: Array
+) -> Array:
     """Return where light to points leaves a device, or views from them end, (n, 3)."""
     light = light_from(device.device, device.world_from_device)
     along, length = light.to_points(points)

@@ -5,21 +5,19 @@ numerically: an error of sign or of order shows as a difference of areas.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Mask
 from geometry.devices import PinholeModel
 
 _STEP = 1e-5
 
 
-def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def dot(a: Array, b: Array) -> Array:
     """Return the scalar products of vectors (n, 3), shape (n,)."""
     return np.einsum("ij,ij->i", a, b)
 
 
-def towards(
-    points: NDArray[np.float64], origin: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def towards(points: Array, origin: Array) -> tuple[Array, Array]:
     """Return unit directions from an origin to points (n, 3), and distances (n,)."""
     offset = points - origin
     length = np.linalg.norm(offset, axis=1)
@@ -27,21 +25,17 @@ def towards(
         return offset / length[:, None], length
 
 
-def in_frame(
-    world_from_frame: NDArray[np.float64], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def in_frame(world_from_frame: Array, points: Array) -> Array:
     """Return world points (n, 3) in a frame: R^T (P - t)."""
     return (points - world_from_frame[:3, 3]) @ world_from_frame[:3, :3]
 
 
-def in_world(
-    world_from_frame: NDArray[np.float64], directions: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def in_world(world_from_frame: Array, directions: Array) -> Array:
     """Return directions (n, 3) of a frame in the world: R d."""
     return directions @ world_from_frame[:3, :3].T
 
 
-def pixels_of(device: PinholeModel, local: NDArray[np.float64]) -> NDArray[np.float64]:
+def pixels_of(device: PinholeModel, local: Array) -> Array:
     """Return where points in front of a device appear, (n, 3) to (n, 2) [px].
 
     OpenCV's model: x' = x/z, s = x'^2 + y'^2, radial factor 1 + k1 s + k2 s^2 + k3 s^3,
@@ -58,31 +52,19 @@ def pixels_of(device: PinholeModel, local: NDArray[np.float64]) -> NDArray[np.fl
     return np.column_stack([fx * bent_x + skew * bent_y + cx, fy * bent_y + cy])
 
 
-def in_image(
-    resolution: tuple[int, int], pixels: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def in_image(resolution: tuple[int, int], pixels: Array) -> Mask:
     """Return whether pixels (n, 2) lie inside the image; pixel centres are integers."""
     width, height = resolution
     u, v = pixels[:, 0], pixels[:, 1]
     return (u >= -0.5) & (u <= width - 0.5) & (v >= -0.5) & (v <= height - 0.5)
 
 
-def pixel_gradient(
-    device: PinholeModel, local: NDArray[np.float64], across: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return g = J_r^T v for vectors v across the viewing rays.
+def pixel_gradient(device: PinholeModel, local: Array, across: Array) -> Array:
+    """Return g = J_r^T v [1/px], (n, 2), of vectors v (n, 3) across the viewing rays.
 
     The image shifts by A = d pixel / d(turn of the ray about the optical centre) along
     two directions e1, e2 perpendicular to the ray r, taken by central differences; then
-    J_r = E A^-1 with E = [e1 e2], and g = A^-T E^T v.
-
-    Args:
-        device: The camera.
-        local: Points in its frame in [m], shape (n, 3).
-        across: Vectors v in its frame, perpendicular to the rays, shape (n, 3).
-
-    Returns:
-        g in [1/px], shape (n, 2).
+    J_r = E A^-1 with E = [e1 e2], and g = A^-T E^T v. All in the camera's own frame.
     """
     r = local / np.linalg.norm(local, axis=1, keepdims=True)
     spare = np.where(np.abs(r[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
 from planning.model.bodies import Box
@@ -20,9 +20,6 @@ from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
-from .audit_optics import in_frame
-
-_Array = NDArray[np.float64]
 _Device = PlannedProjector | PlannedCamera
 # Positions are written to 0.01 mm, so bodies in contact may overlap by as much.
 _SLACK_M = 2e-5
@@ -35,38 +32,37 @@ class Block:
 
     Attributes:
         name: What messages call it.
-        world_from_box: Its frame, the origin in its middle, shape (4, 4).
+        turn: Its axes, the columns of a rotation.
+        middle: In the world [m], shape (3,).
         half: Half of its sides [m], shape (3,).
     """
 
     name: str
-    world_from_box: _Array
-    half: _Array
+    turn: Array
+    middle: Array
+    half: Array
 
-    @classmethod
-    def at(cls, name: str, turn: _Array, middle: _Array, half: _Array) -> "Block":
-        """Return a box of axes that are the columns of a rotation, about its middle."""
-        frame = np.eye(4)
-        frame[:3, :3], frame[:3, 3] = turn, middle
-        return cls(name, frame, half)
+    def local(self, points: Array) -> Array:
+        """Return points (n, 3) in the frame of its axes, from its middle."""
+        return (points - self.middle) @ self.turn
 
     @property
-    def corners(self) -> _Array:
+    def corners(self) -> Array:
         """Shape (8, 3) [m]; those whose numbers differ in one bit share an edge."""
         bits = (np.arange(8)[:, None] >> np.arange(3)) & 1
         local = (2.0 * bits - 1.0) * self.half
-        return local @ self.world_from_box[:3, :3].T + self.world_from_box[:3, 3]
+        return local @ self.turn.T + self.middle
 
     @property
-    def edges(self) -> tuple[_Array, _Array]:
+    def edges(self) -> tuple[Array, Array]:
         """Both ends of the twelve edges, (12, 3) each."""
         ends = [(i, i | 1 << k) for k in range(3) for i in range(8) if not i >> k & 1]
         first, last = np.array(ends).T
         return self.corners[first], self.corners[last]
 
-    def meets(self, starts: _Array, ends: _Array) -> NDArray[np.bool_]:
+    def meets(self, starts: Array, ends: Array) -> Mask:
         """Return which straight lines share a point with the box, shape (n,)."""
-        a, b = (in_frame(self.world_from_box, p) for p in (starts, ends))
+        a, b = self.local(starts), self.local(ends)
         middle, way = 0.5 * (a + b), 0.5 * (b - a)
         reach = np.abs(way)
         met = np.all(np.abs(middle) <= self.half + reach, axis=1)
@@ -94,13 +90,13 @@ def block_of(device: _Device) -> Block | None:
         return None
     turn, origin = device.world_from_device[:3, :3], device.world_from_device[:3, 3]
     middle = origin + turn @ np.array(device.body.centre_m)
-    return Block.at(device.id, turn, middle, np.array(device.body.half_m))
+    return Block(device.id, turn, middle, np.array(device.body.half_m))
 
 
-def block_of_zone(zone: Box, centre: _Array) -> Block:
+def block_of_zone(zone: Box, centre: Array) -> Block:
     """Return a zone in the frame in which the workspace's centre is at `centre`."""
     middle, turn = centre + zone.centre_m, np.array(zone.axes).T
-    return Block.at(zone.name, turn, middle, np.array(zone.half_m))
+    return Block(zone.name, turn, middle, np.array(zone.half_m))
 
 
 def bodies_but(plan: RigPlan, device: _Device) -> tuple[Block, ...]:
@@ -110,23 +106,18 @@ def bodies_but(plan: RigPlan, device: _Device) -> tuple[Block, ...]:
 
 
 def bodies_of_reference(
-    plan: RigPlan, kind: str, poses: _Array
+    plan: RigPlan, kind: str, poses: Array
 ) -> list[tuple[Block, ...]]:
-    """Return the bodies among which each reference pose covers what it does.
+    """Return the bodies among which each reference pose (n, 4, 4) covers what it does.
 
-    Those of existing devices, and for a camera those of the projectors.
-
-    Args:
-        plan: The plan.
-        kind: `projector` or `camera`.
-        poses: Of the reference devices, (n, 4, 4); a device of their kind that stands
-            at one of them is itself.
+    Those of existing devices, and for a camera those of the projectors. A device of
+    their kind that stands at one of the poses is itself.
     """
     cameras = [camera for camera in plan.cameras if camera.existing]
     projectors = [p for p in plan.projectors if kind == "camera" or p.existing]
-    others, alike = cameras, projectors
+    alike, others = projectors, cameras
     if kind == "camera":
-        others, alike = projectors, cameras
+        alike, others = cameras, projectors
     return [
         _bodies(
             [
@@ -150,7 +141,7 @@ class Hindrance:
         self.name = obstacle.name
         self.caster = RayCaster(obstacle.mesh, threads=threads)
 
-    def meets(self, starts: _Array, ends: _Array) -> NDArray[np.bool_]:
+    def meets(self, starts: Array, ends: Array) -> Mask:
         """Return which straight lines meet it more than 0.02 mm before their ends."""
         way = ends - starts
         length = np.linalg.norm(way, axis=1)
@@ -160,8 +151,8 @@ class Hindrance:
 
 
 def free_of(
-    blocks: Sequence[Block | Hindrance], points: _Array, along: _Array, lengths: _Array
-) -> NDArray[np.bool_]:
+    blocks: Sequence[Block | Hindrance], points: Array, along: Array, lengths: Array
+) -> Mask:
     """Return which segments that end at points (n, 3) meet none of them, (n,)."""
     free = np.ones(len(points), dtype=bool)
     if len(points):
@@ -187,7 +178,6 @@ def touches(block: Block, caster: RayCaster) -> bool:
 
 
 def _bodies(devices: Iterable[_Device]) -> tuple[Block, ...]:
-    """The bodies of those devices that have one."""
     blocks = (block_of(device) for device in devices)
     return tuple(block for block in blocks if block is not None)
 
@@ -208,18 +198,14 @@ class Shadow:
     Args:
         mesh: The occluder.
         threads: Worker threads of the ray caster.
-        hindrances: Obstacles, in the way of every device.
+        obstacles: In the way of every device.
     """
 
     def __init__(
-        self,
-        mesh: TriangleMesh,
-        *,
-        threads: int,
-        hindrances: tuple[Hindrance, ...] = (),
+        self, mesh: TriangleMesh, *, threads: int, obstacles: Sequence[Obstacle] = ()
     ) -> None:
-        self.hindrances = hindrances
-        self._caster = RayCaster(mesh, threads=threads)
+        self.hindrances = [Hindrance(each, threads=threads) for each in obstacles]
+        self.caster = RayCaster(mesh, threads=threads)
         self._centre = mesh.centre
         self._radius = 1.05 * mesh.reach
         self._slack = _SLACK * mesh.radius
@@ -227,29 +213,13 @@ class Shadow:
     @classmethod
     def of(cls, plan: RigPlan, *, threads: int) -> Self:
         """Return what stands in the way about a plan's object, but devices."""
-        obstacles = plan.surface.obstacles
-        hindrances = tuple(Hindrance(each, threads=threads) for each in obstacles)
-        return cls(plan.surface.mesh, threads=threads, hindrances=hindrances)
+        surface = plan.surface
+        return cls(surface.mesh, threads=threads, obstacles=surface.obstacles)
 
-    @property
-    def caster(self) -> RayCaster:
-        """The bare ray caster, for other questions about the same mesh."""
-        return self._caster
+    def free(self, points: Array, faces: Ints, along: Array, lengths: Array) -> Mask:
+        """Return whether segments (n,) along unit directions are free.
 
-    def free(
-        self,
-        points: NDArray[np.float64],
-        faces: NDArray[np.int64],
-        along: NDArray[np.float64],
-        lengths: NDArray[np.float64],
-    ) -> NDArray[np.bool_]:
-        """Return whether each segment is free.
-
-        Args:
-            points: Ends of the segments, samples of the mesh in [m], shape (n, 3).
-            faces: Face of each sample, shape (n,).
-            along: Unit direction from the device to the sample, shape (n, 3).
-            lengths: Lengths of the segments in [m], shape (n,).
+        They end at samples of the mesh, whose faces are known.
         """
         if len(points) == 0:
             return np.zeros(0, dtype=bool)
@@ -257,5 +227,5 @@ class Shadow:
         b = np.einsum("ij,ij->i", offset, along)
         inside = self._radius**2 - np.einsum("ij,ij->i", offset, offset)
         back = np.minimum(lengths, b + np.sqrt(b * b + inside))
-        hit, distance = self._caster.first_hits(points - back[:, None] * along, along)
+        hit, distance = self.caster.first_hits(points - back[:, None] * along, along)
         return (hit == faces) | (distance >= back - self._slack)

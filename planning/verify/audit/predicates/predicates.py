@@ -7,6 +7,7 @@ so that the first limit that fails, and the device that came furthest, are both 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import Array, Mask
 from planning.model.requirements import (
     CameraLimits,
     ProjectorLimits,
@@ -18,6 +19,7 @@ from .audit_devices import AuditCamera, AuditProjector
 from .audit_optics import dot, in_frame, in_image, pixel_gradient, pixels_of, towards
 from .occlusion import Shadow, free_of
 
+Steps = NDArray[np.int8]
 LIGHT_CAUSES = (
     "projector_beam",
     "projector_range",
@@ -37,11 +39,8 @@ SIGHT_CAUSES = (
     "sample_distance",
 )
 PAIR_CAUSES = ("conditioning", "sigma", "pitch")
-LIT, SEEN, MEASURED = (
-    len(LIGHT_CAUSES),
-    len(SIGHT_CAUSES),
-    len(SIGHT_CAUSES + PAIR_CAUSES),
-)
+LIT, SEEN = len(LIGHT_CAUSES), len(SIGHT_CAUSES)
+MEASURED = SEEN + len(PAIR_CAUSES)
 OCCLUDED = LIGHT_CAUSES.index("projector_occlusion")
 PROJECTOR_BODY = LIGHT_CAUSES.index("projector_body")
 CAMERA_BODY = SIGHT_CAUSES.index("camera_body")
@@ -54,7 +53,7 @@ def light_steps(
     samples: AuditSamples,
     limits: ProjectorLimits,
     shadow: Shadow,
-) -> NDArray[np.int8]:
+) -> Steps:
     """Return how many limits of *lit* each sample passes, shape (n,); `LIT`: lit."""
     along, length = projector.light.to_points(samples.points)
     near, far = projector.device.range_m
@@ -70,7 +69,7 @@ def light_steps(
 
 def light_margin(
     projector: AuditProjector, samples: AuditSamples, limits: ProjectorLimits
-) -> NDArray[np.float64]:
+) -> Array:
     """Return min(theta_max - incidence, tangent angle - tau_min) [rad], shape (n,).
 
     Only the first term counts where `steep` is zero.
@@ -84,7 +83,7 @@ def light_margin(
 
 def sight_steps(
     camera: AuditCamera, samples: AuditSamples, limits: CameraLimits, shadow: Shadow
-) -> NDArray[np.int8]:
+) -> Steps:
     """Return how many limits of *seen* each sample passes, shape (n,); `SEEN`: seen."""
     local = in_frame(camera.world_from_device, samples.points)
     ahead = np.flatnonzero(local[:, 2] > 0)
@@ -114,7 +113,7 @@ def pair_steps(
     camera: AuditCamera,
     samples: AuditSamples,
     limits: TriangulationLimits,
-) -> NDArray[np.int8]:
+) -> Steps:
     """Return how many limits of *measurable* lit and seen samples pass, shape (n,)."""
     light, _ = projector.light.to_points(samples.points)
     r, t = towards(samples.points, camera.world_from_device[:3, 3])
@@ -140,17 +139,17 @@ def pair_steps(
     )
 
 
-def _passed(*conditions: NDArray[np.bool_]) -> NDArray[np.int8]:
+def _passed(*conditions: Mask) -> Steps:
     """How many conditions hold for each sample before the first that doesn't, (n,)."""
     return np.cumprod(conditions, axis=0, dtype=np.int8).sum(axis=0, dtype=np.int8)
 
 
 def _pass_free(
-    steps: NDArray[np.int8],
+    steps: Steps,
     before: int,
     device: AuditProjector | AuditCamera,
     samples: AuditSamples,
-    way: tuple[NDArray[np.float64], NDArray[np.float64]],
+    way: tuple[Array, Array],
     shadow: Shadow,
 ) -> None:
     """Take samples at `before` past surface, bodies and obstacles, in place."""
@@ -165,10 +164,8 @@ def _pass_free(
 
 
 def _or(limit: float | None, otherwise: float) -> float:
-    """A limit, or a value that binds nothing where there is none."""
     return otherwise if limit is None else limit
 
 
-def _angle(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The angle of a cosine that rounding may have pushed past 1 [rad]."""
+def _angle(cosine: Array) -> Array:
     return np.arccos(np.clip(cosine, -1.0, 1.0))

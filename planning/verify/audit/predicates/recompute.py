@@ -6,10 +6,10 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.arrays import Array, Ints, Mask
 from planning.model.plan import RigPlan
-from planning.model.requirements import ProjectorLimits, Requirements
+from planning.model.requirements import Requirements
 from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_devices import (
@@ -25,6 +25,7 @@ from .predicates import (
     LIT,
     MEASURED,
     SEEN,
+    Steps,
     light_margin,
     light_steps,
     pair_steps,
@@ -32,8 +33,6 @@ from .predicates import (
 )
 
 _NOT_LIT = -1
-_Flags = NDArray[np.bool_]
-_Steps = NDArray[np.int8]
 _Device = TypeVar("_Device")
 
 
@@ -42,7 +41,6 @@ class Recomputed:
     """The plan's poses against one set of samples.
 
     Attributes:
-        samples: The samples.
         light: Limits of *lit* passed, for each projector, shape (n_p, n).
         margins: Margin of each lit sample, -inf where unlit, shape (n_p, n) [rad].
         pairs: Limits of *seen* and *measurable* passed, in that order, -1 where the
@@ -50,39 +48,44 @@ class Recomputed:
     """
 
     samples: AuditSamples
-    light: _Steps
-    margins: NDArray[np.float64]
-    pairs: _Steps
+    light: Steps
+    margins: Array
+    pairs: Steps
 
     @cached_property
-    def lit_by(self) -> _Flags:
+    def lit_by(self) -> Mask:
         """Whether each projector lights each sample, shape (n_p, n)."""
         return self.light == LIT
 
     @cached_property
-    def lit(self) -> _Flags:
+    def lit(self) -> Mask:
         """Whether any projector lights each sample, shape (n,)."""
         return np.any(self.lit_by, axis=0)
 
     @cached_property
-    def measured_by(self) -> _Flags:
+    def measured_by(self) -> Mask:
         """Whether each camera measures each sample with any projector, (n_c, n)."""
         return np.any(self.pairs == MEASURED, axis=0)
 
     @cached_property
-    def measured(self) -> _Flags:
+    def measured(self) -> Mask:
         """Whether any pair of the plan measures each sample, shape (n,)."""
         return np.any(self.measured_by, axis=0)
 
+    @property
+    def by_pair(self) -> Array:
+        """Share of the samples that each pair measures, shape (n_p, n_c)."""
+        return np.mean(self.pairs == MEASURED, axis=2)
+
     @cached_property
-    def primary(self) -> NDArray[np.int64]:
+    def primary(self) -> Ints:
         """Index of each sample's primary projector, -1 where unlit, (n,)."""
         if len(self.margins) == 0:
             return np.full(len(self.samples), -1)
         return np.where(self.lit, np.argmax(self.margins, axis=0), -1)
 
     @cached_property
-    def cause(self) -> NDArray[np.int64]:
+    def cause(self) -> Ints:
         """Index into `LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES`, -1 where measured.
 
         That of the projector (unlit samples) or lit pair (lit ones) that came furthest.
@@ -99,8 +102,7 @@ class Reachable:
     """What the reference poses could do.
 
     Attributes:
-        projectors: Reachable by projectors, shape (n,).
-        cameras: Reachable by cameras, shape (n,).
+        projectors: Reachable by projectors, shape (n,); `cameras` likewise.
         furthest: Most limits of *lit* that any reference projector passes, shape (n,);
             final only where no reference projector lights the sample.
         furthest_pair: Most limits of *seen* and *measurable* that any pair of a
@@ -108,20 +110,17 @@ class Reachable:
             samples that no such pair, and none of the plan's, measures.
     """
 
-    projectors: _Flags
-    cameras: _Flags
-    furthest: _Steps
-    furthest_pair: _Steps
+    projectors: Mask
+    cameras: Mask
+    furthest: Steps
+    furthest_pair: Steps
 
 
 def light_of_plan(
-    plan: RigPlan,
-    samples: AuditSamples,
-    shadow: Shadow,
-    limits: ProjectorLimits | None = None,
-) -> tuple[_Steps, NDArray[np.float64]]:
-    """Return `light` and `margins` of `Recomputed`; by the plan's limits or others."""
-    limits = plan.requirements.projector if limits is None else limits
+    plan: RigPlan, samples: AuditSamples, shadow: Shadow
+) -> tuple[Steps, Array]:
+    """Return `light` and `margins` of `Recomputed`."""
+    limits = plan.requirements.projector
     projectors = audit_projectors(plan)
     light = np.zeros((len(projectors), len(samples)), dtype=np.int8)
     margins = np.full(light.shape, -np.inf)
@@ -132,22 +131,10 @@ def light_of_plan(
     return light, margins
 
 
-def recompute(
-    plan: RigPlan,
-    samples: AuditSamples,
-    shadow: Shadow,
-    requirements: Requirements | None = None,
-) -> Recomputed:
-    """Recompute what every device and every pair of the plan does to each sample.
-
-    Args:
-        plan: Devices, and the limits that hold by default.
-        samples: Of its surface.
-        shadow: Occlusion.
-        requirements: Limits other than the plan's.
-    """
-    limits = plan.requirements if requirements is None else requirements
-    light, margins = light_of_plan(plan, samples, shadow, limits.projector)
+def recompute(plan: RigPlan, samples: AuditSamples, shadow: Shadow) -> Recomputed:
+    """Recompute what every device and every pair of the plan does to each sample."""
+    limits = plan.requirements
+    light, margins = light_of_plan(plan, samples, shadow)
     lit_by = light == LIT
     projectors, cameras = audit_projectors(plan), audit_cameras(plan)
     pairs = np.full((len(light), len(cameras), len(samples)), _NOT_LIT, dtype=np.int8)
@@ -170,11 +157,11 @@ def reachable_by(
     rng = np.random.default_rng(seed)
     requirements, projectors = plan.requirements, audit_projectors(plan)
 
-    def lights(projector: AuditProjector, chosen: NDArray[np.int64]) -> _Steps:
+    def lights(projector: AuditProjector, chosen: Ints) -> Steps:
         samples = actual.samples.take(chosen)
         return light_steps(projector, samples, requirements.projector, shadow)
 
-    def measures(camera: AuditCamera, chosen: NDArray[np.int64]) -> _Steps:
+    def measures(camera: AuditCamera, chosen: Ints) -> Steps:
         samples, lit_by = actual.samples.take(chosen), actual.lit_by[:, chosen]
         steps = pairs_with(camera, projectors, samples, lit_by, requirements, shadow)
         return steps.max(axis=0, initial=0)
@@ -189,11 +176,11 @@ def reachable_by(
 
 def _furthest(
     devices: Sequence[_Device],
-    steps_of: Callable[[_Device, NDArray[np.int64]], _Steps],
-    wanted: _Flags,
+    steps_of: Callable[[_Device, Ints], Steps],
+    wanted: Mask,
     every: int,
     rng: np.random.Generator,
-) -> _Steps:
+) -> Steps:
     """Most limits that any device passes on wanted samples, 0 on others, (n,)."""
     furthest = np.zeros(len(wanted), dtype=np.int8)
     waiting = np.flatnonzero(wanted)
@@ -210,10 +197,10 @@ def pairs_with(
     camera: AuditCamera,
     projectors: Sequence[AuditProjector],
     samples: AuditSamples,
-    lit_by: _Flags,
+    lit_by: Mask,
     limits: Requirements,
     shadow: Shadow,
-) -> _Steps:
+) -> Steps:
     """Return `Recomputed.pairs` of one camera, on samples lit as `lit_by` says."""
     sight = sight_steps(camera, samples, limits.camera, shadow)
     pairs = np.where(lit_by, sight, np.int8(_NOT_LIT))
