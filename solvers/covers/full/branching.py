@@ -87,7 +87,8 @@ class Tree(ABC):
                 self._push(again, depth)
                 continue
             support = np.flatnonzero(node.primal > INTEGRAL)
-            if support.size < self.size and self._is_cover(support):
+            covered = self.covers[:, support].any(axis=1).all()
+            if support.size < self.size and covered:
                 return Refutation(support, lower)
             children = self.branch(node)
             if children is None:
@@ -95,9 +96,6 @@ class Tree(ABC):
             for child in children:
                 self._push(child, depth - 1)
         return Refutation(None, self.size)
-
-    def _is_cover(self, support: NDArray[np.int64]) -> bool:
-        return bool(self.covers[:, support].any(axis=1).all())
 
     def _take_in(self, node: Node) -> Node | None:
         """Return the node bounded over more rows, or None if it misses none by much."""
