@@ -14,6 +14,7 @@ from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
 )
+from planning.verify.reconstruction.check.accuracy import share_of
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
 
@@ -63,9 +64,9 @@ def ring_outcomes(scanner: Scanner, cloud: Cloud) -> tuple[RingOutcome, ...]:
                     projector.id,
                     k,
                     len(points) / _PLACES,
-                    {one.id: _share(s) for one, s in zip(cameras, seen, strict=True)},
-                    {one.id: _share(m) for one, m in zip(cameras, got, strict=True)},
-                    _share(np.any(got, axis=0)),
+                    {one.id: share_of(s) for one, s in zip(cameras, seen, strict=True)},
+                    {one.id: share_of(m) for one, m in zip(cameras, got, strict=True)},
+                    share_of(np.any(got, axis=0)),
                 )
             )
     return tuple(outcomes)
@@ -138,7 +139,3 @@ def _measured(cloud: Cloud, which: tuple[int, int, int], points: Array) -> Mask:
     tree = KDTree(cloud.points[of_ring])
     apart, _ = tree.query(points, distance_upper_bound=_NEAR_M)
     return np.isfinite(apart)
-
-
-def _share(values: Mask) -> float:
-    return float(np.mean(values)) if len(values) else 0.0

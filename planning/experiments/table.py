@@ -73,12 +73,10 @@ def ring_lines(outcome: Outcome) -> list[str]:
 
 def label_line(labels: LabelCount) -> str:
     """Return how labels of single images compare with the truth."""
-    counts = (labels.right, labels.wrong, labels.stray, labels.off_prior)
-    right, wrong, stray, off, unsure = (
-        100.0 * part / max(labels.n, 1) for part in (*counts, labels.ambiguous)
-    )
+    n, *counts = astuple(labels)
+    right, wrong, stray, off, unsure = (100.0 * count / max(n, 1) for count in counts)
     return (
-        f"labels by the prior mesh: {labels.n} points of lines; right {right:.1f} %, "
+        f"labels by the prior mesh: {n} points of lines; right {right:.1f} %, "
         f"wrong {wrong:.2f} %, on no ring {stray:.2f} %, left out "
         f"{off + unsure:.1f} % ({unsure:.1f} ambiguous, {off:.1f} off the prior)"
     )

@@ -128,23 +128,19 @@ def measure_completeness(
 ) -> Completeness:
     """Return how much of the samples was measured, and what should have been.
 
-    Args:
-        everything: All points.
-        merged: Those that stay after redundancy is removed.
-        expected: Of the target; without a claim, all samples are asked for.
-        tau_m: One ring gap [m].
+    Of samples of the target; without a claim, all are asked for.
     """
     samples, predicted = expected.samples, expected.measured
     claimed = np.ones(len(samples), dtype=bool) if predicted is None else predicted
     thresholds = (0.5 * tau_m, tau_m, 2.0 * tau_m)
     reach = 2.01 * tau_m
     near = nearest_distance(merged, samples.take(claimed), reach)
-    half, whole, twice = (_share(near <= threshold) for threshold in thresholds)
+    half, whole, twice = (share_of(near <= threshold) for threshold in thresholds)
     missing = claimed & ~(nearest_distance(everything, samples, reach) <= tau_m)
     return Completeness(
         thresholds,
         (half, whole, twice),
-        None if predicted is None else _share(missing[claimed]),
+        None if predicted is None else share_of(missing[claimed]),
         missing,
     )
 
@@ -180,5 +176,6 @@ def judge(
     return tuple(failures)
 
 
-def _share(values: Mask) -> float:
+def share_of(values: Mask) -> float:
+    """Return the share that is true; 0 of none."""
     return float(np.mean(values)) if len(values) else 0.0

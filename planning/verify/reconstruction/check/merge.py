@@ -30,8 +30,7 @@ class Merged:
     Attributes:
         cloud: The points that stay.
         stays: Which of all points these are, shape (n_all,).
-        normals: Estimated from the points around each, towards the camera; NaN where
-            too few lie around, shape (n, 3).
+        normals: By the points around, towards the camera; NaN: too few, shape (n, 3).
         sigma: Standard deviation of each point along its normal [m]; NaN likewise.
     """
 

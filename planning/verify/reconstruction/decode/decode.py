@@ -211,6 +211,10 @@ def _out_of_order(flips: Indices, named: Indices) -> bool:
 def _cloud(
     edges: ImageEdges, rays: Array, hits: RingHits, calibration: PairCalibration
 ) -> Cloud:
+    """Points, which move on their rings with the edges: t dr - r (m.t dr)/(r.m)."""
+    beside = calibration.camera.rays(edges.pixels + 0.5 * edges.across)
+    moved = 2.0 * hits.distances[:, None] * (beside - rays)
+    slide = np.einsum("ij,ij->i", moved, hits.normals)
     return Cloud(
         points=hits.points,
         rays=rays,
@@ -220,16 +224,6 @@ def _cloud(
         projector=np.zeros(len(edges), dtype=np.int16),
         ring=edges.rings.astype(np.int16),
         conditioning=hits.conditioning,
-        shift=_shift(edges, rays, hits, calibration),
+        shift=moved - (slide / hits.conditioning)[:, None] * rays,
         noise_px=edges.noise_px,
     )
-
-
-def _shift(
-    edges: ImageEdges, rays: Array, hits: RingHits, calibration: PairCalibration
-) -> Array:
-    """Move of a point on its ring surface with its edge: t dr - r (m.t dr)/(r.m)."""
-    beside = calibration.camera.rays(edges.pixels + 0.5 * edges.across)
-    moved = 2.0 * hits.distances[:, None] * (beside - rays)
-    slide = np.einsum("ij,ij->i", moved, hits.normals)
-    return moved - (slide / hits.conditioning)[:, None] * rays

@@ -39,9 +39,7 @@ Occluder = RayCaster | Both
 def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
     """Return the bodies of all devices but one, and obstacles; None of nothing.
 
-    Args:
-        scanner: What really stands there.
-        name: Id of the device whose light or view they are in the way of.
+    They are in the way of the light or view of the device of that name.
     """
     every = (*scanner.projectors, *scanner.cameras)
     corners = [
