@@ -6,7 +6,7 @@ from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import grouped
 from geometry.poses import fibonacci_cap
-from geometry.rays.rays import RayCaster
+from geometry.rays.rays import RayCaster, equal_parts
 
 from .openness import Spots, spots_on
 
@@ -41,10 +41,8 @@ def containers(
     spots = spots_on(mesh, 0, group=patch, least=least, within=inner[patch])
     pairs = np.concatenate(
         [
-            _spots_inside(mesh, patch, spots.take(slice_), n, caster)
-            for slice_ in np.array_split(
-                np.arange(len(spots)), -(-len(spots) // _CHUNK)
-            )
+            _spots_inside(mesh, patch, spots.take(part), n, caster)
+            for part in equal_parts(len(spots), _CHUNK)
         ]
     )
     pairs, counts = np.unique(pairs, return_counts=True)

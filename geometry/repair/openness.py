@@ -14,7 +14,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
-from geometry.rays.rays import RayCaster
+from geometry.rays.rays import RayCaster, equal_parts
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 # Fractional parts of multiples of these fill a line, a square evenly (Roberts' R2).
@@ -44,7 +44,7 @@ class Spots:
     def __len__(self) -> int:
         return len(self.faces)
 
-    def take(self, chosen: Ints | Mask) -> "Spots":
+    def take(self, chosen: slice) -> "Spots":
         """Return some of the spots."""
         return Spots(
             self.faces[chosen],
@@ -128,9 +128,7 @@ def look_out(
     around = np.arange(n_rays) * _GOLDEN
     escaped = np.empty(len(spots), dtype=np.int64)
     offset = side * _OFFSET * caster.extent
-    step = max(_MAX_RAYS // n_rays, 1)
-    for begin in range(0, len(spots), step):
-        part = slice(begin, begin + step)
+    for part in equal_parts(len(spots), max(_MAX_RAYS // n_rays, 1)):
         e1, e2, normal = np.moveaxis(spots.frames[part], 1, 0)
         angle = spots.turns[part, None] + around
         along = (
