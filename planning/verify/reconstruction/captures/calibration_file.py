@@ -14,13 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from scipy.spatial.transform import Rotation
 
 from planning.model.errors import CalibrationError
-from planning.model.table_types import (
-    Name,
-    Table,
-    WrittenPose,
-    fault_words,
-    read_pose,
-)
+from planning.model.table_types import Name, Table, WrittenPose, fault_words, read_pose
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,

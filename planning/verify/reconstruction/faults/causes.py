@@ -31,15 +31,12 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
         causes += wrong_roots(plan, decoded) if not diagnosed else []
     incomplete = where_missing(measured, displaced=bool(causes)) + causes
     inaccurate = causes or [where_inaccurate(plan, measured.cloud)]
+    # So `judge` words that something is missing.
+    absent = "predicted measured"
     return tuple(
-        "; ".join([clause, *(incomplete if _of_coverage(clause) else inaccurate)])
+        "; ".join([clause, *(incomplete if absent in clause else inaccurate)])
         for clause in failures
     )
-
-
-def _of_coverage(clause: str) -> bool:
-    """Whether a clause of `judge` says that something is missing."""
-    return "predicted measured" in clause
 
 
 def _unordered(measured: MeasuredClouds) -> list[str]:

@@ -15,6 +15,7 @@ from planning.verify.reconstruction.calibration import DeviceCalibration
 from .supposed import Evidence, Object, Role, Supposed
 
 Move = Literal["swap", "afar", "turn", "shift", "zoom"]
+Moves = tuple[Move, ...]
 _N_PARAMETERS: dict[Move, int] = {
     "swap": 0,
     "afar": 0,
@@ -43,7 +44,7 @@ class Correction:
 
     role: Role
     devices: tuple[int, ...]
-    moves: tuple[Move, ...]
+    moves: Moves
     reach_m: float = 1.0
     size_m: float = 1.0
     pose: Array | None = None
@@ -54,7 +55,7 @@ class Correction:
         supposed: Supposed,
         role: Role,
         index: int,
-        moves: tuple[Move, ...],
+        moves: Moves,
         pose: Array | None = None,
     ) -> Self:
         """Return a change of one device, or of the object."""

@@ -37,17 +37,14 @@ def diagnose(plan: Scanner, evidence: Evidence) -> tuple[Cause, ...]:
     causes: list[Cause] = []
     while len(causes) < _MOST_CAUSES and state.misfit() > fine:
         good = _equally_good(state.explanations())
-        if not (good and _helps(good[0])):
+        if not good:
+            break
+        before, after = (s.misfit(good[0].concerned) for s in (state, good[0].after))
+        if after > _MUST_LEAVE * before:
             break
         causes.append(good)
         state = good[0].after
     return tuple(causes)
-
-
-def _helps(one: Explanation) -> bool:
-    """Whether it removes most of the mismatch of the edges that it bears on."""
-    before, after = (s.misfit(one.concerned) for s in (one.before, one.after))
-    return after <= _MUST_LEAVE * before
 
 
 def _equally_good(tried: list[Explanation]) -> Cause:

@@ -13,7 +13,7 @@ import numpy as np
 from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import DeviceCalibration
 
-from .corrections import Correction, Move, far_poses, turns_aside
+from .corrections import Correction, Moves, far_poses, turns_aside
 from .fits import fit
 from .supposed import Evidence, Places, Role, Supposed, mismatches, places
 
@@ -26,18 +26,13 @@ _FAR_CAP_M = 5e-2
 # Beyond so many times what is fine, other places than those nearby are looked at.
 _FAR_TIMES = 4.0
 _ROLES: tuple[Role, Role] = ("cameras", "projectors")
-_DEVICE_MOVES: tuple[tuple[Move, ...], ...] = (
-    ("zoom",),
-    ("turn",),
-    ("shift",),
-    ("turn", "shift"),
-)
-_OBJECT_MOVES: tuple[tuple[Move, ...], ...] = (
+_DEVICE_MOVES: tuple[Moves, ...] = ("zoom",), ("turn",), ("shift",), ("turn", "shift")
+_OBJECT_MOVES: tuple[Moves, ...] = (
     ("zoom",),
     ("turn", "shift"),
     ("turn", "shift", "zoom"),
 )
-_FAR_MOVES: tuple[Move, ...] = ("afar", "turn", "shift")
+_FAR_MOVES: Moves = ("afar", "turn", "shift")
 # A change and its parameters.
 Start = tuple[Correction, Array]
 # Starts are compared on every fourth edge, the best few are fitted.
