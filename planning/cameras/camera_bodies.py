@@ -23,13 +23,7 @@ from .camera_cover import CameraCover, candidate_cover
 
 @dataclass(frozen=True, eq=False)
 class CameraInterference(Interference):
-    """Cameras, and the lit samples that they measure.
-
-    Attributes:
-        scene: With the bodies of the projectors.
-        projectors: As planned.
-        samples: Samples that the projectors light, were there no cameras.
-    """
+    """Cameras, and the lit samples that each measures, were it alone."""
 
     devices: Sequence[PlannedCamera]
     scene: Scene
@@ -94,11 +88,7 @@ def lit_among(
     samples: LitSamples,
     cameras: Sequence[PlannedCamera],
 ) -> NDArray[np.bool_]:
-    """Return which projector lights which sample past the bodies of planned cameras.
-
-    Returns:
-        Shape (n, n_projectors).
-    """
+    """Return which projector lights which sample past the bodies of planned cameras."""
     bodies = bodies_of(camera for camera in cameras if not camera.existing)
     lit = samples.lit.copy()
     for p, projector in enumerate(projectors):

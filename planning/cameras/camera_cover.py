@@ -30,12 +30,7 @@ _ROUNDS = 3
 
 
 class NothingMeasuredError(InfeasibleLimitsError):
-    """No candidate measures any lit sample.
-
-    Attributes:
-        cameras: The candidates.
-        samples: The lit samples.
-    """
+    """No candidate, of these cameras, measures any of the lit samples."""
 
     def __init__(
         self, message: str, cameras: tuple[PlannedCamera, ...], samples: LitSamples

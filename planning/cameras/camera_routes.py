@@ -87,8 +87,7 @@ def better_route(
 ) -> tuple[CameraCover, RouteCounts, tuple[PlannedCamera, ...]]:
     """Return the cover that needs fewest cameras, and what either route needs.
 
-    Returns:
-        Also as many cameras of the paper's route, where the cover's stay.
+    Also as many cameras of the paper's route, where the cover's stay.
     """
     if by == "paper":
         cover = _again_if_fewer(scene, projectors, cover)

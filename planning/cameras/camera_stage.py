@@ -23,12 +23,7 @@ _SPARE = 0.002
 
 @dataclass(frozen=True, eq=False)
 class CameraSolution:
-    """Cameras as placed, and the projectors with their ring axes moved for them.
-
-    Attributes:
-        projectors: With the ring axes that the cameras were chosen for.
-        stage: Candidates, cover and certificate, for exactly these ring axes.
-    """
+    """Cameras, and the projectors with the ring axes that they were proved for."""
 
     projectors: tuple[PlannedProjector, ...]
     stage: CameraStage

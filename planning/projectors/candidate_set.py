@@ -59,14 +59,9 @@ class CandidateSource:
 
 @dataclass(frozen=True, eq=False)
 class CandidateSet:
-    """Candidate poses, and what forbids each of them at each sample.
+    """Candidate poses, and the first limit that each violates at each sample, (n, k).
 
-    Attributes:
-        scene: Surface and requirements.
-        samples: Samples of the target.
-        projectors: The poses.
-        stages: First violated limit of each sample and pose, shape (n, k).
-        n_existing: First poses that are taken whatever they light, and stay.
+    The first `n_existing` are taken whatever they light, and stay.
     """
 
     scene: Scene
@@ -140,11 +135,7 @@ class CandidateSet:
 
 
 class NothingLitError(InfeasibleLimitsError):
-    """No candidate lights any sample.
-
-    Attributes:
-        candidates: The poses, the samples, and what forbids each.
-    """
+    """No candidate lights any sample."""
 
     def __init__(self, candidates: CandidateSet) -> None:
         n_causes = len(projector_limits.CAUSES)

@@ -19,7 +19,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
 from planning.proofs.selection import cover_problem
 from planning.scene.placed_bodies import movable
@@ -41,12 +40,8 @@ _SCALES = (1.0, 0.5, 0.25)
 def margin_at_share(margin: NDArray[np.float64], required: int) -> float:
     """Return the margin that so many samples have at least, in [rad].
 
-    Args:
-        margin: Of each sample (row) and projector, -inf where unlit, shape (n, k).
-        required: Samples that count, at least 1.
-
-    Returns:
-        Minus infinity where fewer are lit.
+    Margins of each sample (row) and projector are -inf where unlit, and so is the
+    answer where fewer are lit.
     """
     if required > len(margin):
         return -np.inf
@@ -100,14 +95,12 @@ def widest_between(
 ) -> tuple[PlannedProjector, ...]:
     """Return as many projectors at poses of larger margin, where there are any."""
     n_existing = len(projectors) - len(movable(projectors))
-    margin, last = margins(projectors), projectors[-1]
-    source = CandidateSource(scene, last)
+    margin, source = margins(projectors), CandidateSource(scene, projectors[-1])
     for scale in _SCALES:
         between = source.around(projectors, n_lattice, scale)
         if not between:
             break
-        moved = tuple(moved_to(last, p.world_from_device) for p in between)
-        margin = np.concatenate([margin, margins(moved)], axis=1)
+        margin = np.concatenate([margin, margins(between)], axis=1)
         chosen = widest_selection(
             margin,
             np.arange(len(projectors)),
@@ -115,7 +108,7 @@ def widest_between(
             seed=scene.seed,
             n_existing=n_existing,
         )
-        candidates = (*projectors, *moved)
+        candidates = (*projectors, *between)
         projectors = tuple(candidates[i] for i in chosen)
         margin = margin[:, chosen]
     return projectors

@@ -118,12 +118,7 @@ def _one_fewer(
 
 @dataclass(frozen=True, eq=False)
 class PlannedStage:
-    """What projector and camera stages have in common.
-
-    Attributes:
-        by_count: Best devices found for each number of them, for the marginal table.
-        certificate: What was proved, as the plan says it.
-    """
+    """What was proved of a kind of device, and the best found of each number."""
 
     by_count: Mapping[int, tuple[Any, ...]]
     certificate: Certificate

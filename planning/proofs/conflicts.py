@@ -188,11 +188,7 @@ def _compatible(
 def _harmless(
     among: Interference, standing: list[int], every: list[int], spare: int
 ) -> NDArray[np.bool_]:
-    """What candidates cover; nothing where they cost those that stand more than spare.
-
-    A cover can't count samples that a member takes away, so who takes many isn't
-    offered.
-    """
+    """What candidates cover; nothing where they take too much from those standing."""
     covers = among.covers(standing, every)
     before = int(covers[:, standing].any(axis=1).sum())
     if before <= spare:

@@ -107,11 +107,7 @@ def _promising(
 
 
 def _within(cube: CubeMap, workspace: Workspace, aside: float) -> NDArray[np.bool_]:
-    """Return the cells from which parallel light may come at all, shape (size,).
-
-    A device at Q is off the direction u of its light, as the centre C sees it, by
-    asin(aside / |Q - C|) at most.
-    """
+    """Cells from which light may come: Q is off it by asin(aside / |Q - C|) at most."""
     near, far = workspace.projector_radius_m
     slack = cube.radii + float(np.arcsin(min(1.0, aside / near))) + 1e-9
     along = np.arccos(np.clip(cube.centres @ np.array(workspace.axis), -1.0, 1.0))

@@ -68,13 +68,10 @@ def move_ring_axes(
 
 @dataclass(frozen=True, eq=False)
 class AxisJudge:
-    """Samples, how the cameras see them, and the best s_N by each projector.
+    """Lit samples with the rings as they stand, and how each camera sees them.
 
-    Attributes:
-        scene: Surface and requirements.
-        samples: Lit samples, with the rings of the projectors as they stand.
-        views: What each camera sees of them.
-        sigma: Least s_N over the cameras in [m]; inf where none measures, (n_p, n).
+    `sigma` is each projector's least s_N over the cameras in [m], (n_p, n); inf for
+    none.
     """
 
     scene: Scene

@@ -22,13 +22,7 @@ _SHARPEST_FACET = np.deg2rad(40.0)
 
 @dataclass(frozen=True, eq=False)
 class Creases:
-    """Points spread along the creases of a mesh, each for a piece of equal length.
-
-    Attributes:
-        points: In the world in [m], shape (n, 3).
-        faces: The two faces that meet there, shape (n, 2).
-        length: Of each piece in [m], shape (n,).
-    """
+    """Points (n, 3) along creases, the faces (n, 2) that meet there, and lengths."""
 
     points: NDArray[np.float64]
     faces: NDArray[np.int64]
@@ -56,13 +50,10 @@ def find_creases(mesh: TriangleMesh, step: float) -> Creases:
 def crease_errors(
     scene: Scene, projector: PlannedProjector, creases: Creases
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Return which points a projector lights, and the error J h / 4 of a slope jump J.
+    """Return which points are lit on both sides, and the error J h / 4 of a jump J.
 
     Along the beam, radially: a face of normal n rises by -(n.m)/(n.L) a metre across
-    the rings; J is the difference of both faces', h the gap of the rings there.
-
-    Returns:
-        Lit on both sides; J h / 4 in [m], (n,) each.
+    the rings; J is the difference of both faces', h the gap of the rings there [m].
     """
     mesh = scene.mesh
     rings = code_surfaces(projector, creases.points)

@@ -28,12 +28,10 @@ def best_pitch(
     views: Sequence[ViewedSamples],
     samples: LitSamples,
 ) -> NDArray[np.float64]:
-    """Return each projector's largest pitch among the cameras that measure a sample.
+    """Return each projector's largest pitch [px] of cameras that measure a sample.
 
-    The light of the samples is used; their rings are computed anew.
-
-    Returns:
-        In [px], 0 where no pair of this projector measures, shape (n, n_projectors).
+    0 where none does, shape (n, n_projectors). The light of the samples is used; their
+    rings are computed anew.
     """
     for p, projector in enumerate(projectors):
         samples = samples.with_code(p, projector)

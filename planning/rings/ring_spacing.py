@@ -77,11 +77,7 @@ def spaced_radii(
 
 
 def _with_centre(radii: NDArray[np.float64], limits: GapLimits) -> NDArray[np.float64]:
-    """What lies inside the innermost ring is as near to it as it is to the next.
-
-    So that ring moves inwards, or where that would widen a gap beyond h_max, it gets
-    another one inside.
-    """
+    """Halve the innermost ring, or add one inside where a gap would be too wide."""
     half = 0.5 * radii[1]
     if radii[0] <= half:
         return radii

@@ -40,13 +40,7 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class RingStage:
-    """The projectors with their final rings, and what is to be said of each.
-
-    Attributes:
-        projectors: As placed, with their own radii.
-        even_radii: Those that each had before.
-        records: `rings` of each projector in the plan.
-    """
+    """Projectors with their final rings, the even radii, and `rings` of the plan."""
 
     projectors: tuple[PlannedProjector, ...]
     even_radii: tuple[NDArray[np.float64], ...]

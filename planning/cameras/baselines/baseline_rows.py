@@ -64,8 +64,7 @@ def baseline_rows(
 ) -> list[BaselineRow]:
     """Return one row for each order of each neighbouring pair of cameras.
 
-    Returns:
-        The plan's `baselines`; `docs/method/baselines.md` defines every key.
+    `docs/method/baselines.md` defines every key.
     """
     rows: list[BaselineRow] = []
     pairs = neighbouring_pairs(measured_by, surface)

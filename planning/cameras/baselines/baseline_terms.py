@@ -43,15 +43,7 @@ _EASE = 0.03
 
 @dataclass(frozen=True, eq=False)
 class BaselineTerms:
-    """Cameras as they stand, and what binds them on the samples.
-
-    Attributes:
-        cameras: As they stand.
-        measured_by: Which camera measures which sample now, shape (n, k).
-        surface: The samples.
-        limits: What binds.
-        rings: What each projector draws on them; None: no rings.
-    """
+    """Cameras as they stand, which measures which sample (n, k), and what binds."""
 
     cameras: Sequence[PlannedCamera]
     measured_by: NDArray[np.bool_]

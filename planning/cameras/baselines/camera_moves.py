@@ -1,12 +1,12 @@
 """How cameras move: the points that they look at stay, and their rolls."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
+from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 
@@ -20,10 +20,7 @@ def poses_of(cameras: Sequence[PlannedCamera]) -> _Array:
 
 def at_poses(cameras: Sequence[PlannedCamera], poses: _Array) -> list[PlannedCamera]:
     """Return the cameras at other poses, shape (k, 4, 4)."""
-    return [
-        replace(camera, world_from_device=pose)
-        for camera, pose in zip(cameras, poses, strict=True)
-    ]
+    return [moved_to(camera, pose) for camera, pose in zip(cameras, poses, strict=True)]
 
 
 def aims_and_rolls(

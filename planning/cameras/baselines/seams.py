@@ -31,12 +31,7 @@ _FIRM = 2
 
 @dataclass(frozen=True, eq=False)
 class SampledSurface:
-    """Area-true samples of the target.
-
-    Attributes:
-        points: In [m], shape (n, 3).
-        normals: Unit face normals, shape (n, 3).
-    """
+    """Area-true samples of the target: points [m] and unit normals, (n, 3) each."""
 
     points: _Array
     normals: _Array
@@ -139,15 +134,12 @@ def _border(count: NDArray[np.int64], reach: NDArray[np.bool_]) -> NDArray[np.in
 def neighbouring_pairs(
     measured_by: NDArray[np.bool_], surface: SampledSurface
 ) -> list[tuple[int, int]]:
-    """Return the pairs of cameras whose parts overlap or touch by enough of the target.
+    """Return pairs (a, b), a < b, of cameras whose parts overlap or touch by enough.
 
     Parts overlap by enough if both measure at least `MIN_OVERLAP_SHARE` of the n
     samples. They touch by enough if the line along which they meet is at least as long
     as the side of a square of that area: on samples, at least sqrt(MIN_OVERLAP_SHARE n)
     of either part have a near one in the other only.
-
-    Returns:
-        Pairs (a, b) with a < b, in increasing order.
     """
     least = MIN_OVERLAP_SHARE * len(measured_by)
     pairs: list[tuple[int, int]] = []
@@ -173,10 +165,7 @@ def overlap_components(measured_by: NDArray[np.bool_]) -> list[list[int]]:
     """Return the groups of cameras whose parts can be registered with each other.
 
     Two parts can be registered if both measure at least `MIN_OVERLAP_SHARE` of the
-    samples; to touch is not enough.
-
-    Returns:
-        Groups of camera indices, each increasing, ordered by their first camera.
+    samples; to touch is not enough. Groups are ordered by their first camera.
     """
     part = measured_by.astype(np.float64)
     shared = part.T @ part

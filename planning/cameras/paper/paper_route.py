@@ -38,12 +38,7 @@ class PaperRoute:
 
 
 def paper_route(problem: RouteProblem) -> PaperRoute:
-    """Plan cameras by the largest baselines alone.
-
-    Returns:
-        Cameras that measure the required samples; as many as help where nothing more
-        does.
-    """
+    """Plan cameras by the largest baselines alone; where short, as many as help."""
     by_count: dict[int, Cameras] = {}
     placed, best_without_one = _best_start(problem, by_count)
     while len(placed.cameras) > len(problem.fixed):

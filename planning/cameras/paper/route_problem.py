@@ -52,12 +52,7 @@ class RouteProblem:
 
 @dataclass(frozen=True, eq=False)
 class CameraSet:
-    """Cameras, existing ones first.
-
-    Attributes:
-        cameras: The cameras.
-        measured: Which measures which sample, shape (n, k).
-    """
+    """Cameras, existing ones first, and which measures which sample, shape (n, k)."""
 
     cameras: Cameras
     measured: _Measured

@@ -34,12 +34,7 @@ _SPREAD = 5
 
 @dataclass(frozen=True, eq=False)
 class DirectionTree:
-    """A quadtree of directions on each face of a cube.
-
-    Attributes:
-        levels: Bit rows of the cells of cube maps of 1, 2, 4, ... cells an edge.
-        n_rows: Number of samples.
-    """
+    """A quadtree of directions on each face of a cube; bit rows of every level."""
 
     levels: tuple[NDArray[np.uint64], ...]
     n_rows: int

@@ -79,12 +79,9 @@ class Seen(NamedTuple):
 def directions_of(
     cubes: Sequence[CubeMap], level: NDArray[np.int64], cell: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return unit middles of cells, and the angle about each that holds the cell.
+    """Return unit middles of cells, and the angle about each that holds the cell [rad].
 
     `cubes` are cube maps of 1, 2, 4, ... cells an edge.
-
-    Returns:
-        Shapes (n, 3) and (n,), the latter in [rad].
     """
     middles, radii = np.empty((cell.size, 3)), np.empty(cell.size)
     for k in np.unique(level):
