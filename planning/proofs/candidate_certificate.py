@@ -22,7 +22,6 @@ from .selection import (
     Marginals,
     Selection,
     marginals,
-    others_instead,
 )
 
 _ByCount = Mapping[int, NDArray[np.int64]]
@@ -43,7 +42,11 @@ def certified(
     """
     others = marginals(cover, selection)
     if by_count is not None:
-        others = others_instead(others, by_count, cover)
+        reported = {n: by_count[n] for n in others.by_count if n in by_count}
+        covered = {
+            n: (cover.n_covered(c), others.n_covered[n][1]) for n, c in reported.items()
+        }
+        others = replace(others, by_count=reported, n_covered=covered)
     bodied = among is not None and among.bodied
     if among is not None:
         others = resolve_others(among, cover, others, len(selection.chosen))

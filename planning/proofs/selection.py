@@ -4,8 +4,7 @@ Both stages pose the same program: samples are area-true, all of equal weight, s
 weights are counts and every comparison is exact.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -208,20 +207,6 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
             n_covered[count] = cover.n_covered(best), bound
         by_count[count] = best
     return Marginals(by_count, n_covered, _greedy_count(cover))
-
-
-def others_instead(
-    others: Marginals, by_count: Mapping[int, NDArray[np.int64]], cover: CandidateCover
-) -> Marginals:
-    """Return marginals with other candidates for each count, and the same bounds.
-
-    Counts for which there are none are left out.
-    """
-    reported = {n: by_count[n] for n in others.by_count if n in by_count}
-    covered = {
-        n: (cover.n_covered(c), others.n_covered[n][1]) for n, c in reported.items()
-    }
-    return replace(others, by_count=reported, n_covered=covered)
 
 
 def cover_problem(

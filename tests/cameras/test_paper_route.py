@@ -122,8 +122,9 @@ def test_a_sphere_band_takes_as_many_as_its_closed_form_says(latitude, count):
     latitude = np.radians(latitude)
     assert sphere_band_limit(RADIUS, RING, THETA, latitude).n_min == count
     body = band(latitude)
-    route = paper_route(body.problem())
-    assert route.met
+    problem = body.problem()
+    route = paper_route(problem)
+    assert route.cameras.count >= problem.required
     assert len(route.cameras.cameras) == count
     assert body.measure(route.cameras.cameras).any(axis=1).all()
     assert route.best_without_one < len(body.points)
@@ -132,16 +133,18 @@ def test_a_sphere_band_takes_as_many_as_its_closed_form_says(latitude, count):
 @pytest.mark.parametrize(("half_height", "count"), [(0.02, 4), (0.9, 5)])
 def test_an_upright_cylinder_takes_as_many_as_its_closed_form_says(half_height, count):
     assert cylinder_limit(RADIUS, RING, THETA, half_height).n_min == count
-    route = paper_route(side(half_height).problem())
-    assert route.met
+    problem = side(half_height).problem()
+    route = paper_route(problem)
+    assert route.cameras.count >= problem.required
     assert len(route.cameras.cameras) == count
 
 
 def test_a_part_of_the_turn_lets_cameras_go_and_the_rest_slide_to_the_limit():
     """Two of the ring's four do for 200 degrees, at most 2 eta = 110 degrees apart."""
     body = band(np.radians(5.0), span=np.radians(100.0))
-    route = paper_route(body.problem())
-    assert route.met
+    problem = body.problem()
+    route = paper_route(problem)
+    assert route.cameras.count >= problem.required
     first, last = azimuths(route.cameras.cameras)
     assert 2.0 * (np.radians(100.0) - ETA) < last - first < 2.0 * ETA
     assert 2.0 * np.sin((last - first) / 2) == pytest.approx(
@@ -155,8 +158,9 @@ def test_a_part_of_the_turn_lets_cameras_go_and_the_rest_slide_to_the_limit():
 
 def test_half_of_the_turn_takes_half_of_the_ring():
     """A share of the requirement is what must be measured, no more."""
-    route = paper_route(band(np.radians(5.0)).problem(share=0.58))
-    assert route.met
+    problem = band(np.radians(5.0)).problem(share=0.58)
+    route = paper_route(problem)
+    assert route.cameras.count >= problem.required
     assert len(route.cameras.cameras) == 2
 
 
@@ -182,7 +186,6 @@ def test_a_ring_that_misses_a_part_grows_a_camera_over_it():
 def test_what_no_camera_can_measure_ends_the_route_short():
     body = band(np.radians(5.0))
     route = paper_route(body.problem(required=len(body.points) + 1))
-    assert not route.met
     assert route.cameras.count == len(body.points)
     nothing = body.problem(stand=lambda directions: ())
     assert paper_route(nothing).by_count == {}
@@ -191,8 +194,9 @@ def test_what_no_camera_can_measure_ends_the_route_short():
 def test_cameras_that_stand_already_stay_and_count():
     body = band(np.radians(5.0))
     given = replace(at(0.3), existing="old")
-    route = paper_route(body.problem(fixed=(given,)))
-    assert route.met
+    problem = body.problem(fixed=(given,))
+    route = paper_route(problem)
+    assert route.cameras.count >= problem.required
     assert len(route.cameras.cameras) == 4
     np.testing.assert_array_equal(
         route.cameras.cameras[0].world_from_device, given.world_from_device

@@ -27,13 +27,11 @@ class PaperRoute:
         cameras: The cameras, and what they measure.
         by_count: Cameras for 1, 2, ... of them, on the way and beyond; those of the
             final count at their largest baselines.
-        met: Whether they measure what is required.
         best_without_one: Most samples that one camera fewer was seen to measure.
     """
 
     cameras: CameraSet
     by_count: dict[int, Cameras]
-    met: bool
     best_without_one: int
 
 
@@ -53,8 +51,7 @@ def paper_route(problem: RouteProblem) -> PaperRoute:
         placed = swept(problem, placed)
     _fill(problem, placed, by_count)
     by_count.pop(0, None)
-    met = placed.count >= problem.required
-    return PaperRoute(placed, by_count, met, best_without_one)
+    return PaperRoute(placed, by_count, best_without_one)
 
 
 def _best_start(

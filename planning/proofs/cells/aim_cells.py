@@ -51,7 +51,9 @@ class AimTree(GrownTree):
     ) -> tuple[NDArray[np.int64], Sequence[NDArray[Any]]]:
         place, level, _ = self.cells(names)
         may_turn = level < self._finest
-        turning = (self._open_by_aim(level) > self.positions.widths(place)) & may_turn
+        # Every aim, named by level -1, is open by pi.
+        widths = np.array([cube.radii.max() for cube in self._cubes] + [np.pi])
+        turning = (widths[level] > self.positions.widths(place)) & may_turn
         moved = self._moved(names, np.flatnonzero(~turning))
         # What can't be cut by position any more may still be by aim.
         whole = ~turning & may_turn
@@ -86,11 +88,6 @@ class AimTree(GrownTree):
         aims = np.concatenate([faces, quarters(level[~every], aim[~every]).ravel()])
         place, level, _ = self.cells(names[owner])
         return owner, place, level + 1, aims
-
-    def _open_by_aim(self, level: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return omega of cells of a level; of those with every aim, pi."""
-        widths = np.array([cube.radii.max() for cube in self._cubes] + [np.pi])
-        return widths[level]
 
     def _coverage(
         self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]

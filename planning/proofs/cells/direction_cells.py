@@ -132,22 +132,9 @@ def open_samples(
             samples.steep[part],
             drawn.faces[part],
         )
-        packed = _packed_columns(marks)
+        packed = np.packbits(marks, axis=0)
         bytes_of[:, part.start // POINTS, : len(packed)] = packed.T
 
     parts = [slice(b, b + POINTS) for b in range(0, len(samples), POINTS)]
     scene.visibility.caster.share(fill, parts)
     return rows
-
-
-def _packed_columns(marks: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return what `numpy.packbits` does along the first axis, ten times as fast.
-
-    Whole rows are joined, eight at a time: columns are what it is slow at.
-    """
-    n_bytes = -(-len(marks) // 8)
-    packed = np.zeros((n_bytes, marks.shape[1]), dtype=np.uint8)
-    for k in range(8):
-        bits = marks[k::8].view(np.uint8)
-        packed[: len(bits)] |= bits << np.uint8(7 - k)
-    return packed
