@@ -162,9 +162,9 @@ def _store(
     element: PlyElement, p: PlyProperty, values: NDArray[np.generic], lengths: Ints
 ) -> None:
     """Keep a column, in the widest type of its kind."""
-    integer = p.count_dtype is not None and values.dtype.kind != "f"
-    wide = values.astype(np.int64 if integer else np.float64)
     if p.count_dtype is None:
-        element.scalars[p.name] = wide
+        element.scalars[p.name] = values.astype(np.float64)
+    elif values.dtype.kind == "f":
+        element.lists[p.name] = PlyLists(values.astype(np.float64), lengths)
     else:
-        element.lists[p.name] = PlyLists(wide, lengths)
+        element.lists[p.name] = PlyLists(values.astype(np.int64), lengths)

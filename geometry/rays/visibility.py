@@ -142,8 +142,9 @@ class Visibility:
                 raise ValueError(f"along must be a unit vector, got {along.tolist()}")
             # The plane's own point nearest to the mesh keeps float32 from losing
             # digits.
-            local, along = (local @ along) * along, along.astype(np.float32)
-        return Source(local.astype(np.float32), along, float(np.linalg.norm(local)))
+            local = (local @ along) * along
+        light = None if along is None else along.astype(np.float32)
+        return Source(local.astype(np.float32), light, float(np.linalg.norm(local)))
 
 
 def morton_order(points: Single) -> Ints:
