@@ -21,9 +21,10 @@ from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.range_guard import Guard, guarded
 from planning.rig.rig import Rig
 from planning.rig.wishes import TargetName, Wishes
-from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
+from planning.rings.ring_radii import ring_gap, uniform_radii
 from planning.scene.bodies.clearance import check_existing_clearance
 from planning.scene.interest import Select, Weight, interest_of
+from planning.scene.lights import light_of
 from planning.scene.obstructions import Obstruction
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
@@ -99,7 +100,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         field = principal_curvatures(mesh)
         regions = _regions(request, field)
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
-    requirements, radii, tilt = _resolve(request)
+    requirements, radii = _resolve(request)
     scene = Scene(
         mesh,
         regions.face_region,
@@ -117,7 +118,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         rig.light,
         np.eye(4),
         # Upwards in the image until cameras are known.
-        ring_frame(np.eye(4), rig.projector_device(), tilt, -0.5 * np.pi),
+        ring_frame(np.eye(4), rig.projector_device(), rig.ring_offset, -0.5 * np.pi),
         rig.projector_device(),
         radii,
         body=rig.projector_body(),
@@ -141,32 +142,30 @@ def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
     return regions
 
 
-def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64], float]:
-    """Return the requirements, the ring radii, and the tilt or shift of ring axes."""
+def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
+    """Return the requirements and the ring radii."""
     mesh, rig = request.mesh, request.rig
     requirements = rig.requirements(
         mesh.centre, mesh.radius, request.wishes, tau_m=rig.standoff_m
     )
     projector, camera = rig.projector_device(), rig.camera_device()
-    parallel = rig.light == "parallel"
-    tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
+    light, offset = light_of(projector), rig.ring_offset
     workspace = requirements.workspace
     gap = rig.ring_gap_m or ring_gap(
         projector, camera, requirements.triangulation, rig.standoff_m
     )
     corner = rig.outer_ring_radius()
-    outer = outer_radius(
-        projector, tilt, mesh.radius, workspace.projector_radius_m[0], corner
-    )
+    nearest = workspace.projector_radius_m[0]
+    outer = min(corner, light.object_ring(offset, mesh.radius, nearest))
     if workspace.projector_standoff_m is not None:
         # What is looked at from beside reaches to the corners of the image.
         outer = corner
-    radii = uniform_radii(outer, gap if parallel else gap / rig.standoff_m)
+    radii = uniform_radii(outer, light.ring_step(gap, rig.standoff_m))
     x, y, z = bearing(mesh, np.array(workspace.axis)).tolist()
     workspace = replace(
         workspace, reference_ring_radius=float(radii[-1]), bearing=(x, y, z)
     )
-    return replace(requirements, workspace=workspace), radii, tilt
+    return replace(requirements, workspace=workspace), radii
 
 
 def _steep(regions: DominantRegions, target: str | None) -> NDArray[np.float64]:

@@ -81,26 +81,3 @@ def blur_diameter(
     aperture = focal_m / f_number
     magnification = focal_m / (focus_m - focal_m)
     return aperture * magnification * abs(distance_m - focus_m) / distance_m
-
-
-def largest_corner_tangent(
-    camera_matrix: NDArray[np.float64], resolution: tuple[int, int], turn: float
-) -> float:
-    """Return the tangent of the cone that holds the image from any turned axis.
-
-    A cone about the optical centre whose axis is turned by `turn` against the optical
-    axis, in whatever direction, contains the whole image iff its half opening is at
-    least the angle of the farthest corner plus the turn::
-
-        R = tan(max_corner angle + turn)
-
-    Without distortion; infinite where the cone would open to a half space or more.
-    """
-    width, height = resolution
-    u = np.array([-0.5, width - 0.5])
-    v = np.array([-0.5, height - 0.5])
-    x = (u - camera_matrix[0, 2]) / camera_matrix[0, 0]
-    y = (v - camera_matrix[1, 2]) / camera_matrix[1, 1]
-    widest = math.atan(math.hypot(float(np.abs(x).max()), float(np.abs(y).max())))
-    opening = widest + turn
-    return math.tan(opening) if opening < 0.5 * math.pi else math.inf

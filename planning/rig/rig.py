@@ -20,8 +20,8 @@ from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.obstacles import Obstacle
 from planning.model.requirements import Requirements, Workspace
+from planning.scene.lights import light_of
 
-from . import optics
 from .existing_tables import build_existing, check_existing
 from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
@@ -78,17 +78,10 @@ class Rig:
         return self.table.placement.standoff_play_mm * 1e-3
 
     @property
-    def ring_tilt_rad(self) -> float:
-        """Turn of the ring axis against the projector's optical axis in [rad]."""
-        return math.radians(self.table.rings.tilt_deg)
-
-    @property
-    def ring_shift_m(self) -> float:
-        """Shift of the ring axis in the panel's plane, parallel light, in [m].
-
-        ``standoff tan(tilt)``: as far on the object as the turned axis would move.
-        """
-        return self.standoff_m * math.tan(self.ring_tilt_rad)
+    def ring_offset(self) -> float:
+        """Tilt of the ring axis [rad]; in parallel light its shift on the panel [m]."""
+        tilt = math.radians(self.table.rings.tilt_deg)
+        return light_of(self._projector).ring_offset(tilt, self.standoff_m)
 
     @property
     def ring_gap_m(self) -> float | None:
@@ -134,19 +127,8 @@ class Rig:
         return Body.of(self.table.camera.body)
 
     def outer_ring_radius(self) -> float:
-        """Return the outermost ring, wherever the ring axis is turned or shifted to.
-
-        Diverging: tangent of the angle between ring axis and farthest image corner,
-        ``tan(corner + tilt)``. Parallel: half the panel's diagonal (the beam's radius
-        if that is less) plus the shift, in [m].
-        """
-        device = self.projector_device()
-        if isinstance(device, PinholeModel):
-            return optics.largest_corner_tangent(
-                device.camera_matrix, device.resolution, self.ring_tilt_rad
-            )
-        reach = min(float(np.hypot(*device.half_panel)), device.beam_reach)
-        return reach + self.ring_shift_m
+        """Return the outermost ring, wherever the ring axis is turned or shifted to."""
+        return light_of(self._projector).image_ring(self.ring_offset)
 
     def notes(self, object_radius_m: float | None = None) -> tuple[str, ...]:
         """Return what a user should know of these limits, a sentence each.
@@ -173,18 +155,15 @@ class Rig:
     def _depth_notes(self, radius: float) -> list[str]:
         """Compare the rim of a ball, the farthest it shows, with what is sharp."""
         centre = self.standoff_m + self.standoff_play_m + radius
-        rim = math.sqrt(centre**2 - radius**2)
-        # Along a parallel beam the rim is as deep as the ball's centre.
-        depth = rim if self.light == "diverging" else centre
-        cases = (
-            ("camera", self.camera_device(), rim),
-            ("projector", self.projector_device(), depth),
-        )
         return [
             f"the {role} is sharp to {device.range_m[1]:.2f} m, and the rim of an "
             f"object of radius {radius * 1e3:.0f} mm can be {far:.2f} m away"
-            for role, device, far in cases
-            if far > device.range_m[1]
+            for role, device in (
+                ("camera", self._camera),
+                ("projector", self._projector),
+            )
+            if (far := light_of(device).rim_distance(centre, radius))
+            > device.range_m[1]
         ]
 
     def requirements(
@@ -247,7 +226,7 @@ class Rig:
 
         Tables whose keys end in _mm or _deg are as written in the rig file.
         """
-        table, parallel = self.table, self.light == "parallel"
+        table = self.table
         # No key where there are none.
         listed = {
             key: [entry.to_document() for entry in getattr(table, key)]
@@ -268,8 +247,9 @@ class Rig:
             "n_candidate_projectors": table.placement.n_candidate_projectors,
             "n_candidate_cameras": table.placement.n_candidate_cameras,
             "rings": {
-                "tilt": None if parallel else self.ring_tilt_rad,
-                "shift_m": self.ring_shift_m if parallel else None,
+                "tilt": None,
+                "shift_m": None,
+                light_of(self._projector).offset_key: self.ring_offset,
                 "gap_m": self.ring_gap_m,
                 "spacing": self.ring_spacing,
                 "outer_radius": self.outer_ring_radius(),

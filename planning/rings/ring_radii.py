@@ -49,33 +49,6 @@ def ring_axis(
     return frame[:2, 2] / (1.0 + frame[2, 2])
 
 
-def outer_radius(
-    device: PinholeModel | ParallelModel,
-    tilt: float,
-    object_radius: float,
-    least_distance: float,
-    corner_radius: float,
-) -> float:
-    """Return the outermost ring: it holds the whole object, or the whole image.
-
-    Args:
-        device: Optics.
-        tilt: As in `ring_frame`.
-        object_radius: Radius of the sphere that holds the object [m].
-        least_distance: From the projector to the sphere's centre, at least [m].
-        corner_radius: The ring that reaches the farthest corner of the image.
-
-    Returns:
-        Tangent R (diverging), or radius in [m] (parallel).
-    """
-    if isinstance(device, ParallelModel):
-        return min(corner_radius, tilt + object_radius)
-    if object_radius >= least_distance:
-        return corner_radius
-    reach = tilt + np.arcsin(object_radius / least_distance)
-    return corner_radius if reach >= np.pi / 2 else min(corner_radius, np.tan(reach))
-
-
 def ring_gap(
     projector: PinholeModel | ParallelModel,
     camera: PinholeModel,

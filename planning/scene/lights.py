@@ -6,6 +6,7 @@ rings are cylinders of radius R in [m]. A light belongs to a projector's optics 
 holds no pose.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,7 @@ class DivergingLight:
 
     device: PinholeModel
     reach_words = "an image that reaches {:.0f} degrees off its middle on every side"
+    offset_key = "tilt"
 
     def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
         """Return unit L = (P - Q) / |P - Q|, (n, 3), and |P - Q| in [m], (n,)."""
@@ -95,6 +97,36 @@ class DivergingLight:
         local /= np.linalg.norm(local, axis=1, keepdims=True)
         return frame[:3, 3], local @ frame[:3, :3].T
 
+    def ring_offset(self, tilt: float, standoff: float) -> float:
+        """Return how far the ring axis is off the middle: turned by the tilt [rad]."""
+        return tilt
+
+    def image_ring(self, offset: float) -> float:
+        """Return R that holds the image from any axis so far off; inf: no cone does.
+
+        ``R = tan(max_corner angle + offset)``, without distortion.
+        """
+        matrix = self.device.camera_matrix
+        ends = np.array([[-0.5, -0.5], np.array(self.device.resolution) - 0.5])
+        corner = np.abs((ends - matrix[:2, 2]) / np.diag(matrix)[:2]).max(axis=0)
+        opening = math.atan(math.hypot(*corner)) + offset
+        return math.tan(opening) if opening < 0.5 * math.pi else math.inf
+
+    def object_ring(self, offset: float, radius: float, distance: float) -> float:
+        """Return R that holds a ball in the middle, so far off at least; or inf."""
+        if radius >= distance:
+            return np.inf
+        opening = offset + np.arcsin(radius / distance)
+        return float(np.tan(opening)) if opening < 0.5 * np.pi else np.inf
+
+    def ring_step(self, gap: float, standoff: float) -> float:
+        """Return what a gap of rings in [m] at the standoff is of R."""
+        return gap / standoff
+
+    def rim_distance(self, distance: float, radius: float) -> float:
+        """Return how far the rim of a ball is, its middle at a distance [m]."""
+        return math.sqrt(distance**2 - radius**2)
+
     def off_axis(self, local: _Array) -> _Array:
         """Return the angle to the ray of the image's middle [deg]."""
         far = np.maximum(np.linalg.norm(local, axis=1), 1e-12)
@@ -108,6 +140,7 @@ class ParallelLight:
 
     device: ParallelModel
     reach_words = "a beam of {:.0f} mm about its axis"
+    offset_key = "shift_m"
 
     def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
         """Return +z of the device, and depths z."""
@@ -148,6 +181,27 @@ class ParallelLight:
         """Return origins (n, 3) and unit rays (n, 3) at ring coordinates (n, 2)."""
         origins = frame[:3, 3] + flat @ frame[:3, :2].T
         return origins, np.tile(frame[:3, 2], (len(flat), 1))
+
+    def ring_offset(self, tilt: float, standoff: float) -> float:
+        """Return the shift of the ring axis [m] that moves as far as the tilt would."""
+        return standoff * math.tan(tilt)
+
+    def image_ring(self, offset: float) -> float:
+        """Return R that holds the beam from any axis so far off [m]."""
+        corner = float(np.hypot(*self.device.half_panel))
+        return min(corner, self.device.beam_reach) + offset
+
+    def object_ring(self, offset: float, radius: float, distance: float) -> float:
+        """Return R that holds a ball in the middle, from any axis so far off [m]."""
+        return offset + radius
+
+    def ring_step(self, gap: float, standoff: float) -> float:
+        """Return what a gap of rings in [m] is of R."""
+        return gap
+
+    def rim_distance(self, distance: float, radius: float) -> float:
+        """Return how deep the rim of a ball is: as deep as its middle."""
+        return distance
 
     def off_axis(self, local: _Array) -> _Array:
         """Return the distance from the beam's axis [mm]."""

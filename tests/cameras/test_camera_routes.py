@@ -62,7 +62,7 @@ def ball():
     eye = np.eye(4)
     scene = make_scene(mesh, required)
     lens, radii = rig.projector_device(), uniform_radii(0.3, 0.0035)
-    ring = ring_frame(eye, lens, rig.ring_tilt_rad, -np.pi / 2)
+    ring = ring_frame(eye, lens, rig.ring_offset, -np.pi / 2)
     template = PlannedProjector("", rig.light, eye, ring, lens, radii)
     stage = plan_projectors(scene, template, 120, rounds=1)
     camera = make_camera(rig)

@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from geometry.devices import PinholeModel
 from planning.rig import optics
+from planning.scene.lights import light_of
 
 LENSES = [
     (0.012, 11.0, 3.45e-6, 1.15),
@@ -92,11 +94,13 @@ def test_cone_holds_the_image_from_every_turned_axis(cy, turn):
         ]
     )
     widest = np.arccos(np.clip(rays @ axes.T, -1, 1)).max()
-    tangent = optics.largest_corner_tangent(k, (1024, 768), turn)
+    device = PinholeModel(k, (1024, 768), (0.5, 2.0))
+    tangent = light_of(device).image_ring(turn)
     assert np.tan(widest) <= tangent + 1e-12
     assert np.tan(widest) == pytest.approx(tangent, rel=1e-4)
 
 
 def test_cone_of_a_half_space_has_no_tangent():
     k = np.array([[100.0, 0, 511.5], [0, 100.0, 383.5], [0, 0, 1]])
-    assert optics.largest_corner_tangent(k, (1024, 768), 0.2) == math.inf
+    device = PinholeModel(k, (1024, 768), (0.5, 2.0))
+    assert light_of(device).image_ring(0.2) == math.inf

@@ -136,7 +136,7 @@ def test_default_counts_and_contract_values():
     assert min(placement.n_candidate_cameras, placement.n_reference_cameras) >= 400
     assert (rig.standoff_m, rig.standoff_play_m) == (1.0, 0.05)
     assert rig.ring_gap_m is None
-    assert rig.ring_tilt_rad == pytest.approx(np.deg2rad(8.0))
+    assert rig.ring_offset == pytest.approx(np.deg2rad(8.0))
     asked = require(rig)
     degrees = np.rad2deg(
         [
@@ -204,7 +204,7 @@ def test_light_without_its_projector_is_refused(write):
 def test_outer_ring_holds_every_panel_corner():
     rig = load_rig(light="parallel")
     half = rig.projector_device().half_panel
-    shift = rig.ring_shift_m
+    shift = rig.ring_offset
     assert shift == pytest.approx(np.tan(np.deg2rad(8.0)))
     around = np.linspace(0, 2 * np.pi, 3601)
     corner = half - shift * np.column_stack([np.cos(around), np.sin(around)])
@@ -214,7 +214,7 @@ def test_outer_ring_holds_every_panel_corner():
 def test_beam_radius_bounds_the_outer_ring(write):
     text = 'base = "default"\nlight = "parallel"\n[parallel_projector]\n'
     rig = load_rig(write(text + "beam_radius_mm = 200.0\n"))
-    assert rig.outer_ring_radius() == pytest.approx(0.2 + rig.ring_shift_m)
+    assert rig.outer_ring_radius() == pytest.approx(0.2 + rig.ring_offset)
 
 
 def test_centre_ray_meets_the_image_centre():

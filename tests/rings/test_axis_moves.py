@@ -46,7 +46,7 @@ def ball(request):
     required = make_requirements(mesh, rig, max_projectors=2, coverage=0.8)
     scene = make_scene(mesh, required)
     parallel = rig.light == "parallel"
-    tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
+    tilt = rig.ring_offset
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
     template = make_projector(rig, radii, (tilt, -np.pi / 2))
     offered = Candidates(template, required.workspace).over(100)

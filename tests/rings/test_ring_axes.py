@@ -33,7 +33,7 @@ def scene(request):
 def stages(scene):
     rig, made = scene
     parallel = rig.light == "parallel"
-    tilt = rig.ring_shift_m if parallel else rig.ring_tilt_rad
+    tilt = rig.ring_offset
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
     template = make_projector(rig, radii, (tilt, -np.pi / 2))
     projectors = plan_projectors(made, template, 200)

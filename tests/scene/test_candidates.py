@@ -8,7 +8,8 @@ from geometry.poses import inverse, transform
 from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits, Workspace
-from planning.rings.ring_radii import outer_radius, ring_gap, uniform_radii
+from planning.rings.ring_radii import ring_gap, uniform_radii
+from planning.scene.lights import light_of
 from planning.scene.workspace.candidates import Candidates, aimed_poses
 from planning.scene.workspace.shell_positions import shell_positions
 
@@ -143,7 +144,7 @@ def test_parallel_ring_axis_is_shifted_in_the_panel():
 def test_outermost_ring_holds_the_object(device):
     """No point of the object's ball lies beyond it, whatever the azimuth."""
     tilt, radius, distance = 0.14, 0.2, 1.15
-    outer = outer_radius(device, tilt, radius, distance, 10.0)
+    outer = light_of(device).object_ring(tilt, radius, distance)
     ball = np.random.default_rng(1).normal(size=(4000, 3))
     ball *= radius / np.linalg.norm(ball, axis=1, keepdims=True)
     middle = (
