@@ -16,7 +16,7 @@ from planning.proofs.selection import required_samples
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
-from planning.scene.patterns.ring_pattern import RingPattern
+from planning.scene.patterns import RingPattern
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene

@@ -17,7 +17,7 @@ from planning.proofs.projector_bound import bound_projectors
 from planning.proofs.selection import fewest_count, select_fewest
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns.pattern import pattern_of
+from planning.scene.patterns import pattern_of
 from planning.scene.placed_bodies import existing_devices
 from planning.scene.samples import Target
 from planning.scene.scene import Scene

@@ -23,7 +23,7 @@ from planning.scene.measured import (
     pairs_of,
     taken,
 )
-from planning.scene.patterns.ring_pattern import inside_rings
+from planning.scene.patterns import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
 from solvers.poses.axis_program import better_starts, solve_axis

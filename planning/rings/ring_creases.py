@@ -11,7 +11,7 @@ from planning.model.planned import PlannedProjector
 from planning.scene.lighting import first_failure
 from planning.scene.lights import light_on
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns import code_surfaces
 from planning.scene.scene import Scene
 
 from .beam_profile import on_faces

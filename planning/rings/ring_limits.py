@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
-from planning.scene.patterns.ring_pattern import ring_coordinate
+from planning.scene.patterns import ring_coordinate
 from planning.scene.scene import Scene
 
 from .beam_profile import BeamProfile, cast_beam

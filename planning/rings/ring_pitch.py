@@ -11,7 +11,7 @@ from planning.model.planned import PlannedProjector
 from planning.scene.lighting import assigned_projectors, margins_of
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples, pairs_of
-from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns import code_surfaces
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

@@ -22,8 +22,7 @@ from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples
-from planning.scene.patterns.pattern import code_surfaces
-from planning.scene.patterns.ring_pattern import ring_coordinate
+from planning.scene.patterns import code_surfaces, ring_coordinate
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 

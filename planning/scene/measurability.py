@@ -29,7 +29,7 @@ from planning.scene.limits.camera_limits import (
 )
 from planning.scene.limits.limit import first_violated
 from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality
-from planning.scene.patterns.code_surfaces import CodeSurfaces
+from planning.scene.patterns import CodeSurfaces
 
 from .lights import LightOnSamples
 from .placed_bodies import Blocker, first_blocked

@@ -11,8 +11,7 @@ from planning.model.requirements import TriangulationLimits
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED, PairQuality
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns.code_surfaces import CodeSurfaces
-from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns import CodeSurfaces, code_surfaces
 
 from .camera_views import CameraView, camera_views, view_of
 from .lighting import lit_stages

@@ -24,7 +24,7 @@ from planning.model.requirements import TriangulationLimits
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED
 from planning.scene.measurability import first_pair_failure, pair_quality
-from planning.scene.patterns.code_surfaces import CodeSurfaces
+from planning.scene.patterns import CodeSurfaces
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

@@ -22,8 +22,7 @@ from planning.report.assemble import write_plan
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns.code_surfaces import CodeSurfaces
-from planning.scene.patterns.ring_pattern import RingPattern
+from planning.scene.patterns import CodeSurfaces, RingPattern
 from planning.verify.audit.audit import audit_plan
 
 RIG = """

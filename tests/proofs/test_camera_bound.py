@@ -36,7 +36,7 @@ from planning.scene.draws import Draw
 from planning.scene.lights import LightOnSamples
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
-from planning.scene.patterns.code_surfaces import CodeSurfaces
+from planning.scene.patterns import CodeSurfaces
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
 

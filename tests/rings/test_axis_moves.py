@@ -29,8 +29,7 @@ from planning.rings.ring_radii import ring_axis, ring_frame_of_axis, uniform_rad
 from planning.scene import measurability
 from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns.pattern import code_surfaces
-from planning.scene.patterns.ring_pattern import ring_coordinate
+from planning.scene.patterns import code_surfaces, ring_coordinate
 from planning.scene.workspace.candidates import Candidates
 from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores
 

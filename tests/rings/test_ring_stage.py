@@ -26,7 +26,7 @@ from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
 from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns import code_surfaces
 
 RADIUS = 0.1
 AWAY = 1.1

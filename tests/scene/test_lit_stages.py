@@ -22,7 +22,7 @@ from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.lights import light_on
 from planning.scene.limits import projector_limits
-from planning.scene.patterns.ring_pattern import ring_coordinate
+from planning.scene.patterns import ring_coordinate
 from planning.scene.samples import Target
 from planning.scene.workspace.candidates import Candidates
 

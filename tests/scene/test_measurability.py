@@ -11,7 +11,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
 from planning.scene.limits import camera_limits, pair_limits
-from planning.scene.patterns.pattern import code_surfaces
+from planning.scene.patterns import code_surfaces
 from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -12,7 +12,7 @@ from geometry.shapes.boxes import OrientedBox
 from planning.model.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
-from planning.scene.patterns.ring_pattern import RingPattern
+from planning.scene.patterns import RingPattern
 from planning.scene.placed_bodies import Device, placed_box
 
 from .picture_view import Colour, facing

@@ -26,7 +26,7 @@ from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
 from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns.pattern import pattern_of
+from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.colouring import fewest_colours

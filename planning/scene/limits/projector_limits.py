@@ -11,7 +11,7 @@ from geometry.devices import DeviceModel
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene.lights import light_of
-from planning.scene.patterns.pattern import pattern_of
+from planning.scene.patterns import pattern_of
 from planning.scene.samples import SampleColumns
 
 from .limit import (

@@ -1,26 +1,35 @@
-"""Rings about an axis: cones in diverging light, cylinders in parallel light."""
+"""What projectors show: which of their light carries a code, and its surfaces."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedProjector
-from planning.scene.lights import light_of
 
-from .code_surfaces import CodeSurfaces
+from .lights import light_of
+from .samples import SampleArrays
 
 # Wider than any ring that is drawn, as a tangent or in [m].
 _WIDEST = 1e3
 
 
-class RingPattern:
-    """The rings of one projector.
+@dataclass(frozen=True, eq=False)
+class CodeSurfaces(SampleArrays):
+    """One projector's surfaces of equal code at n samples.
 
-    Args:
-        projector: Its ring frame and radii.
+    Attributes:
+        normals: m, their unit normals in the world, shape (n, 3).
+        spacing: h, distance of neighbouring edges along m in [m], shape (n,).
     """
+
+    normals: NDArray[np.float64]
+    spacing: NDArray[np.float64]
+
+
+class RingPattern:
+    """Rings about an axis: cones in diverging light, cylinders in parallel light."""
 
     def __init__(self, projector: PlannedProjector) -> None:
         self.projector, self._light = projector, light_of(projector.device)
@@ -37,14 +46,11 @@ class RingPattern:
         return self._light.within_ring(local, self.outermost)
 
     def coordinate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the ring coordinate R of points (n, 3): tangent, or radius in [m].
-
-        Points behind a diverging projector get inf.
-        """
+        """Return R of points (n, 3): tangent (inf behind), or radius in [m]."""
         return self._light.ring_coordinate(self._local(points))
 
     def surfaces(self, points: NDArray[np.float64]) -> CodeSurfaces:
-        """Return the ring surfaces through points (n, 3) and the spacing of rings."""
+        """Return the surfaces of equal code through points (n, 3)."""
         radii, frame = self.projector.ring_radii, self.projector.world_from_ring
         surface = self._light.ring_surface(self._local(points))
         index = np.searchsorted(radii, surface.coordinate)
@@ -53,18 +59,34 @@ class RingPattern:
         return CodeSurfaces(surface.normals @ frame[:3, :3].T, gaps * surface.stretch)
 
     def with_border(self) -> PlannedProjector:
-        """Return the projector with the annulus that is drawn about the last ring."""
+        """Return the projector with all that it lights beyond the last edge, too."""
         radii = self.projector.ring_radii
         border = radii[-1] + np.diff(radii, prepend=0.0)[-1]
         return replace(self.projector, ring_radii=np.append(radii, border))
 
     def everywhere(self) -> PlannedProjector:
-        """Return the projector with one ring more, about everything."""
+        """Return the projector with a pattern as wide as any light it may send."""
         radii = np.append(self.projector.ring_radii, _WIDEST)
         return replace(self.projector, ring_radii=radii)
 
     def _local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return transform(inverse(self.projector.world_from_ring), points)
+
+
+# A class for each `PlannedProjector.pattern`.
+PATTERNS: dict[str, type[RingPattern]] = {"rings": RingPattern}
+
+
+def pattern_of(projector: PlannedProjector) -> RingPattern:
+    """Return what a projector shows."""
+    return PATTERNS[projector.pattern](projector)
+
+
+def code_surfaces(
+    projector: PlannedProjector, points: NDArray[np.float64]
+) -> CodeSurfaces:
+    """Return a projector's surfaces of equal code through points (n, 3)."""
+    return pattern_of(projector).surfaces(points)
 
 
 def ring_coordinate(

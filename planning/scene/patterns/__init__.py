@@ -1,1 +1,0 @@
-"""What projectors show: which of their light carries a code, and its surfaces."""
