@@ -14,8 +14,8 @@ from planning.scene.draws import DRAWS
 from planning.scene.lighting import (
     assigned_projectors,
     first_failure,
+    lit_margins,
     lit_stages,
-    margins_of,
 )
 from planning.scene.limits import camera_limits, pair_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
@@ -119,7 +119,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
         unreachable_inside_m2=area(inside),
     )
     coverage = coverage.changed(**_blocked(planned, devices, target))
-    lit, margin = target.first == LIT, margins_of(scene, devices.projectors, samples)
+    lit, margin = target.first == LIT, lit_margins(scene, devices.projectors, samples)
     served = assigned_projectors(lit, margin)
     alone = seen & (seen.sum(axis=1) == 1)[:, None]
     return Claims(

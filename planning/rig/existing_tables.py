@@ -73,14 +73,14 @@ def build_existing(
 
     `devices` are the rig's model of each kind, and its body.
     """
-    existing: list[Existing] = []
-    for table in tables:
+
+    def placed(table: ExistingTable) -> Existing:
         device, body = devices[table.kind]
-        pose = rounded_pose(table.pose(workspace, device))
-        rows = tuple(tuple(row) for row in pose.tolist())
-        body = Body.of(table.body) or body
-        existing.append(Existing(table.name, table.kind, rows, body))
-    return tuple(existing)
+        pose = rounded_pose(table.pose(workspace, device)).tolist()
+        rows = tuple(tuple(row) for row in pose)
+        return Existing(table.name, table.kind, rows, Body.of(table.body) or body)
+
+    return tuple(placed(table) for table in tables)
 
 
 def check_existing(required: Requirements) -> None:

@@ -26,7 +26,7 @@ from .existing_tables import build_existing, check_existing
 from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
 from .rig_files import read_rig, rig_folder
-from .rig_requirements import build_requirements
+from .rig_requirements import build_requirements, build_workspace
 from .rig_tables import ParallelTable, PinholeTable, RigTable
 from .wishes import Wishes
 
@@ -186,23 +186,23 @@ class Rig:
         """
         projector, camera = self.projector_device(), self.camera_device()
         middle_m = self.standoff_m + object_radius_m
-        required = build_requirements(
+        workspace = build_workspace(
             self.table,
             self.outer_ring_radius(),
             mesh_centre,
             object_radius_m,
-            wishes,
-            tau_m=tau_m,
-            overflowing=(
+            wishes.up,
+            (
                 not projector.holds_ball(object_radius_m, middle_m),
                 not camera.holds_ball(object_radius_m, middle_m),
             ),
         )
+        required = build_requirements(self.table, wishes, workspace, tau_m=tau_m)
         devices = {
             "projector": (projector, self.projector_body()),
             "camera": (camera, self.camera_body()),
         }
-        existing = build_existing(self.table.existing, required.workspace, devices)
+        existing = build_existing(self.table.existing, workspace, devices)
         required = replace(required, existing=existing)
         check_existing(required)
         return required

@@ -31,23 +31,12 @@ _UP_VECTORS = {
 
 
 def build_requirements(
-    table: RigTable,
-    reference_ring_radius: float,
-    mesh_centre: Sequence[float] | NDArray[np.float64],
-    object_radius_m: float,
-    wishes: Wishes,
-    *,
-    tau_m: float,
-    overflowing: tuple[bool, bool],
+    table: RigTable, wishes: Wishes, workspace: Workspace, *, tau_m: float
 ) -> Requirements:
-    """Return what a plan must reach; `Rig.requirements` documents the arguments.
-
-    But for `overflowing`: whether the object is wider than the field of projectors, and
-    of cameras.
+    """Return what a plan in a workspace must reach.
 
     Raises:
         InputError: If an argument isn't usable.
-        InfeasibleLimitsError: If no position in the workspace is admissible.
     """
     shares = table.requirements
     target = wishes.target or "dominant"
@@ -78,18 +67,11 @@ def build_requirements(
         camera=_limits_of(CameraLimits, table.limits, "camera_"),
         triangulation=triangulation,
         check=CheckLimits(**checked, tau_m=tau_m),
-        workspace=_workspace(
-            table,
-            reference_ring_radius,
-            mesh_centre,
-            object_radius_m,
-            wishes.up,
-            overflowing,
-        ),
+        workspace=workspace,
     )
 
 
-def _workspace(
+def build_workspace(
     table: RigTable,
     reference_ring_radius: float,
     mesh_centre: Sequence[float] | NDArray[np.float64],
@@ -108,6 +90,12 @@ def _workspace(
     the part of it that they look at, which may be as near to the centre as it likes::
 
         s - p <= |Q - centre| <= s + R + p
+
+    `overflowing` says whether it is wider than that of projectors, and of cameras.
+
+    Raises:
+        InputError: If an argument isn't usable.
+        InfeasibleLimitsError: If no position in the workspace is admissible.
     """
     _check_positive("object_radius_m", object_radius_m)
     placement, spec = table.placement, table.workspace

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
 from planning.model.planned import PlannedProjector
-from planning.scene.lighting import assigned_projectors, margins_of
+from planning.scene.lighting import assigned_projectors, lit_margins
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples, pairs_of
 from planning.scene.patterns import code_surfaces
@@ -55,7 +55,7 @@ def users(
     The one that it is assigned to, if a camera measures it with that, else the one
     whose rings lie widest in some camera's image.
     """
-    margins = margins_of(scene, projectors, samples.target)
+    margins = lit_margins(scene, projectors, samples.target)
     assigned = assigned_projectors(samples.lit, margins)
     measured = pitch[np.arange(len(assigned)), assigned] > 0
     best = np.where(measured, assigned, np.argmax(pitch, axis=1))

@@ -157,21 +157,18 @@ def margins(light: LightOnSamples, limits: ProjectorLimits) -> NDArray[np.float6
     return np.where(light.tangent_cos > 0, np.minimum(margin, tangent), margin)
 
 
-def margins_of(
-    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
-) -> NDArray[np.float64]:
-    """Return the smaller margin of each sample (row) and projector (column) [rad]."""
-    every = np.ones((len(target), len(projectors)), dtype=bool)
-    return lit_margins(scene, projectors, target, every)
-
-
 def lit_margins(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     target: Target,
-    lit: NDArray[np.bool_],
+    lit: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
-    """Return what `margins_of` does, -inf where a projector doesn't light a sample."""
+    """Return the smaller margin of each sample (row) and projector (column) [rad].
+
+    It is -inf where a projector doesn't light a sample, if `lit` says which do.
+    """
+    if lit is None:
+        lit = np.ones((len(target), len(projectors)), dtype=bool)
     margin = np.full(lit.shape, -np.inf)
     for column, projector in enumerate(projectors):
         chosen = np.flatnonzero(lit[:, column])

@@ -23,7 +23,7 @@ from planning.proofs.all_poses import Effort
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
-from planning.scene.lighting import assigned_projectors, lit_stages, margins_of
+from planning.scene.lighting import assigned_projectors, lit_margins, lit_stages
 from planning.scene.limits.projector_limits import LIT
 from solvers.poses.cone import max_margin_direction
 
@@ -185,7 +185,7 @@ def served_normals(found, projectors):
     """Normals of the rows that each projector serves."""
     rows = found.stage.candidates.samples
     lit = lit_stages(found.scene, projectors, rows) == LIT
-    server = assigned_projectors(lit, margins_of(found.scene, projectors, rows))
+    server = assigned_projectors(lit, lit_margins(found.scene, projectors, rows))
     return [rows.samples.normals[server == p] for p in range(len(projectors))]
 
 
@@ -234,7 +234,7 @@ def test_widest_margins_are_those_of_closed_form_and_of_the_cone_program(case):
     assert found.count == found.least == (2 if case == "box" else 1)
     projectors = widen_margins(found.scene, found.stage)
     least = (
-        margins_of(found.scene, projectors, found.stage.candidates.samples)
+        lit_margins(found.scene, projectors, found.stage.candidates.samples)
         .max(axis=1)
         .min()
     )
@@ -256,5 +256,5 @@ def test_in_diverging_light_a_patch_is_lit_from_far_over_its_middle():
     rows = found.stage.candidates.samples
     reach = np.hypot(*rows.samples.points[:, :2].T).max()
     assert degrees_between(away(projector), [0, 0, 1]) < 0.1
-    margin = margins_of(found.scene, [projector], rows).min()
+    margin = lit_margins(found.scene, [projector], rows).min()
     assert margin == pytest.approx(np.radians(60.0) - np.arctan(reach / far), abs=2e-3)

@@ -14,7 +14,7 @@ from planning.rig.rig import load_rig
 from planning.rings.ring_pitch import widest_gap
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
-from planning.scene.lighting import lit_stages, margins_of
+from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.samples import merged
 
 RADIUS = 0.1
@@ -102,4 +102,4 @@ def test_merged_samples_stand_for_the_same_area(stages):
     assert both.samples.weight * 2000 == pytest.approx(a.samples.weight * 500)
     stages_of = lit_stages(made, projectors.projectors, both)
     assert stages_of.shape == (2000, len(projectors.projectors))
-    assert margins_of(made, projectors.projectors, both).shape == stages_of.shape
+    assert lit_margins(made, projectors.projectors, both).shape == stages_of.shape

@@ -122,11 +122,7 @@ class CellView:
     focal_px: float
 
 
-class CameraLimit(Limit[CameraRays, CellView, CameraLimits]):
-    """A limit of cameras; its cells are `CellView`."""
-
-
-class CameraField(CameraLimit):
+class CameraField(Limit[CameraRays, CellView, CameraLimits]):
     """Within the image."""
 
     name = "camera_field"
@@ -181,7 +177,7 @@ class CameraRange(InRange):
         yield from range_ends(self.name, "camera", allowed, sharp)
 
 
-class CameraIncidence(CameraLimit):
+class CameraIncidence(Limit[CameraRays, CellView, CameraLimits]):
     """-N.r >= cos(max_incidence)."""
 
     name = "camera_incidence"
@@ -201,7 +197,7 @@ class CameraIncidence(CameraLimit):
         yield wider_angle(self.name, limit, lambda view: view.facing)
 
 
-class SampleDistance(CameraLimit):
+class SampleDistance(Limit[CameraRays, CellView, CameraLimits]):
     """z / (f cos(incidence)) <= max_sample_distance."""
 
     name = "sample_distance"

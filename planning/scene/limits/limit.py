@@ -191,38 +191,39 @@ def range_ends(
     Each is left out where that end isn't what binds: `ends` are those that a rig file
     may change, `sharp` those that hold [m].
     """
-    near, far = ends
     low, high = 1e3 * sharp[0], 1e3 * sharp[1]
 
-    def away(view: RangedView) -> Array:
-        return 1e3 * view.distances
+    def relaxed(
+        ask: Callable[[Array], Array], say: Callable[[float], str]
+    ) -> LimitRelaxation:
+        words = f"a {device} sharp "
+        return LimitRelaxation(
+            cause,
+            lambda view: ask(1e3 * view.distances),
+            to_step(1.0),
+            lambda value: words + say(value),
+        )
 
-    nearer = LimitRelaxation(
-        cause,
-        lambda view: np.where(
-            (view.distances >= 0.0) & (view.distances <= sharp[1]), -away(view), np.inf
-        ),
-        to_step(1.0),
-        lambda value: f"a {device} sharp from {-value:.0f} mm (now {low:.0f})",
-    )
-    farther = LimitRelaxation(
-        cause,
-        lambda view: np.where(view.distances >= sharp[0], away(view), np.inf),
-        to_step(1.0),
-        lambda value: f"a {device} sharp to {value:.0f} mm (now {high:.0f})",
-    )
-    both = LimitRelaxation(
-        cause,
-        lambda view: np.maximum(low - away(view), away(view) - high),
-        to_step(1.0),
-        lambda value: (
-            f"a {device} sharp from {max(low - value, 0.0):.0f} to "
-            f"{high + value:.0f} mm (now {low:.0f} to {high:.0f})"
-        ),
-    )
-    binds = (near > 0.0 and near >= sharp[0], far < np.inf and far <= sharp[1])
-    offered = zip((*binds, all(binds)), (nearer, farther, both), strict=True)
-    yield from (relaxation for offer, relaxation in offered if offer)
+    nearer = 0.0 < ends[0] and ends[0] >= sharp[0]
+    farther = ends[1] < np.inf and ends[1] <= sharp[1]
+    if nearer:
+        yield relaxed(
+            lambda away: np.where((away >= 0.0) & (away <= high), -away, np.inf),
+            lambda value: f"from {-value:.0f} mm (now {low:.0f})",
+        )
+    if farther:
+        yield relaxed(
+            lambda away: np.where(away >= low, away, np.inf),
+            lambda value: f"to {value:.0f} mm (now {high:.0f})",
+        )
+    if nearer and farther:
+        yield relaxed(
+            lambda away: np.maximum(low - away, away - high),
+            lambda value: (
+                f"from {max(low - value, 0.0):.0f} to {high + value:.0f} mm "
+                f"(now {low:.0f} to {high:.0f})"
+            ),
+        )
 
 
 def degrees(cosines: Array) -> Array:

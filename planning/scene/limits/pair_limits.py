@@ -63,11 +63,7 @@ class PairCell:
     spacing: Array
 
 
-class PairLimit(Limit[PairQuality, PairCell, TriangulationLimits]):
-    """A limit of pairs; its cells are `PairCell`."""
-
-
-class Conditioning(PairLimit):
+class Conditioning(Limit[PairQuality, PairCell, TriangulationLimits]):
     """|r.m| >= min_conditioning."""
 
     name = "conditioning"
@@ -94,7 +90,7 @@ class Conditioning(PairLimit):
         )
 
 
-class Sigma(PairLimit):
+class Sigma(Limit[PairQuality, PairCell, TriangulationLimits]):
     """s_N <= max_sigma."""
 
     name = "sigma"
@@ -126,7 +122,7 @@ class Sigma(PairLimit):
         )
 
 
-class Pitch(PairLimit):
+class Pitch(Limit[PairQuality, PairCell, TriangulationLimits]):
     """Neighbouring rings at least min_ring_pitch apart in the image."""
 
     name = "pitch"

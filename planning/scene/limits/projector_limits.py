@@ -71,11 +71,7 @@ class ProjectorView:
         )
 
 
-class ProjectorLimit(Limit[ProjectorView, object, ProjectorLimits]):
-    """A limit of projectors."""
-
-
-class ProjectorBeam(ProjectorLimit):
+class ProjectorBeam(Limit[ProjectorView, object, ProjectorLimits]):
     """Within the pattern, and in the light that leaves the device."""
 
     name = "projector_beam"
@@ -109,7 +105,7 @@ class ProjectorRange(InRange):
         yield from islice(range_ends(self.name, "projector", sharp, sharp), 2)
 
 
-class ProjectorIncidence(ProjectorLimit):
+class ProjectorIncidence(Limit[ProjectorView, object, ProjectorLimits]):
     """-N.L >= cos(theta_max)."""
 
     name = "projector_incidence"
@@ -125,7 +121,7 @@ class ProjectorIncidence(ProjectorLimit):
         yield wider_angle(self.name, limit, lambda view: view.incidence_cos)
 
 
-class TangentAngle(ProjectorLimit):
+class TangentAngle(Limit[ProjectorView, object, ProjectorLimits]):
     """|T1.L| <= cos(tau_min)."""
 
     name = "tangent_angle"
