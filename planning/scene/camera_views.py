@@ -68,17 +68,11 @@ def camera_views(
     )
     if not scene.bodies:
         return tuple(clear)
-    return tuple(
-        sight.take(np.flatnonzero(~_blocked(scene, camera, target, sight.samples)))
-        for sight, camera in zip(clear, cameras, strict=True)
-    )
-
-
-def _blocked(
-    scene: Scene, camera: PlannedCamera, target: Target, some: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    points = target.samples.points[some]
-    return blocked_by(scene.bodies, camera, points).any(axis=1)
+    views: list[CameraView] = []
+    for sight, camera in zip(clear, cameras, strict=True):
+        blocked = blocked_by(scene.bodies, camera, samples.points[sight.samples])
+        views.append(sight.take(np.flatnonzero(~blocked.any(axis=1))))
+    return tuple(views)
 
 
 def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> ViewedSamples:

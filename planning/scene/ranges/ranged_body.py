@@ -82,7 +82,7 @@ class RangedBody:
         return (self.mesh.vertices - self.ball.centre) / self.ball.radius
 
     @cached_property
-    def _largest(self) -> NDArray[np.float64]:
+    def _largest(self) -> NDArray[np.floating]:
         return np.linalg.eigvalsh(self.ball.point_covariances(self._outward))[:, 2]
 
 
