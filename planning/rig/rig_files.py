@@ -125,9 +125,9 @@ def _lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, A
 
 
 def _is_path(name: str | Path) -> bool:
-    if isinstance(name, Path):
-        return True
-    return name.lower().endswith(".toml") or "/" in name or "\\" in name
+    text = str(name)
+    named = text.lower().endswith(".toml") or "/" in text or "\\" in text
+    return named or isinstance(name, Path)
 
 
 def _read_file(path: Path) -> dict[str, Any]:

@@ -28,13 +28,13 @@ _WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 
 @dataclass(frozen=True, eq=False)
 class Interest:
-    """The faces that are to be the target, and who said so.
+    """The faces of the mesh that are to be the target, and who said so.
 
     Attributes:
         kind: `faces`, or `vertex_weight` (the faces of highest weight).
-        chosen: Whether each face of the mesh is in the target, shape (n_f,).
+        chosen: Whether each is, shape (n_f,).
         source: The file or `ply:NAME` it came from; None: an array in memory.
-        sha256: Digest of that file; None for a property of the mesh file itself.
+        sha256: Digest of that file, if it is one.
         n_removed: Chosen polygons of the file of which repair left nothing.
     """
 

@@ -54,10 +54,7 @@ class DivergingLight:
     def cosines(
         self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
     ) -> tuple[_Array, _Array, _Array]:
-        """Return |P - Q|, -N.L and |T1.L|, shape (n,) each.
-
-        Offsets P - Q, N and T1 are columns, (3, n): as rows they are slow to handle.
-        """
+        """Return |P - Q|, -N.L and |T1.L| of columns P - Q, N and T1, (3, n)."""
         distances = np.sqrt(_dots(offsets, offsets))
         apart = np.where(distances > 0.0, distances, 1.0)
         incidence = _dots(normals, offsets) / -apart

@@ -27,13 +27,9 @@ _PAIRS = 8192
 
 @dataclass(frozen=True, eq=False)
 class LitSamples:
-    """Samples with the light of every projector of the plan on them.
+    """Samples with light and code of every projector of the plan on them.
 
-    Attributes:
-        target: The samples that at least one projector lights.
-        lit: Which projector lights which, shape (n, n_projectors).
-        lights: Light of each projector.
-        surfaces: Those of equal code of each projector.
+    At least one projector lights each; `lit` says which, shape (n, n_projectors).
     """
 
     target: Target
@@ -48,7 +44,7 @@ class LitSamples:
         target: Target,
         lit: NDArray[np.bool_],
     ) -> "LitSamples":
-        """Return samples, lit as stated, with light and code of every projector."""
+        """Return samples, lit as stated."""
         points = target.samples.points
         return cls(
             target,

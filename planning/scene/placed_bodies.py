@@ -30,14 +30,7 @@ CLEARANCE_M = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class PlacedBody:
-    """A body in the world.
-
-    Attributes:
-        kind: `projector` or `camera`, whose it is.
-        world_from_device: Its device's pose, shape (4, 4) [m].
-        box: Where it is.
-        name: Of its device; empty until it has one.
-    """
+    """A body in the world, with kind, pose and name (if it has one) of its device."""
 
     kind: str
     world_from_device: NDArray[np.float64]

@@ -120,8 +120,8 @@ class Scene:
 
     def _samples(self, draw: Draw, within: NDArray[np.bool_] | None) -> Target:
         # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.
-        seed = int(
-            np.random.SeedSequence([self.seed, draw.stream]).generate_state(1)[0]
+        mixed = np.random.SeedSequence([self.seed, draw.stream]).generate_state(1)
+        samples = sample_surface(
+            self.mesh, draw.count, seed=int(mixed[0]), within=within
         )
-        samples = sample_surface(self.mesh, draw.count, seed=seed, within=within)
         return Target(samples, self.steep[samples.faces])

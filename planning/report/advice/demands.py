@@ -93,7 +93,7 @@ def demands(
     furthest[near] = np.minimum(furthest[near], between)
     near = near[(between == SEEN) & (hopeful | seen)[near]]
     demanded = np.full_like(asks, np.inf)
-    view = _viewed(camera, rays.take(near))
+    view = _viewed(camera, CameraRays.of(camera, target.take(near)))
     for pair in pairs_of(required.triangulation, samples, view, samples=near):
         indices, quality = pair.samples, pair.quality
         beyond = indices[seen[indices]]

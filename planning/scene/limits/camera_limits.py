@@ -65,16 +65,6 @@ class CameraRays:
         local = transform(inverse(pose), points)
         return cls(camera.device, local, rays, distances, facing)
 
-    def take(self, chosen: NDArray[np.int64]) -> "CameraRays":
-        """Return some of the samples."""
-        return CameraRays(
-            self.device,
-            self.local[chosen],
-            self.rays[chosen],
-            self.distances[chosen],
-            self.facing[chosen],
-        )
-
     @property
     def sample_distance(self) -> Array:
         """Z / (f cos(incidence)), what a pixel covers of the surface [m], (n,)."""
@@ -111,10 +101,7 @@ class ViewedSamples(SampleArrays):
 class CellView:
     """The best a camera anywhere in a cell of poses may have of k samples.
 
-    Attributes:
-        facing: -N.r at most, shape (k,).
-        least_depth: z at least, wherever in the image a sample appears [m], (k,).
-        focal_px: f.
+    -N.r at most, shape (k,), and z at least, wherever in the image they appear [m].
     """
 
     facing: Array

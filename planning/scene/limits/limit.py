@@ -60,8 +60,8 @@ class LimitRelaxation:
 
     Attributes:
         cause: Name of the limit.
-        ask: What samples of a view ask of it, (n,): more where it must give way
-            farther; inf where it is not worth it.
+        ask: What samples ask of it, (n,): more where it must give way farther; inf
+            where it is not worth it.
         rounded: Rounds what is asked outwards, to what people write.
         say: The limit with a rounded value, as a rig file names it.
     """

@@ -98,14 +98,9 @@ class Candidates(Generic[_D]):
         """Return candidates between those of a lattice, close around chosen ones.
 
         Each chosen pose gets positions out to the lattice's spacing, as seen from the
-        centre of the workspace, as far as they are admissible; laid out from the
-        vertical through it, so that they turn with the workspace. In tiled placement,
-        they are turned about what they look at and moved along with it.
-
-        Args:
-            chosen: Devices of the lattice.
-            n_lattice: Poses of the lattice.
-            scale: How far out, as a share of the lattice's spacing.
+        centre of the workspace (times `scale`), as far as they are admissible; laid out
+        from the vertical through it, so that they turn with the workspace. In tiled
+        placement, they are turned about what they look at and moved along with it.
         """
         if not chosen:
             return ()

@@ -37,13 +37,8 @@ _SMALLER = 0.9
 class Site:
     """What one kind of device stands over, and how far from it.
 
-    Attributes:
-        device: Optics.
-        workspace: Where devices may stand.
-        radius_m: Least and largest distance of this kind from the workspace's centre.
-        standoff_m: Distance from the surface.
-        samples: Of the surface that counts.
-        max_incidence: Largest angle at which a sample is of use [rad].
+    Least and largest distance are from the workspace's centre, the standoff from the
+    surface [m]; up to `max_incidence` [rad] a sample is of use.
     """
 
     device: DeviceModel
@@ -59,11 +54,8 @@ def tiled_poses(
 ) -> tuple[_Array, NDArray[np.int64]]:
     """Return admissible ``world_from_device`` over tiles, and the direction of each.
 
-    Args:
-        site: What is looked at.
-        directions: Unit vectors from the object to the device, shape (n, 3).
-        rolls: Turns of the device about its line of sight, against the upright or, if
-            that is clearly smaller, the smallest rectangle [rad].
+    Directions are unit vectors from the object to the device, (n, 3); rolls count from
+    the upright or, if that is clearly smaller, the smallest rectangle [rad].
     """
     frames, anchors, depths, owner = [], [], [], []
     upright = look_at(directions, np.zeros(3), np.array(site.workspace.up))
