@@ -18,6 +18,11 @@ from planning.model.table_types import Axis, Name, PositivePair, Sides, Table, U
 _PARALLEL = 1.0 - 1e-9
 # Length below which a vector is no direction, and a cross product no level line.
 _NO_DIRECTION = 1e-9
+# Which keys a shape takes, and what they are.
+_SHAPES = (
+    ("cone", ("axis", "half_angle_deg"), ""),
+    ("box", ("min_mm", "max_mm"), ", its two corners"),
+)
 _IDENTITY: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -93,29 +98,20 @@ class WorkspaceTable(Table):
     mounting: list[MountingTable] = Field(default=[])
 
     @model_validator(mode="after")
-    def _check_cone(self) -> Self:
-        both = self.axis is not None and self.half_angle_deg is not None
-        neither = self.axis is None and self.half_angle_deg is None
-        if self.shape == "cone" and not both:
-            raise ValueError("shape = 'cone' needs axis and half_angle_deg")
-        if self.shape != "cone" and not neither:
-            raise ValueError("axis and half_angle_deg need shape = 'cone'")
+    def _check_shape(self) -> Self:
+        for shape, keys, what in _SHAPES:
+            given, both = [getattr(self, key) for key in keys], " and ".join(keys)
+            if self.shape == shape and None in given:
+                raise ValueError(f"shape = {shape!r} needs {both}{what}")
+            if self.shape != shape and given != [None, None]:
+                raise ValueError(f"{both} need shape = {shape!r}")
         if self.axis is not None and not np.linalg.norm(self.axis) > _NO_DIRECTION:
             raise ValueError(f"axis = {self.axis} must not be zero")
-        return self
-
-    @model_validator(mode="after")
-    def _check_box(self) -> Self:
-        low, high = self.min_mm, self.max_mm
-        if self.shape == "box" and (low is None or high is None):
-            raise ValueError("shape = 'box' needs min_mm and max_mm, its two corners")
-        if self.shape != "box" and not (low is None and high is None):
-            raise ValueError("min_mm and max_mm need shape = 'box'")
-        if low is not None and high is not None:
-            if not all(a < b for a, b in zip(low, high, strict=True)):
-                raise ValueError(
-                    f"min_mm = {low} must be less than max_mm = {high} along each axis"
-                )
+        low, high = self.min_mm or [], self.max_mm or []
+        if not all(a < b for a, b in zip(low, high, strict=True)):
+            raise ValueError(
+                f"min_mm = {low} must be less than max_mm = {high} along each axis"
+            )
         return self
 
     @model_validator(mode="after")

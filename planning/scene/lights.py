@@ -45,11 +45,11 @@ class DivergingLight:
     reach_words = "an image that reaches {:.0f} degrees off its middle on every side"
     offset_key = "tilt"
 
-    def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
-        """Return unit L = (P - Q) / |P - Q|, (n, 3), and |P - Q| in [m], (n,)."""
+    def directions(self, pose: _Array, points: _Array) -> _Array:
+        """Return unit L = (P - Q) / |P - Q|, (n, 3)."""
         offsets = points - pose[:3, 3]
         distances = lengths(offsets)
-        return offsets / np.where(distances > 0, distances, 1.0)[:, None], distances
+        return offsets / np.where(distances > 0, distances, 1.0)[:, None]
 
     def cosines(
         self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
@@ -139,10 +139,9 @@ class ParallelLight:
     reach_words = "a beam of {:.0f} mm about its axis"
     offset_key = "shift_m"
 
-    def rays(self, pose: _Array, points: _Array) -> tuple[_Array, _Array]:
-        """Return +z of the device, and depths z."""
-        directions = np.broadcast_to(pose[:3, 2], points.shape)
-        return directions, (points - pose[:3, 3]) @ pose[:3, 2]
+    def directions(self, pose: _Array, points: _Array) -> _Array:
+        """Return +z of the device."""
+        return np.broadcast_to(pose[:3, 2], points.shape)
 
     def cosines(
         self, pose: _Array, offsets: _Array, normals: _Array, steep: _Array
@@ -220,14 +219,10 @@ class LightOnSamples(SampleArrays):
     """One projector's light on n samples, before occlusion.
 
     Attributes:
-        directions: Unit L(P), shape (n, 3).
-        distances: |P - Q| (diverging) or z (parallel) in [m], shape (n,).
         incidence_cos: -N.L, shape (n,).
         tangent_cos: |T1.L|, 0 where T1 is arbitrary, shape (n,).
     """
 
-    directions: _Array
-    distances: _Array
     incidence_cos: _Array
     tangent_cos: _Array
 
@@ -236,10 +231,8 @@ def light_on(projector: PlannedProjector, target: Target) -> LightOnSamples:
     """Return the light of a projector at samples, wherever they are."""
     points, normals = target.samples.points, target.samples.normals
     light = light_of(projector.device)
-    directions, distances = light.rays(projector.world_from_device, points)
+    directions = light.directions(projector.world_from_device, points)
     return LightOnSamples(
-        directions,
-        distances,
         -np.einsum("ij,ij->i", normals, directions),
         np.abs(np.einsum("ij,ij->i", target.steep, directions)),
     )

@@ -90,7 +90,7 @@ def pair_quality(
     placement = (limits.ring_sigma_m or 0.0) * facing / safe
     pitch = surfaces.spacing * facing / np.maximum(seen.distances * g, 1e-15)
     sigma = np.hypot(spread, placement)
-    return PairQuality(conditioning, sigma, pitch, seen, light)
+    return PairQuality(conditioning, sigma, pitch)
 
 
 def first_pair_failure(

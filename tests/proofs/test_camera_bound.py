@@ -89,7 +89,7 @@ def everything_lit(scene, n):
     normals, one = target.samples.normals, np.ones(n)
     across = np.cross(normals, [0.3, 0.5, 0.8])
     across /= np.linalg.norm(across, axis=1)[:, None]
-    light = LightOnSamples(-normals, one, one, 0.0 * one)
+    light = LightOnSamples(one, 0.0 * one)
     lit = np.ones((n, 1), dtype=bool)
     return LitSamples(target, lit, (light,), (CodeSurfaces(across, 0.01 * one),))
 

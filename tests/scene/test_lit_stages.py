@@ -87,6 +87,9 @@ def test_the_first_limit_that_fails_follows_from_the_rays(light):
         else replace(device, beam_radius=0.11, range_m=(0.05, 0.3))
     )
     limits = ProjectorLimits(np.radians(70.0), np.radians(60.0))
+    away = local[:, 2]
+    if light == "diverging":
+        away = np.linalg.norm(local, axis=1)
     seen = []
     for _ in range(12):
         pose, turn = np.eye(4), np.eye(4)
@@ -104,7 +107,7 @@ def test_the_first_limit_that_fails_follows_from_the_rays(light):
         inside = ring_coordinate(one, points) <= radii[-1]
         holds = (
             inside & lighting.in_panel(one, points),
-            (ray.distances >= 0.05) & (ray.distances <= 0.3),
+            (away >= 0.05) & (away <= 0.3),
             ray.incidence_cos >= np.cos(limits.max_incidence),
             ray.tangent_cos <= np.cos(limits.min_tangent_angle),
             np.zeros(n, dtype=bool),

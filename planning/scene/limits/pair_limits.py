@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from planning.model.requirements import TriangulationLimits
-from planning.scene.lights import LightOnSamples
 
-from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES, ViewedSamples
+from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES
 from .limit import (
     Array,
     Limit,
@@ -38,15 +37,11 @@ class PairQuality:
         conditioning: |r.m|, shape (n,).
         sigma: s_N in [m], shape (n,).
         pitch: Distance of neighbouring rings in the image in [px], shape (n,).
-        view: How the camera sees them; seen from a sample, it is at -t r.
-        light: That falls on them; seen from a sample, it starts at -d L.
     """
 
     conditioning: Array
     sigma: Array
     pitch: Array
-    view: ViewedSamples
-    light: LightOnSamples
 
 
 @dataclass(frozen=True, eq=False)
