@@ -43,13 +43,8 @@ def depth_of_field(
 
     Both follow from the thin lens equation 1/f = 1/s + 1/s' and the width of the cone
     of light that the aperture f / N lets onto the sensor; the blur is c at both ends
-    and zero at s. The same holds for a projector, whose light runs the other way.
-
-    Args:
-        focal_m: Focal length f in [m].
-        f_number: N, focal length over diameter of the aperture.
-        blur_m: c, diameter of the circle of confusion on the panel or sensor in [m].
-        focus_m: Distance s of the plane in focus from the optical centre in [m].
+    and zero at s. The same holds for a projector, whose light runs the other way. The
+    blur is the diameter of the circle of confusion on the panel or sensor.
 
     Raises:
         ValueError: If an argument isn't positive or s <= f, where no image forms.

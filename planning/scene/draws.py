@@ -23,24 +23,10 @@ class Draw:
 class Draws:
     """Every draw of a plan, and how many of drawn samples slower steps look at.
 
-    Attributes:
-        site: What stands out of an object wider than the field.
-        projectors: Of the projectors' cover.
-        fresh_projectors: That confirm it; a stream further on each round.
-        cameras: Of the cameras' cover.
-        fresh_cameras: That confirm it, likewise.
-        axes: That confirm ring axes.
-        baselines: That moved cameras are judged on.
-        confirming_baselines: That confirm a move which those did not forbid.
-        rings: Of a round of ring spacing, two streams further on each round.
-        claims: That areas in the plan are computed from.
-        overlaps: That shared areas are computed from.
-        relaxations: That relaxations of projectors are found on.
-        dark: At most, where nothing at all is lit.
-        fewer_devices: At most, for what would let fewer devices be enough.
-        routes: At most, for routes of baselines.
-        paper_route: At most, for the paper's route.
-        axis_program: At most, for the program of one ring axis.
+    Fresh samples confirm a cover, a stream further on each round; rounds of ring
+    spacing go two streams further. Areas of the plan are computed from `claims`. Mere
+    numbers are samples at most: `dark` where nothing at all is lit, `fewer_devices` for
+    what would let fewer be enough.
     """
 
     site: Draw = Draw(2000, 50)

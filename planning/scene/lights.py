@@ -24,12 +24,9 @@ _Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class RingSurface:
-    """Ring surfaces through n points of the ring frame.
+    """Ring surfaces through n points of the ring frame: R, and unit normals m.
 
-    Attributes:
-        coordinate: R, tangent (diverging) or radius in [m] (parallel), shape (n,).
-        normals: m, unit normals in the ring frame, shape (n, 3).
-        stretch: Spacing along m for a gap of 1 in R, shape (n,).
+    The stretch is their spacing along m for a gap of 1 in R.
     """
 
     coordinate: _Array
@@ -216,12 +213,7 @@ def light_of(device: DeviceModel) -> Light:
 
 @dataclass(frozen=True, eq=False)
 class LightOnSamples(SampleArrays):
-    """One projector's light on n samples, before occlusion.
-
-    Attributes:
-        incidence_cos: -N.L, shape (n,).
-        tangent_cos: |T1.L|, 0 where T1 is arbitrary, shape (n,).
-    """
+    """-N.L and |T1.L| (0 where T1 is arbitrary) of n samples, before occlusion."""
 
     incidence_cos: _Array
     tangent_cos: _Array

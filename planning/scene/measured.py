@@ -83,14 +83,10 @@ def taken(
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A projector and a camera, on samples that one lights and the other sees.
+    """A projector, by its index, and a camera, on samples that one lights and one sees.
 
-    Attributes:
-        projector: Its index.
-        places: Where the samples stand in the camera's view, shape (k,).
-        samples: Which of the lit samples they are, shape (k,).
-        quality: How well they are triangulated.
-        first_violated: Index in `CAUSES`, or `MEASURED`, shape (k,).
+    `places` are where they stand in the camera's view, `samples` which of the lit
+    samples they are; the first violated limit is an index in `CAUSES`, or `MEASURED`.
     """
 
     projector: int

@@ -19,9 +19,7 @@ _WIDEST = 1e3
 class CodeSurfaces(SampleArrays):
     """One projector's surfaces of equal code at n samples.
 
-    Attributes:
-        normals: m, their unit normals in the world, shape (n, 3).
-        spacing: h, distance of neighbouring edges along m in [m], shape (n,).
+    Unit normals m in the world, and h, the distance of neighbouring edges along m [m].
     """
 
     normals: NDArray[np.float64]

@@ -59,13 +59,7 @@ class SampleArrays:
 
 @dataclass(frozen=True, eq=False)
 class SampleColumns:
-    """Samples, a coordinate at a time: rows of three are too short for numpy's loops.
-
-    Attributes:
-        points: In [m], shape (3, n).
-        normals: Unit normals, same shape.
-        steep: Unit T1, zero where arbitrary, same shape.
-    """
+    """Samples and T1, (3, n) each: rows of three are too short for numpy's loops."""
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]

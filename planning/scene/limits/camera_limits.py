@@ -37,14 +37,9 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class CameraRays:
-    """How a camera stands to n samples.
+    """How a camera stands to n samples, in its frame at `local` [m], shape (n, 3).
 
-    Attributes:
-        device: Its optics.
-        local: Samples in its frame [m], shape (n, 3).
-        rays: Unit viewing rays r in the world, shape (n, 3).
-        distances: t in [m], shape (n,).
-        facing: -N.r, shape (n,).
+    Unit viewing rays r in the world, distances t [m], and -N.r.
     """
 
     device: PinholeModel

@@ -36,13 +36,8 @@ from .limit import (
 class ProjectorView:
     """How a projector's light meets n samples.
 
-    Attributes:
-        projector: Pose, optics and pattern.
-        points: In the world [m], columns, shape (3, n).
-        local: In the device's frame [m], likewise.
-        distances: |P - Q| (diverging) or z (parallel) in [m], shape (n,).
-        incidence_cos: -N.L, shape (n,).
-        tangent_cos: |T1.L|, 0 where T1 is arbitrary, shape (n,).
+    Points are columns of the world and of the device's frame [m], shape (3, n);
+    distances are |P - Q| (diverging) or z (parallel) [m], the cosines -N.L and |T1.L|.
     """
 
     projector: PlannedProjector
