@@ -41,19 +41,19 @@ def stages(scene):
     offered = camera_candidate_views(made, camera, 160)
     cover = plan_cameras(made, projectors.projectors, offered)
     cameras = camera_stage(made, cover)
-    return made, projectors, cameras, tilt
+    return made, projectors, cameras
 
 
 def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
     """Caps of 60 degrees (parallel) hold a quarter of the area: 0.6 takes 3 or more."""
-    _, projectors, cameras, _ = stages
+    _, projectors, cameras = stages
     least = projectors.certificate.candidates.lower_bound
     assert 3 <= least <= len(projectors.projectors) <= 4
     assert len(cameras.cameras) >= 2
 
 
 def test_widest_gap_is_that_of_the_farthest_lit_sample(stages):
-    made, projectors, _, _ = stages
+    made, projectors, _ = stages
     target = made.target_samples(Draw(3000, 8))
     gap = widest_gap(made, projectors.projectors, target)
     radii = projectors.projectors[0].ring_radii
@@ -66,7 +66,7 @@ def test_widest_gap_is_that_of_the_farthest_lit_sample(stages):
 
 def test_claims_of_a_ball_follow_from_its_caps(stages):
     """Everything is reachable; a projector lights its cap as seen from where it is."""
-    made, projectors, cameras, _ = stages
+    made, projectors, cameras = stages
     devices = Devices(
         projectors.projectors, cameras.cameras, projectors.reference, cameras.reference
     )
@@ -90,12 +90,12 @@ def test_claims_of_a_ball_follow_from_its_caps(stages):
 
 
 def test_no_relaxation_is_offered_where_nothing_is_out_of_reach(stages):
-    made, projectors, _, tilt = stages
-    assert reachability_relaxations(made, projectors.reference[::20], (tilt, 0.0)) == ()
+    made, projectors, _ = stages
+    assert reachability_relaxations(made, projectors.reference[::20]) == ()
 
 
 def test_merged_samples_stand_for_the_same_area(stages):
-    made, projectors, _, _ = stages
+    made, projectors, _ = stages
     a, b = made.target_samples(Draw(500, 1)), made.target_samples(Draw(1500, 2))
     both = merged(a, b)
     assert len(both) == 2000
