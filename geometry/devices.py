@@ -7,6 +7,7 @@ questions about their field, so that callers needn't ask which one they have.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -102,6 +103,17 @@ class PinholeModel:
         matrix[:2, 2] += 0.5 * (times - 1) * np.array([width, height])
         size = (times * width, times * height)
         return replace(self, camera_matrix=matrix, resolution=size)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return plain values; None for what only the other kind of optics has."""
+        return {
+            "K": self.camera_matrix.tolist(),
+            "resolution": list(self.resolution),
+            "distortion": list(self.distortion),
+            "range_m": list(self.range_m),
+            "pixel_pitch_m": None,
+            "beam_radius": None,
+        }
 
     def ray_starts(self, points: Array) -> Array:
         """Return where the rays to points (..., 3) of the device frame start."""
@@ -249,6 +261,17 @@ class ParallelModel:
         return replace(
             self, resolution=(times * width, times * height), beam_radius=None
         )
+
+    def to_document(self) -> dict[str, Any]:
+        """As of `PinholeModel`."""
+        return {
+            "K": None,
+            "resolution": list(self.resolution),
+            "distortion": None,
+            "range_m": list(self.range_m),
+            "pixel_pitch_m": self.pixel_pitch_m,
+            "beam_radius": self.beam_radius,
+        }
 
     def ray_starts(self, points: Array) -> Array:
         """As of `PinholeModel`."""

@@ -12,7 +12,6 @@ from geometry.mesh.bearing import bearing
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
-from planning.model.device_poses import ring_frame
 from planning.model.errors import InputError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
@@ -24,7 +23,7 @@ from planning.rig.wishes import TargetName, Wishes
 from planning.rings.ring_radii import ring_gap, uniform_radii
 from planning.scene.bodies.clearance import check_existing_clearance
 from planning.scene.interest import Select, Weight, interest_of
-from planning.scene.lights import light_of
+from planning.scene.lights import light_of, ring_frame
 from planning.scene.obstructions import Obstruction
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene

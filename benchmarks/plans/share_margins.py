@@ -34,7 +34,6 @@ from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.camera_stage import move_axes
-from planning.model.device_poses import ring_frame
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_poses import widen_margins
@@ -45,6 +44,7 @@ from planning.report.partial_plan import Prepared
 from planning.rings.axis_moves import AxisJudge
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.lights import ring_frame
 from planning.scene.limits import projector_limits
 from planning.scene.measured import lit_samples
 from planning.scene.scene import Scene

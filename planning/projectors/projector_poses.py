@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from geometry.devices import PinholeModel
 from geometry.poses import inverse
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
@@ -15,6 +14,7 @@ from planning.model.requirements import Workspace
 from planning.proofs.selection import required_samples
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.lights import light_of
 from planning.scene.limits import projector_limits
 from planning.scene.patterns import RingPattern
 from planning.scene.placed_bodies import moves_bodies
@@ -187,7 +187,6 @@ def pose_program(
     """State the pose program of one projector over the samples assigned to it."""
     required, device = scene.requirements, projector.device
     workspace = scene.safe_workspace
-    pinhole = isinstance(device, PinholeModel)
     up, centre = np.array(workspace.up), np.array(workspace.centre)
     return PoseProgram(
         points=assigned.samples.points,
@@ -202,11 +201,7 @@ def pose_program(
         centre=centre,
         axis=np.array(workspace.axis),
         half_angle=workspace.half_angle,
-        camera_matrix=device.camera_matrix if pinhole else None,
-        resolution=device.resolution if pinhole else None,
-        half_panel_m=None if pinhole else tuple(device.half_panel),
         pixel_margin=_PIXEL_MARGIN,
-        beam_radius_m=np.inf if pinhole else device.beam_radius or np.inf,
         ring_radius=RingPattern(projector).outermost,
         ring_from_device=inverse(projector.world_from_ring)
         @ projector.world_from_device,
@@ -216,6 +211,7 @@ def pose_program(
         else workspace.floor_m + float(up @ centre),
         max_move_m=_MAX_MOVE_M,
         half_spaces=_held_in(workspace, projector.world_from_device[:3, 3]),
+        **light_of(device).pose_limits(),
     )
 
 

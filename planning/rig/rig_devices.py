@@ -56,16 +56,9 @@ def device_document(
     table: PinholeTable | ParallelTable, device: DeviceModel
 ) -> dict[str, Any]:
     """Return a device as plain values, with figures as written and their sources."""
-    beam = device if isinstance(device, ParallelModel) else None
-    image = device if isinstance(device, PinholeModel) else None
     return {
         "name": table.name,
-        "K": image and image.camera_matrix.tolist(),
-        "resolution": list(device.resolution),
-        "distortion": image and list(image.distortion),
-        "range_m": list(device.range_m),
-        "pixel_pitch_m": beam and beam.pixel_pitch_m,
-        "beam_radius": beam and beam.beam_radius,
+        **device.to_document(),
         "figures": table.model_dump(
             mode="json",
             exclude={"name", "sources"},

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
-from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
+from planning.scene.lights import light_of
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import (
     LitSamples,
@@ -27,8 +27,6 @@ from planning.scene.patterns import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
 from solvers.poses.axis_program import better_starts, solve_axis
-
-from .ring_radii import ring_axis, ring_frame_of_axis
 
 _SWEEPS = 2
 _STEPS = (1.0, 0.5, 0.25)
@@ -113,10 +111,11 @@ def _move(
     """Move one axis if that is better; the judges then go by it."""
     scene, projector = judges[0].scene, moved[p]
     scene.check_cancelled()
+    light = light_of(projector.device)
     for axis in proposals(
         axis_program(scene, moved, p, judges[0].samples, judges[0].views)
     ):
-        frame = ring_frame_of_axis(projector.world_from_device, projector.device, axis)
+        frame = projector.world_from_device @ light.ring_frame(axis)
         turned = replace(projector, world_from_ring=frame)
         lit = all(judge.holds(turned, p) for judge in judges)
         if not (lit and inside_rings(turned, held)):
@@ -175,8 +174,8 @@ def axis_program(
 ) -> AxisProgram:
     """State the axis program of projector p."""
     limits, projector = scene.requirements.triangulation, projectors[p]
-    pose, device = projector.world_from_device, projector.device
-    middle = ring_frame(pose, device, 0.0, 0.0)
+    pose, light = projector.world_from_device, light_of(projector.device)
+    middle = pose @ light.ring_frame(np.zeros(2))
     turn, into = middle[:3, :3], inverse(middle)
     lit = np.flatnonzero(samples.lit[:, p])
     chosen = lit[:: max(1, -(-len(lit) // DRAWS.axis_program))]
@@ -216,7 +215,7 @@ def axis_program(
         facing=np.abs(facing) / distances,
         others=others,
         held=transform(into, points[lit]),
-        start=ring_axis(pose, device, projector.world_from_ring),
+        start=light.axis_of(inverse(pose) @ projector.world_from_ring),
         ring_radius=_RING_SHARE * float(projector.ring_radii[-1]),
         gap=float(projector.ring_radii[1] - projector.ring_radii[0]),
         min_conditioning=conditioning,

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.scene.lights import Light, light_of
 
 from .beam_profile import BeamProfile
 
@@ -27,7 +28,7 @@ def chord_errors(
     heights: NDArray[np.float64],
     coordinates: NDArray[np.float64],
     reach: int,
-    light: str,
+    light: Light,
 ) -> NDArray[np.float64]:
     """Return how far the surface is from the chord over it, along the beam.
 
@@ -37,7 +38,7 @@ def chord_errors(
         heights: z in ring coordinates [m], shape (n_c, n_a).
         coordinates: Ring coordinates of the rows, equally spaced, shape (n_c,).
         reach: Rows from the middle to either end.
-        light: `diverging` or `parallel`.
+        light: Of the projector.
 
     Returns:
         In [m], NaN where an end is missing, shape (n_c, n_a).
@@ -48,13 +49,8 @@ def chord_errors(
         heights[reach:-reach],
         heights[2 * reach :],
     )
-    if light == "parallel":
-        inner = np.abs(middle - 0.5 * (before + after))
-    else:
-        chord = 2.0 / (1.0 / before + 1.0 / after)
-        stretch = np.sqrt(1.0 + coordinates[reach:-reach] ** 2)
-        inner = np.abs(middle - chord) * stretch[:, None]
-    errors[reach:-reach] = inner
+    stretch = light.stretch(coordinates[reach:-reach])[:, None]
+    errors[reach:-reach] = np.abs(middle - light.chord(before, after)) * stretch
     return errors
 
 
@@ -69,18 +65,11 @@ def smooth_stretches(
     A surface that is lit all along never rises faster against the beam than
     tan(max_incidence), by the mean value theorem: a steeper chord crosses a step.
     """
-    lit, heights, c = profile.lit, profile.heights, profile.coordinates
-    whole = np.zeros_like(lit)
-    steepest = np.tan(max_incidence)
-    step = reach * (c[1] - c[0])
-    if projector.light == "parallel":
-        rise = np.abs(heights[reach:] - heights[:-reach])
-        flat = rise <= steepest * step
-    else:
-        # Along a ray at the angle gamma to the axis, dt / (t dgamma) is the slope.
-        far = np.log(heights * np.sqrt(1.0 + c**2)[:, None])
-        turn = np.arctan(c[reach:]) - np.arctan(c[:-reach])
-        flat = np.abs(far[reach:] - far[:-reach]) <= steepest * turn[:, None]
+    lit, whole = profile.lit, np.zeros_like(profile.lit)
+    chart = light_of(projector.device).slope_chart
+    high, along = chart(profile.heights, profile.coordinates)
+    steepest = np.tan(max_incidence) * (along[reach:] - along[:-reach])
+    flat = np.abs(high[reach:] - high[:-reach]) <= steepest[:, None]
     together = lit[: -2 * reach] & lit[reach:-reach] & lit[2 * reach :]
     whole[reach:-reach] = together & flat[:-reach] & flat[reach:]
     return whole

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.scene.lights import light_of
 from planning.scene.patterns import ring_coordinate
 from planning.scene.scene import Scene
 
@@ -107,7 +108,9 @@ def ring_beam(scene: Scene, projector: PlannedProjector, creases: Creases) -> Ri
         projector,
         edges,
         profile,
-        chord_errors(profile.heights, profile.coordinates, reach, projector.light),
+        chord_errors(
+            profile.heights, profile.coordinates, reach, light_of(projector.device)
+        ),
         on_target if on_target.any() else smooth,
         np.asarray(profile.lit.any(axis=1)),
     )

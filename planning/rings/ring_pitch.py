@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import PinholeModel
 from geometry.poses import inverse
 from planning.model.planned import PlannedProjector
 from planning.scene.lighting import assigned_projectors, lit_margins
+from planning.scene.lights import light_of
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples, pairs_of
 from planning.scene.patterns import code_surfaces
@@ -17,7 +17,6 @@ from planning.scene.scene import Scene
 
 from .ring_radii import MIN_PROJECTOR_PX
 
-_AZIMUTHS = 72
 # Rings are planned this much wider than they must be: samples are but samples.
 _ROOM = 1.08
 
@@ -100,24 +99,9 @@ def projector_gaps(
     projector: PlannedProjector, coordinates: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the ring gap that is 3 projector pixels wide or more all round, (n,)."""
-    device = projector.device
-    if not isinstance(device, PinholeModel):
-        return np.full(
-            len(coordinates), _ROOM * MIN_PROJECTOR_PX * device.pixel_pitch_m
-        )
-    turn = inverse(projector.world_from_device) @ projector.world_from_ring
-    angle = np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS)
-    spoke = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_AZIMUTHS)])
-    rays = coordinates[:, None, None] * spoke + np.array([0.0, 0.0, 1.0])
-    step = 1e-6
-    pixels, beyond = (
-        device.project(ray @ turn[:3, :3].T) for ray in (rays, rays + step * spoke)
-    )
-    rate = np.linalg.norm(beyond - pixels, axis=2) / step
-    rate = np.where(device.contains(pixels), rate, np.inf)
-    least = rate.min(axis=1)
-    # A ring that misses the panel altogether isn't drawn.
-    return np.where(np.isfinite(least), _ROOM * MIN_PROJECTOR_PX / least, 0.0)
+    frame = inverse(projector.world_from_device) @ projector.world_from_ring
+    light = light_of(projector.device)
+    return light.drawn_gaps(frame, coordinates, _ROOM * MIN_PROJECTOR_PX)
 
 
 def widest_gap(

@@ -1,17 +1,10 @@
-"""The rings of a projector: their frame, their radii, and the gap between them.
-
-The ring axis need not be the device's axis. Turned aside (parallel light: shifted), it
-moves the curves on which a camera is blind (|r.m| = 0) off the object.
-"""
+"""The rings of a projector: their radii, and the gap between them."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel, PinholeModel
-from geometry.poses import inverse
-from planning.model.device_poses import frame_along, ring_frame, shifted_frame
+from geometry.devices import DeviceModel, PinholeModel
 from planning.model.requirements import TriangulationLimits
-from solvers.poses.axis_program import axis_direction
 
 MIN_PROJECTOR_PX = 3.0
 _MIN_PITCH_PX = 6.0
@@ -19,38 +12,8 @@ _MIN_PITCH_PX = 6.0
 _GAP_FACING = 0.5
 
 
-def ring_frame_of_axis(
-    world_from_device: NDArray[np.float64],
-    device: PinholeModel | ParallelModel,
-    axis: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return ``world_from_ring`` of an axis in the coordinates of `ring_axis`."""
-    if isinstance(device, ParallelModel):
-        return world_from_device @ shifted_frame(axis)
-    middle = ring_frame(np.eye(4), device, 0.0, 0.0)[:3, :3]
-    return world_from_device @ frame_along(middle @ axis_direction(axis))
-
-
-def ring_axis(
-    world_from_device: NDArray[np.float64],
-    device: PinholeModel | ParallelModel,
-    world_from_ring: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the ring axis as two numbers a, (0, 0) in the middle of the beam.
-
-    Parallel: where it meets the device plane, in [m]. Diverging: tan(tilt/2) times the
-    unit vector towards which it is turned against the ray of the image centre, so that
-    `solvers.poses.axis_program.axis_direction` is its inverse.
-    """
-    middle = ring_frame(world_from_device, device, 0.0, 0.0)
-    frame = inverse(middle) @ world_from_ring
-    if isinstance(device, ParallelModel):
-        return frame[:2, 3]
-    return frame[:2, 2] / (1.0 + frame[2, 2])
-
-
 def ring_gap(
-    projector: PinholeModel | ParallelModel,
+    projector: DeviceModel,
     camera: PinholeModel,
     limits: TriangulationLimits,
     distance: float,

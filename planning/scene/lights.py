@@ -8,6 +8,7 @@ holds no pose.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,15 @@ from numpy.typing import NDArray
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from geometry.mesh.tensors import lengths
 from planning.model.planned import PlannedProjector
+from solvers.poses.axis_program import axis_direction
 
 from .samples import SampleArrays, Target
 
 _Array = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
+
+# Directions in which the width of a ring is looked at, and the change of R for it.
+_AZIMUTHS, _STEP = 72, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,7 @@ class DivergingLight:
     device: PinholeModel
     reach_words = "an image that reaches {:.0f} degrees off its middle on every side"
     offset_key = "tilt"
+    bounded_over = "position and aim"
 
     def directions(self, pose: _Array, points: _Array) -> _Array:
         """Return unit L = (P - Q) / |P - Q|, (n, 3)."""
@@ -95,6 +101,64 @@ class DivergingLight:
         """Return how far the ring axis is off the middle: turned by the tilt [rad]."""
         return tilt
 
+    def ring_axis(self, offset: float, azimuth: float) -> _Array:
+        """Return the axis a, `solvers.poses.axis_program`, so far off the middle."""
+        return math.tan(0.5 * offset) * np.array([np.cos(azimuth), np.sin(azimuth)])
+
+    def ring_frame(self, axis: _Array) -> _Array:
+        """Return ``device_from_ring`` of an axis, z turned from the middle ray.
+
+        Lens shift so doesn't move the rings off the object.
+        """
+        middle = _frame_along(self.device.middle_ray)
+        return _frame_along(middle[:3, :3] @ axis_direction(axis))
+
+    def axis_of(self, device_from_ring: _Array) -> _Array:
+        """Return the axis of a ring frame: tan(tilt/2) towards where it is turned."""
+        z = device_from_ring[:3, 2] @ _frame_along(self.device.middle_ray)[:3, :3]
+        return z[:2] / (1.0 + z[2])
+
+    def drawn_gaps(
+        self, device_from_ring: _Array, coordinates: _Array, pixels: float
+    ) -> _Array:
+        """Return the gaps in R that are so many pixels wide or more all round, (n,).
+
+        0 where a ring misses the image altogether: it isn't drawn.
+        """
+        angle = np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS)
+        spoke = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_AZIMUTHS)])
+        rays = coordinates[:, None, None] * spoke + np.array([0.0, 0.0, 1.0])
+        image, beyond = (
+            self.device.project(ray @ device_from_ring[:3, :3].T)
+            for ray in (rays, rays + _STEP * spoke)
+        )
+        rate = np.linalg.norm(beyond - image, axis=2) / _STEP
+        least = np.where(self.device.contains(image), rate, np.inf).min(axis=1)
+        return np.where(np.isfinite(least), pixels / least, 0.0)
+
+    def chord(self, before: _Array, after: _Array) -> _Array:
+        """Return the height z of a chord in its middle: it is straight in 1/z."""
+        return 2.0 / (1.0 / before + 1.0 / after)
+
+    def stretch(self, coordinates: _Array) -> _Array:
+        """Return lengths along the light for one of z."""
+        return np.sqrt(1.0 + coordinates**2)
+
+    def slope_chart(
+        self, heights: _Array, coordinates: _Array
+    ) -> tuple[_Array, _Array]:
+        """Return log t, (n_c, n_a), and the angle to the axis, (n_c,).
+
+        dt / (t dgamma) is the slope of the surface against the light.
+        """
+        far = heights * self.stretch(coordinates)[:, None]
+        return np.log(far), np.arctan(coordinates)
+
+    def pose_limits(self) -> dict[str, Any]:
+        """Return what bounds the light, as `solvers.poses` names it."""
+        device = self.device
+        return {"camera_matrix": device.camera_matrix, "resolution": device.resolution}
+
     def image_ring(self, offset: float) -> float:
         """Return R that holds the image from any axis so far off; inf: no cone does.
 
@@ -135,6 +199,7 @@ class ParallelLight:
     device: ParallelModel
     reach_words = "a beam of {:.0f} mm about its axis"
     offset_key = "shift_m"
+    bounded_over = "direction"
 
     def directions(self, pose: _Array, points: _Array) -> _Array:
         """Return +z of the device."""
@@ -179,6 +244,45 @@ class ParallelLight:
         """Return the shift of the ring axis [m] that moves as far as the tilt would."""
         return standoff * math.tan(tilt)
 
+    def ring_axis(self, offset: float, azimuth: float) -> _Array:
+        """Return where the axis meets the device plane, so far off the middle [m]."""
+        return offset * np.array([np.cos(azimuth), np.sin(azimuth)])
+
+    def ring_frame(self, axis: _Array) -> _Array:
+        """Return ``device_from_ring``, moved to an axis in the device plane."""
+        frame = np.eye(4)
+        frame[:2, 3] = axis
+        return frame
+
+    def axis_of(self, device_from_ring: _Array) -> _Array:
+        """Return the axis of a ring frame [m]."""
+        return device_from_ring[:2, 3]
+
+    def drawn_gaps(
+        self, device_from_ring: _Array, coordinates: _Array, pixels: float
+    ) -> _Array:
+        """Return the gaps in R that are so many pixels wide, (n,)."""
+        return np.full(len(coordinates), pixels * self.device.pixel_pitch_m)
+
+    def chord(self, before: _Array, after: _Array) -> _Array:
+        """Return the height z of a chord in its middle."""
+        return 0.5 * (before + after)
+
+    def stretch(self, coordinates: _Array) -> _Array:
+        """Return 1: z runs along the light."""
+        return np.ones_like(coordinates)
+
+    def slope_chart(
+        self, heights: _Array, coordinates: _Array
+    ) -> tuple[_Array, _Array]:
+        """Return z and R: dz / dR is the slope of the surface against the light."""
+        return heights, coordinates
+
+    def pose_limits(self) -> dict[str, Any]:
+        """Return what bounds the light, as `solvers.poses` names it."""
+        device = self.device
+        return {"half_panel_m": device.half_panel, "beam_radius_m": device.beam_reach}
+
     def image_ring(self, offset: float) -> float:
         """Return R that holds the beam from any axis so far off [m]."""
         corner = float(np.hypot(*self.device.half_panel))
@@ -211,6 +315,17 @@ def light_of(device: DeviceModel) -> Light:
     return DivergingLight(device)
 
 
+def ring_frame(
+    world_from_device: _Array, device: DeviceModel, offset: float, azimuth: float
+) -> _Array:
+    """Return ``world_from_ring``, its axis so far off the middle (`ring_offset`).
+
+    The azimuth is counted from the device's +x towards +y [rad].
+    """
+    light = light_of(device)
+    return world_from_device @ light.ring_frame(light.ring_axis(offset, azimuth))
+
+
 @dataclass(frozen=True, eq=False)
 class LightOnSamples(SampleArrays):
     """-N.L and |T1.L| (0 where T1 is arbitrary) of n samples, before occlusion."""
@@ -228,6 +343,15 @@ def light_on(projector: PlannedProjector, target: Target) -> LightOnSamples:
         -np.einsum("ij,ij->i", normals, directions),
         np.abs(np.einsum("ij,ij->i", target.steep, directions)),
     )
+
+
+def _frame_along(z: _Array) -> _Array:
+    """Return a frame whose z is a unit vector and whose x lies across +y."""
+    x = np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    frame = np.eye(4)
+    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    return frame
 
 
 def _radial(local: _Array) -> tuple[_Array, _Array]:

@@ -28,7 +28,6 @@ from planning.cameras.camera_routes import (
 from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
 from planning.cameras.proved_cameras import camera_stage
 from planning.model.bodies import Body
-from planning.model.device_poses import ring_frame
 from planning.model.document.certificates import Certificate, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
@@ -39,6 +38,7 @@ from planning.report.summary.proof_lines import route_lines
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
+from planning.scene.lights import ring_frame
 from planning.scene.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_findings import AuditFindings

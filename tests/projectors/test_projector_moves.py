@@ -9,7 +9,6 @@ from support.plain_shapes import box
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_poses import _between, widen_margins
@@ -19,6 +18,7 @@ from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_margins, lit_stages
+from planning.scene.lights import ring_frame
 from planning.scene.limits import projector_limits
 from planning.scene.workspace.candidates import aimed_poses
 

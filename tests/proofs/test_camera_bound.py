@@ -14,7 +14,6 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.proved_cameras import bound_stage, camera_stage
-from planning.model.device_poses import ring_frame
 from planning.model.document.certificates import (
     BestArea,
     CandidateBound,
@@ -33,7 +32,7 @@ from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
-from planning.scene.lights import LightOnSamples
+from planning.scene.lights import LightOnSamples, ring_frame
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.patterns import CodeSurfaces

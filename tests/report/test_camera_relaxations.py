@@ -15,7 +15,6 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import CameraCover
 from planning.cameras.proved_cameras import CameraStage
-from planning.model.device_poses import ring_frame
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.advice import camera_relaxations
@@ -35,6 +34,7 @@ from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import Draw
+from planning.scene.lights import ring_frame
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.measured import furthest_failure, lit_samples, measured_by
 from planning.scene.workspace.candidates import aimed_poses

@@ -10,13 +10,13 @@ from support.plain_shapes import box, grid, joined
 from geometry.devices import ParallelModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.model.device_poses import ring_frame
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.report.summary.coverage_lines import schedule_lines
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
+from planning.scene.lights import ring_frame
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine

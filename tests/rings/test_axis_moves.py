@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.factories import make_camera, make_projector, make_requirements, make_scene
 
+from geometry.poses import inverse
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.camera_stage import (
@@ -16,7 +17,6 @@ from planning.cameras.camera_stage import (
     with_cameras,
 )
 from planning.cameras.proved_cameras import camera_stage
-from planning.model.device_poses import ring_frame
 from planning.rig.rig import load_rig
 from planning.rings.axis_moves import (
     AxisJudge,
@@ -25,9 +25,10 @@ from planning.rings.axis_moves import (
     move_ring_axes,
     proposals,
 )
-from planning.rings.ring_radii import ring_axis, ring_frame_of_axis, uniform_radii
+from planning.rings.ring_radii import uniform_radii
 from planning.scene import measurability
 from planning.scene.draws import Draw
+from planning.scene.lights import light_of, ring_frame
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns import code_surfaces, ring_coordinate
 from planning.scene.workspace.candidates import Candidates
@@ -86,7 +87,9 @@ def test_errors_fall_and_nothing_is_lost(ball, moved):
         assert np.array_equal(old.world_from_device, new.world_from_device)
         assert np.array_equal(old.ring_radii, new.ring_radii)
     tilts = [
-        np.linalg.norm(ring_axis(p.world_from_device, p.device, p.world_from_ring))
+        np.linalg.norm(
+            light_of(p.device).axis_of(inverse(p.world_from_device) @ p.world_from_ring)
+        )
         for p in moved
     ]
     assert np.ptp(tilts) > 1e-4
@@ -240,9 +243,9 @@ def test_an_axis_and_its_ring_frame_are_the_same(ball):
     _, projectors, _ = ball
     for p in projectors:
         for tilt, azimuth in ((0.05, 0.3), (0.12, 4.0)):
-            frame = ring_frame(p.world_from_device, p.device, tilt, azimuth)
-            axis = ring_axis(p.world_from_device, p.device, frame)
-            again = ring_frame_of_axis(p.world_from_device, p.device, axis)
+            frame = ring_frame(np.eye(4), p.device, tilt, azimuth)
+            axis = light_of(p.device).axis_of(frame)
+            again = light_of(p.device).ring_frame(axis)
             assert again == pytest.approx(frame, abs=1e-12)
             size = tilt if p.light == "parallel" else np.tan(tilt / 2)
             assert np.linalg.norm(axis) == pytest.approx(size)

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
+from planning.rig.rig import load_rig
 from planning.rings.ring_curvature import chord_errors, ring_curvature
 from planning.rings.ring_spacing import GapLimits, spaced_radii
+from planning.scene.lights import light_of
 
 RADIUS = 0.1
 DISTANCE = 1.0
+LIGHTS = {
+    light: light_of(load_rig("default", light=light).projector_device())
+    for light in ("diverging", "parallel")
+}
 
 
 def limits(kappa, *, coarsest=1.0, finest=1e-6, outer=1.0, free=False):
@@ -35,7 +41,7 @@ def sphere_depth(rho, light):
 def test_kappa_of_a_ball_is_its_closed_form(light, outer):
     """Parallel light: z'' = a^2 / (a^2 - c^2)^(3/2)."""
     c = np.linspace(0.0, outer, 401)[1:]
-    errors = chord_errors(sphere_depth(c, light)[:, None], c, 2, light)
+    errors = chord_errors(sphere_depth(c, light)[:, None], c, 2, LIGHTS[light])
     gap = 4 * (c[1] - c[0])
     kappa = ring_curvature(errors, np.isfinite(errors), gap)
     inside = slice(2, -2)
@@ -54,7 +60,7 @@ def test_a_slanted_plane_has_no_kappa_in_either_light(light):
     c = np.linspace(0.0, 0.2, 101)[1:]
     # z = 1 + 0.7 x, with x = c (parallel) or x = c z (diverging).
     z = 1.0 + 0.7 * c if light == "parallel" else 1.0 / (1.0 - 0.7 * c)
-    errors = chord_errors(z[:, None], c, 2, light)
+    errors = chord_errors(z[:, None], c, 2, LIGHTS[light])
     assert np.nanmax(errors) < 1e-15
 
 
@@ -63,7 +69,7 @@ def test_a_cylinder_across_the_axis_bends_most_at_one_azimuth():
     c = np.linspace(0.0, 0.05, 201)[1:]
     azimuths = np.linspace(0.0, 2.0 * np.pi, 721)[:-1]
     z = 1.0 - np.sqrt(RADIUS**2 - np.outer(c, np.cos(azimuths)) ** 2)
-    errors = chord_errors(z, c, 2, "parallel")
+    errors = chord_errors(z, c, 2, LIGHTS["parallel"])
     kappa = ring_curvature(errors, np.isfinite(errors), 4 * (c[1] - c[0]))
     steepest = RADIUS**2 / (RADIUS**2 - c**2) ** 1.5
     assert kappa[2:-2] == pytest.approx(steepest[2:-2], rel=0.01)

@@ -11,7 +11,6 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
@@ -25,6 +24,7 @@ from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
 from planning.scene.draws import Draw
+from planning.scene.lights import ring_frame
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.patterns import code_surfaces
 

@@ -5,11 +5,10 @@ import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits, Workspace
 from planning.rings.ring_radii import ring_gap, uniform_radii
-from planning.scene.lights import light_of
+from planning.scene.lights import light_of, ring_frame
 from planning.scene.workspace.candidates import Candidates, aimed_poses
 from planning.scene.workspace.shell_positions import shell_positions
 

@@ -11,7 +11,6 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import transform
 from geometry.shapes.primitives import sphere
-from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.report.reach import furthest_lit
@@ -20,7 +19,7 @@ from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
-from planning.scene.lights import light_on
+from planning.scene.lights import light_on, ring_frame
 from planning.scene.limits import projector_limits
 from planning.scene.patterns import ring_coordinate
 from planning.scene.samples import Target

@@ -6,10 +6,10 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from planning import Rig, load_rig
-from planning.model.device_poses import ring_frame
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements, Workspace
 from planning.rig.wishes import Wishes
+from planning.scene.lights import ring_frame
 from planning.scene.scene import Scene
 
 TAU_M = 0.004

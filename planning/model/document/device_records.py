@@ -151,22 +151,15 @@ def projector_record(
     projector: PlannedProjector, *, min_margin_rad: float | None, lit_area_m2: float
 ) -> ProjectorRecord:
     """Return a projector with its claims as the file holds it."""
-    device = projector.device
-    pinhole = isinstance(device, PinholeModel)
     return ProjectorRecord(
         id=projector.id,
         light=projector.light,
         world_from_device=projector.world_from_device.tolist(),
         world_from_ring=projector.world_from_ring.tolist(),
-        K=device.camera_matrix.tolist() if pinhole else None,
-        resolution=device.resolution,
-        pixel_pitch_m=None if pinhole else device.pixel_pitch_m,
-        range_m=device.range_m,
-        beam_radius=None if pinhole else device.beam_radius,
         ring_radii=tuple(projector.ring_radii.tolist()),
         min_margin_rad=min_margin_rad,
         lit_area_m2=lit_area_m2,
-        **_where_known(projector),
+        **_described(projector, ProjectorRecord),
     )
 
 
@@ -177,21 +170,21 @@ def camera_record(
     return CameraRecord(
         id=camera.id,
         world_from_device=camera.world_from_device.tolist(),
-        K=camera.device.camera_matrix.tolist(),
-        distortion=camera.device.distortion,
-        resolution=camera.device.resolution,
-        range_m=camera.device.range_m,
         seen_area_m2=seen_area_m2,
         sole_area_m2=sole_area_m2,
-        **_where_known(camera),
+        **_described(camera, CameraRecord),
     )
 
 
-def _where_known(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:
-    """Body, and name of an existing device; no key where there is none."""
+def _described(
+    device: PlannedProjector | PlannedCamera, record: type[Part]
+) -> dict[str, Any]:
+    """Optics; body, and name of an existing device: no key where there is none."""
+    optics = device.device.to_document().items()
+    kept = {key: value for key, value in optics if key in record.model_fields}
     body = {} if device.body is None else {"body": device.body}
     name = {"existing": True, "name": device.existing} if device.existing else {}
-    return body | name
+    return kept | body | name
 
 
 class BaselineRow(Part):

@@ -4,6 +4,7 @@ from planning.model.document.certificates import Certificate
 from planning.model.document.input_records import SelectionRecord
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
+from planning.scene.lights import light_of
 
 _EXCLUDED = {
     "projector_beam": "lie outside the beam",
@@ -19,11 +20,11 @@ _EXCLUDED = {
 def proof_lines(plan: RigPlan) -> list[str]:
     """Return what was proved of both counts, and over what."""
     requirements, proofs = plan.requirements, plan.document.certificates
-    parallel = plan.projectors[0].light == "parallel"
+    poses = light_of(plan.projectors[0].device).bounded_over
     return [
         "",
         _proof("projector", proofs.projectors, requirements.dominant_coverage, "light"),
-        _continuous(proofs.projectors, "direction" if parallel else "position and aim"),
+        _continuous(proofs.projectors, poses),
         _proof("camera", proofs.cameras, requirements.coverage, "measure")
         + " (given these projectors)",
         _continuous(proofs.cameras, "position, aim and roll"),
