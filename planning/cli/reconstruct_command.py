@@ -11,7 +11,6 @@ from typing import Any
 
 import click
 
-from geometry.mesh.sampling import SurfaceSamples
 from planning.model.errors import CapturesError
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
@@ -35,6 +34,7 @@ from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
 )
+from planning.verify.verification import bare
 
 from .console import cores, print_json, reporter, writable
 
@@ -81,7 +81,8 @@ def _reconstruct(
     mounted = options["calibration"]
     mounted = None if mounted is None else calibrated(scanner, mounted)
     report("predicting what the plan's poses measure")
-    expected = _expected(plan, seed, threads)
+    predicted = predict_measured(plan, seed=seed, threads=threads)
+    expected = Expected(bare(predicted.samples), predicted.measured, predicted.by_pair)
 
     def progress(done: int, total: int) -> None:
         report(f"pair {done} of {total}")
@@ -110,15 +111,6 @@ def _reconstruct(
         save=None if place is None else CaptureFolder(place, scanner),
         progress=progress,
     )
-
-
-def _expected(plan: RigPlan, seed: int, threads: int) -> Expected:
-    predicted = predict_measured(plan, seed=seed, threads=threads)
-    inside = predicted.samples
-    samples = SurfaceSamples(
-        inside.points, inside.normals, inside.faces, float(inside.weights[0])
-    )
-    return Expected(samples, predicted.measured, predicted.by_pair)
 
 
 def save_cloud(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.sampling import SurfaceSamples
+from geometry.mesh.sampling import SurfaceSamples, sample_surface
 from geometry.rays.proximity import closest_points
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
@@ -198,15 +198,14 @@ def _reconstruct(
         seed=seed,
         threads=threads,
         truth=standing,
-        expected=Expected(_bare(inside), predicted),
+        expected=Expected(bare(inside), predicted),
         progress=_countdown(say),
     )
     samples, actual = audit.case.samples, audit.case.actual
     prediction = PredictedSamples(
-        _bare(samples),
+        bare(samples),
         samples.weights,
         samples.in_target,
-        samples.region,
         np.array([camera.world_from_device[:3, 3] for camera in plan.cameras]),
         actual.measured_by,
         possible_at_floors(plan, samples, threads=threads),
@@ -228,19 +227,15 @@ def _countdown(say: Callable[[str], None]) -> Callable[[int, int], None]:
     return pair_done
 
 
-def _bare(samples: AuditSamples) -> SurfaceSamples:
-    """The samples as the reconstruction takes them, of one weight."""
+def bare(samples: AuditSamples) -> SurfaceSamples:
+    """Return samples as the reconstruction takes them, of one weight."""
     weight = float(samples.weights[0]) if len(samples) else 0.0
     return SurfaceSamples(samples.points, samples.normals, samples.faces, weight)
 
 
 def _apart(mesh: TriangleMesh, other: TriangleMesh) -> float:
     """Largest distance of random points of one mesh from the other in [m]."""
-    rng = np.random.default_rng(0)
-    areas = mesh.face_areas
-    faces = rng.choice(len(areas), size=_MESH_SAMPLES, p=areas / areas.sum())
-    shares = rng.dirichlet((1.0, 1.0, 1.0), size=_MESH_SAMPLES)
-    points = np.einsum("nk,nkd->nd", shares, mesh.corners[faces])
+    points = sample_surface(mesh, _MESH_SAMPLES, seed=0).points
     return float(np.abs(closest_points(other, points).distances).max())
 
 

@@ -70,18 +70,14 @@ def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
         findings.holds(
             not one.overlaps(other), key, f"overlaps the body of {other.name}"
         )
+    obstacles = {f"obstacle {h.name!r}": h.caster for h in case.shadow.hindrances}
     for device, block in solid:
         below = findings.at(f"{device.id}.body")
-        below.holds(
-            not touches(block, case.shadow.caster),
-            "",
-            "touches the object; it must stand off it",
-        )
-        for solid in case.shadow.hindrances:
+        for name, caster in {"object": case.shadow.caster, **obstacles}.items():
             below.holds(
-                not touches(block, solid.caster),
+                not touches(block, caster),
                 "",
-                f"touches the obstacle {solid.name!r}; it must stand off it",
+                f"touches the {name}; it must stand off it",
             )
         if not device.existing:
             _audit_zones(block, case.plan.requirements.workspace, below)

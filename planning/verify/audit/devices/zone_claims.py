@@ -37,9 +37,9 @@ def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
     space, findings = case.plan.requirements.workspace, findings.at(_KEY)
     tables: Mapping[str, Any] = case.plan.document.rig.workspace
     _audit_shell(case, findings)
-    rooms = [tables] if "min_mm" in tables else []
+    rooms = [_as_volume(tables)] if "min_mm" in tables else []
     for name, boxes, stated, same in (
-        ("box", [] if space.box is None else [space.box], rooms, _audit_room),
+        ("box", [] if space.box is None else [space.box], rooms, _audit_volume),
         ("keep_out", space.keep_out, tables.get("keep_out") or [], _audit_volume),
         ("mounting", space.mounting, tables.get("mounting") or [], _audit_plane),
     ):
@@ -105,17 +105,23 @@ def _audit_box(box: Box, findings: AuditFindings) -> None:
     )
 
 
-def _audit_room(box: Box, table: Mapping[str, Any], findings: AuditFindings) -> None:
-    low, high = 1e-3 * np.array(table["min_mm"]), 1e-3 * np.array(table["max_mm"])
-    stated = Block(box.name, np.eye(3), 0.5 * (low + high), 0.5 * (high - low))
-    _audit_corners(box, stated, findings)
+def _as_volume(table: Mapping[str, Any]) -> dict[str, Any]:
+    low, high = np.array(table["min_mm"]), np.array(table["max_mm"])
+    centre, turn = 0.5 * (low + high), np.zeros(3)
+    return {"centre_mm": centre, "size_mm": high - low, "turn_deg": turn}
 
 
 def _audit_volume(box: Box, table: Mapping[str, Any], findings: AuditFindings) -> None:
     turn = turned(np.radians(table["turn_deg"]))
     centre, size = (1e-3 * np.array(table[name]) for name in ("centre_mm", "size_mm"))
     stated = Block(box.name, turn, centre, 0.5 * size)
-    _audit_corners(box, stated, findings)
+    claimed = block_of_zone(box, np.zeros(3))
+    off = float(np.abs(claimed.corners - stated.corners).max())
+    findings.holds(
+        off <= _ROUNDING,
+        "",
+        f"{box.name!r} differs from rig.workspace's by {1e3 * off:.3g} mm at a corner",
+    )
 
 
 def _audit_plane(box: Box, table: Mapping[str, Any], findings: AuditFindings) -> None:
@@ -147,13 +153,3 @@ def turned(angles: Array) -> Array:
         step[one, two], step[two, one] = -np.sin(angle), np.sin(angle)
         turn = step @ turn
     return turn
-
-
-def _audit_corners(box: Box, stated: Block, findings: AuditFindings) -> None:
-    claimed = block_of_zone(box, np.zeros(3))
-    off = float(np.abs(claimed.corners - stated.corners).max())
-    findings.holds(
-        off <= _ROUNDING,
-        "",
-        f"{box.name!r} differs from rig.workspace's by {1e3 * off:.3g} mm at a corner",
-    )

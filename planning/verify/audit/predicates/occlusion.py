@@ -110,21 +110,13 @@ def bodies_of_reference(
 ) -> list[tuple[Block, ...]]:
     """Return the bodies among which each reference pose (n, 4, 4) covers what it does.
 
-    Those of existing devices, and for a camera those of the projectors. A device of
-    their kind that stands at one of the poses is itself.
+    Those of existing devices, and for a camera those of the projectors. A device that
+    stands at one of the poses is itself.
     """
-    cameras = [camera for camera in plan.cameras if camera.existing]
     projectors = [p for p in plan.projectors if kind == "camera" or p.existing]
-    alike, others = projectors, cameras
-    if kind == "camera":
-        alike, others = cameras, projectors
+    standing = [*projectors, *(camera for camera in plan.cameras if camera.existing)]
     return [
-        _bodies(
-            [
-                *(d for d in alike if np.abs(d.world_from_device - pose).max() > _POSE),
-                *others,
-            ]
-        )
+        _bodies(d for d in standing if np.abs(d.world_from_device - pose).max() > _POSE)
         for pose in poses
     ]
 

@@ -31,7 +31,6 @@ class PredictedSamples:
         samples: Points of the whole surface.
         weights: Area that each stands for [m²], shape (n,).
         in_target: Whether each lies in the target, shape (n,).
-        region: Dominant region of each, -1 for none, shape (n,).
         centres: Of the cameras [m], shape (n_c, 3).
         claimed: Measurable by each camera within the plan's limits, shape (n_c, n).
         possible: The same at the limits at which light and decoder fail, (n_c, n).
@@ -40,7 +39,6 @@ class PredictedSamples:
     samples: SurfaceSamples
     weights: Array
     in_target: Mask
-    region: Indices
     centres: Array
     claimed: Mask
     possible: Mask
@@ -111,14 +109,14 @@ def compare(
         shares = _shares(prediction, measured, area)
         return SurfaceShare(**region, **shares, **_errors(accuracy, faces))
 
-    dominant = face_region >= 0
+    dominant, region = face_region >= 0, face_region[prediction.samples.faces]
     ids = [int(i) for i in np.unique(face_region[dominant])]
     return Comparison(
         ConfusionRecords(
             target=tables(prediction.in_target), surface=tables(everywhere)
         ),
-        tuple(share(prediction.region == i, face_region == i, id=i) for i in ids),
-        share(prediction.region >= 0, dominant) if ids else None,
+        tuple(share(region == i, face_region == i, id=i) for i in ids),
+        share(region >= 0, dominant) if ids else None,
         share(everywhere, np.ones(len(face_region), dtype=bool)),
     )
 
