@@ -39,22 +39,6 @@ _EXPORTS = {
     "read_weight": "planning.scene.interest",
     "verify_plan": "planning.verify.verification",
 }
-__all__ = [
-    "InputError",
-    "PlanningError",
-    "RangedBody",
-    "RequirementError",
-    "Rig",
-    "RigPlan",
-    "Verification",
-    "load_mesh",
-    "load_rig",
-    "plan_rig",
-    "read_ranges",
-    "read_selection",
-    "read_weight",
-    "verify_plan",
-]
 
 
 def __getattr__(name: str) -> object:
@@ -64,7 +48,7 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return list(_EXPORTS)
 
 
 check_siblings()

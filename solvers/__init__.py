@@ -25,15 +25,6 @@ _EXPORTS = {
     "solve_cover": "covers.cover",
     "solve_max_coverage": "covers.cover",
 }
-__all__ = [
-    "CellProblem",
-    "CoverProblem",
-    "CoverSolution",
-    "SolveStatus",
-    "bound_count",
-    "solve_cover",
-    "solve_max_coverage",
-]
 
 
 def __getattr__(name: str) -> object:
@@ -43,7 +34,7 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return list(_EXPORTS)
 
 
 check_siblings()

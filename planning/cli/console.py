@@ -21,6 +21,7 @@ from planning.model.progress import Report
 _Command = Callable[..., Any]
 # As in sysexits.h: a bug of ours, nothing that the user did.
 _INTERNAL = 70
+_STOPS = (signal.SIGINT, signal.SIGTERM)
 
 debug_option = click.option(
     "--debug", is_flag=True, help="Tracebacks instead of one-line errors."
@@ -79,11 +80,6 @@ def reporter(*, quiet: bool) -> Report:
     return report
 
 
-def cores() -> int:
-    """Return the number of cores that this process may use; 2 where it isn't told."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
-
-
 def print_json(document: Mapping[str, Any]) -> None:
     """Write one JSON object to stdout."""
     click.echo(json.dumps(document, indent=1, allow_nan=False))
@@ -114,13 +110,24 @@ def writable(folder: Path) -> Generator[None]:
         raise
 
 
+@contextmanager
+def stop_signals(handler: Callable[[int, Any], Any]) -> Generator[None]:
+    """Handle Ctrl-C and SIGTERM in another way meanwhile."""
+    before = [signal.signal(number, handler) for number in _STOPS]
+    try:
+        yield
+    finally:
+        for number, handled in zip(_STOPS, before, strict=True):
+            signal.signal(number, handled)
+
+
 def run(command: Callable[[], int], *, debug: bool) -> None:
     """Run a command; turn our own errors into one line and the documented exit code."""
     from geometry.mesh.mesh import MeshError
     from planning.model.errors import PlanningError
 
     try:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in _STOPS:
             signal.signal(number, signal.default_int_handler)
         sys.exit(command())
     except KeyboardInterrupt:
@@ -132,7 +139,8 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
     except (PlanningError, MeshError, OSError) as error:
         if debug:
             raise
-        stop(str(error), 2 if isinstance(error, OSError) else _exit_code(error))
+        code = 2 if isinstance(error, OSError) else getattr(error, "exit_code", 3)
+        stop(str(error), code)
     except Exception as error:
         if debug or isinstance(error, click.ClickException):
             raise
@@ -142,10 +150,6 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
             f"and report it",
             _INTERNAL,
         )
-
-
-def _exit_code(error: Exception) -> int:
-    return int(getattr(error, "exit_code", 3))
 
 
 def stop(message: str, code: int) -> NoReturn:

@@ -4,7 +4,6 @@ Heavy packages are imported inside the commands, so that `plan --help` stays qui
 """
 
 import os
-import signal
 import sys
 from typing import NoReturn
 
@@ -14,7 +13,7 @@ from planning.cli.declared.other_declared import rigs, sample, schema, verify
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
 
-from .console import stop
+from .console import stop, stop_signals
 
 _NOT_BUILT = {
     "report": "writes one self-contained HTML file",
@@ -49,7 +48,11 @@ class _DefaultGroup(click.Group):
 @click.group(
     "plan",
     cls=_DefaultGroup,
-    context_settings={"help_option_names": ["--help", "-h"], "max_content_width": 100},
+    context_settings={
+        "help_option_names": ["--help", "-h"],
+        "max_content_width": 100,
+        "show_default": True,
+    },
 )
 @click.version_option(package_name="ringrig", prog_name="plan")
 def commands() -> None:
@@ -95,10 +98,9 @@ def main() -> None:
     # and IPOPT are loaded. Rays have threads of their own.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, _quit) for number in numbers]
     try:
-        sys.exit(commands.main(prog_name="plan", standalone_mode=False))
+        with stop_signals(_quit):
+            sys.exit(commands.main(prog_name="plan", standalone_mode=False))
     except click.exceptions.NoArgsIsHelpError as error:
         error.show()
         sys.exit(error.exit_code)
@@ -106,9 +108,6 @@ def main() -> None:
         stop(f"{error.format_message()} (see `plan --help`)", error.exit_code)
     except (click.Abort, KeyboardInterrupt):
         stop("interrupted", 130)
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 def _quit(number: int, frame: object) -> NoReturn:

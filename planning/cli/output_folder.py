@@ -7,7 +7,6 @@ file system. What others put into the old folder is moved along.
 import ctypes
 import os
 import shutil
-import signal
 import sys
 import tempfile
 from collections.abc import Generator
@@ -16,6 +15,8 @@ from pathlib import Path
 
 from planning.verify.reconstruction.cloud_file import is_cloud
 from planning.verify.reconstruction.pattern_files import is_patterns
+
+from .console import stop_signals
 
 # What a run writes, and what of an older plan doesn't stay beside a new one.
 OWNED = ("plan.json", "surface.npz", "rig.png", "patterns", "cloud.ply")
@@ -69,16 +70,9 @@ def uninterrupted() -> Generator[None]:
     Raises:
         KeyboardInterrupt: Afterwards, if one came.
     """
-    numbers, came = (signal.SIGINT, signal.SIGTERM), []
-    before = [
-        signal.signal(number, lambda number, _: came.append(number))
-        for number in numbers
-    ]
-    try:
+    came: list[int] = []
+    with stop_signals(lambda number, _: came.append(number)):
         yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
     if came:
         raise KeyboardInterrupt
 

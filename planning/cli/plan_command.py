@@ -10,6 +10,7 @@ import click
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
+from geometry.parallel import n_threads
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
 from planning.pipeline import plan_rig
@@ -24,7 +25,7 @@ from planning.scene.ranges.ranged_body import read_ranges
 from planning.verify.reconstruction.pattern_files import write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 
-from .console import cores, print_json, reporter, writable
+from .console import print_json, reporter, writable
 from .output_folder import OWNED, exchanged, uninterrupted
 
 # Options that `plan_rig` takes as they are.
@@ -77,7 +78,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 surface,
                 rig,
                 select=interest,
-                threads=options["threads"] or cores(),
+                threads=options["threads"] or n_threads(),
                 check=not options["no_check"],
                 time_limit=_remaining(options["time_limit"], begin),
                 progress=report,

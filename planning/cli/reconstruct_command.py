@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from geometry.parallel import n_threads
 from planning.model.errors import CapturesError
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
@@ -36,7 +37,7 @@ from planning.verify.reconstruction.single_shot.single_shot import (
 )
 from planning.verify.verification import bare
 
-from .console import cores, print_json, reporter, writable
+from .console import print_json, reporter, writable
 
 CLOUD = "cloud.ply"
 # How near the object is taken to lie to the mesh that labels single images.
@@ -77,7 +78,7 @@ def _reconstruct(
 ) -> Reconstruction:
     seed = options["seed"]
     seed = plan.document.seed if seed is None else seed
-    threads = options["threads"] or cores()
+    threads = options["threads"] or n_threads()
     mounted = options["calibration"]
     mounted = None if mounted is None else calibrated(scanner, mounted)
     report("predicting what the plan's poses measure")

@@ -9,10 +9,11 @@ import numpy as np
 
 from geometry.files.readers import UNITS, load_mesh
 from geometry.mesh.mesh import TriangleMesh
+from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.verify.verification import verify_plan
 
-from .console import cores, print_json, reporter
+from .console import print_json, reporter
 
 
 def verify_command(options: Mapping[str, Any]) -> int:
@@ -28,7 +29,7 @@ def verify_command(options: Mapping[str, Any]) -> int:
         mesh,
         truth=truth,
         seed=options["seed"],
-        threads=options["threads"] or cores(),
+        threads=options["threads"] or n_threads(),
         progress=report,
     )
     if options["as_json"]:

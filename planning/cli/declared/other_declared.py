@@ -58,7 +58,6 @@ def schema(debug: bool) -> None:
     "--output",
     type=click.Path(path_type=Path),
     default="face.obj",
-    show_default=True,
     metavar="FILE",
     help="Where it goes.",
 )
@@ -66,7 +65,6 @@ def schema(debug: bool) -> None:
     "--faces",
     type=click.IntRange(500, 2_000_000),
     default=40_000,
-    show_default=True,
     metavar="N",
     help="Triangles of the closed head, about; the neck is then cut open.",
 )

@@ -71,7 +71,6 @@ class DefaultCommand(click.Command):
     "--rig",
     "rig_name",
     default="default",
-    show_default=True,
     metavar="NAME|rig.toml",
     help="Devices and limits.",
 )
@@ -84,7 +83,6 @@ class DefaultCommand(click.Command):
     "--pattern",
     type=click.Choice(["rings", "dense", "none"]),
     default="rings",
-    show_default=True,
     help="What is projected.",
 )
 @click.option(
@@ -131,7 +129,6 @@ class DefaultCommand(click.Command):
     "--cameras-by",
     type=click.Choice(["cover", "paper", "both"]),
     default="both",
-    show_default=True,
     help="Fewest of the candidates, the paper's largest baselines, or what is better.",
 )
 @click.option(
@@ -145,7 +142,6 @@ class DefaultCommand(click.Command):
     "--seed",
     type=click.IntRange(0),
     default=0,
-    show_default=True,
     help="Of every random draw.",
 )
 @click.option(
