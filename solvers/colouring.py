@@ -5,25 +5,20 @@ Given a graph, colour its vertices so that the ends of each edge differ::
     minimise k  s.t.  colour_i in {0 .. k-1},   colour_i != colour_j for every edge ij
 
 A clique of k vertices proves that k colours are needed. One colour more than that is
-tried until a colouring exists. Up to eight vertices all cliques and colourings are
-listed; above, HiGHS decides, up to a number of nodes::
-
-    clique:     maximise sum_i x_i,  x_i + x_j <= 1 where i and j don't conflict
-    colouring:  sum_c x_ic = 1 for each i,  x_ic + x_jc <= 1 for each edge ij and c
+tried until a colouring exists. Cliques and colourings are searched vertex by vertex,
+back to the last choice where none is left, up to a number of steps.
 """
 
 from dataclasses import dataclass
-from itertools import combinations, product
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-_LISTED = 8
-_MAX_NODES = 20_000
-# Of `scipy.optimize.milp`.
-_INFEASIBLE = 2
+from .status import WorkBudget
+
+# About two seconds.
+_MAX_NODES = 200_000
 
 Proof = Literal["clique", "exhaustion", "none"]
 
@@ -65,25 +60,26 @@ def fewest_colours(
     Args:
         conflicts: Whether two vertices conflict: symmetric, no vertex with itself,
             shape (n, n).
-        max_nodes: Nodes that each run of HiGHS may take.
+        max_nodes: Vertices that each search may choose or colour.
 
     Raises:
         ValueError: If the table isn't square, boolean, symmetric and free of loops.
     """
     _check(conflicts)
-    n, listed = len(conflicts), len(conflicts) <= _LISTED
-    clique = _largest_clique(conflicts) if listed else _clique(conflicts, max_nodes)
+    n, clique = len(conflicts), tuple[int, ...]()
+    every = np.arange(n)
+    while larger := _clique(conflicts, every, len(clique) + 1, WorkBudget(max_nodes)):
+        clique = larger
     least, count, proved = len(clique), len(clique), True
+    others = np.setdiff1d(every, clique)
     while True:
-        if count == n:
-            colours, refuted = np.arange(n), True
-        elif listed:
-            colours, refuted = _listed_colouring(conflicts, clique, count), True
-        else:
-            colours, refuted = _colouring(conflicts, clique, count, max_nodes)
-        if colours is not None:
+        # With as many colours as vertices no step is in vain.
+        budget = WorkBudget(max_nodes if count < n else np.inf)
+        colours = np.full(n, -1)
+        colours[list(clique)] = np.arange(len(clique))
+        if _coloured(conflicts, colours, others, count, budget):
             break
-        proved = proved and refuted
+        proved = proved and not budget.exhausted
         count += 1
         least = count if proved else least
     count = int(np.unique(colours).size)
@@ -95,81 +91,48 @@ def fewest_colours(
     return Colouring(named.astype(np.int64), count, least, clique, proof)
 
 
-def _largest_clique(conflicts: NDArray[np.bool_]) -> tuple[int, ...]:
-    """Return the last of the largest cliques, trying all."""
-    n = len(conflicts)
-    cliques = (
-        chosen
-        for size in range(n, -1, -1)
-        for chosen in reversed(list(combinations(range(n), size)))
-        if all(conflicts[i, j] for i, j in combinations(chosen, 2))
-    )
-    return next(cliques)
-
-
-def _listed_colouring(
-    conflicts: NDArray[np.bool_], clique: tuple[int, ...], count: int
-) -> NDArray[np.int64] | None:
-    """Return the first colouring of all in which the clique has the first colours."""
-    colours = np.zeros(len(conflicts), dtype=np.int64)
-    colours[list(clique)] = np.arange(len(clique))
-    others = np.setdiff1d(np.arange(len(conflicts)), clique)
-    one, other = np.nonzero(np.triu(conflicts))
-    for choice in product(range(count), repeat=others.size):
-        colours[others] = choice
-        if not np.any(colours[one] == colours[other]):
-            return colours
+def _clique(
+    conflicts: NDArray[np.bool_],
+    among: NDArray[np.int64],
+    size: int,
+    budget: WorkBudget,
+) -> tuple[int, ...] | None:
+    """Return the last clique of a size among vertices, None if none was met."""
+    if size == 0:
+        return ()
+    for i in range(len(among) - size, -1, -1):
+        if budget.exhausted:
+            break
+        budget.spend(1)
+        later = among[i + 1 :][conflicts[among[i], among[i + 1 :]]]
+        rest = _clique(conflicts, later, size - 1, budget)
+        if rest is not None:
+            return (int(among[i]), *rest)
     return None
 
 
-def _clique(conflicts: NDArray[np.bool_], max_nodes: int) -> tuple[int, ...]:
-    n = len(conflicts)
-    pairs = np.argwhere(np.triu(~conflicts, 1))
-    x, _ = _binaries(np.ones(n), pairs, np.ones(n), max_nodes)
-    # A run that was cut may have found none: a vertex is one.
-    return (0,) if x is None else tuple(np.flatnonzero(x > 0.5).tolist())
-
-
-def _colouring(
-    conflicts: NDArray[np.bool_], clique: tuple[int, ...], count: int, max_nodes: int
-) -> tuple[NDArray[np.int64] | None, bool]:
-    n = len(conflicts)
-    edges = np.argwhere(np.triu(conflicts))
-    pairs = np.concatenate([edges + n * c for c in range(count)])
-    once = sparse.csr_array(np.tile(np.eye(n), count))
-    upper = np.ones((count, n))
-    upper[:, list(clique)] = np.eye(count, len(clique))
-    x, refuted = _binaries(np.zeros(n * count), pairs, upper.ravel(), max_nodes, once)
-    return (None if x is None else np.argmax(x.reshape(count, n), axis=0)), refuted
-
-
-def _binaries(
-    gains: NDArray[np.float64],
-    pairs: NDArray[np.int64],
-    upper: NDArray[np.float64],
-    max_nodes: int,
-    once: sparse.csr_array | None = None,
-) -> tuple[NDArray[np.float64] | None, bool]:
-    """Maximise gains of binaries, no pair of which is taken; rows of `once` take one.
-
-    Returns the solution or None, and whether it is proved that there is none.
-    """
-    from scipy.optimize import Bounds, LinearConstraint, milp
-
-    rows = np.repeat(np.arange(len(pairs)), 2)
-    table = (np.ones(pairs.size), (rows, pairs.ravel()))
-    shape = (len(pairs), gains.size)
-    limits = [LinearConstraint(sparse.csr_array(table, shape=shape), ub=1.0)]
-    if once is not None:
-        limits.append(LinearConstraint(once, 1.0, 1.0))
-    answer = milp(
-        -gains,
-        integrality=np.ones(gains.size),
-        bounds=Bounds(0.0, upper),  # type: ignore[arg-type]
-        constraints=limits,
-        options={"node_limit": max_nodes},
-    )
-    return answer.x, answer.status == _INFEASIBLE
+def _coloured(
+    conflicts: NDArray[np.bool_],
+    colours: NDArray[np.int64],
+    others: NDArray[np.int64],
+    count: int,
+    budget: WorkBudget,
+) -> bool:
+    """Colour the other vertices in order, if `count` colours and the budget do."""
+    if not others.size:
+        return True
+    vertex, later = others[0], others[1:]
+    # Colours that no vertex has yet are alike: one of them is tried.
+    most = min(int(colours.max(initial=-1)) + 2, count)
+    for colour in np.setdiff1d(np.arange(most), colours[conflicts[vertex]]):
+        if budget.exhausted:
+            break
+        budget.spend(1)
+        colours[vertex] = colour
+        if _coloured(conflicts, colours, later, count, budget):
+            return True
+    colours[vertex] = -1
+    return False
 
 
 def _check(conflicts: NDArray[np.bool_]) -> None:
