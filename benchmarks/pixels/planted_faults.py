@@ -29,7 +29,7 @@ from planning import load_mesh, load_rig, plan_rig
 from planning.cli.other_commands import write_sample
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit import audit_plan
-from planning.verify.verification import verify_plan
+from planning.verify.verification import bare, verify_plan
 
 SEEDS = 20
 # Incidence that a grazing projector is turned to [rad].
@@ -48,10 +48,8 @@ class Claims:
     @classmethod
     def of(cls, plan: RigPlan, seed: int = 0) -> "Claims":
         """Audit a plan."""
-        inside, predicted = audit_plan(plan, seed=seed).in_target()
-        weight = float(inside.weights[0])
-        samples = SurfaceSamples(inside.points, inside.normals, inside.faces, weight)
-        return cls(samples, predicted)
+        case = audit_plan(plan, seed=seed).case
+        return cls(bare(case.samples), case.actual.measured)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ Only values, as rig files and plans hold them; what follows from them the planne
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 from .table_types import Axis, Sides, Table
 
@@ -54,13 +54,6 @@ class Body:
     def __post_init__(self) -> None:
         if not min(self.half_m) > 0.0:
             raise ValueError(f"body: half_m = {self.half_m} must be positive")
-
-
-def body_entry(body: Body | None) -> dict[str, Any]:
-    """Return `body` of a plan's table; no key where there is none."""
-    if body is None:
-        return {}
-    return {"body": {"centre_m": list(body.centre_m), "half_m": list(body.half_m)}}
 
 
 @dataclass(frozen=True)

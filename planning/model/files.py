@@ -1,11 +1,28 @@
-"""Outputs are written beside their place under a temporary name, then moved into it."""
+"""Inputs that can't be read are refused; outputs are written whole, or not at all."""
 
 import os
 import tempfile
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import BinaryIO
+
+from .errors import InputError
+
+
+@contextmanager
+def reading(
+    path: Path, refused: type[InputError], *, absent: str = ""
+) -> Generator[None]:
+    """Refuse what can't be read within as this kind of input, `absent` a remedy."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise refused(f"{path}: no such file{absent}") from None
+    except OSError as error:
+        raise refused(
+            f"{path}: can't be read ({error.strerror}); check the path and its rights"
+        ) from None
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:

@@ -13,7 +13,7 @@ from planning.model.document.coverage_records import Coverage
 from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
 
 from .errors import PlanFileError, PlanningError
-from .files import write_together
+from .files import reading, write_together
 from .planned import PlannedCamera, PlannedProjector
 from .requirements import Requirements
 from .surface import Surface
@@ -117,13 +117,14 @@ class RigPlan:
                 understood, or doesn't belong to the other.
         """
         path = Path(path)
-        text = _read_text(path)
-        name, digest = _surface_of(text, path)
+        with reading(path, PlanFileError):
+            content = path.read_bytes()
+        name, digest = _surface_of(content, path)
         surface = Surface.load(path.parent / name, digest)
-        return cls._parsed(text, surface, str(path))
+        return cls._parsed(content, surface, str(path))
 
     @classmethod
-    def _parsed(cls, text: str, surface: Surface, where: str) -> Self:
+    def _parsed(cls, text: str | bytes, surface: Surface, where: str) -> Self:
         try:
             plan = cls(PlanDocument.read(text), surface)
             _ = plan.projectors, plan.cameras
@@ -134,23 +135,14 @@ class RigPlan:
         return plan
 
 
-def _read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise PlanFileError(f"{path}: no such file") from None
-    except (OSError, ValueError) as error:
-        raise PlanFileError(f"{path}: not readable ({error})") from None
-
-
-def _surface_of(text: str, path: Path) -> tuple[str, str | None]:
+def _surface_of(content: bytes, path: Path) -> tuple[str, str | None]:
     """Return name and digest of a plan's surface, of a plan of our version.
 
     Raises:
         PlanFileError: If it isn't.
     """
     try:
-        document = json.loads(text)
+        document = json.loads(content)
     except (ValueError, RecursionError) as error:
         raise PlanFileError(f"{path}: not readable as JSON ({error})") from None
     if not isinstance(document, dict) or document.get("format") != FORMAT:

@@ -18,6 +18,7 @@ from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import MeshError, TriangleMesh
 
 from .errors import PlanFileError
+from .files import reading
 from .obstacles import Obstacle
 
 # Kinds of numbers and the shape of each array; any number n.
@@ -128,26 +129,22 @@ class Surface:
             PlanFileError: If the file is missing, another one than the plan's, broken,
                 or lacks an array.
         """
-        try:
+        beside = "; the surface must stand beside the plan, "
+        beside += "copy both from the output folder"
+        with reading(path, PlanFileError, absent=beside):
             content = path.read_bytes()
-            # Before it is unpacked: what was damaged on the way may break any reader.
-            if sha256 not in (None, hashlib.sha256(content).hexdigest()):
-                raise PlanFileError(
-                    f"{path}: its SHA-256 isn't the one in the plan; "
-                    f"the two files must come from one run"
-                )
+        # Before it is unpacked: what was damaged on the way may break any reader.
+        if sha256 not in (None, hashlib.sha256(content).hexdigest()):
+            raise PlanFileError(
+                f"{path}: its SHA-256 isn't the one in the plan; "
+                f"the two files must come from one run"
+            )
+        try:
             with np.load(BytesIO(content), allow_pickle=False) as archive:
                 wanted = _ARRAYS | (
                     _OBSTACLES if set(_OBSTACLES) & set(archive) else {}
                 )
                 arrays = {name: archive[name] for name in wanted}
-        except PlanFileError:
-            raise
-        except FileNotFoundError:
-            raise PlanFileError(
-                f"{path}: no such file; the surface must stand beside the plan, "
-                f"copy both from the output folder"
-            ) from None
         except KeyError as error:
             raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
         except (OSError, ValueError, *_DAMAGED) as error:

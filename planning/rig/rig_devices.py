@@ -1,12 +1,13 @@
 """Devices of a rig file, turned into optical models in pixels and metres."""
 
 import math
+from dataclasses import asdict
 from typing import Any, cast
 
 import numpy as np
 
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
-from planning.model.bodies import Body, body_entry
+from planning.model.bodies import Body
 from planning.model.errors import RigError
 
 from . import optics
@@ -56,6 +57,7 @@ def device_document(
     table: PinholeTable | ParallelTable, device: DeviceModel
 ) -> dict[str, Any]:
     """Return a device as plain values, with figures as written and their sources."""
+    body = Body.of(table.body)
     return {
         "name": table.name,
         **device.to_document(),
@@ -66,7 +68,7 @@ def device_document(
             exclude_unset=True,
         ),
         "sources": {key: table.sources.get(key, _UNSAID) for key in table.figures()},
-        **body_entry(Body.of(table.body)),
+        **({} if body is None else {"body": asdict(body)}),
     }
 
 

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from planning.model.errors import RigError
+from planning.model.files import reading
 from planning.model.table_types import fault_words
 
 from .rig_tables import RigTable
@@ -131,17 +132,11 @@ def _is_path(name: str | Path) -> bool:
 
 
 def _read_file(path: Path) -> dict[str, Any]:
+    presets = f"; give a rig file or a preset ({', '.join(preset_names())})"
+    with reading(path, RigError, absent=presets):
+        content = path.read_bytes()
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise RigError(
-            f"{path}: no such file; give a rig file or a preset "
-            f"({', '.join(preset_names())})"
-        ) from None
-    except OSError as error:
-        raise RigError(
-            f"{path}: can't be read ({error.strerror}); check the path and its rights"
-        ) from None
+        return tomllib.loads(content.decode())
     except ValueError as error:
         raise RigError(f"{path}: not TOML ({error}); correct that line") from None
 

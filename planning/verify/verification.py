@@ -192,26 +192,21 @@ def _reconstruct(
     standing = None if truth is None and mesh is None else Scanner.of(truth or plan)
     if standing is not None and mesh is not None:
         standing = replace(standing, mesh=mesh)
-    inside, predicted = audit.in_target()
+    case, believed = audit.case, Scanner.of(plan)
+    samples = bare(case.samples)
     pixels = reconstruct(
-        Scanner.of(plan),
+        believed,
         seed=seed,
         threads=threads,
         truth=standing,
-        expected=Expected(bare(inside), predicted),
+        expected=Expected(samples, case.actual.measured),
         progress=_countdown(say),
     )
-    samples, actual = audit.case.samples, audit.case.actual
+    possible = possible_at_floors(plan, case.samples, threads=threads)
     prediction = PredictedSamples(
-        bare(samples),
-        samples.weights,
-        samples.in_target,
-        np.array([camera.world_from_device[:3, 3] for camera in plan.cameras]),
-        actual.measured_by,
-        possible_at_floors(plan, samples, threads=threads),
+        samples, case.samples.weights, case.actual.measured_by, possible
     )
-    tau_m, regions = plan.requirements.check.tau_m, plan.surface.region
-    compared = compare(prediction, pixels.everything, pixels.accuracy, regions, tau_m)
+    compared = compare(believed, prediction, pixels.everything, pixels.accuracy)
     return replace(pixels, comparison=compared)
 
 

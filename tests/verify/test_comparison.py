@@ -1,6 +1,8 @@
 """Prediction against measurement: counted areas, parts of the surface, both limits."""
 
 import dataclasses
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +40,17 @@ def cloud_at(points: np.ndarray) -> Cloud:
     )
 
 
+def scanner(region: np.ndarray, *centres: list[float]) -> Any:
+    """What a comparison asks of a rig; its regions are the target."""
+    check = SimpleNamespace(tau_m=TAU)
+    return SimpleNamespace(
+        region=region,
+        target=region >= 0,
+        cameras=[SimpleNamespace(centre=np.array(centre)) for centre in centres],
+        limits=SimpleNamespace(check=check),
+    )
+
+
 @pytest.fixture(scope="module")
 def four():
     """Four samples a metre apart that face up; the first two lie beside a point."""
@@ -46,15 +59,13 @@ def four():
     prediction = PredictedSamples(
         SurfaceSamples(points, up, np.arange(4), 1.0),
         weights=np.array([1.0, 2.0, 3.0, 4.0]),
-        in_target=np.array([True, True, True, False]),
-        centres=np.array([[0.0, 0.0, 9.0], [0.0, 0.0, 8.0]]),
         claimed=np.array([[True, False, False, False], [False, False, True, False]]),
         possible=np.array([[True, True, False, False], [False] * 4]),
     )
     near = points[:2] + np.array([0.9 * TAU, 0.0, 0.0])
     accuracy = Accuracy(np.array([3e-5, -4e-5]), np.array([0, 1]))
-    faces = np.array([0, 1, 1, -1])
-    return compare(prediction, cloud_at(near), accuracy, faces, TAU)
+    rig = scanner(np.array([0, 1, 1, -1]), [0.0, 0.0, 9.0], [0.0, 0.0, 8.0])
+    return compare(rig, prediction, cloud_at(near), accuracy)
 
 
 def test_areas_are_counted_by_what_was_said_and_what_was_found(four):
@@ -91,13 +102,11 @@ def beside(normal, centre) -> ConfusionRecord:
     prediction = PredictedSamples(
         SurfaceSamples(points, normals, np.arange(3), 1.0),
         np.ones(3),
-        np.ones(3, bool),
-        np.array([centre]),
         claimed,
         claimed,
     )
-    found = compare(prediction, cloud_at(points[:1]), None, np.full(3, -1), TAU)
-    return found.confusion.surface.limits
+    rig = scanner(np.full(3, -1), centre)
+    return compare(rig, prediction, cloud_at(points[:1]), None).confusion.surface.limits
 
 
 def test_what_lies_beside_predicted_surface_is_counted_apart():

@@ -46,9 +46,10 @@ def test_a_true_plan_is_verified_down_to_the_pixels(verified):
 
 def test_pixels_judge_the_audits_own_samples(verified):
     found, _ = verified
-    inside, predicted = found.audit.in_target()
+    case = found.audit.case
+    predicted = case.actual.measured[case.samples.in_target]
     missing = found.reconstruction.completeness.missing
-    assert missing.shape == predicted.shape == (len(inside),)
+    assert missing.shape == predicted.shape
     assert not np.any(missing & ~predicted)
 
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from geometry.arrays import Mask
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.verify.audit.baselines.baseline_claims import audit_baselines
@@ -35,7 +34,6 @@ from planning.verify.audit.rings.ring_claims import audit_rings
 
 from .audit_case import AuditCase, examine
 from .audit_findings import AuditFindings
-from .audit_samples import AuditSamples
 
 _CLAIMS = (
     audit_devices,
@@ -88,11 +86,6 @@ class Audit:
     def areas(self) -> dict[str, dict[str, float]]:
         """Recomputed AREAS of `surface` and `target`, keys as in `coverage` [m²]."""
         return recomputed_areas(self.case)
-
-    def in_target(self) -> tuple[AuditSamples, Mask]:
-        """Return the samples of the target, all of one weight, and their prediction."""
-        inside = self.case.samples.in_target
-        return self.case.samples.take(inside), self.case.actual.measured[inside]
 
 
 def audit_plan(

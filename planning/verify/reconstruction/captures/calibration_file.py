@@ -14,7 +14,15 @@ from pydantic import Field, ValidationError, model_validator
 from scipy.spatial.transform import Rotation
 
 from planning.model.errors import CalibrationError
-from planning.model.table_types import Name, Table, WrittenPose, fault_words, read_pose
+from planning.model.files import reading
+from planning.model.table_types import (
+    Axis,
+    Name,
+    Table,
+    WrittenPose,
+    fault_words,
+    read_pose,
+)
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
@@ -23,8 +31,7 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-_Three = Annotated[list[float], Field(min_length=3, max_length=3)]
-_Matrix = Annotated[list[_Three], Field(min_length=3, max_length=3)]
+_Matrix = Annotated[list[Axis], Field(min_length=3, max_length=3)]
 _Lens = Annotated[list[float], Field(min_length=5, max_length=5)]
 # Patterns and root discs are drawn for the planned poses; farther off another unit or
 # another device is meant: share of the distance to the object's centre, and radians.
@@ -157,15 +164,10 @@ def _measured_pose(device: _Device, planned: DeviceCalibration, plan: Scanner) -
 
 
 def _read(path: Path) -> _File:
+    with reading(path, CalibrationError):
+        content = path.read_bytes()
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-        return _File.model_validate(values)
-    except FileNotFoundError:
-        raise CalibrationError(f"{path}: no such file") from None
-    except OSError as error:
-        raise CalibrationError(
-            f"{path}: can't be read ({error.strerror}); check the path and its rights"
-        ) from None
+        return _File.model_validate(json.loads(content))
     except ValidationError as error:
         fault = fault_words(
             error.errors(include_url=False)[0],

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from planning.model.errors import CapturesError
-from planning.model.files import write_together
+from planning.model.files import reading, write_together
 from planning.verify.reconstruction.arrays import Images
 from planning.verify.reconstruction.patterns.ring_patterns import Frames
 from planning.verify.reconstruction.scanner import Scanner
@@ -126,12 +126,8 @@ def _scaled(stack: NDArray[np.uint8 | np.uint16]) -> Images:
 
 
 def _entries(folder: Path) -> list[Path]:
-    try:
+    with reading(folder, CapturesError):
         return sorted(folder.iterdir())
-    except OSError as error:
-        raise CapturesError(
-            f"{folder}: can't be read ({error.strerror}); check the path and its rights"
-        ) from None
 
 
 def _holding(folder: Path) -> str:

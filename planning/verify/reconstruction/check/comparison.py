@@ -17,8 +17,9 @@ from planning.model.document.check_records import (
     ConfusionRecords,
     SurfaceShare,
 )
-from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.scanner import Scanner
 
 from .accuracy import Accuracy, nearest_distance
 
@@ -30,29 +31,14 @@ class PredictedSamples:
     Attributes:
         samples: Points of the whole surface.
         weights: Area that each stands for [m²], shape (n,).
-        in_target: Whether each lies in the target, shape (n,).
-        centres: Of the cameras [m], shape (n_c, 3).
         claimed: Measurable by each camera within the plan's limits, shape (n_c, n).
         possible: The same at the limits at which light and decoder fail, (n_c, n).
     """
 
     samples: SurfaceSamples
     weights: Array
-    in_target: Mask
-    centres: Array
     claimed: Mask
     possible: Mask
-
-    def widened(self, by_camera: Mask, tau_m: float) -> Mask:
-        """Return which samples lie within tau of what a camera would measure, (n,)."""
-        cameras, chosen = np.nonzero(by_camera)
-        points = self.samples.points[chosen]
-        rays = points - self.centres[cameras]
-        rays /= np.linalg.norm(rays, axis=1)[:, None]
-        ideal = replace(
-            Cloud.empty(), points=points, rays=rays, camera=cameras.astype(np.int16)
-        )
-        return nearest_distance(ideal, self.samples, 1.01 * tau_m) <= tau_m
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,26 +59,24 @@ class Comparison:
 
 
 def compare(
+    plan: Scanner,
     prediction: PredictedSamples,
     everything: Cloud,
     accuracy: Accuracy | None,
-    face_region: Indices,
-    tau_m: float,
 ) -> Comparison:
     """Return how prediction and measurement compare.
 
     Args:
-        prediction: Of the plan, over samples of the whole surface.
+        plan: Of which the prediction is.
+        prediction: Over samples of the whole surface.
         everything: All points, before redundancy was removed.
         accuracy: Of the merged cloud.
-        face_region: Dominant region of each face, -1 for none, shape (n_faces,).
-        tau_m: One ring gap [m].
     """
-    distance = nearest_distance(everything, prediction.samples, 1.01 * tau_m)
-    measured = distance <= tau_m
+    samples, tau_m = prediction.samples, plan.limits.check.tau_m
+    measured = nearest_distance(everything, samples, 1.01 * tau_m) <= tau_m
     everywhere = np.ones(len(measured), dtype=bool)
     by_limits, by_floors = (
-        (_by_any(by_camera), prediction.widened(by_camera, tau_m))
+        (_by_any(by_camera), _widened(by_camera, samples, plan))
         for by_camera in (prediction.claimed, prediction.possible)
     )
 
@@ -109,15 +93,15 @@ def compare(
         shares = _shares(prediction, measured, area)
         return SurfaceShare(**region, **shares, **_errors(accuracy, faces))
 
-    dominant, region = face_region >= 0, face_region[prediction.samples.faces]
-    ids = [int(i) for i in np.unique(face_region[dominant])]
+    dominant, region = plan.region >= 0, plan.region[samples.faces]
+    ids = [int(i) for i in np.unique(plan.region[dominant])]
     return Comparison(
         ConfusionRecords(
-            target=tables(prediction.in_target), surface=tables(everywhere)
+            target=tables(plan.target[samples.faces]), surface=tables(everywhere)
         ),
-        tuple(share(region == i, face_region == i, id=i) for i in ids),
+        tuple(share(region == i, plan.region == i, id=i) for i in ids),
         share(region >= 0, dominant) if ids else None,
-        share(everywhere, np.ones(len(face_region), dtype=bool)),
+        share(everywhere, np.ones(len(dominant), dtype=bool)),
     )
 
 
@@ -159,6 +143,18 @@ def confusion(
         agreement=right / (right + wrong) if right > 0.0 else 0.0,
         trivial_agreement=max(yes, no) / (yes + no) if yes + no > 0.0 else 0.0,
     )
+
+
+def _widened(by_camera: Mask, samples: SurfaceSamples, plan: Scanner) -> Mask:
+    """Which samples lie within tau of what a camera would measure, shape (n,)."""
+    cameras, chosen = np.nonzero(by_camera)
+    tau_m, points = plan.limits.check.tau_m, samples.points[chosen]
+    rays = points - np.array([camera.centre for camera in plan.cameras])[cameras]
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    ideal = replace(
+        Cloud.empty(), points=points, rays=rays, camera=cameras.astype(np.int16)
+    )
+    return nearest_distance(ideal, samples, 1.01 * tau_m) <= tau_m
 
 
 def _by_any(by_camera: Mask) -> Mask:
