@@ -61,7 +61,7 @@ def write_sample(
         MeshError: If `n_faces` is out of range.
         OSError: If the file can't be written.
     """
-    mesh = sample_head(shape, n_faces=n_faces)
+    mesh = sample_head(shape, n_faces=n_faces, open_neck=True)
     text = head_as_obj(mesh, "open at the neck")
     write_atomically(Path(path), lambda file: file.write(text.encode("ascii")))
     return mesh

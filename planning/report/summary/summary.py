@@ -47,7 +47,7 @@ def _head(plan: RigPlan) -> str:
     document, workspace = plan.document, plan.requirements.workspace
     mesh = document.meshes[0]
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
-    cut = "; TRUNCATED, not the best that could be found" if document.truncated else ""
+    cut = "; TRUNCATED" if document.truncated else ""
     cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
     return (
         f"PLAN     {count_words(len(plan.projectors), 'projector')}, "
