@@ -33,6 +33,13 @@ class _DefaultGroup(click.Group):
             args = [self.default, *args]
         return super().parse_args(ctx, args)
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Let the default command show as plain `plan`, not `plan rig`."""
+        name, command, others = super().resolve_command(ctx, args)
+        return "" if name == self.default else name, command, others
+
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Show the default command's options below the group's own page."""
         super().format_help(ctx, formatter)

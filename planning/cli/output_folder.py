@@ -8,10 +8,10 @@ import ctypes
 import os
 import shutil
 import sys
-import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from uuid import uuid4
 
 from planning.verify.reconstruction.cloud_file import is_cloud
 from planning.verify.reconstruction.pattern_files import is_patterns
@@ -47,18 +47,20 @@ def exchanged(folder: Path) -> Generator[Path]:
     beside = folder.parent if movable else folder
     if movable:
         _recover(folder)
-    fresh = Path(tempfile.mkdtemp(dir=beside, prefix=_prefix(folder)))
+    fresh = beside / f"{_prefix(folder)}{uuid4().hex}"
+    fresh.mkdir()
     try:
-        umask = os.umask(0)
-        os.umask(umask)
-        fresh.chmod(folder.stat().st_mode if folder.exists() else 0o777 & ~umask)
+        if folder.exists():
+            fresh.chmod(folder.stat().st_mode)
         yield fresh
         with uninterrupted():
-            if movable:
+            if not movable:
+                _move_entries(fresh, folder)
+            elif not folder.exists():
+                fresh.rename(folder)
+            else:
                 _swap(fresh, folder)
                 _bring_others(fresh, folder)
-            else:
-                _move_entries(fresh, folder)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
 
@@ -82,10 +84,7 @@ def _prefix(folder: Path) -> str:
 
 
 def _swap(fresh: Path, folder: Path) -> None:
-    """Let two folders change places; without an old one the new one is just moved."""
-    if not folder.exists():
-        fresh.rename(folder)
-        return
+    """Let two folders change places."""
     if not _exchange(fresh, folder):
         # Two steps: a kill between them leaves both, and `_recover` finds them.
         aside = Path(f"{fresh}-old")
@@ -107,8 +106,6 @@ def _exchange(one: Path, other: Path) -> bool:
 
 def _bring_others(old: Path, folder: Path) -> None:
     """Move what others put into the old folder to the new one."""
-    if not old.exists():
-        return
     for entry in old.iterdir():
         if not _is_ours(entry) and not (folder / entry.name).exists():
             entry.rename(folder / entry.name)
@@ -140,10 +137,9 @@ def _move_entries(fresh: Path, folder: Path) -> None:
 
 def _recover(folder: Path) -> None:
     """Clean up behind a run that was killed while folders changed places."""
-    for left in folder.parent.glob(f"{_prefix(folder)}*"):
-        if left.name.endswith("-old") and not folder.exists():
-            left.rename(folder)
-            continue
+    for remnant in folder.parent.glob(f"{_prefix(folder)}*"):
         if folder.exists():
-            _bring_others(left, folder)
-        shutil.rmtree(left, ignore_errors=True)
+            _bring_others(remnant, folder)
+        elif remnant.name.endswith("-old"):
+            remnant.rename(folder)
+        shutil.rmtree(remnant, ignore_errors=True)

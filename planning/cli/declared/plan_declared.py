@@ -10,21 +10,7 @@ import click
 from planning.cli.console import Positive, output_options, run, threads_option
 
 
-class DefaultCommand(click.Command):
-    """The command that runs when no subcommand is named; it shows as plain `plan`."""
-
-    def make_context(
-        self,
-        info_name: str | None,
-        args: list[str],
-        parent: click.Context | None = None,
-        **extra: Any,  # noqa: ANN401
-    ) -> click.Context:
-        """Return a context whose usage line says `plan`, not `plan rig`."""
-        return super().make_context("", args, parent, **extra)
-
-
-@click.command("rig", cls=DefaultCommand)
+@click.command("rig")
 @click.option(
     "--mesh",
     "meshes",
