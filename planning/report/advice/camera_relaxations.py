@@ -23,7 +23,7 @@ from planning.report.reach import measured_by_any
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
-from planning.scene.limits.limit import LimitRelaxation
+from planning.scene.limits.limit import LimitRelaxation, Mask
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, lit_samples, taken
@@ -33,8 +33,8 @@ from planning.scene.workspace.candidates import Candidates
 from .demands import Demands, demands
 from .least_changes import (
     ANYWHERE,
-    Allowed,
     Share,
+    enough,
     least_changes,
     least_enough,
     relaxations_of_cameras,
@@ -121,11 +121,13 @@ def for_so_many(
         axis=2,
     )
     share = min(scene.requirements.coverage + SPARE, 1.0)
-    allowed = Allowed(
-        count, n_fixed(scene), scene.seed, lambda any_: required_samples(any_, share)
-    )
+
+    def suffices(covered: Mask) -> bool:
+        required = required_samples(np.any(covered, axis=1), share)
+        return enough(covered, required, count, n_fixed(scene), scene.seed)
+
     least = (
-        least_enough(relaxation, table, allowed.enough)
+        least_enough(relaxation, table, suffices)
         for relaxation, table in zip(relaxations, demanded, strict=True)
     )
     return tuple(change for change in least if change is not None)

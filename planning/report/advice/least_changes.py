@@ -74,45 +74,33 @@ def least_changes(
     return changes
 
 
-@dataclass(frozen=True, eq=False)
-class Allowed:
-    """So many devices, and what they must cover.
+def enough(
+    covered: Mask, required: int, count: int, n_existing: int, seed: int
+) -> bool:
+    """Return whether so many candidates cover the required number of samples.
 
-    Attributes:
-        count: Candidates, with the existing ones.
-        n_existing: First candidates, which are taken whatever they cover.
-        seed: Of the search.
-        required: Samples, by what any candidate covers, shape (n,).
+    What each covers is (n, m); the first ones exist and are taken in any case.
     """
-
-    count: int
-    n_existing: int
-    seed: int
-    required: Callable[[Mask], int]
-
-    def enough(self, covered: Mask) -> bool:
-        """Whether they can, by what each candidate covers, shape (n, m)."""
-        required = self.required(np.any(covered, axis=1))
-        problem = cover_problem(covered, required, self.n_existing)
-        best = solve_max_coverage(problem, self.count, seed=self.seed, budget=_BUDGET)
-        return bool(covered[:, best.selected].any(axis=1).sum() >= required)
+    problem = cover_problem(covered, required, n_existing)
+    best = solve_max_coverage(problem, count, seed=seed, budget=_BUDGET)
+    return bool(covered[:, best.selected].any(axis=1).sum() >= required)
 
 
 def least_enough(
     relaxation: LimitRelaxation,
     demanded: NDArray[np.float64],
-    enough: Callable[[Mask], bool],
+    suffices: Callable[[Mask], bool],
 ) -> str | None:
     """Return the least change of a limit with which candidates are enough.
 
     Args:
         relaxation: Of the limit.
         demanded: What a sample asks of it at a candidate, shape (n, m).
-        enough: Whether what each candidate covers then is, shape (n, m).
+        suffices: Whether what each candidate covers then is, shape (n, m).
     """
     asked = relaxation.rounded(demanded[np.isfinite(demanded)])
     values = np.unique(asked).tolist()
-    least = bisect_left(values, True, key=lambda value: enough(demanded <= value))
+    least = bisect_left(values, True, key=lambda value: suffices(demanded <= value))
     return relaxation.say(values[least]) if least < len(values) else None
 
 

@@ -26,8 +26,8 @@ from planning.scene.workspace.view_tiles import Site
 from .demands import light_demands
 from .least_changes import (
     ANYWHERE,
-    Allowed,
     Share,
+    enough,
     least_changes,
     least_enough,
     relaxations_of_projectors,
@@ -113,8 +113,11 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
     )
     least = required_samples(candidates.reached[:n], required.dominant_coverage)
     n_existing = len(required.existing_of("projector"))
-    allowed = Allowed(count, n_existing, scene.seed, lambda _: least)
-    return least_enough(field, demanded, allowed.enough)
+    return least_enough(
+        field,
+        demanded,
+        lambda covered: enough(covered, least, count, n_existing, scene.seed),
+    )
 
 
 def _over_larger_tiles(

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from math import prod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +21,7 @@ from planning.model.document.device_records import (
 )
 from planning.model.document.input_records import (
     MeshRecord,
-    Repair,
     SelectionRecord,
-    ShellRecord,
 )
 from planning.model.document.plan_document import CostRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -92,17 +92,13 @@ def mesh_record(mesh: TriangleMesh, shell: MeshShell) -> MeshRecord:
     """Return one entry of the plan's `meshes`."""
     n_vertices, n_faces = len(mesh.vertices), len(mesh.faces)
     source = mesh.source or MeshSource("", "", "m", 1.0, n_vertices, n_faces)
-    return MeshRecord(
-        path=source.path or None,
-        sha256=source.sha256 or None,
-        unit=source.unit,
-        scale_to_m=source.scale_to_m,
-        n_vertices=source.n_vertices,
-        n_faces=source.n_faces,
-        area_m2=mesh.area,
-        repairs=tuple(Repair(**asdict(repair)) for repair in source.repairs),
-        shell=ShellRecord(**asdict(shell)),
-    )
+    figures: dict[str, Any] = asdict(source) | {
+        "shell": asdict(shell),
+        "area_m2": mesh.area,
+    }
+    for name in ("path", "sha256"):
+        figures[name] = figures[name] or None
+    return MeshRecord(**figures)
 
 
 def selection_record(
@@ -162,7 +158,7 @@ def cost_record(
         seconds: Measured processor times in [s]: of the stages of planning, and where a
             check was made of `render`, `decode` and `merge`.
     """
-    pixels = sum(c.device.resolution[0] * c.device.resolution[1] for c in cameras)
+    pixels = sum(prod(camera.device.resolution) for camera in cameras)
     t4, t5 = (
         sum(seconds.get(name, 0.0) for name in names)
         for names in (_PROJECTOR_STAGES, _CAMERA_STAGES)
@@ -171,12 +167,9 @@ def cost_record(
     if "render" in seconds:
         t1, t2 = seconds["render"] / pixels, seconds["decode"] / pixels
         t3 = seconds["merge"]
-        before = pixels * n_before / len(cameras)
-        times = {
-            "t1": t1,
-            "t2": t2,
-            "t3": t3,
-            "C": pixels * (t1 + t2) + t3 + t4 + t5,
-            "C_before": before * (t1 + t2) + t3 + t4 + t5,
-        }
+        costs = (
+            pixels * share * (t1 + t2) + t3 + t4 + t5
+            for share in (1.0, n_before / len(cameras))
+        )
+        times = dict(zip(times, (t1, t2, t3, *costs), strict=True))
     return CostRecord(pixels=pixels, n_cameras_before=n_before, t4=t4, t5=t5, **times)
