@@ -65,6 +65,26 @@ class PinholeModel:
         """Unit direction in which the middle of the image looks, shape (3,)."""
         return self.rays(0.5 * (np.array(self.resolution) - 1.0))
 
+    @property
+    def corners(self) -> Array:
+        """Corners of the image in [px], shape (4, 2)."""
+        width, height = self.resolution
+        u, v = np.array([-0.5, width - 0.5]), np.array([-0.5, height - 0.5])
+        return np.stack(np.meshgrid(u, v), axis=-1).reshape(4, 2)
+
+    def sides(self, spare_px: float = 0.0) -> Array:
+        """Return the least and the largest x/z and y/z in the image, shape (2, 2).
+
+        Without distortion; so many pixels stay free at its border.
+        """
+        high = np.array(self.resolution) - 0.5 - spare_px
+        return (np.array([[spare_px - 0.5] * 2, high]) - self._principal) / self._focal
+
+    @property
+    def beam_reach(self) -> float:
+        """As of `ParallelModel`: the light of a lens is bounded by its image alone."""
+        return np.inf
+
     def holds_ball(self, radius: float, distance: float) -> bool:
         """Return whether a sphere about the aim, so far away, lies inside the image."""
         width, height = self.resolution
@@ -85,10 +105,7 @@ class PinholeModel:
         It is across the line of sight at a distance in [m], sides along the image's,
         its middle on the aim.
         """
-        width, height = self.resolution
-        u, v = np.array([-0.5, width - 0.5]), np.array([-0.5, height - 0.5])
-        corners = self.rays(np.stack(np.meshgrid(u, v), axis=-1).reshape(4, 2))
-        across = corners @ turned_to(self.middle_ray).T
+        across = self.rays(self.corners) @ turned_to(self.middle_ray).T
         # With lens shift the image is a trapezoid across the line of sight.
         return distance * np.min(np.abs(across[:, :2] / across[:, 2:]), axis=0)
 
@@ -220,6 +237,10 @@ class ParallelModel:
     def beam_reach(self) -> float:
         """Radius that the beam fills in [m], inf where only the panel bounds it."""
         return np.inf if self.beam_radius is None else self.beam_radius
+
+    def sides(self, spare_px: float = 0.0) -> Array:
+        """As of `PinholeModel`, x and y in [m], up to the edges of the panel."""
+        return np.array([-self.half_panel, self.half_panel])
 
     def in_field(self, points: Array) -> Mask:
         """Return whether points (..., 3) of the device frame lie in its beam."""

@@ -14,7 +14,6 @@ from planning.model.requirements import Workspace
 from planning.proofs.selection import required_samples
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
-from planning.scene.lights import light_of
 from planning.scene.limits import projector_limits
 from planning.scene.patterns import RingPattern
 from planning.scene.placed_bodies import moves_bodies
@@ -201,7 +200,8 @@ def pose_program(
         centre=centre,
         axis=np.array(workspace.axis),
         half_angle=workspace.half_angle,
-        pixel_margin=_PIXEL_MARGIN,
+        sides=device.sides(_PIXEL_MARGIN),
+        beam_radius_m=device.beam_reach,
         ring_radius=RingPattern(projector).outermost,
         ring_from_device=inverse(projector.world_from_ring)
         @ projector.world_from_device,
@@ -211,7 +211,6 @@ def pose_program(
         else workspace.floor_m + float(up @ centre),
         max_move_m=_MAX_MOVE_M,
         half_spaces=_held_in(workspace, projector.world_from_device[:3, 3]),
-        **light_of(device).pose_limits(),
     )
 
 

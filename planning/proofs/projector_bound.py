@@ -62,7 +62,7 @@ def bound_projectors(
     if isinstance(device, ParallelModel):
         # How far off a device's own axis what it lights may be.
         width = float(np.hypot(*device.half_panel))
-        aside = reach + min(width, device.beam_radius or np.inf)
+        aside = reach + min(width, device.beam_reach)
         depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
         shadows = shadows and bool(depth >= reach)
         opened = open_samples(

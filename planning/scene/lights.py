@@ -8,7 +8,6 @@ holds no pose.
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,19 +153,12 @@ class DivergingLight:
         far = heights * self.stretch(coordinates)[:, None]
         return np.log(far), np.arctan(coordinates)
 
-    def pose_limits(self) -> dict[str, Any]:
-        """Return what bounds the light, as `solvers.poses` names it."""
-        device = self.device
-        return {"camera_matrix": device.camera_matrix, "resolution": device.resolution}
-
     def image_ring(self, offset: float) -> float:
         """Return R that holds the image from any axis so far off; inf: no cone does.
 
         ``R = tan(max_corner angle + offset)``, without distortion.
         """
-        matrix = self.device.camera_matrix
-        ends = np.array([[-0.5, -0.5], np.array(self.device.resolution) - 0.5])
-        corner = np.abs((ends - matrix[:2, 2]) / np.diag(matrix)[:2]).max(axis=0)
+        corner = np.abs(self.device.sides()).max(axis=0)
         opening = math.atan(math.hypot(*corner)) + offset
         return math.tan(opening) if opening < 0.5 * math.pi else math.inf
 
@@ -277,11 +269,6 @@ class ParallelLight:
     ) -> tuple[_Array, _Array]:
         """Return z and R: dz / dR is the slope of the surface against the light."""
         return heights, coordinates
-
-    def pose_limits(self) -> dict[str, Any]:
-        """Return what bounds the light, as `solvers.poses` names it."""
-        device = self.device
-        return {"half_panel_m": device.half_panel, "beam_radius_m": device.beam_reach}
 
     def image_ring(self, offset: float) -> float:
         """Return R that holds the beam from any axis so far off [m]."""

@@ -170,26 +170,11 @@ def n_planes_of(program: PoseProgram) -> int:
 
 def _device_limits(program: PoseProgram, size: float) -> NDArray[np.float64]:
     """Return the device parameters; those of constraints that don't apply are inf."""
-    ring = program.ring_radius
+    sides, ring = program.sides.T.ravel(), program.ring_radius
     if program.light == "diverging":
-        assert program.camera_matrix is not None
-        assert program.resolution is not None
-        k, (width, height) = program.camera_matrix, program.resolution
-        low = -0.5 + program.pixel_margin
-        sides = [
-            (low - k[0, 2]) / k[0, 0],
-            (width - 1.0 - low - k[0, 2]) / k[0, 0],
-            (low - k[1, 2]) / k[1, 1],
-            (height - 1.0 - low - k[1, 2]) / k[1, 1],
-        ]
-        reach = np.square(program.range_m) / size**2
-        return np.array([*sides, *reach, ring**2])
-    assert program.half_panel_m is not None
-    half = np.array(program.half_panel_m) / size
-    reach = np.array(program.range_m) / size
-    beam = program.beam_radius_m
-    sides = [-half[0], half[0], -half[1], half[1]]
-    return np.array([*sides, *reach, (ring / size) ** 2, (beam / size) ** 2])
+        return np.array([*sides, *np.square(program.range_m) / size**2, ring**2])
+    across = np.square([ring / size, program.beam_radius_m / size])
+    return np.array([*sides / size, *np.array(program.range_m) / size, *across])
 
 
 def run_ipopt(

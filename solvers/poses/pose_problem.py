@@ -27,11 +27,9 @@ class PoseProgram:
         shell_m: Limits of |Q - centre| in [m].
         centre: Centre of the workspace in [m], shape (3,).
         axis: Axis of the workspace cone, unit, shape (3,).
+        sides: Least and largest x and y of the field, as tangents x/z (diverging) or
+            in [m] (parallel), shape (2, 2).
         half_angle: Opening of that cone in [rad]; pi doesn't bind.
-        camera_matrix: K in [px], shape (3, 3); diverging light only.
-        resolution: Width and height in [px]; diverging light only.
-        half_panel_m: Half width and height in [m]; parallel light only.
-        pixel_margin: Pixels that stay free at the image border; diverging light only.
         beam_radius_m: Largest distance from the optical axis; parallel light only.
         ring_radius: Largest ring, a tangent (diverging) or in [m] (parallel).
         ring_from_device: Ring frame, fixed to the device, shape (4, 4).
@@ -57,11 +55,8 @@ class PoseProgram:
     shell_m: tuple[float, float]
     centre: NDArray[np.float64]
     axis: NDArray[np.float64]
+    sides: NDArray[np.float64]
     half_angle: float = np.pi
-    camera_matrix: NDArray[np.float64] | None = None
-    resolution: tuple[int, int] | None = None
-    half_panel_m: tuple[float, float] | None = None
-    pixel_margin: float = 0.5
     beam_radius_m: float = np.inf
     ring_radius: float = np.inf
     ring_from_device: NDArray[np.float64] | None = None
@@ -76,6 +71,7 @@ class PoseProgram:
             raise ValueError("points is empty: a pose needs a sample to serve")
         shapes = {"points": (n, 3), "normals": (n, 3), "steep": (n, 3)}
         shapes |= {"world_from_device": (4, 4), "centre": (3,), "axis": (3,)}
+        shapes |= {"sides": (2, 2)}
         check_program(self, self.light, shapes)
         for name in ("range_m", "shell_m"):
             low, high = getattr(self, name)
@@ -84,11 +80,6 @@ class PoseProgram:
         for name in ("max_incidence", "min_tangent_angle"):
             if not 0.0 <= getattr(self, name) <= np.pi / 2:
                 raise ValueError(f"{name} must lie within 0 and pi/2")
-        if self.light == "diverging":
-            if self.camera_matrix is None or self.resolution is None:
-                raise ValueError("diverging light needs camera_matrix and resolution")
-        elif self.half_panel_m is None:
-            raise ValueError("parallel light needs half_panel_m")
         planes = self.planes
         if planes.ndim != 2 or planes.shape[1] != 4 or not np.all(np.isfinite(planes)):
             raise ValueError(f"half_spaces must be finite, (k, 4), is {planes.shape}")

@@ -77,40 +77,30 @@ def pose_slack(
     local = (program.points - position) @ rotation
     frame = program.ring_from_device
     ring = local if frame is None else local @ frame[:3, :3].T + frame[:3, 3]
-    beyond = np.hypot(ring[:, 0], ring[:, 1])
+    flat, rings = (_flattened(program, points) for points in (local, ring))
+    inside = np.min([flat - program.sides[0], program.sides[1] - flat], axis=(0, 2))
+    if np.isfinite(program.ring_radius):
+        beyond = np.hypot(rings[:, 0], rings[:, 1])
+        inside = np.minimum(inside, program.ring_radius - beyond)
     if program.light == "parallel":
-        assert program.half_panel_m is not None
         span = local[:, 2]
-        inside = np.min(np.array(program.half_panel_m) - np.abs(local[:, :2]), axis=1)
         axial = program.beam_radius_m - np.hypot(local[:, 0], local[:, 1])
-        inside = np.minimum(inside, np.minimum(axial, program.ring_radius - beyond))
+        inside = np.minimum(inside, axial)
     else:
         span = np.linalg.norm(local, axis=1)
-        inside = _image_slack(program, local)
-        if np.isfinite(program.ring_radius):
-            front = ring[:, 2] > 0
-            tangent = np.where(front, beyond / np.where(front, ring[:, 2], 1), np.inf)
-            inside = np.minimum(inside, program.ring_radius - tangent)
     low, high = program.range_m
     samples = np.min([inside, span - low, high - span], axis=0)
     return np.append(samples, _workspace_slack(program, position))
 
 
-def _image_slack(
-    program: PoseProgram, local: NDArray[np.float64]
+def _flattened(
+    program: PoseProgram, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Distance to the image border, less the margin, over the focal length."""
-    assert program.camera_matrix is not None
-    assert program.resolution is not None
-    k = program.camera_matrix
-    focal = np.array([k[0, 0], k[1, 1]])
-    front = local[:, 2] > 0
-    depth = np.where(front, local[:, 2], 1.0)[:, None]
-    pixels = local[:, :2] / depth * focal + k[:2, 2]
-    low = -0.5 + program.pixel_margin
-    high = np.array(program.resolution) - 0.5 - program.pixel_margin
-    room = np.minimum(pixels - low, high - pixels) / focal
-    return np.where(front, np.min(room, axis=1), -np.inf)
+    """Return x and y (parallel), or x/z and y/z (diverging; inf behind), (n, 2)."""
+    flat, z = points[:, :2], points[:, 2:]
+    if program.light == "parallel":
+        return flat
+    return np.where(z > 0, flat / np.where(z > 0, z, 1.0), np.inf)
 
 
 def _workspace_slack(program: PoseProgram, position: NDArray[np.float64]) -> float:

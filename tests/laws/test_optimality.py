@@ -24,6 +24,8 @@ from solvers.poses.pose_problem import INSET, PoseProgram, pose_margins
 from solvers.poses.pose_program import solve_pose
 
 K = np.array([[1400.0, 0.0, 639.5], [0.0, 1400.0, 399.5], [0.0, 0.0, 1.0]])
+IMAGE = (np.array([[0.0, 0.0], [1279.0, 799.0]]) - K[:2, 2]) / 1400.0
+PANEL = np.outer([-1.0, 1.0], (0.07, 0.065))
 LIGHTS = ["diverging", "parallel"]
 
 
@@ -101,9 +103,7 @@ def program_for(light, seed, **changes):
         "centre": np.array([0.01, 0.0, -0.01]),
         "axis": unit([0.1, -1.0, 0.0]),
         "half_angle": 0.22,
-        "camera_matrix": K,
-        "resolution": (1280, 800),
-        "half_panel_m": (0.07, 0.065),
+        "sides": IMAGE if light == "diverging" else PANEL,
         "beam_radius_m": 0.075,
         "ring_radius": 0.12 if light == "diverging" else 0.08,
         "ring_from_device": ring,
@@ -128,10 +128,7 @@ def stated(program, x):
     if program.light == "diverging":
         distance = np.linalg.norm(local, axis=1)
         rays = unit(away)
-        low = program.pixel_margin - 0.5
-        w, h = program.resolution
-        left, right = (np.array([low, w - 1 - low]) - K[0, 2]) / K[0, 0]
-        top, bottom = (np.array([low, h - 1 - low]) - K[1, 2]) / K[1, 1]
+        (left, top), (right, bottom) = program.sides
         u = local / distance[:, None]
         lows = [
             u[:, 0] - left * u[:, 2],
@@ -149,7 +146,7 @@ def stated(program, x):
         ]
     else:
         rays = np.broadcast_to(turn[:, 2], (n, 3))
-        half = np.array(program.half_panel_m) / size
+        half = program.sides[1] / size
         lows = [
             local[:, 0] + half[0],
             half[0] - local[:, 0],
@@ -313,7 +310,8 @@ def test_kkt_where_field_and_range_bind_in_diverging_light(side, limits, binding
         # A strip of 60 columns, far off the axis: turned until the bowl is in it.
         aside = np.arctan2(K[0, 2] - 29.5, K[0, 0])
         start[:3, :3] @= Rotation.from_rotvec([0.0, aside, 0.0]).as_matrix()
-        ring, narrow = 0.7, {"resolution": (60, 800)}
+        strip = np.where(IMAGE == IMAGE[1, 0], (59.0 - K[0, 2]) / K[0, 0], IMAGE)
+        ring, narrow = 0.7, {"sides": strip}
     program = program_for(
         "diverging",
         5,

@@ -150,10 +150,7 @@ def half_field(
 
 def _undistorted_edge(device: PinholeModel, along: _Array, towards: _Array) -> _Array:
     """Where a ray leaves the four planes of the image's frustum."""
-    matrix = device.camera_matrix
-    focal = np.array([matrix[0, 0], matrix[1, 1]])
-    low = (np.array([-0.5, -0.5]) - matrix[:2, 2]) / focal
-    high = (np.array(device.resolution) - 0.5 - matrix[:2, 2]) / focal
+    low, high = device.sides()
     inward = np.array(
         [[1, 0, -low[0]], [-1, 0, high[0]], [0, 1, -low[1]], [0, -1, high[1]]]
     )

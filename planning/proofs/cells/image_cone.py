@@ -51,7 +51,7 @@ def image_cone(device: PinholeModel) -> ImageCone:
     """Return the bounds for a camera's image."""
     if any(device.distortion):
         return _distorted_cone(device)
-    axis, corners = device.middle_ray, device.rays(_corners(device))
+    axis, corners = device.middle_ray, device.rays(device.corners)
     if not np.all(corners @ axis > 0.0):
         axis = np.array([0.0, 0.0, 1.0])
     # The image is a convex polygon of rays in one half space of the axis: none of them
@@ -76,9 +76,8 @@ def _cone(
 
 
 def _distorted_cone(device: PinholeModel) -> ImageCone:
-    k, focal = device.camera_matrix, device.camera_matrix[[0, 1], [0, 1]]
-    corners = (_corners(device) - k[:2, 2]) / focal
-    rho = _farthest(device, float(np.linalg.norm(corners, axis=1).max()))
+    reach = float(np.hypot(*np.abs(device.sides()).max(axis=0)))
+    rho = _farthest(device, reach)
     axis = np.array([0.0, 0.0, 1.0])
     if not np.isfinite(rho):
         return ImageCone(axis, _QUARTER, _QUARTER, 0.0)
@@ -103,9 +102,3 @@ def _farthest(device: PinholeModel, reach: float) -> float:
     beyond = 2.0 * rho + 1.0
     over = abs(np.polyval(radial, beyond)) - np.polyval(bend, beyond)
     return rho if over > 0.0 else float("inf")
-
-
-def _corners(device: PinholeModel) -> NDArray[np.float64]:
-    width, height = device.resolution
-    u, v = np.array([-0.5, width - 0.5]), np.array([-0.5, height - 0.5])
-    return np.stack(np.meshgrid(u, v), axis=-1).reshape(4, 2)

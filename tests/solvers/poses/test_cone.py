@@ -112,7 +112,7 @@ def parallel_program(normals, **changes):
         "shell_m": (0.5, 1.5),
         "centre": np.zeros(3),
         "axis": np.array([0.0, -1.0, 0.0]),
-        "half_panel_m": (0.2, 0.2),
+        "sides": np.array([[-0.2, -0.2], [0.2, 0.2]]),
     }
     return PoseProgram(**(arguments | changes))
 
@@ -158,7 +158,10 @@ def test_no_global_claim_where_another_limit_binds(limit):
             "min_tangent_angle": np.deg2rad(10),
         },
         "cone": {"half_angle": np.deg2rad(5)},
-        "panel": {"half_panel_m": (0.045, 0.045), "points": 0.1 * normals},
+        "panel": {
+            "sides": np.array([[-0.045, -0.045], [0.045, 0.045]]),
+            "points": 0.1 * normals,
+        },
         "none faces all": {},
     }[limit]
     if limit == "none faces all":

@@ -38,7 +38,18 @@ def look_at(position, target=(0.0, 0.0, 0.0), up=(0.0, 0.0, 1.0)):
     return pose
 
 
-def program_of(points, normals, *, steep=None, light="diverging", at, **changes):
+def program_of(
+    points,
+    normals,
+    *,
+    steep=None,
+    light="diverging",
+    at,
+    half_panel=(0.2, 0.2),
+    **changes,
+):
+    """A program of an image of 1280 x 800, or of a panel."""
+    image = (np.array([[0.0, 0.0], [1279.0, 799.0]]) - K[:2, 2]) / 1400.0
     points = np.atleast_2d(points).astype(float)
     arguments = {
         "points": points,
@@ -52,9 +63,7 @@ def program_of(points, normals, *, steep=None, light="diverging", at, **changes)
         "shell_m": (0.8, 1.2),
         "centre": np.zeros(3),
         "axis": unit(np.array(at, dtype=float)),
-        "camera_matrix": K,
-        "resolution": (1280, 800),
-        "half_panel_m": (0.2, 0.2),
+        "sides": image if light == "diverging" else np.outer([-1, 1], half_panel),
     }
     return PoseProgram(**(arguments | changes))
 
@@ -143,7 +152,7 @@ def test_statement_equals_the_numpy_figures(light):
         ring_from_device=frame,
         ring_radius=0.06 if light == "diverging" else 0.07,
         beam_radius_m=0.08,
-        half_panel_m=(0.06, 0.05),
+        half_panel=(0.06, 0.05),
         range_m=(0.95, 1.1),
         shell_m=(0.95, 1.1),
     )
@@ -223,7 +232,7 @@ def test_limits_hold_in_the_answer(light):
         light=light,
         at=[0.0, -1.0, 0.0],
         half_angle=np.deg2rad(10),
-        half_panel_m=(0.06, 0.055),
+        half_panel=(0.06, 0.055),
         beam_radius_m=0.07,
         up=np.eye(3)[2],
         floor=-0.01,
@@ -323,8 +332,7 @@ def test_same_answer_twice():
         ({"range_m": (1.0, 0.5)}, "range_m is 1.0 to 0.5"),
         ({"shell_m": (np.nan, 1.0)}, "shell_m is nan"),
         ({"max_incidence": np.nan}, "max_incidence must lie"),
-        ({"camera_matrix": None}, "needs camera_matrix"),
-        ({"light": "parallel", "half_panel_m": None}, "needs half_panel_m"),
+        ({"sides": np.zeros(4)}, r"sides must be finite and \(2, 2\)"),
     ],
 )
 def test_bad_programs_are_refused(changes, message):
