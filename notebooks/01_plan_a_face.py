@@ -24,14 +24,13 @@
 import tempfile
 from pathlib import Path
 
-import numpy as np
-
-from geometry import dominant_regions, principal_curvatures
+from geometry import RayCaster, dominant_regions, principal_curvatures
 from planning import RigPlan, load_mesh, load_rig, plan_rig, verify_plan
 from planning.cli.other_commands import write_sample
 from planning.report.drawing.face_colours import face_status, region_colours
+from planning.report.drawing.picture_view import fitted
 from planning.report.drawing.rig_picture import draw_rig
-from planning.report.drawing.shader import draw_mesh
+from planning.report.drawing.shader import Shader
 
 folder = Path(tempfile.mkdtemp())
 write_sample(folder / "face.obj", n_faces=12_000)
@@ -49,13 +48,10 @@ f"{len(mesh.faces)} faces, {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm"
 # %%
 regions = dominant_regions(mesh, principal_curvatures(mesh))
 print(f"{len(regions)} regions, {regions.dominant_share:.1%} of the area")
-draw_mesh(
-    mesh,
-    direction=np.array([0.5, 1.0, -0.1]),
-    up=np.array([0.0, 0.0, 1.0]),
-    size=(500, 600),
-    face_colours=region_colours(regions.face_region),
-)
+points = mesh.corners.reshape(-1, 3)
+view = fitted(points, [0.5, 1.0, -0.1], [0, 0, 1], (1000, 1200), margin_px=50)
+shader = Shader(RayCaster(mesh), region_colours(regions.face_region))
+shader.shade(view).reduce(2)
 
 # %% [markdown]
 # ## Plan

@@ -14,9 +14,11 @@ from PIL import Image
 from geometry.curvature.curvature import principal_curvatures
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
+from geometry.rays.rays import RayCaster
 from geometry.regions.regions import dominant_regions
 from planning.report.drawing.face_colours import region_colours
-from planning.report.drawing.shader import draw_mesh
+from planning.report.drawing.picture_view import fitted
+from planning.report.drawing.shader import Shader
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZE = (400, 500)
@@ -38,12 +40,12 @@ def main() -> int:
             f"{path.name}: {len(mesh.faces):,} faces, {len(found)} regions, "
             f"{found.dominant_share:.1%} of the area"
         )
+        shader = Shader(RayCaster(mesh), region_colours(found.face_region))
+        points = mesh.corners.reshape(-1, 3)
         for direction in directions:
-            colours = region_colours(found.face_region)
-            view = draw_mesh(
-                mesh, direction=direction, up=up, size=SIZE, face_colours=colours
-            )
-            views.append(view)
+            size = (2 * SIZE[0], 2 * SIZE[1])
+            view = fitted(points, direction, up, size, margin_px=0.1 * SIZE[0])
+            views.append(shader.shade(view).reduce(2))
     sheet = Image.new("RGB", (SIZE[0] * len(views), SIZE[1]))
     for i, view in enumerate(views):
         sheet.paste(view, (SIZE[0] * i, 0))

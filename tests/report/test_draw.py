@@ -26,13 +26,14 @@ from planning.report.drawing.figures import (
 from planning.report.drawing.panel import Panel, round_length
 from planning.report.drawing.picture_view import (
     BACKGROUND,
+    CLAY,
     PictureView,
     facing,
     fitted,
     save_picture,
 )
 from planning.report.drawing.rig_picture import draw_rig, draw_zones
-from planning.report.drawing.shader import Shader, draw_mesh
+from planning.report.drawing.shader import Shader
 
 K_PROJECTOR = [[2100.0, 0, 639.5], [0, 2100.0, 399.5], [0, 0, 1]]
 K_CAMERA = [[3500.0, 0, 1223.5], [0, 3500.0, 1023.5], [0, 0, 1]]
@@ -240,19 +241,25 @@ def test_a_sphere_is_a_disc_of_its_own_size():
     )
 
 
+def shaded(mesh, direction, px, colours=CLAY):
+    """Pixels of a mesh seen from a direction, in one colour or one for each face."""
+    points = mesh.corners.reshape(-1, 3)
+    view = fitted(points, direction, (0, 0, 1), (2 * px, 2 * px), margin_px=0.1 * px)
+    colours = np.broadcast_to(np.array(colours, float), (len(mesh.faces), 3))
+    return pixels(Shader(RayCaster(mesh), colours).shade(view).reduce(2))
+
+
 def test_faces_show_their_colours_where_they_are():
     ball = sphere()
     colours = np.zeros((len(ball.faces), 3))
     colours[ball.face_centroids[:, 0] > 0] = (255, 0, 0)
     colours[ball.face_centroids[:, 0] <= 0] = (0, 0, 255)
-    seen = pixels(
-        draw_mesh(ball, direction=(0, -1, 0), size=(200, 200), face_colours=colours)
-    )
+    seen = shaded(ball, (0, -1, 0), 200, colours)
     # Seen from the front (-y), +x is on the right.
     assert seen[100, 150, 0] > 100 > seen[100, 150, 2]
     assert seen[100, 50, 2] > 100 > seen[100, 50, 0]
     assert seen[2, 2].tolist() == [255, 255, 255]
-    above = pixels(draw_mesh(ball, direction=(0, -1, 0), size=(200, 200)))
+    above = shaded(ball, (0, -1, 0), 200)
     assert above[40, 100].sum() > above[170, 130].sum(), "light comes from above"
 
 
@@ -270,7 +277,7 @@ def test_flat_faces_keep_their_creases():
     ]
     faces = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
     cube = TriangleMesh(corners, np.array(faces))
-    seen = pixels(draw_mesh(cube, direction=(-0.3, -1, 0.2), size=(300, 300)))
+    seen = shaded(cube, (-0.3, -1, 0.2), 300)
     # Three flat faces: three shades, and hardly a pixel in between.
     _, counts = np.unique(seen.reshape(-1, 3), axis=0, return_counts=True)
     assert np.sort(counts)[-4:].sum() > 0.98 * 300 * 300
@@ -278,20 +285,11 @@ def test_flat_faces_keep_their_creases():
 
 def test_a_coarse_sphere_is_shaded_like_a_fine_one():
     coarse, fine = (
-        pixels(draw_mesh(sphere(frequency=n), size=(200, 200))) for n in (10, 60)
+        shaded(sphere(frequency=n), (-0.5, -0.8, 0.3), 200) for n in (10, 60)
     )
     rows, columns = np.indices(coarse.shape[:2])
     inside = np.hypot(rows - 99.5, columns - 99.5) < 80
     assert np.abs(coarse - fine)[inside].max() <= 5
-
-
-@pytest.mark.parametrize(
-    "colours",
-    [np.zeros((3, 3)), np.full((11520, 3), np.nan), np.full((11520, 3), 256.0)],
-)
-def test_colours_that_do_not_fit_are_refused(colours):
-    with pytest.raises(ValueError, match="face_colours must be"):
-        draw_mesh(sphere(), face_colours=colours)
 
 
 def test_lines_behind_the_object_are_faint():

@@ -1,6 +1,5 @@
 """Pictures of a mesh without OpenGL: parallel rays, smooth shading, flat colours."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import summed, unit
 from geometry.rays.rays import RayCaster
 
-from .picture_view import BACKGROUND, CLAY, SUPERSAMPLING, PictureView, fitted
+from .picture_view import BACKGROUND, PictureView
 
 # A corner whose mean normal is turned by more than this lies on a crease.
 _CREASE = np.cos(np.deg2rad(40.0))
@@ -101,39 +99,6 @@ class Shader:
         mean = unit(total)[mesh.faces]
         crease = np.sum(mean * flat, axis=2) < _CREASE
         return np.where(crease[:, :, None], flat, mean)
-
-
-def draw_mesh(
-    mesh: TriangleMesh,
-    *,
-    direction: Sequence[float] = (-0.5, -0.8, 0.3),
-    up: Sequence[float] = (0.0, 0.0, 1.0),
-    size: tuple[int, int] = (800, 800),
-    face_colours: NDArray[np.float64] | None = None,
-) -> Image.Image:
-    """Return a shaded picture of a mesh.
-
-    Args:
-        mesh: The mesh.
-        direction: From the mesh to the viewer, any length.
-        up: World direction that is up in the picture.
-        size: Width and height in [px].
-        face_colours: Red, green, blue of each face, 0 to 255, shape (n_f, 3); default
-            clay.
-
-    Raises:
-        ValueError: If the colours don't fit the faces or a direction has no length.
-    """
-    if face_colours is None:
-        face_colours = np.tile(np.array(CLAY, dtype=np.float64), (len(mesh.faces), 1))
-    colours, expected = np.asarray(face_colours, dtype=float), (len(mesh.faces), 3)
-    if colours.shape != expected or not np.all((colours >= 0) & (colours <= 255)):
-        raise ValueError(f"face_colours must be {expected} in 0..255: {colours.shape}")
-    fine = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
-    points = mesh.corners.reshape(-1, 3)
-    view = fitted(points, direction, up, fine, margin_px=0.05 * min(fine))
-    picture = Shader(RayCaster(mesh), colours).shade(view)
-    return picture.resize(size, Image.Resampling.BOX)
 
 
 def _brightness(normals: NDArray[np.float64], view: PictureView) -> NDArray[np.float64]:
