@@ -34,9 +34,10 @@ def compare_figures(
         return []
     findings = AuditFindings("reconstruction")
     for name, (share, floor) in _REPEATABLE.items():
-        value = getattr(fresh, name)
-        slack = max(share * abs(value or 0.0), floor)
-        _compare(name, getattr(recorded, name), value, slack, findings)
+        claimed, value = getattr(recorded, name), getattr(fresh, name)
+        if value is not None:
+            slack = max(share * abs(value), floor)
+            findings.number(name, claimed, value, slack, "")
     # Plans from before have none; rows of single regions rest on few samples.
     for name in ("confusion", "dominant", "whole_surface"):
         tables = getattr(recorded, name), getattr(fresh, name)
@@ -47,8 +48,8 @@ def compare_figures(
         return list(findings.failures)
     for row, again in zip(rows, fresh.completeness, strict=True):
         at = f"{key} at {_MM * again.threshold_m:.3g} mm"
-        _compare(at, row.threshold_m, again.threshold_m, 1e-9, findings)
-        _compare(at, row.fraction, again.fraction, _FRACTION_SLACK, findings)
+        findings.number(at, row.threshold_m, again.threshold_m, 1e-9, "m")
+        findings.number(at, row.fraction, again.fraction, _FRACTION_SLACK, "")
     findings.holds(
         fresh.passed or not recorded.passed,
         "passed",
@@ -76,20 +77,5 @@ def _compare_shares(
         claimed, value = getattr(recorded, name), getattr(fresh, name)
         if isinstance(value, Part):
             _compare_shares(claimed, value, findings.at(name))
-        elif name in _SHARES:
-            _compare(name, claimed, value, _FRACTION_SLACK, findings)
-
-
-def _compare(
-    key: str,
-    claimed: float | None,
-    value: float | None,
-    slack: float,
-    findings: AuditFindings,
-) -> None:
-    if value is not None:
-        findings.holds(
-            claimed is not None and abs(claimed - value) <= slack,
-            key,
-            f"claimed {claimed}, run again {value:.6g}, tolerance {slack:.2g}",
-        )
+        elif name in _SHARES and value is not None:
+            findings.number(name, claimed, value, _FRACTION_SLACK, "")

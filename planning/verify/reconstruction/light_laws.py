@@ -48,10 +48,6 @@ class LightLaw:
         beams = np.broadcast_to(pose[:3, 2], points.shape)
         return points - depth[:, None] * beams, beams, depth
 
-    def faces(self, pose: Array, points: Array, normals: Array) -> Mask:
-        """Return whether surface of normals (n, 3) is turned to a device's light."""
-        return normals @ pose[:3, 2] < 0.0
-
     def falloff(self, depth: Array) -> Array | float:
         """Return the brightness at depths, 1 at their median, shape (n,)."""
         return 1.0
@@ -111,10 +107,6 @@ class _Diverging(LightLaw):
         reach = np.sqrt(np.einsum("ij,ij->i", beams, beams))
         beams /= reach[:, None]
         return pose[:3, 3], beams, reach
-
-    def faces(self, pose: Array, points: Array, normals: Array) -> Mask:
-        along = np.einsum("ij,ij->i", normals, points)
-        return along - normals @ pose[:3, 3] < 0.0
 
     def falloff(self, depth: Array) -> Array | float:
         return (float(np.median(depth)) / depth) ** 2

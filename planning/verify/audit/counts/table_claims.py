@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from planning.model.plan import RigPlan
+from planning.model.words import count_words
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
 from planning.verify.audit.estimates import POINT, ROUNDING
@@ -49,21 +50,16 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
         slack = case.estimator.tolerance(
             chosen & case.samples.in_target, case.estimator.target_m2
         )
-        _audit_rising(case.plan, kind.name, slack, findings)
-
-
-def _audit_rising(
-    plan: RigPlan, kind: str, slack: float, findings: AuditFindings
-) -> None:
-    """On the target more devices do more; on the surface one more may well add less."""
-    for (fewer, less), (number, more) in pairwise(marginal_of(plan, kind, "target")):
-        findings.holds(
-            more >= less - slack,
-            f"marginal.{kind}s",
-            f"{_verb(kind)}_target_m2 falls from {square_centimetres(less)} with "
-            f"{fewer} {kind}{'s' * (fewer != 1)} to {square_centimetres(more)} with "
-            f"{number}, more than sampling explains ({square_centimetres(slack)})",
-        )
+        # On the target more devices do more; on the surface one more may add less.
+        table = marginal_of(case.plan, kind.name, "target")
+        for (fewer, less), (number, more) in pairwise(table):
+            findings.holds(
+                more >= less - slack,
+                f"marginal.{kind.name}s",
+                f"{verb}_target_m2 falls from {square_centimetres(less)} with "
+                f"{count_words(fewer, kind.name)} to {square_centimetres(more)} with "
+                f"{number}, more than sampling explains ({square_centimetres(slack)})",
+            )
 
 
 def audit_shares(case: AuditCase, findings: AuditFindings) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
-from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
@@ -79,6 +78,15 @@ def _audit_model(
 
 def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
     """Check existing devices against requirements, certificates and the rig."""
+    tables = {
+        str(table.get("name")): table for table in case.plan.document.rig.existing
+    }
+    names = sorted(device.name for device in case.plan.requirements.existing)
+    findings.holds(
+        sorted(tables) == names,
+        "requirements.existing",
+        f"holds {names}, but rig.existing has {sorted(tables)}",
+    )
     for kind in case.kinds:
         stated = case.plan.requirements.existing_of(kind.name)
         marked = {d.existing: d for d in kind.devices if d.existing}
@@ -105,30 +113,16 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
             f"{kind.proof.given} is claimed, but {len(stated)} {kind.name}s are "
             f"existing devices",
         )
-    _audit_rig(case.plan, findings)
-
-
-def _audit_rig(plan: RigPlan, findings: AuditFindings) -> None:
-    """Check that existing devices are those of the rig, where it has them."""
-    stated = {str(table.get("name")): table for table in plan.document.rig.existing}
-    names = sorted(device.name for device in plan.requirements.existing)
-    findings.holds(
-        sorted(stated) == names,
-        "requirements.existing",
-        f"holds {names}, but rig.existing has {sorted(stated)}",
-    )
-    for device in (*plan.projectors, *plan.cameras):
-        table, below = stated.get(device.existing), findings.at(device.id)
-        if table is None:
-            continue
-        kind = "camera" if isinstance(device, PlannedCamera) else "projector"
-        below.holds(
-            table["kind"] == kind,
-            "existing",
-            f"is a {kind}, but rig.existing {device.existing!r} is a {table['kind']}",
-        )
-        space = plan.requirements.workspace
-        _audit_pose(device, table, space, below.at("world_from_device"))
+        for name, device in marked.items():
+            if name in tables:
+                table, below = tables[name], findings.at(device.id)
+                below.holds(
+                    table["kind"] == kind.name,
+                    "existing",
+                    f"is a {kind.name}, but rig.existing {name!r} is a {table['kind']}",
+                )
+                space = case.plan.requirements.workspace
+                _audit_pose(device, table, space, below.at("world_from_device"))
 
 
 def _audit_pose(

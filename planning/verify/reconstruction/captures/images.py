@@ -67,7 +67,13 @@ def _grey(image: Image.Image, path: Path) -> NDArray[np.uint8 | np.uint16]:
     if image.mode == "L":
         return np.array(image)
     if image.mode == "I" or image.mode.startswith("I;16"):
-        return _sixteen_bits(np.array(image), path)
+        levels = np.array(image)
+        if levels.min() < 0 or levels.max() > _SIXTEEN_BITS:
+            raise CapturesError(
+                f"{path}: grey levels {levels.min()} to {levels.max()}, must be 0 to "
+                f"{_SIXTEEN_BITS}; save 8 or 16 bits"
+            )
+        return levels.astype(np.uint16)
     if image.mode in ("P", "PA"):
         image = image.convert("RGBA")
     if image.mode not in ("LA", "RGB", "RGBA"):
@@ -81,14 +87,3 @@ def _grey(image: Image.Image, path: Path) -> NDArray[np.uint8 | np.uint16]:
         channels = channels[:, :, :-1]
     mean = np.rint(channels.mean(axis=2)).astype(np.uint8)
     return np.where(channels.max(axis=2) >= _CLIPPED, np.uint8(255), mean)
-
-
-def _sixteen_bits(
-    levels: NDArray[np.integer], path: Path
-) -> NDArray[np.uint8 | np.uint16]:
-    if levels.min() < 0 or levels.max() > _SIXTEEN_BITS:
-        raise CapturesError(
-            f"{path}: grey levels {levels.min()} to {levels.max()}, must be 0 to "
-            f"{_SIXTEEN_BITS}; save 8 or 16 bits"
-        )
-    return levels.astype(np.uint16)

@@ -58,12 +58,9 @@ class ImageEdges(Columns):
     @classmethod
     def nothing(cls) -> "ImageEdges":
         """Return no edges."""
-        places, ring, root = (
-            np.zeros((0, 2)),
-            np.zeros(0, np.int64),
-            np.zeros(0, np.int8),
-        )
-        return cls(places, ring, root, places, np.zeros(0))
+        places, numbers = np.zeros((0, 2)), np.zeros(0)
+        rings, roots = numbers.astype(np.int64), numbers.astype(np.int8)
+        return cls(places, rings, roots, places, numbers)
 
 
 def find_edges(

@@ -59,9 +59,8 @@ class Shown:
 
     def light(self, seen: RenderedView, in_focus_m: float) -> RenderedLight:
         """Return its light on a view's samples, edges in focus blurred by so much."""
-        pose = self.projector.world_from_device
-        facing = self.projector.light.faces(pose, seen.points, seen.normals)
-        samples = np.flatnonzero(facing)
+        cosine = self.projector.incidence_cosine(seen.points, seen.normals)
+        samples = np.flatnonzero(cosine > 0.0)
         # In parts, so that what is between stays in the cache.
         parts = equal_parts(len(samples), CHUNK) or [slice(0)]
         light = RenderedLight.join(
