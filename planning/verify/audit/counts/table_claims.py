@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 
 from planning.model.plan import RigPlan
-from planning.model.words import count_words
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
 from planning.verify.audit.estimates import POINT, ROUNDING
@@ -57,7 +56,7 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
                 more >= less - slack,
                 f"marginal.{kind.name}s",
                 f"{verb}_target_m2 falls from {square_centimetres(less)} with "
-                f"{count_words(fewer, kind.name)} to {square_centimetres(more)} with "
+                f"{fewer} {kind.name}{'s' * (fewer != 1)} to {square_centimetres(more)} with "
                 f"{number}, more than sampling explains ({square_centimetres(slack)})",
             )
 
