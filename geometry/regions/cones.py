@@ -28,14 +28,6 @@ _NO_REST = 0.05
 _HALVINGS = (0.5, 0.25, 0.125, 0.0625)
 
 
-def check_cone_options(min_region_share: float, cone_half_angle: float) -> None:
-    """Raise ValueError if the share isn't in [0, 1) or the angle not in (0, pi)."""
-    if not 0 <= min_region_share < 1:
-        raise ValueError(f"min_region_share must lie in [0, 1), got {min_region_share}")
-    if not 0 < cone_half_angle < np.pi:
-        raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
-
-
 def cone_pieces(
     mesh: TriangleMesh,
     chosen: Mask,

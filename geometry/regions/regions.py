@@ -11,8 +11,11 @@ from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
 
-from .cones import check_cone_options, cone_pieces, normal_cone
+from .cones import cone_pieces, normal_cone
 from .dominance import dominant_faces, face_curvedness
+
+# Of the area, and of the normals of a region.
+MIN_REGION_SHARE, CONE_HALF_ANGLE = 0.002, float(np.deg2rad(50.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +71,8 @@ def dominant_regions(
     field: CurvatureField,
     *,
     area_share: float = 0.2,
-    min_region_share: float = 0.002,
-    cone_half_angle: float = np.deg2rad(50.0),
+    min_region_share: float = MIN_REGION_SHARE,
+    cone_half_angle: float = CONE_HALF_ANGLE,
 ) -> DominantRegions:
     """Return the share of the trusted area with the highest curvedness, in regions.
 
@@ -95,19 +98,21 @@ def dominant_regions(
     """
     if not 0 < area_share <= 1:
         raise ValueError(f"area_share must lie in (0, 1], got {area_share}")
-    check_cone_options(min_region_share, cone_half_angle)
+    if not 0 <= min_region_share < 1:
+        raise ValueError(f"min_region_share must lie in [0, 1), got {min_region_share}")
+    if not 0 < cone_half_angle < np.pi:
+        raise ValueError(f"cone_half_angle must lie in (0, pi), got {cone_half_angle}")
     curvedness, trusted = face_curvedness(mesh, field)
     pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     least = min_region_share * mesh.area
     dominant = dominant_faces(mesh, curvedness, trusted, pairs, area_share, least)
     whole = bool(dominant.all())
     pieces = cone_pieces(mesh, dominant, pairs, least, cone_half_angle, keep_all=whole)
-    steep = steep_directions(mesh, field)
-    return regions_of_pieces(mesh, pieces, curvedness, steep)
+    return regions_of_pieces(mesh, field, pieces, curvedness)
 
 
 def regions_of_pieces(
-    mesh: TriangleMesh, pieces: Sequence[Ints], curvedness: Array, steep: Array
+    mesh: TriangleMesh, field: CurvatureField, pieces: Sequence[Ints], curvedness: Array
 ) -> DominantRegions:
     """Return pieces (each the ascending indices of its faces) as numbered regions."""
     regions = tuple(
@@ -116,6 +121,7 @@ def regions_of_pieces(
     face_region = np.full(len(mesh.faces), -1, dtype=np.int64)
     for region in regions:
         face_region[region.faces] = region.id
+    steep = steep_directions(mesh, field)
     share = float(mesh.face_areas[face_region >= 0].sum() / mesh.area)
     for values in (face_region, steep):
         values.setflags(write=False)

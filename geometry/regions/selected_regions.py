@@ -5,34 +5,31 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry.arrays import Mask
 from geometry.curvature.curvature import CurvatureField
-from geometry.curvature.face_curvature import steep_directions
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
 
-from .cones import check_cone_options, cone_pieces
+from .cones import cone_pieces
 from .dominance import face_curvedness
-from .regions import DominantRegions, regions_of_pieces
+from .regions import (
+    CONE_HALF_ANGLE,
+    MIN_REGION_SHARE,
+    DominantRegions,
+    regions_of_pieces,
+)
 
 
 def regions_of_faces(
-    mesh: TriangleMesh,
-    field: CurvatureField,
-    chosen: ArrayLike,
-    *,
-    min_region_share: float = 0.002,
-    cone_half_angle: float = float(np.deg2rad(50.0)),
+    mesh: TriangleMesh, field: CurvatureField, chosen: ArrayLike
 ) -> DominantRegions:
     """Return exactly the chosen faces, bool (n_f,), in regions for one projector each.
 
     Nothing is added and nothing left out: not at an open border, where curvature isn't
     trusted, nor small pieces. Steep directions come from the curvature as in
     `dominant_regions`; where it isn't trusted they are zero and bind nothing. Pieces
-    below ``min_region_share`` of the chosen area, in [0, 1), are joined to a neighbour
-    if one cone of the half angle [rad] holds both.
+    below 0.2 % of the chosen area are joined to a neighbour if one cone holds both.
 
     Raises:
-        ValueError: If `chosen` isn't one bool a face or chooses none, or an option is
-            out of range.
+        ValueError: If `chosen` isn't one bool a face or chooses none.
     """
     faces = np.asarray(chosen)
     if faces.dtype != np.bool_ or faces.shape != (len(mesh.faces),):
@@ -42,13 +39,11 @@ def regions_of_faces(
         )
     if not faces.any():
         raise ValueError("chosen must hold at least one face, holds none")
-    check_cone_options(min_region_share, cone_half_angle)
     curvedness, _ = face_curvedness(mesh, field)
     pairs = face_pairs(mesh.edges, manifold_only=False)[0]
-    least = min_region_share * float(mesh.face_areas[faces].sum())
-    pieces = cone_pieces(mesh, faces, pairs, least, cone_half_angle, keep_all=True)
-    steep = steep_directions(mesh, field)
-    return regions_of_pieces(mesh, pieces, curvedness, steep)
+    least = MIN_REGION_SHARE * float(mesh.face_areas[faces].sum())
+    pieces = cone_pieces(mesh, faces, pairs, least, CONE_HALF_ANGLE, keep_all=True)
+    return regions_of_pieces(mesh, field, pieces, curvedness)
 
 
 def heaviest_faces(

@@ -16,8 +16,8 @@ from geometry.regions.selected_regions import (
 from geometry.shapes.primitives import sphere
 
 
-def regions_of(mesh: TriangleMesh, chosen: np.ndarray, **options) -> DominantRegions:
-    return regions_of_faces(mesh, principal_curvatures(mesh), chosen, **options)
+def regions_of(mesh: TriangleMesh, chosen: np.ndarray) -> DominantRegions:
+    return regions_of_faces(mesh, principal_curvatures(mesh), chosen)
 
 
 def is_connected(mesh: TriangleMesh, faces: np.ndarray) -> bool:
@@ -65,10 +65,6 @@ def test_a_whole_ball_needs_at_least_as_many_cones_as_its_area_says() -> None:
     found = regions_of(ball, np.ones(len(ball.faces), dtype=bool))
     # A cone of 50 degrees that may miss 5 % holds (1 - cos 50) / 2 / 0.95 of a ball.
     assert len(found) >= 0.95 * 2 / (1 - np.cos(np.deg2rad(50.0)))
-    wide = regions_of(
-        ball, np.ones(len(ball.faces), dtype=bool), cone_half_angle=np.deg2rad(80.0)
-    )
-    assert len(wide) < len(found)
 
 
 def test_an_open_border_is_chosen_like_anything_else() -> None:
@@ -163,13 +159,6 @@ def test_what_cannot_be_a_selection_or_a_weight_is_refused() -> None:
             regions_of_faces(ball, field, bad)
     with pytest.raises(ValueError, match="at least one face, holds none"):
         regions_of_faces(ball, field, np.zeros(n, bool))
-    whole = np.ones(n, bool)
-    for share in (-0.1, 1.0, np.nan):
-        with pytest.raises(ValueError, match="min_region_share must lie in"):
-            regions_of_faces(ball, field, whole, min_region_share=share)
-    for angle in (0.0, np.pi, np.nan):
-        with pytest.raises(ValueError, match="cone_half_angle must lie in"):
-            regions_of_faces(ball, field, whole, cone_half_angle=angle)
     for share in (0.0, 1.1, np.nan):
         with pytest.raises(ValueError, match="area_share must lie in"):
             by_face(ball, np.ones(n), share)
