@@ -56,8 +56,9 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
                 more >= less - slack,
                 f"marginal.{kind.name}s",
                 f"{verb}_target_m2 falls from {square_centimetres(less)} with "
-                f"{fewer} {kind.name}{'s' * (fewer != 1)} to {square_centimetres(more)} with "
-                f"{number}, more than sampling explains ({square_centimetres(slack)})",
+                f"{fewer} {kind.name}{'s' * (fewer != 1)} to "
+                f"{square_centimetres(more)} with {number}, more than sampling "
+                f"explains ({square_centimetres(slack)})",
             )
 
 
