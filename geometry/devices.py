@@ -14,6 +14,8 @@ import numpy as np
 from .arrays import Array, Mask
 
 _UNDISTORT_STEPS = 12
+_AHEAD = np.array([0.0, 0.0, 1.0])
+_AHEAD.flags.writeable = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,10 +304,14 @@ class ParallelModel:
 DeviceModel = PinholeModel | ParallelModel
 
 
-def turned_to(direction: Array) -> Array:
-    """Return the smallest rotation that takes a unit direction to +z (Rodrigues)."""
-    axis = np.cross(direction, [0.0, 0.0, 1.0])
-    skew = np.array(
-        [[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]]
-    )
-    return np.eye(3) + (skew + skew @ skew / (1.0 + direction[2]))
+def turned_to(direction: Array, ends: Array = _AHEAD) -> Array:
+    """Return the smallest rotations of a unit direction to unit ends (Rodrigues).
+
+    Ends are (..., 3), the rotations (..., 3, 3).
+    """
+    x, y, z = np.moveaxis(np.cross(direction, ends), -1, 0)
+    none = np.zeros_like(x)
+    rows = [[none, -z, y], [z, none, -x], [-y, x, none]]
+    skew = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    turned = skew @ skew / (1.0 + ends @ direction)[..., None, None]
+    return np.eye(3) + skew + turned

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation, Slerp
 from geometry.poses import inverse
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
-from planning.model.requirements import Workspace
 from planning.proofs.selection import required_samples
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
@@ -19,7 +18,7 @@ from planning.scene.patterns import RingPattern
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.workspace.admissible import half_spaces, is_zoned
+from planning.scene.workspace.admissible import half_spaces
 from solvers.poses.pose_problem import PoseProgram, pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 
@@ -187,6 +186,8 @@ def pose_program(
     required, device = scene.requirements, projector.device
     workspace = scene.safe_workspace
     up, centre = np.array(workspace.up), np.array(workspace.centre)
+    offset = projector.world_from_device[:3, 3] - centre
+    normals, offsets = half_spaces(workspace, offset)
     return PoseProgram(
         points=assigned.samples.points,
         normals=assigned.samples.normals,
@@ -210,19 +211,8 @@ def pose_program(
         if workspace.floor_m is None
         else workspace.floor_m + float(up @ centre),
         max_move_m=_MAX_MOVE_M,
-        half_spaces=_held_in(workspace, projector.world_from_device[:3, 3]),
+        half_spaces=np.column_stack([normals, offsets + normals @ centre]),
     )
-
-
-def _held_in(
-    workspace: Workspace, position: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
-    """Rows (n, d) of the convex part of the zones about a position, n.Q >= d."""
-    if not is_zoned(workspace):
-        return None
-    centre = np.array(workspace.centre)
-    normals, offsets = half_spaces(workspace, position - centre)
-    return np.column_stack([normals, offsets + normals @ centre])
 
 
 def _part_of_the_way(

@@ -24,6 +24,7 @@ from planning.proofs.cells.direction_cells import (
     open_samples,
 )
 from planning.proofs.cells.position_cells import PositionTree
+from planning.scene.lights import light_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.admissible import may_stand
@@ -58,23 +59,19 @@ def bound_projectors(
     limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
     workspace, device = scene.requirements.workspace, template.device
     near = workspace.projector_radius_m[0]
+    parallel = isinstance(device, ParallelModel)
+    # How far off a device's own axis what it lights may be.
+    aside = reach + light_of(device).image_ring(0.0) if parallel else 0.0
+    depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
+    shadows = shadows and bool(depth >= reach)
+    opened = open_samples(
+        scene, limits, samples, cube, shadows=shadows, nearest_m=depth
+    )
     tree: DirectionTree | PositionTree
-    if isinstance(device, ParallelModel):
-        # How far off a device's own axis what it lights may be.
-        width = float(np.hypot(*device.half_panel))
-        aside = reach + min(width, device.beam_reach)
-        depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
-        shadows = shadows and bool(depth >= reach)
-        opened = open_samples(
-            scene, limits, samples, cube, shadows=shadows, nearest_m=depth
-        )
+    if parallel:
         opened[~_within(cube, workspace, aside)] = 0
         tree = DirectionTree.over(opened, len(samples))
     else:
-        shadows = shadows and bool(near >= reach)
-        opened = open_samples(
-            scene, limits, samples, cube, shadows=shadows, nearest_m=near
-        )
         tree = PositionTree(
             workspace,
             workspace.projector_radius_m,

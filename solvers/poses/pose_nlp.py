@@ -135,8 +135,10 @@ def pose_parameters(
     bent = np.where(np.any(steep != 0.0, axis=1), 0.0, -np.inf)
     bounded = program.half_angle < np.pi
     floored = program.up is not None and np.isfinite(program.floor)
-    planes, held = _half_spaces(program, size)
-    last = [True, True, bounded, floored, *held]
+    normals, offsets = program.half_spaces[:, :3], program.half_spaces[:, 3]
+    held = np.column_stack([normals, (offsets - normals @ start[:3, 3]) / size])
+    planes = np.pad(held, ((0, n_planes_of(program) - len(held)), (0, 0)))
+    last = [True, True, bounded, floored, *(np.arange(len(planes)) < len(held))]
     lower = np.concatenate(
         [
             np.zeros(n),
@@ -151,21 +153,9 @@ def pose_parameters(
     return np.nan_to_num(packed, posinf=0, neginf=0), lower
 
 
-def _half_spaces(
-    program: PoseProgram, size: float
-) -> tuple[NDArray[np.float64], list[bool]]:
-    """Return rows (n, d) for q instead of Q, and which of them apply."""
-    limits = program.planes
-    planes = np.zeros((n_planes_of(program), 4))
-    planes[: len(limits), :3] = limits[:, :3]
-    start = program.world_from_device[:3, 3]
-    planes[: len(limits), 3] = (limits[:, 3] - limits[:, :3] @ start) / size
-    return planes, [k < len(limits) for k in range(len(planes))]
-
-
 def n_planes_of(program: PoseProgram) -> int:
     """Return how many half-spaces the program is built with."""
-    return -(-len(program.planes) // _PLANES) * _PLANES
+    return -(-len(program.half_spaces) // _PLANES) * _PLANES
 
 
 def _device_limits(program: PoseProgram, size: float) -> NDArray[np.float64]:

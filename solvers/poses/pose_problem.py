@@ -1,6 +1,6 @@
 """Data of the pose program; `pose_program` solves it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ class PoseProgram:
         floor: Least up.Q in [m].
         max_move_m: Largest change of each coordinate of Q in [m].
         half_spaces: Rows (n, d), unit n and d in [m], of half-spaces n.Q >= d that hold
-            Q, shape (k, 4); None: none.
+            Q, shape (k, 4).
 
     Raises:
         ValueError: If an array has the wrong shape, a number isn't finite, or a limit
@@ -63,7 +63,7 @@ class PoseProgram:
     up: NDArray[np.float64] | None = None
     floor: float = -np.inf
     max_move_m: float = np.inf
-    half_spaces: NDArray[np.float64] | None = None
+    half_spaces: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
 
     def __post_init__(self) -> None:
         n = len(self.points)
@@ -80,15 +80,9 @@ class PoseProgram:
         for name in ("max_incidence", "min_tangent_angle"):
             if not 0.0 <= getattr(self, name) <= np.pi / 2:
                 raise ValueError(f"{name} must lie within 0 and pi/2")
-        planes = self.planes
+        planes = self.half_spaces
         if planes.ndim != 2 or planes.shape[1] != 4 or not np.all(np.isfinite(planes)):
             raise ValueError(f"half_spaces must be finite, (k, 4), is {planes.shape}")
-
-    @property
-    def planes(self) -> NDArray[np.float64]:
-        """Rows (n, d) of the half-spaces, shape (k, 4); k = 0 without any."""
-        rows = np.empty((0, 4)) if self.half_spaces is None else self.half_spaces
-        return np.asarray(rows, dtype=np.float64)
 
 
 def light_directions(

@@ -114,7 +114,7 @@ def _workspace_slack(program: PoseProgram, position: NDArray[np.float64]) -> flo
         slack = min(slack, program.half_angle - float(angle))
     if program.up is not None and np.isfinite(program.floor):
         slack = min(slack, float(program.up @ position) - program.floor)
-    planes = program.planes
+    planes = program.half_spaces
     if len(planes):
         slack = min(slack, float(np.min(planes[:, :3] @ position - planes[:, 3])))
     return slack

@@ -102,7 +102,7 @@ def poses_beside(site: Site, poses: _Array, n: int, *, reach: float) -> _Array:
         depths = np.concatenate([np.full(n, near), depth])
         offsets, kept = _placed(site, anchors, sights, depths)
         moved = np.repeat(pose[None], 2 * n, axis=0)
-        moved[:, :3, :3] = _turns(outwards, sights) @ pose[:3, :3]
+        moved[:, :3, :3] = turned_to(outwards, sights) @ pose[:3, :3]
         moved[:, :3, 3] = centre + offsets
         found.append(moved[kept])
     return np.concatenate(found)
@@ -215,12 +215,3 @@ def _disc(n: int, start: _Array, normal: _Array) -> _Array:
     radius = np.sqrt((i + 0.5) / n)
     plane = np.column_stack([radius * np.cos(around), radius * np.sin(around)])
     return plane @ np.stack([x, np.cross(normal, x)])
-
-
-def _turns(start: _Array, ends: _Array) -> _Array:
-    """Smallest rotations that take a unit direction to others, shape (n, 3, 3)."""
-    axis = np.cross(start, ends)
-    skew = np.zeros((len(ends), 3, 3))
-    skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
-    skew -= skew.transpose(0, 2, 1)
-    return np.eye(3) + skew + skew @ skew / (1.0 + ends @ start)[:, None, None]

@@ -366,7 +366,7 @@ def test_half_spaces_hold_the_device(light, n_planes):
         assert position == pytest.approx(
             [0.0, -0.4, np.sqrt(1.2**2 - 0.4**2)], abs=2e-3
         )
-    free = solve_pose(dataclasses.replace(program, half_spaces=None))
+    free = solve_pose(dataclasses.replace(program, half_spaces=np.empty((0, 4))))
     assert free.margin_rad > np.deg2rad(59)
 
 
