@@ -106,7 +106,7 @@ class RigPlan:
         Raises:
             PlanFileError: If a value is missing or can't be used.
         """
-        return cls._parsed(json.dumps(document), surface, "plan")
+        return cls(_document(json.dumps(document), "plan"), surface)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -119,28 +119,14 @@ class RigPlan:
         path = Path(path)
         with reading(path, PlanFileError):
             content = path.read_bytes()
-        name, digest = _surface_of(content, path)
-        surface = Surface.load(path.parent / name, digest)
-        return cls._parsed(content, surface, str(path))
-
-    @classmethod
-    def _parsed(cls, text: str | bytes, surface: Surface, where: str) -> Self:
-        try:
-            plan = cls(PlanDocument.read(text), surface)
-            _ = plan.projectors, plan.cameras
-        except ValidationError as error:
-            raise PlanFileError(f"{where}: {_faults(error)}; plan again") from None
-        except ValueError as error:
-            raise PlanFileError(f"{where}: broken plan ({error}); plan again") from None
-        return plan
+        _require_plan(content, path)
+        document = _document(content, str(path))
+        surface = document.surface
+        return cls(document, Surface.load(path.parent / surface.path, surface.sha256))
 
 
-def _surface_of(content: bytes, path: Path) -> tuple[str, str | None]:
-    """Return name and digest of a plan's surface, of a plan of our version.
-
-    Raises:
-        PlanFileError: If it isn't.
-    """
+def _require_plan(content: bytes, path: Path) -> None:
+    """Refuse what isn't a plan of our version."""
     try:
         document = json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -151,14 +137,18 @@ def _surface_of(content: bytes, path: Path) -> tuple[str, str | None]:
         raise PlanFileError(
             f"{path}: version {document.get('version')}, this program reads {VERSION}"
         )
-    surface = document.get("surface")
-    table = surface if isinstance(surface, dict) else {}
-    name, digest = table.get("path"), table.get("sha256")
-    # What is no name or digest is refused with the rest of the document.
-    return (
-        name if isinstance(name, str) else "surface.npz",
-        digest if isinstance(digest, str) else None,
-    )
+
+
+def _document(text: str | bytes, where: str) -> PlanDocument:
+    try:
+        document = PlanDocument.read(text)
+        for record in (*document.projectors, *document.cameras):
+            record.planned()
+    except ValidationError as error:
+        raise PlanFileError(f"{where}: {_faults(error)}; plan again") from None
+    except ValueError as error:
+        raise PlanFileError(f"{where}: broken plan ({error}); plan again") from None
+    return document
 
 
 def _faults(error: ValidationError) -> str:

@@ -42,7 +42,6 @@ class DeviceKind:
         share: Of it that must be covered.
         poses: Of the reference set, shape (n, 4, 4); `n_poses` are claimed.
         shell: Least and largest distance from the centre of the workspace [m].
-        standoff_m: Of tiled placement; None without.
     """
 
     name: str
@@ -57,7 +56,6 @@ class DeviceKind:
     poses: Array
     n_poses: int
     shell: tuple[float, float]
-    standoff_m: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +115,6 @@ class AuditCase:
             poses=getattr(plan.surface, f"reference_{name}s"),
             n_poses=getattr(limits.workspace, f"n_reference_{name}s"),
             shell=getattr(limits.workspace, f"{name}_radius_m"),
-            standoff_m=getattr(limits.workspace, f"{name}_standoff_m"),
         )
 
 

@@ -227,12 +227,12 @@ def _audit_row(
 ) -> None:
     largest = claimed.stated["camera.max_incidence"]
     limit = _limit(section, largest)
-    gradient = np.array(
-        [
-            (_at(section, step, largest) - _at(section, -step, largest)) / (2.0 * _STEP)
-            for step in _STEP * np.eye(3)
-        ]
+    steps = _STEP * np.eye(3)
+    ahead, back = (
+        np.array([_limit(section, largest, step) for step in way])
+        for way in (steps, -steps)
     )
+    gradient = (ahead - back) / (2.0 * _STEP)
     d_max, spread, covered = row.d_max_stated, row.d_max_sigma, row.covered_at_2_sigma
     if not (np.isfinite(limit) and np.all(np.isfinite(gradient))):
         none = d_max is None and spread is None and covered is None
@@ -255,12 +255,9 @@ def _audit_row(
         )
 
 
-def _at(section: SeamPlane, step: Array, largest: float) -> float:
-    return _limit(replace(section, meeting=section.meeting + step), largest)
-
-
-def _limit(section: SeamPlane, largest: float) -> float:
+def _limit(section: SeamPlane, largest: float, step: Array | float = 0.0) -> float:
     """d_max of eq. (9) under an incidence; NaN where phi_max leaves (0, pi) [m]."""
+    section = replace(section, meeting=section.meeting + step)
     room = min(section.field_slack, section.incidence_slack(largest))
     phi = section.phi + room
     return section.baseline_at(phi) if 0.0 < phi < np.pi else np.nan

@@ -63,11 +63,8 @@ def _audit_shape(
         middle = middle - 0.5 * sides[2] * turn[:, 2]
     local = (obstacle.mesh.corners.reshape(-1, 3) - centre - middle) @ turn
     off = float(np.abs(_excess(table, local, 0.5 * sides)).max())
-    extent = np.stack([local.min(axis=0), local.max(axis=0)]) - 0.5 * sides * [
-        [-1],
-        [1],
-    ]
-    off = max(off, float(np.abs(extent).max()))
+    extent = np.stack([-local.min(axis=0), local.max(axis=0)])
+    off = max(off, float(np.abs(extent - 0.5 * sides).max()))
     key = f"obstacle {obstacle.name!r}"
     findings.holds(
         off <= _ROUNDING, key, f"differs from the rig's by {1e3 * off:.3g} mm"

@@ -74,12 +74,13 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
         return
     middle = standoff + space.object_radius_m
     for kind in case.kinds:
-        tiled, name = kind.standoff_m, f"{kind.name}_radius_m"
+        radius, name = f"{kind.name}_radius_m", f"{kind.name}_standoff_m"
+        tiled = getattr(space, name)
         truth = [(middle if tiled is None else standoff) - play, middle + play]
-        findings.same(name, kind.shell, truth, "by rig.standoff_m", _ROUNDING)
+        findings.same(radius, kind.shell, truth, "by rig.standoff_m", _ROUNDING)
         findings.holds(
             tiled is None or abs(tiled - standoff) <= _ROUNDING,
-            f"{kind.name}_standoff_m",
+            name,
             f"{tiled!r} m, but rig.standoff_m is {standoff:g} m",
         )
 

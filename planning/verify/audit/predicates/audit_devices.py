@@ -14,7 +14,7 @@ from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .audit_optics import in_frame, in_image, in_world, pixels_of, towards
-from .occlusion import Block, bodies_but, bodies_of_reference
+from .occlusion import Block, bodies_about, bodies_but
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,13 +224,11 @@ def reference_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
     if not plan.projectors:
         return ()
     last = np.array([plan.requirements.workspace.reference_ring_radius])
-    poses = plan.surface.reference_projectors
-    bodies = bodies_of_reference(plan, "projector", poses)
+    device, surface = plan.projectors[0].device, plan.surface
+    poses = zip(surface.reference_projectors, surface.reference_rings, strict=True)
     return tuple(
-        AuditProjector(plan.projectors[0].device, pose, ring, last, blocks)
-        for pose, ring, blocks in zip(
-            poses, plan.surface.reference_rings, bodies, strict=True
-        )
+        AuditProjector(device, pose, ring, last, bodies_about(plan, "projector", pose))
+        for pose, ring in poses
     )
 
 
@@ -238,11 +236,10 @@ def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
     """Return the reference cameras: the plan's model at every reference pose."""
     if not plan.cameras:
         return ()
-    poses = plan.surface.reference_cameras
-    bodies = bodies_of_reference(plan, "camera", poses)
+    device = plan.cameras[0].device
     return tuple(
-        AuditCamera(plan.cameras[0].device, pose, blocks)
-        for pose, blocks in zip(poses, bodies, strict=True)
+        AuditCamera(device, pose, bodies_about(plan, "camera", pose))
+        for pose in plan.surface.reference_cameras
     )
 
 

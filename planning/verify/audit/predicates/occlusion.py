@@ -69,10 +69,8 @@ class Block:
         turned = np.abs(np.cross(middle, way))
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            met &= (
-                turned[:, i]
-                <= self.half[j] * reach[:, k] + self.half[k] * (reach[:, j])
-            )
+            across = self.half[j] * reach[:, k] + self.half[k] * reach[:, j]
+            met &= turned[:, i] <= across
         return met
 
     def overlaps(self, other: "Block") -> bool:
@@ -105,20 +103,17 @@ def bodies_but(plan: RigPlan, device: _Device) -> tuple[Block, ...]:
     return _bodies(other for other in every if other.id != device.id)
 
 
-def bodies_of_reference(
-    plan: RigPlan, kind: str, poses: Array
-) -> list[tuple[Block, ...]]:
-    """Return the bodies among which each reference pose (n, 4, 4) covers what it does.
+def bodies_about(plan: RigPlan, kind: str, pose: Array) -> tuple[Block, ...]:
+    """Return the bodies among which a reference pose covers what it does.
 
     Those of existing devices, and for a camera those of the projectors. A device that
-    stands at one of the poses is itself.
+    stands at the pose is itself.
     """
     projectors = [p for p in plan.projectors if kind == "camera" or p.existing]
     standing = [*projectors, *(camera for camera in plan.cameras if camera.existing)]
-    return [
-        _bodies(d for d in standing if np.abs(d.world_from_device - pose).max() > _POSE)
-        for pose in poses
-    ]
+    return _bodies(
+        d for d in standing if np.abs(d.world_from_device - pose).max() > _POSE
+    )
 
 
 class Hindrance:

@@ -101,9 +101,8 @@ def sight_steps(
     _pass_free(steps, 3, camera, samples, (along, length), shadow)
     focal = np.sqrt(np.prod(np.diag(camera.device.camera_matrix)[:2]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        fine = local[:, 2] / (focal * squarely) <= _or(
-            limits.max_sample_distance_m, np.inf
-        )
+        distance = local[:, 2] / (focal * squarely)
+        fine = distance <= _or(limits.max_sample_distance_m, np.inf)
     steps[(steps == SEEN - 1) & fine] = SEEN
     return steps
 

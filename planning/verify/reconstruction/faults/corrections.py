@@ -4,7 +4,7 @@ Parameters are lengths at the object in [m], so that one step size suits them al
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -37,34 +37,13 @@ class Correction:
         role: Of the devices.
         devices: Indices of the one that it changes, or of the two that it swaps.
         moves: What it changes; parameters stand in their order.
-        reach_m: Length that turns are measured at [m].
-        size_m: Likewise zooms.
         pose: Where a device that is taken `afar` begins, shape (4, 4).
     """
 
     role: Role
     devices: tuple[int, ...]
     moves: Moves
-    reach_m: float = 1.0
-    size_m: float = 1.0
     pose: Array | None = None
-
-    @classmethod
-    def of(
-        cls,
-        supposed: Supposed,
-        role: Role,
-        index: int,
-        moves: Moves,
-        pose: Array | None = None,
-    ) -> Self:
-        """Return a change of one device, or of the object."""
-        body = supposed.objects[0]
-        size = reach = body.mesh.radius
-        if role != "objects":
-            device: DeviceCalibration = getattr(supposed, role)[index]
-            reach = float(np.linalg.norm(device.centre - body.centre))
-        return cls(role, (index,), moves, reach, size, pose)
 
     @property
     def n_parameters(self) -> int:
@@ -88,25 +67,28 @@ class Correction:
         if "swap" in self.moves:
             devices[first], devices[last] = devices[last], devices[first]
         else:
-            devices[first] = self._changed(devices[first], x)
+            devices[first] = self._changed(devices[first], supposed.objects[0], x)
         return replace(supposed, **{self.role: tuple(devices)})
 
     def _changed(
-        self, device: DeviceCalibration | Object, x: Array
+        self, device: DeviceCalibration | Object, body: Object, x: Array
     ) -> DeviceCalibration | Object:
         ends = np.cumsum([_N_PARAMETERS[move] for move in self.moves])
         steps = dict(zip(self.moves, np.split(x, ends[:-1]), strict=True))
         begin = device.world_from_device if self.pose is None else self.pose
         pose = begin.copy()
+        size = reach = body.mesh.radius
+        if device is not body:
+            reach = float(np.linalg.norm(device.centre - body.centre))
         if "turn" in steps:
-            turn = Rotation.from_rotvec(steps["turn"] / self.reach_m).as_matrix()
+            turn = Rotation.from_rotvec(steps["turn"] / reach).as_matrix()
             pose[:3, :3] = turn @ pose[:3, :3]
         if "shift" in steps:
             pose[:3, 3] += steps["shift"]
         device = replace(device, world_from_device=pose)
         if "zoom" not in steps:
             return device
-        factor = 1.0 + float(steps["zoom"][0]) / self.size_m
+        factor = 1.0 + float(steps["zoom"][0]) / size
         if isinstance(device, Object):
             return replace(device, scale=factor * device.scale)
         matrix = device.matrix.copy()

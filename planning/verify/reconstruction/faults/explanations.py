@@ -84,10 +84,7 @@ class State:
         ]
         every = {role: len(np.unique(self.evidence.index(role))) for role in _ROLES}
         if all(len(off[role]) == every[role] for role in _ROLES):
-            changes += [
-                Correction.of(self.supposed, "objects", 0, moves)
-                for moves in _OBJECT_MOVES
-            ]
+            changes += [Correction("objects", (0,), moves) for moves in _OBJECT_MOVES]
         tried = [self._fitted(one, np.zeros(one.n_parameters)) for one in changes]
         several = all(len(off[role]) > 1 for role in _ROLES)
         if several and any(e.remaining_m <= self.fine_m for e in tried):
@@ -124,7 +121,7 @@ class State:
     def _nearby(self, role: Role, index: int) -> list["Explanation"]:
         """Fit the changes of one device that begin where it should stand."""
         zoom, aim, place, pose = (
-            Correction.of(self.supposed, role, index, moves) for moves in _DEVICE_MOVES
+            Correction(role, (index,), moves) for moves in _DEVICE_MOVES
         )
         device: DeviceCalibration = getattr(self.supposed, role)[index]
         aside = turns_aside(device.world_from_device)
@@ -141,7 +138,7 @@ class State:
         device: DeviceCalibration = getattr(self.supposed, role)[index]
         middle, begin = self.supposed.objects[0].centre, np.zeros(6)
         starts = [
-            (Correction.of(self.supposed, role, index, _FAR_MOVES, pose), begin)
+            (Correction(role, (index,), _FAR_MOVES, pose), begin)
             for pose in far_poses(device.world_from_device, middle)
         ]
         fitted = [
