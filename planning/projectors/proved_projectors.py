@@ -40,8 +40,8 @@ def prove_fewest(
     source = CandidateSource(scene, template)
     while stage.certificate.needed.count > stage.certificate.given:
         bound = _bound_of(scene, stage, template, effort)
-        found = source.towards(bound.directions)
-        better = _with_more(stage, found) if found else stage
+        offered = source.towards(bound.directions)
+        better = _with_more(stage, offered) if offered else stage
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.proof()))
         stage = better

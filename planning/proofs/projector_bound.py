@@ -80,26 +80,26 @@ def bound_projectors(
             WidenedMaps(opened, cube),
             finest=effort.finest,
         )
-    found = question.searched(tree, effort.budget)
+    bound = question.searched(tree, effort.budget)
     unrefuted = np.empty((0, 3))
-    if found.status in (CellStatus.SURVIVED, CellStatus.CUT):
-        unrefuted = _promising(found, tree, effort.offers)
+    if bound.status in (CellStatus.SURVIVED, CellStatus.CUT):
+        unrefuted = _promising(bound, tree, effort.offers)
     shadows = shadows or question.count <= 1
-    return ContinuousBound(question, found, shadows, unrefuted)
+    return ContinuousBound(question, bound, shadows, unrefuted)
 
 
 def _promising(
-    found: CellBound, tree: DirectionTree | PositionTree, n: int
+    bound: CellBound, tree: DirectionTree | PositionTree, n: int
 ) -> NDArray[np.float64]:
     """Return the directions of cells that weren't refuted, and of n more.
 
     In these a projector would save most, by the multipliers.
     """
     names, covered = tree.spread_cells()
-    values = BitSum(found.multipliers)(covered)
+    values = BitSum(bound.multipliers)(covered)
     best = names[np.argsort(-values, kind="stable")[:n]]
-    if found.survivor is not None:
-        best = np.concatenate([np.unique(found.survivor), best])
+    if bound.survivor is not None:
+        best = np.concatenate([np.unique(bound.survivor), best])
     return tree.directions(best) if best.size else np.empty((0, 3))
 
 

@@ -137,20 +137,20 @@ class Rig:
         """
         limits = self.table.limits
         theta, tau = limits.projector_max_incidence_deg, limits.min_tangent_angle_deg
-        found: list[str] = []
+        sentences: list[str] = []
         if tau <= 90.0 - theta:
-            found.append(
+            sentences.append(
                 f"the tangent limit of {tau:g} degrees doesn't bind: at an incidence "
                 f"of {theta:g} degrees or less the angle is {90.0 - theta:g} or more"
             )
         if theta > _WARN_INCIDENCE_DEG:
-            found.append(
+            sentences.append(
                 f"projector incidence up to {theta:g} degrees: errors triple at 75, "
                 f"and at 84 only 0.6 of the surface is measured"
             )
         if object_radius_m is not None:
-            found += self._depth_notes(object_radius_m)
-        return tuple(found)
+            sentences += self._depth_notes(object_radius_m)
+        return tuple(sentences)
 
     def _depth_notes(self, radius: float) -> list[str]:
         """Compare the rim of a ball, the farthest it shows, with what is sharp."""

@@ -119,9 +119,9 @@ def _lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, A
     if "body" in given:
         replaced |= {key for key in base.get("sources", {}) if key.startswith("body.")}
     sources = {k: v for k, v in base.get("sources", {}).items() if k not in replaced}
-    own = given.get("sources", {})
+    newer = given.get("sources", {})
     device |= {key: given[key] for key in given if key not in ("focus", "sources")}
-    device["sources"] = {**sources, **own} if isinstance(own, dict) else own
+    device["sources"] = {**sources, **newer} if isinstance(newer, dict) else newer
     return device
 
 

@@ -101,11 +101,11 @@ def on_faces(
 
 def _spread(
     values: NDArray[Any],
-    found: NDArray[np.int64],
+    places: NDArray[np.int64],
     empty: float,
     shape: tuple[int, int],
 ) -> NDArray[Any]:
     """Return values at their places in the grid, `empty` elsewhere."""
     grid = np.full((shape[0] * shape[1], *values.shape[1:]), empty, dtype=values.dtype)
-    grid[found] = values
+    grid[places] = values
     return grid.reshape(*shape, *values.shape[1:])

@@ -98,14 +98,14 @@ class CandidateViews:
     def on(self, target: Target) -> tuple[CameraView, ...]:
         """Return what each camera sees of samples."""
         points = target.samples.points
-        for known, found in self._known:
+        for known, views in self._known:
             if np.array_equal(known, points):
-                return found
+                return views
         first = () if self._first is None else self._first.on(target)
         rest = self.cameras[len(first) :]
-        found = first + (camera_views(self._scene, rest, target) if rest else ())
-        self._known.append((points, found))
-        return found
+        views = first + (camera_views(self._scene, rest, target) if rest else ())
+        self._known.append((points, views))
+        return views
 
 
 def _in_the_open(

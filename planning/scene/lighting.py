@@ -78,15 +78,15 @@ def lit_stages(
 ) -> NDArray[np.int8]:
     """Return what `first_failure` does of each sample (row) and projector (column)."""
     samples, limits = SampleColumns.of(target), scene.requirements.projector
-    found = np.empty((len(projectors), len(target)), dtype=np.int8)
+    stages = np.empty((len(projectors), len(target)), dtype=np.int8)
 
     def fill(part: slice) -> None:
         scene.check_cancelled()
         for row in range(part.start, part.stop):
-            found[row] = _ignoring_occlusion(projectors[row], samples, limits)
+            stages[row] = _ignoring_occlusion(projectors[row], samples, limits)
 
     scene.visibility.caster.share(fill, equal_parts(len(projectors), _SHARED))
-    first = np.ascontiguousarray(found.T)
+    first = np.ascontiguousarray(stages.T)
     for kind in {projector.light: None for projector in projectors}:
         alike = [i for i, p in enumerate(projectors) if p.light == kind]
         chosen = [projectors[i] for i in alike]

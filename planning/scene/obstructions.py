@@ -51,8 +51,8 @@ class Obstruction:
         lengths = np.linalg.norm(ways, axis=1)
         along = ways / np.where(lengths > 0.0, lengths, 1.0)[:, None]
         begin = points + self.contact_m * along
-        left = np.maximum(lengths - self.contact_m, 0.0)
-        return self._caster.occluded(begin, along, left)
+        reach = np.maximum(lengths - self.contact_m, 0.0)
+        return self._caster.occluded(begin, along, reach)
 
     def touches(self, box: OrientedBox) -> bool:
         """Return whether a box shares a point with its surface."""

@@ -162,5 +162,5 @@ def collide(device: Device, bodies: Sequence[Blocker]) -> list[Blocker]:
     """Return the bodies and obstacles that a device's own body comes too near to."""
     if device.body is None:
         return []
-    own = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
-    return [body for body in bodies if not body.is_of(device) and body.touches(own)]
+    box = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
+    return [body for body in bodies if not body.is_of(device) and body.touches(box)]

@@ -66,10 +66,10 @@ def read_range_file(path: str | Path) -> RangeFile:
     where, header = next(rows, (0, []))
     names = [name.strip() for name in header]
     _check_header(names, f"{path}: line {where}" if where else f"{path}")
-    found = [_observation(names, row, f"{path}: line {n}", n) for n, row in rows]
-    if not found:
+    observations = [_observation(names, row, f"{path}: line {n}", n) for n, row in rows]
+    if not observations:
         raise InputError(f"{path}: holds no observation below its header")
-    return RangeFile(str(path), hashlib.sha256(data).hexdigest(), tuple(found))
+    return RangeFile(str(path), hashlib.sha256(data).hexdigest(), tuple(observations))
 
 
 def sight_lines(observations: list[Observation]) -> SightLines:

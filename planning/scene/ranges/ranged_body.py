@@ -140,14 +140,14 @@ def _located(
 ) -> tuple[RangedPoint | None, list[Refused]]:
     """A point from its rows, or without the one row that the others speak against."""
     lines = tuple(row.line for row in rows)
-    found, why = _attempt(rows)
-    if found is None:
+    located, why = _attempt(rows)
+    if located is None:
         return None, [Refused(name, lines, why)]
-    if _agrees(found):
-        return RangedPoint(name, lines, found), []
+    if _agrees(located):
+        return RangedPoint(name, lines, located), []
     why = (
-        f"its rows disagree, chi^2 {found.chi_square:.1f} of {found.n_free} free "
-        f"(limit {_limit(found):.1f})"
+        f"its rows disagree, chi^2 {located.chi_square:.1f} of {located.n_free} free "
+        f"(limit {_limit(located):.1f})"
     )
     rest = [_attempt(rows[:k] + rows[k + 1 :])[0] for k in range(len(rows))]
     guilty = [
@@ -158,10 +158,10 @@ def _located(
     if len(guilty) != 1:
         return None, [Refused(name, lines, f"{why}, and none stands out")]
     (k,) = guilty
-    kept, left = rest[k], lines[:k] + lines[k + 1 :]
+    kept, others = rest[k], lines[:k] + lines[k + 1 :]
     assert kept is not None
     reason = f"{why}; without this row they agree"
-    return RangedPoint(name, left, kept), [Refused(name, (lines[k],), reason)]
+    return RangedPoint(name, others, kept), [Refused(name, (lines[k],), reason)]
 
 
 def _attempt(rows: list[Observation]) -> tuple[SightedPoint | None, str]:
@@ -170,23 +170,23 @@ def _attempt(rows: list[Observation]) -> tuple[SightedPoint | None, str]:
         return None, "seen once and without a distance"
     lines = sight_lines(rows)
     try:
-        found = locate(lines)
+        located = locate(lines)
     except (ValueError, np.linalg.LinAlgError) as error:
         return None, str(error)
-    reach = float(np.linalg.norm(found.position - lines.origins, axis=1).min())
-    worst = float(np.sqrt(np.linalg.eigvalsh(found.covariance)[2]))
+    reach = float(np.linalg.norm(located.position - lines.origins, axis=1).min())
+    worst = float(np.sqrt(np.linalg.eigvalsh(located.covariance)[2]))
     if not worst <= _VAGUE * reach:
         return None, (
             f"known to {1e3 * worst:.0f} mm at {1e3 * reach:.0f} mm only: its "
             f"viewpoints stand too near to each other"
         )
-    return found, ""
+    return located, ""
 
 
-def _agrees(found: SightedPoint) -> bool:
-    return found.n_free == 0 or found.chi_square <= _limit(found)
+def _agrees(located: SightedPoint) -> bool:
+    return located.n_free == 0 or located.chi_square <= _limit(located)
 
 
-def _limit(found: SightedPoint) -> float:
+def _limit(located: SightedPoint) -> float:
     """Chi-square that chance exceeds once in a thousand."""
-    return float(chdtri(found.n_free, SIGNIFICANCE))
+    return float(chdtri(located.n_free, SIGNIFICANCE))

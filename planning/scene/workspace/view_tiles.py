@@ -89,7 +89,7 @@ def poses_beside(site: Site, poses: _Array, n: int, *, reach: float) -> _Array:
     near = site.standoff_m
     aside = min(1.0, 3.0 * reach) * float(site.device.half_rectangle(near).min())
     centre = np.array(site.workspace.centre)
-    found: list[_Array] = [np.empty((0, 4, 4))]
+    turned_poses: list[_Array] = [np.empty((0, 4, 4))]
     for pose in poses:
         outwards = -pose[:3, :3] @ site.device.middle_ray
         aim = pose[:3, 3] - centre - near * outwards
@@ -104,8 +104,8 @@ def poses_beside(site: Site, poses: _Array, n: int, *, reach: float) -> _Array:
         moved = np.repeat(pose[None], 2 * n, axis=0)
         moved[:, :3, :3] = turned_to(outwards, sights) @ pose[:3, :3]
         moved[:, :3, 3] = centre + offsets
-        found.append(moved[kept])
-    return np.concatenate(found)
+        turned_poses.append(moved[kept])
+    return np.concatenate(turned_poses)
 
 
 def _facing(site: Site, outwards: _Array) -> _Array:

@@ -62,10 +62,10 @@ def no_position(workspace: Workspace, radius_m: tuple[float, float]) -> str:
 
 def _limits(workspace: Workspace) -> list[tuple[str, Workspace]]:
     """Every limit with its value and a remedy, and the workspace without it."""
-    found: list[tuple[str, Workspace]] = []
+    blamed: list[tuple[str, Workspace]] = []
 
     def blame(text: str, without: Workspace) -> None:
-        found.append((f"workspace.{text}", without))
+        blamed.append((f"workspace.{text}", without))
 
     for k, zone in enumerate(workspace.keep_out):
         size = " x ".join(f"{2e3 * half:g}" for half in zone.half_m)
@@ -90,7 +90,7 @@ def _limits(workspace: Workspace) -> list[tuple[str, Workspace]]:
         degrees = np.degrees(workspace.half_angle)
         text = f"half_angle_deg = {degrees:g} (widen it)"
         blame(text, replace(workspace, half_angle=float(np.pi)))
-    return found
+    return blamed
 
 
 def _out_of_reach(box: Box, workspace: Workspace) -> str | None:
