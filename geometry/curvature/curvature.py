@@ -123,11 +123,11 @@ def _curvatures(mesh: TriangleMesh, radius: float, scale: float) -> CurvatureFie
         whole = ~_near_border(part.vertices, part.edges, radius, RINGS)
         vertices = (part.vertices - mesh.centre) / edge
         mass = part.vertex_areas / (edge * edge)
-        found, ways, fitted = _averaged_fit(
+        curvatures, ways, fitted = _averaged_fit(
             vertices, faces, mass, part.laplacian, whole, scale / edge
         )
         valid[used] = fitted
-        k[:, valid] = found[:, fitted] / edge
+        k[:, valid] = curvatures[:, fitted] / edge
         directions[:, valid] = ways[:, fitted]
     for values in (k, directions, valid):
         values.setflags(write=False)

@@ -29,7 +29,7 @@ def mark_segments(
     """
     flat = marks.reshape(-1)
     # Column by column: rows of three are too short for numpy's loops.
-    starts, ends = (np.ascontiguousarray(given.T).T for given in (starts, ends))
+    starts, ends = (np.ascontiguousarray(each.T).T for each in (starts, ends))
     for part in equal_parts(len(starts), _SEGMENTS):
         for face in range(FACES):
             first, second, met = _clipped(starts[part], ends[part], face)
@@ -43,7 +43,7 @@ def _clipped(starts: Array, ends: Array, face: int) -> tuple[Array, Array, Ints]
     """Return gnomonic ends, (m', 2), of the parts of segments on a face, and whose."""
     met = _may_meet(starts, ends, face)
     a, b = (
-        np.stack([own.take(met) for own in face_coordinates(vectors, face)])
+        np.stack([axis.take(met) for axis in face_coordinates(vectors, face)])
         for vectors in (starts, ends)
     )
     low, high = np.zeros(met.size), np.ones(met.size)
@@ -108,8 +108,8 @@ def _by_column(cube: CubeMap, first: Array, second: Array) -> tuple[Ints, ...]:
 
 
 def _index(cube: CubeMap, steps: Array) -> Ints:
-    found = np.searchsorted(cube.lines, steps, side="right") - 1
-    return np.clip(found, 0, cube.n - 1)
+    line = np.searchsorted(cube.lines, steps, side="right") - 1
+    return np.clip(line, 0, cube.n - 1)
 
 
 def _spread(counts: Ints) -> tuple[Ints, Ints]:

@@ -94,16 +94,16 @@ class CubeMap:
         chords = 2.0 * np.sin(0.5 * np.minimum(reach, np.pi)) + _ROUNDING
         near = KDTree(self.centres).query_ball_point(self.centres[border], chords)
         kept = [
-            np.array(found)[
-                angle_between(self.centres[found], self.centres[cell])
-                <= self.radii[found] + self.radii[cell] + self.clearance + _ROUNDING
+            np.array(cells)[
+                angle_between(self.centres[cells], self.centres[cell])
+                <= self.radii[cells] + self.radii[cell] + self.clearance + _ROUNDING
             ]
-            for cell, found in zip(border, near, strict=True)
+            for cell, cells in zip(border, near, strict=True)
         ]
-        width = max(9, *(found.size for found in kept))
+        width = max(9, *(cells.size for cells in kept))
         around = np.repeat(np.arange(self.size)[:, None], width, axis=1)
-        for row, found in zip(border, kept, strict=True):
-            around[row, : found.size] = found
+        for row, cells in zip(border, kept, strict=True):
+            around[row, : cells.size] = cells
         steps = [(b, a) for b in (-1, 0, 1) for a in (-1, 0, 1)]
         for column, (b, a) in enumerate(steps):
             around[inner, column] += b * n + a
@@ -121,13 +121,13 @@ class CubeMap:
 
     def _directions(self, steps: Array) -> Array:
         n = steps.size
-        found = np.empty((FACES, n, n, 3))
+        directions = np.empty((FACES, n, n, 3))
         x, y = steps[None, :], steps[:, None]
         length = np.sqrt(1.0 + x * x + y * y)
         for face in range(FACES):
-            for own, value in zip(_AXES[face], (x, y, _SIGNS[face]), strict=True):
-                found[face, :, :, own] = value / length
-        return found
+            for axis, value in zip(_AXES[face], (x, y, _SIGNS[face]), strict=True):
+                directions[face, :, :, axis] = value / length
+        return directions
 
 
 def located(directions: Array, n: Ints | int) -> Ints:
@@ -171,18 +171,18 @@ def quarters(level: Ints, cells: Ints) -> Ints:
 
 def middles(level: Ints, cells: Ints) -> Array:
     """Return the unit direction of the middle of cells, shape (m, 3)."""
-    found = np.empty((cells.size, 3))
-    for own in np.unique(level):
-        some = level == own
-        found[some] = CubeMap(1 << int(own)).centres[cells[some]]
-    return found
+    directions = np.empty((cells.size, 3))
+    for depth in np.unique(level):
+        some = level == depth
+        directions[some] = CubeMap(1 << int(depth)).centres[cells[some]]
+    return directions
 
 
 def face_coordinates(vectors: Array, face: int) -> tuple[Array, Array, Array]:
     """Return x, y, z of vectors in the frame of a face: direction (x/z, y/z, 1)."""
-    own = _AXES[face]
-    z = _SIGNS[face] * vectors[..., own[2]]
-    return vectors[..., own[0]], vectors[..., own[1]], z
+    axes = _AXES[face]
+    z = _SIGNS[face] * vectors[..., axes[2]]
+    return vectors[..., axes[0]], vectors[..., axes[1]], z
 
 
 def angle_between(a: Array, b: Array) -> Array:

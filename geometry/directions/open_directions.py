@@ -154,10 +154,10 @@ class OpenDirections:
             # Silhouettes below the horizon weren't asked for: nothing hangs together
             # across it.
             touched |= normals @ cube.centres.T <= np.sin(cube.radii)
-        found = pieces(cells & ~touched, cube.n)
-        row, cell = np.divmod(found.first, cube.size)
+        joined = pieces(cells & ~touched, cube.n)
+        row, cell = np.divmod(joined.first, cube.size)
         answer = self._meets(points[row], normals[row], cube.centres[cell], reach)
-        return found.cells(answer)
+        return joined.cells(answer)
 
     def _meets(
         self, points: Array, normals: Array, directions: Array, reach: float
@@ -171,12 +171,12 @@ class OpenDirections:
         start = points + directions * offset[:, None]
         local, along = caster.local(start), directions.astype(np.float32)
         # What is left of the reach, less what rounding may add.
-        left = np.maximum(reach - offset, 0.0) * (caster.scale * (1.0 - _SINGLE))
-        left = np.minimum(left, 4.0 * caster.reach).astype(np.float32)
+        rest = np.maximum(reach - offset, 0.0) * (caster.scale * (1.0 - _SINGLE))
+        rest = np.minimum(rest, 4.0 * caster.reach).astype(np.float32)
         met = np.zeros(len(points), dtype=bool)
         # In the caller's own thread: maps are made in several.
         for part in equal_parts(len(points), CHUNK):
-            met[part] = caster.blocked_local(local[part], along[part], left[part])
+            met[part] = caster.blocked_local(local[part], along[part], rest[part])
         return up & met
 
 

@@ -93,8 +93,8 @@ class Silhouettes:
         how far from a face's plane is close to it.
         """
         local = points - self._middle
-        own = np.einsum("ij,ij->i", normals, local)
-        above, rows, heights = self._heights.over(np.column_stack([normals, -own]))
+        height = np.einsum("ij,ij->i", normals, local)
+        above, rows, heights = self._heights.over(np.column_stack([normals, -height]))
         above[rows] = packed(heights > 0.0)
         over, rows, heights = self._planes.over(
             np.column_stack([local, np.ones(len(local))]), max(close, self._unsure)
@@ -118,8 +118,8 @@ class Silhouettes:
 
         A few faces that don't quite are told too, none that does is left out.
         """
-        own = np.einsum("ij,ij->i", sides.local, sides.local)
-        columns = np.column_stack([-2.0 * sides.local, np.ones(len(own)), own])
+        square = np.einsum("ij,ij->i", sides.local, sides.local)
+        columns = np.column_stack([-2.0 * sides.local, np.ones(len(square)), square])
         beyond, rows, excess = self._balls_within(reach).over(columns)
         beyond[rows] = packed(excess > self._unsure**2)
         return ~beyond
@@ -152,12 +152,12 @@ class Silhouettes:
         owners, edges = unpacked(words & sides.above, len(sides.local))
         ends = self._ends[edges]
         # Column by column: rows of three are too short for numpy's loops.
-        from_points = [own.take(owners) for own in sides.local.T]
+        from_points = [coordinate.take(owners) for coordinate in sides.local.T]
         begin, end = (
             np.stack([v.take(e) for v in self._columns]) - from_points
             for e in np.ascontiguousarray(ends.T)
         )
-        axes = np.stack([own.take(owners) for own in sides.normals.T])
+        axes = np.stack([coordinate.take(owners) for coordinate in sides.normals.T])
         near = np.flatnonzero(_may_cross(begin, end, axes, half_angle))
         return owners[near], begin.take(near, axis=1).T, end.take(near, axis=1).T
 
@@ -188,15 +188,15 @@ class Silhouettes:
         corners = self._vertices[self._faces[face]]
         near = triangle_distances(local[owner], corners) <= reach
         face, owner = face[near], owner[near]
-        own = faces[owner]
+        home = faces[owner]
         normals = self._normals
-        even = np.einsum("ij,ij->i", normals[face], normals[own]) >= np.sin(half_angle)
-        key = face * len(self._faces) + own
+        even = np.einsum("ij,ij->i", normals[face], normals[home]) >= np.sin(half_angle)
+        key = face * len(self._faces) + home
         place = np.searchsorted(self._smooth, key, side="right") - 1
         even &= self._smooth[place] == key
-        found = np.zeros(len(local), dtype=bool)
-        found[owner[~even]] = True
-        return found
+        rising = np.zeros(len(local), dtype=bool)
+        rising[owner[~even]] = True
+        return rising
 
 
 def _may_cross(begin: Array, end: Array, axes: Array, half_angle: float) -> Mask:

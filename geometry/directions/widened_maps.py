@@ -42,7 +42,7 @@ class WidenedMaps:
         self._angles, self._cells = np.array(angles), np.array(cells)
         # All maps one below the other, so that one look answers from all of them.
         self._rows = np.concatenate(made).view(np.uint8)
-        self._first = np.cumsum([0, *(len(own) for own in made[:-1])])
+        self._first = np.cumsum([0, *(len(maps) for maps in made[:-1])])
 
     def open(self, directions: Array, angles: Array, samples: Ints) -> Mask:
         """Return whether samples (m,) have an open direction near to one given, (m,).
@@ -51,15 +51,15 @@ class WidenedMaps:
         in [rad] how near. More may be called open than is, never less.
         """
         level = np.searchsorted(self._angles, angles)
-        found = np.ones(len(angles), dtype=bool)
+        answer = np.ones(len(angles), dtype=bool)
         # Beyond the widest map's angle anything may be open.
         some = np.flatnonzero(level < self._angles.size)
         level, sample = level[some], samples[some]
         cell = located(directions.take(some, axis=0), self._cells[level])
         byte = (self._first[level] + cell) * self._rows.shape[1] + sample // 8
         bits = self._rows.ravel().take(byte) >> (7 - sample % 8).astype(np.uint8)
-        found[some] = (bits & 1).view(np.bool_)
-        return found
+        answer[some] = (bits & 1).view(np.bool_)
+        return answer
 
 
 def _widened(rows: Words, cube: CubeMap) -> Words:

@@ -151,10 +151,10 @@ class _Cursor:
             _store(element, p, np.frombuffer(b"".join(values), dtype), lengths)
 
     def _short_of(self, element: PlyElement) -> FormatError:
-        left = self._left() // (1 if self._order else 8)
+        rest = self._left() // (1 if self._order else 8)
         return FormatError(
             f"it is cut short: {element.count} rows of '{shortened(element.name)}' "
-            f"don't fit into the {left} {self._unit} left"
+            f"don't fit into the {rest} {self._unit} left"
         )
 
 

@@ -54,15 +54,15 @@ class PlyElement:
 
 def read_header(data: bytes) -> tuple[str, list[PlyElement], bytes]:
     """Return the order of bytes (text: none), the elements, and what follows."""
-    found = re.match(rb"ply[ \t]*(\r\n|\r|\n)", data)
-    if found is None:
+    start = re.match(rb"ply[ \t]*(\r\n|\r|\n)", data)
+    if start is None:
         raise FormatError("it has no PLY header")
     # A lone CR ends lines only where it ends the first; binary data may begin with LF.
-    newline = found[1]
+    newline = start[1]
     end = re.search(newline + rb"end_header[ \t]*" + newline, data)
     if end is None:
         raise FormatError("it has no PLY header that ends")
-    lines = data[found.end() : end.start()].decode("latin-1").split(newline.decode())
+    lines = data[start.end() : end.start()].decode("latin-1").split(newline.decode())
     order: str | None = None
     elements: list[PlyElement] = []
     for line in lines:

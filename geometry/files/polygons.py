@@ -117,17 +117,17 @@ def _concave(points: Array, fans: Ints) -> Mask:
 
 def _ears(points: Array, corners: Ints) -> Ints:
     flat = _in_plane(points[corners])
-    left = list(range(len(corners)))
+    outline = list(range(len(corners)))
     triangles: list[tuple[int, int, int]] = []
-    while len(left) > 3:
-        at = next((i for i in range(len(left)) if _is_ear(flat, left, i)), None)
+    while len(outline) > 3:
+        at = next((i for i in range(len(outline)) if _is_ear(flat, outline, i)), None)
         if at is None:
             # Self-crossing outline: no cut is right; keep every corner in use.
             at = 0
-        n = len(left)
-        triangles.append((left[at - 1], left[at], left[(at + 1) % n]))
-        del left[at]
-    triangles.append((left[0], left[1], left[2]))
+        n = len(outline)
+        triangles.append((outline[at - 1], outline[at], outline[(at + 1) % n]))
+        del outline[at]
+    triangles.append((outline[0], outline[1], outline[2]))
     return corners[np.array(triangles)]
 
 
@@ -140,12 +140,12 @@ def _in_plane(polygon: Array) -> Array:
     return local @ (frame / np.maximum(np.linalg.norm(frame, axis=0), 1e-300))
 
 
-def _is_ear(flat: Array, left: list[int], at: int) -> bool:
-    n = len(left)
-    a, b, c = left[at - 1], left[at], left[(at + 1) % n]
+def _is_ear(flat: Array, outline: list[int], at: int) -> bool:
+    n = len(outline)
+    a, b, c = outline[at - 1], outline[at], outline[(at + 1) % n]
     if not _turn(flat[a], flat[b], flat[c]) > 0:
         return False
-    others = flat[[i for i in left if i not in (a, b, c)]]
+    others = flat[[i for i in outline if i not in (a, b, c)]]
     # A hole is tied to the outline by an edge there and back, whose ends come twice.
     apart = np.abs(others[:, None] - flat[[a, b, c]]).max(axis=2).min(axis=1)
     inside = apart > _SAME * np.ptp(flat)

@@ -113,8 +113,8 @@ def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
     outside = off[mesh.faces].any(axis=1)
     kind = "faces of fragments outside the rest, kept but left out of its size"
     count = int(outside.sum())
-    found = (Repair(kind, count),) if count else ()
-    return longest, found
+    repairs = (Repair(kind, count),) if count else ()
+    return longest, repairs
 
 
 def _scale(

@@ -48,21 +48,21 @@ def _ascii(text: str) -> Array:
     at = 0
     parts: list[Array] = []
     while text[at:].strip():
-        found = _SOLID.match(text, at)
-        if found is None:
+        solid = _SOLID.match(text, at)
+        if solid is None:
             read = sum(len(part) for part in parts)
             facets = len(re.findall(r"^\s*facet\b", text, re.M | re.I))
             raise FormatError(
                 f"{read} of {facets} facets could be read; a 'solid' without its "
                 "'endsolid' may be cut short"
             )
-        if _GEOMETRY.search(found[1]) or _GEOMETRY.search(found[3]):
+        if _GEOMETRY.search(solid[1]) or _GEOMETRY.search(solid[3]):
             raise FormatError(
                 "facets stand on the line of a 'solid' or 'endsolid', where its name "
                 "belongs"
             )
-        parts.append(_facets(found[2].split()))
-        at = found.end()
+        parts.append(_facets(solid[2].split()))
+        at = solid.end()
     return np.concatenate(parts)
 
 

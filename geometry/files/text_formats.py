@@ -123,9 +123,9 @@ def read_off(data: bytes) -> RawMesh:
     whole_text = [word for line in [header_words, *lines[1:]] for word in line]
     by_line = _without_extras(lines[1:], n_vertices, n_faces)
     for stream in (by_line, whole_text):
-        found = None if stream is None else _off_stream(stream, n_vertices, n_faces)
-        if found is not None:
-            return triangulated(_points(found[0]), *end_to_end(found[1]))
+        stored = None if stream is None else _off_stream(stream, n_vertices, n_faces)
+        if stored is not None:
+            return triangulated(_points(stored[0]), *end_to_end(stored[1]))
     raise FormatError(
         f"the header promises {n_vertices} vertices and {n_faces} faces, "
         "the content holds something else"

@@ -48,15 +48,15 @@ def bearing(mesh: TriangleMesh, axis: Array) -> Array:
 def _azimuth(harmonics: list[complex]) -> float:
     for m, clear in enumerate(harmonics, 1):
         if abs(clear) > _CLEAR:
-            offered = (np.angle(clear) + 2.0 * np.pi * np.arange(m)) / m
+            azimuths = (np.angle(clear) + 2.0 * np.pi * np.arange(m)) / m
             lower = sum(
                 (
-                    np.real(c * np.exp(-1j * k * offered))
+                    np.real(c * np.exp(-1j * k * azimuths))
                     for k, c in enumerate(harmonics[: m - 1], 1)
                 ),
                 start=np.zeros(m),
             )
             # Where these tie, as on a box, all serve alike; rounding must not choose.
-            ranks = (np.sin(offered), np.cos(offered), lower)
-            return float(offered[np.lexsort(np.round(ranks, 6))[-1]])
+            ranks = (np.sin(azimuths), np.cos(azimuths), lower)
+            return float(azimuths[np.lexsort(np.round(ranks, 6))[-1]])
     return 0.0

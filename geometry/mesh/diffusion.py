@@ -69,9 +69,9 @@ def diffused(values: Array, mass: Array, laplacian: csr_array, length: float) ->
     stiffness = csr_array((entries.copy(), columns, starts), laplacian.shape)
     rows = np.repeat(np.arange(len(mass)), np.diff(starts))
     # Every node has an entry of its own (`graph_laplacian`), zero as it may be.
-    own = np.flatnonzero(columns == rows)
-    entries[own] += mass
-    diagonal = entries[own]
+    diagonals = np.flatnonzero(columns == rows)
+    entries[diagonals] += mass
+    diagonal = entries[diagonals]
     root = np.sqrt(
         np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
     )

@@ -117,11 +117,11 @@ class Visibility:
 
     def batch(self) -> RayBatch:
         """Return the calling thread's own buffers, empty."""
-        own = self._own
-        if not hasattr(own, "batch"):
-            own.batch = RayBatch(self.caster, self._slack, _BATCH, BLOCK)
-        own.batch.filled = 0
-        return own.batch
+        local = self._own
+        if not hasattr(local, "batch"):
+            local.batch = RayBatch(self.caster, self._slack, _BATCH, BLOCK)
+        local.batch.filled = 0
+        return local.batch
 
     def source(self, origin: Array, along: Array | None = None) -> Source:
         """Return a device in the caster's own frame.

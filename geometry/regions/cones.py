@@ -67,7 +67,7 @@ def cone_pieces(
     piece = _pieces(patch, split, least, keep_all=keep_all)
     if not keep_all and patch.areas.sum() >= _NO_REST * mesh.area:
         piece = _more_kept(patch, piece, least)
-    return [faces[own] for own in _by_area(patch, piece, mesh.area)]
+    return [faces[members] for members in _by_area(patch, piece, mesh.area)]
 
 
 def _more_kept(patch: Patch, piece: Ints, least: float) -> Ints:

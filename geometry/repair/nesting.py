@@ -50,8 +50,8 @@ def containers(
     keep = (counts >= _WHOLLY * least) & holding[holder] & (row != holder)
     row, holder = row[keep], holder[keep]
     depth = np.bincount(row, minlength=n)
-    mine = [holder[own] for own in grouped(row, n)]
-    return [own[np.argsort(depth[own], kind="stable")] for own in mine]
+    mine = [holder[holders] for holders in grouped(row, n)]
+    return [holders[np.argsort(depth[holders], kind="stable")] for holders in mine]
 
 
 def _in_some_box(mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask) -> Mask:
@@ -112,6 +112,6 @@ def _crossings(
         keys.append(alive * n + patch[faces[hit]])
         forward = np.maximum(distances[hit], 0.0) + step
         at = at + forward[:, None] * direction
-    found = np.concatenate(keys) if keys else np.zeros(0, np.int64)
+    met = np.concatenate(keys) if keys else np.zeros(0, np.int64)
     # What is still under way met too many walls: its parity is unknown.
-    return found[~np.isin(found // n, alive)] if len(alive) else found
+    return met[~np.isin(met // n, alive)] if len(alive) else met

@@ -96,9 +96,9 @@ def _algebraic(points: Array) -> Array:
     scale = float(np.linalg.norm(offsets, axis=1).max())
     unit = offsets / scale
     rows = np.column_stack([2.0 * unit, np.ones(len(unit))])
-    found = np.linalg.lstsq(rows, np.sum(unit**2, axis=1), rcond=None)[0]
-    radius = np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0))
-    return np.append(mean + scale * found[:3], scale * radius)
+    solution = np.linalg.lstsq(rows, np.sum(unit**2, axis=1), rcond=None)[0]
+    radius = np.sqrt(max(solution[3] + solution[:3] @ solution[:3], 0.0))
+    return np.append(mean + scale * solution[:3], scale * radius)
 
 
 def _weighted(

@@ -82,7 +82,7 @@ def lines_cross(box: OrientedBox, starts: Array, ends: Array) -> Mask:
 
 def triangles_touch(box: OrientedBox, corners: Array) -> Mask:
     """Return which triangles (n, 3, 3) [m] share a point with a box, (n,)."""
-    found = np.zeros(len(corners), dtype=bool)
+    touching = np.zeros(len(corners), dtype=bool)
     local = box.local(corners)
     low, high = local.min(axis=1), local.max(axis=1)
     near = np.flatnonzero(np.all((low <= box.half) & (high >= -box.half), axis=1))
@@ -94,5 +94,5 @@ def triangles_touch(box: OrientedBox, corners: Array) -> Mask:
     along = np.einsum("nij,nkj->nik", tried, local)
     reach = np.abs(tried) @ box.half
     apart = (along.min(axis=2) > reach) | (along.max(axis=2) < -reach)
-    found[near] = ~apart.any(axis=1)
-    return found
+    touching[near] = ~apart.any(axis=1)
+    return touching

@@ -167,11 +167,11 @@ def _surface_radii(shape: HeadShape, directions: Array, guess: Array | None) -> 
 
 
 def _outermost_inside(shape: HeadShape, directions: Array) -> Array:
-    found = np.full(len(directions), _NEAREST)
+    outermost = np.full(len(directions), _NEAREST)
     for radius in np.arange(_NEAREST, _FARTHEST, _STEP):
         at = np.full(len(directions), radius)
-        found[_field_along(shape, directions, at) < 0.0] = radius
-    return found
+        outermost[_field_along(shape, directions, at) < 0.0] = radius
+    return outermost
 
 
 def _bisect(shape: HeadShape, directions: Array, inner: Array, outer: Array) -> Array:

@@ -69,9 +69,9 @@ def reachability_relaxations(
 
 def nothing_lit(scene: Scene, error: NothingLitError) -> str:
     """Say the least by which a single limit must give way for any light at all."""
-    offered = error.candidates
-    dark = offered.samples.take(np.arange(min(len(offered.samples), DRAWS.dark)))
-    if helps := _least(scene, offered.projectors, dark, 1):
+    candidates = error.candidates
+    dark = candidates.samples.take(np.arange(min(len(candidates.samples), DRAWS.dark)))
+    if helps := _least(scene, candidates.projectors, dark, 1):
         return f"the least that lights any of it: {'; or '.join(helps)}"
     return (
         "no single limit of the projector, relaxed, lights any of it: look at the "
