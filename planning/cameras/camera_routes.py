@@ -47,7 +47,6 @@ _Projectors = tuple[PlannedProjector, ...]
 
 # A smallest baseline counts as clearly larger from this ratio on.
 _CLEARLY = 1.1
-# Samples on which seams are looked for.
 
 
 def cover_by_cover(

@@ -108,7 +108,7 @@ def _state_workspace(
     if shell.floor is not None:
         stated.add(offset @ ca.DM(shell.up), shell.floor)
     held = problem.half_spaces
-    if held is not None and len(held.camera):
+    if len(held.camera):
         along = _dot(_rows(every, held.camera), ca.DM(held.normals))
         stated.add(along - ca.DM(held.offsets))
     # Squared, since the distance from the start has no derivative at the start.

@@ -1,6 +1,6 @@
 """Data of the program that maximises baselines; `baseline_program` solves it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +104,7 @@ class BaselineProblem:
         range_m: Least and largest |O - P| of kept points in [m].
         min_conditioning: e, least |r.m| of kept points.
         max_step: Farthest that a centre may move in [m].
-        half_spaces: What else holds the centres; None: nothing.
+        half_spaces: What else holds the centres.
         fixed: Cameras that stay where they are, wherever that is, shape (f,).
     """
 
@@ -118,7 +118,11 @@ class BaselineProblem:
     range_m: tuple[float, float]
     min_conditioning: float
     max_step: float
-    half_spaces: HalfSpaces | None = None
+    half_spaces: HalfSpaces = field(
+        default_factory=lambda: HalfSpaces(
+            np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0)
+        )
+    )
     fixed: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -130,9 +134,7 @@ class BaselineProblem:
                 f"pairs must be (p, 2) with p >= 1, got {self.pairs.shape}"
             )
         indices = [self.pairs, self.seams.cameras, self.kept.camera]
-        if self.half_spaces is not None:
-            indices.append(self.half_spaces.camera)
-        indices.append(np.array(self.fixed, dtype=np.int64))
+        indices += [self.half_spaces.camera, np.array(self.fixed, dtype=np.int64)]
         if not all(np.all((i >= 0) & (i < k)) for i in indices):
             raise ValueError(f"camera indices must lie in 0 to {k - 1}")
         if not 0.0 < self.max_step < np.inf:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
-from planning.scene.workspace.admissible import half_spaces, is_zoned
+from planning.scene.workspace.admissible import half_spaces
 from solvers.poses.baseline_problem import (
     BaselineProblem,
     HalfSpaces,
@@ -23,6 +23,7 @@ from solvers.poses.baseline_problem import (
 
 from .baseline_limits import BaselineLimits, RingsOnSurface, best_rings
 from .baseline_rows import check_seam, half_field
+from .camera_moves import poses_of
 from .seams import SampledSurface, both_orders, find_seams
 
 _Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ class BaselineTerms:
         space = limits.workspace
         kept = np.unique(np.concatenate([self._sole_samples(), demanded]), axis=0)
         return BaselineProblem(
-            centres=np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
+            centres=poses_of(cameras)[:, :3, 3],
             aims=aims,
             pairs=np.array(pairs, dtype=np.int64),
             shell=PositionShell(
@@ -164,20 +165,15 @@ class BaselineTerms:
         return KeptPoints(index, points, normals, cosine, across, sigma, pitch)
 
 
-def _held_in(
-    workspace: Workspace, cameras: Sequence[PlannedCamera]
-) -> HalfSpaces | None:
+def _held_in(workspace: Workspace, cameras: Sequence[PlannedCamera]) -> HalfSpaces:
     """The convex part of the zones about each camera that may move."""
-    free = [c for c, camera in enumerate(cameras) if not camera.existing]
-    if not (is_zoned(workspace) and free):
-        return None
-    centres = np.stack([cameras[c].world_from_device[:3, 3] for c in free])
-    offsets = centres - np.array(workspace.centre)
-    parts = [half_spaces(workspace, offset) for offset in offsets]
+    free = np.flatnonzero([not camera.existing for camera in cameras])
+    offsets = poses_of(cameras)[free, :3, 3] - np.array(workspace.centre)
+    held = [half_spaces(workspace, offset) for offset in offsets]
     return HalfSpaces(
-        np.repeat(free, [len(normals) for normals, _ in parts]),
-        np.concatenate([normals for normals, _ in parts]),
-        np.concatenate([least for _, least in parts]),
+        np.repeat(free, np.array([len(normals) for normals, _ in held], np.int64)),
+        np.concatenate([np.empty((0, 3)), *(normals for normals, _ in held)]),
+        np.concatenate([np.empty(0), *(least for _, least in held)]),
     )
 
 

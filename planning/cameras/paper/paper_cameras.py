@@ -38,7 +38,6 @@ from solvers import solve_cover
 from .paper_route import PaperRoute, paper_route
 from .route_problem import Cameras, RouteProblem
 
-# Samples that the route looks at; what it ends with is judged on all.
 # Baseline programs each time baselines are maximised; they are most of what the route
 # costs.
 _PROGRAMS = 4
