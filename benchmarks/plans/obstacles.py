@@ -105,8 +105,8 @@ def main() -> int:
     if not (RIGS / "arm.obj").exists():
         arm().export(RIGS / "arm.obj", include_normals=False, header=None)
     print(
-        "| rig | projectors (over all poses) | cameras | reachable [%] | lit | measured "
-        "| unmeasured behind [cm²] | rms [mm], check | seconds |\n"
+        "| rig | projectors (over all poses) | cameras | reachable [%] | lit "
+        "| measured | unmeasured behind [cm²] | rms [mm], check | seconds |\n"
         "|---|---|---|---|---|---|---|---|---|"
     )
     failed = False
