@@ -90,12 +90,14 @@ def camera_trees(
             limits=limits,
         )
 
-    yield positions(effort.finest, None), False
+    # The roughest says soon whether shadows are needed at all.
+    yield positions(max(effort.finest - 1, 0), None), False
     near = space.camera_radius_m[0]
     shadows = len(samples.target) * len(
         scene.mesh.faces
     ) <= effort.shadows and near >= mesh_reach(scene)
     maps = _shadow_maps(scene, samples.target, effort.maps) if shadows else None
+    yield positions(effort.finest, maps), shadows
     yield positions(effort.finest + 1, maps), shadows
     reach = float(lengths(drawn.points - np.array(space.centre)).max())
     # Where a camera that looks at the centre misses no sample, aims forbid nothing.
