@@ -52,13 +52,13 @@ def best(rig: Rig, threads: int) -> tuple[RigPlan, float]:
 
 def blocked_rays(plan: RigPlan) -> tuple[int, int]:
     """Views of measured samples that meet an obstacle, and all of them."""
-    audit = audit_plan(plan, n_samples=4000)
+    case = audit_plan(plan, n_samples=4000).case
     solid = trimesh.util.concatenate(
         [to_trimesh(each.mesh) for each in plan.surface.obstacles]
     )
     met = n = 0
-    for camera, seen in zip(plan.cameras, audit.predicted_by, strict=True):
-        start, points = camera.world_from_device[:3, 3], audit.samples.points[seen]
+    for camera, seen in zip(plan.cameras, case.actual.measured_by, strict=True):
+        start, points = camera.world_from_device[:3, 3], case.samples.points[seen]
         ways = points - start
         length = np.linalg.norm(ways, axis=1)
         spots, ray, _ = solid.ray.intersects_location(

@@ -42,16 +42,12 @@ def audit_obstacles(case: AuditCase, findings: AuditFindings) -> None:
 def _audit_shape(
     plan: RigPlan, obstacle: Obstacle, table: Mapping[str, Any], findings: AuditFindings
 ) -> None:
-    """Compare extent, extreme vertices and area with those of the shape that is stated.
-
-    In the shape's own frame every vertex lies on the box, or on both rims of the
-    cylinder, that bounds it, and the area is that of the shape.
-    """
+    """Compare extent in the shape's own frame, and area, with what is stated."""
     space = plan.requirements.workspace
     centre, up = np.array(space.centre), np.array(space.up)
     turn = turned(np.radians(table.get("turn_deg", [0.0, 0.0, 0.0])))
     middle = 1e-3 * np.array(table.get("centre_mm", [0.0, 0.0, 0.0]))
-    sides = 1e-3 * np.array(table.get("size_mm") or _bounding(table))
+    sides, area = _sides_and_area(table)
     if table["shape"] == "table":
         if "centre_mm" not in table:
             heights = (plan.surface.mesh.corners.reshape(-1, 3) - centre) @ up
@@ -62,36 +58,20 @@ def _audit_shape(
         turn = turn @ axes
         middle = middle - 0.5 * sides[2] * turn[:, 2]
     local = (obstacle.mesh.corners.reshape(-1, 3) - centre - middle) @ turn
-    off = float(np.abs(_excess(table, local, 0.5 * sides)).max())
-    extent = np.stack([-local.min(axis=0), local.max(axis=0)])
-    off = max(off, float(np.abs(extent - 0.5 * sides).max()))
+    ends = np.stack([local.min(axis=0), local.max(axis=0)])
+    off = float(np.abs(ends - 0.5 * sides * [[-1.0], [1.0]]).max())
     key = f"obstacle {obstacle.name!r}"
     findings.holds(
         off <= _ROUNDING, key, f"differs from the rig's by {1e3 * off:.3g} mm"
     )
-    area = _area(table, sides)
     findings.number(f"{key} (area)", obstacle.mesh.area, area, _FACETED * area)
 
 
-def _bounding(table: Mapping[str, Any]) -> list[float]:
-    """Sides of the box about a cylinder [mm]."""
-    return [2.0 * table["radius_mm"], 2.0 * table["radius_mm"], table["height_mm"]]
-
-
-def _excess(table: Mapping[str, Any], local: Array, half: Array) -> Array:
-    """How far vertices lie off the corners of the box, or off the rims, any shape."""
-    beyond = np.abs(local) - half
-    if table["shape"] != "cylinder":
-        return beyond
-    radial = np.linalg.norm(local[:, :2], axis=1)
-    # The middles of both ends are vertices as well.
-    radial = np.where(radial > _ROUNDING, radial - half[0], 0.0)
-    return np.stack([radial, beyond[:, 2]])
-
-
-def _area(table: Mapping[str, Any], sides: Array) -> float:
+def _sides_and_area(table: Mapping[str, Any]) -> tuple[Array, float]:
+    """Sides of the box about a shape [m], and the shape's own area [m²]."""
     if table["shape"] == "cylinder":
-        radius, height = 0.5 * sides[0], sides[2]
-        return 2.0 * np.pi * radius * (radius + height)
-    x, y, z = sides
-    return 2.0 * (x * y + y * z + z * x)
+        radius, height = 1e-3 * table["radius_mm"], 1e-3 * table["height_mm"]
+        sides = np.array([2.0 * radius, 2.0 * radius, height])
+        return sides, 2.0 * np.pi * radius * (radius + height)
+    x, y, z = sides = 1e-3 * np.array(table["size_mm"])
+    return sides, 2.0 * (x * y + y * z + z * x)
