@@ -8,6 +8,7 @@ import ctypes
 import os
 import shutil
 import sys
+import time
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,6 +23,8 @@ from .console import stop_signals
 OWNED = ("plan.json", "surface.npz", "rig.png", "patterns", "cloud.ply")
 # `renameat2` and `renamex_np` exchange two entries under these flags.
 _EXCHANGE, _SWAP, _HERE = 2, 2, -100
+# What is younger may be what another run is writing just now [s].
+_BUSY_S = 600.0
 
 
 @contextmanager
@@ -138,6 +141,8 @@ def _move_entries(fresh: Path, folder: Path) -> None:
 def _recover(folder: Path) -> None:
     """Clean up behind a run that was killed while folders changed places."""
     for remnant in folder.parent.glob(f"{_prefix(folder)}*"):
+        if time.time() - remnant.stat().st_mtime < _BUSY_S and folder.exists():
+            continue
         if folder.exists():
             _bring_others(remnant, folder)
         elif remnant.name.endswith("-old"):

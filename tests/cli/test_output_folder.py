@@ -98,6 +98,9 @@ def test_what_a_killed_run_left_is_cleaned_up(folder):
     left.with_name(".out.ringrig-abc-old").mkdir()
     left.rename(left.with_name(".out.ringrig-def-old"))
     left.with_name(".out.ringrig-abc-old").rmdir()
+    other = folder.with_name(".out.ringrig-old")
+    other.mkdir()
+    os.utime(other, (1.0, 1.0))
     with exchanged(folder) as fresh:
         # The old plan is back while the new one is made.
         assert (folder / "plan.json").read_text() == "old"
