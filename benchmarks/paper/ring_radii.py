@@ -28,7 +28,7 @@ from planning.rings.ring_limits import ring_beam
 from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_spacing import spaced_radii
 from planning.rings.ring_stage import space_rings
-from planning.scene.patterns import ring_coordinate
+from planning.scene.patterns import pattern_of
 from planning.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -177,7 +177,7 @@ def _crossed(
     ring = ring @ projector.world_from_ring[:3, :3]
     turn = np.arctan2(ring[:, 1], ring[:, 0]) % (2.0 * np.pi)
     column = np.floor(turn * AZIMUTHS / (2.0 * np.pi)).astype(int)
-    gap = np.searchsorted(radii, ring_coordinate(projector, creases.points)) - 1
+    gap = np.searchsorted(radii, pattern_of(projector).coordinate(creases.points)) - 1
     crossed = np.zeros((len(radii) - 1, AZIMUTHS), dtype=bool)
     inside = (gap >= 0) & (gap < len(crossed))
     for aside in (-1, 0, 1):

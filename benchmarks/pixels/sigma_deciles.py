@@ -27,7 +27,7 @@ from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
-from planning.scene.patterns import code_surfaces
+from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry
@@ -153,7 +153,7 @@ def _of_camera(
     target = Target(samples, np.zeros(normals.shape))
     seen = measurability.view(camera, target, _LIMITS, None)
     light = lighting.light_on(source, target)
-    rings = code_surfaces(source, cloud.points)
+    rings = pattern_of(source).surfaces(cloud.points)
     asked = TriangulationLimits(0.1, 1.0)
     quality = measurability.pair_quality(normals, light, rings, seen, asked)
     cosine = seen.rays @ camera.world_from_device[:3, 2]

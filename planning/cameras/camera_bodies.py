@@ -30,19 +30,6 @@ class CameraInterference(Interference):
     projectors: tuple[PlannedProjector, ...]
     samples: LitSamples
 
-    @classmethod
-    def of(
-        cls,
-        scene: Scene,
-        projectors: tuple[PlannedProjector, ...],
-        cameras: Sequence[PlannedCamera],
-        samples: LitSamples,
-        measured: NDArray[np.bool_],
-    ) -> "CameraInterference":
-        """Return cameras that measure samples (n, m), but for each other's bodies."""
-        points = samples.target.samples.points
-        return cls(cameras, points, measured, scene, projectors, samples)
-
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]
     ) -> NDArray[np.bool_]:
@@ -108,15 +95,17 @@ def resolved_cover(
     Raises:
         InfeasibleLimitsError: If the body of every camera is in the way.
     """
-    interference = CameraInterference.of(
-        scene, projectors, cover.candidates.cameras, cover.samples, cover.measured
+    cameras, samples = cover.candidates.cameras, cover.samples
+    points = samples.target.samples.points
+    interference = CameraInterference(
+        cameras, points, cover.measured, scene, projectors, samples
     )
     selection = resolve_conflicts(
         interference, candidate_cover(scene, cover.measured), cover.selection
     )
     if not len(selection.chosen):
         raise InfeasibleLimitsError(
-            f"each of {len(cover.candidates.cameras)} camera bodies collides, or keeps "
+            f"each of {len(cameras)} camera bodies collides, or keeps "
             f"something dark that the projectors light; make [camera.body] smaller, or "
             f"let cameras stand elsewhere"
         )

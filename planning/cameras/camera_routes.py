@@ -89,7 +89,10 @@ def better_route(
     Also as many cameras of the paper's route, where the cover's stay.
     """
     if by == "paper":
-        cover = _again_if_fewer(scene, projectors, cover)
+        if cover.selection.lower_bound < cover.selection.needed:
+            # Other axes may let the route end with fewer.
+            again = cover_by_paper(scene, projectors, cover.candidates)
+            cover = min(cover, again, key=lambda one: one.selection.needed)
         return cover, _counts(by, cover, "the paper's route was asked for"), ()
     route: RouteCameras | None = None
     why = "the cover was asked for"
@@ -108,17 +111,6 @@ def better_route(
     as_many = routes.paper == routes.cover == len(after.cameras)
     rival = route.cameras if as_many and routes.taken == "cover" else ()
     return after, routes, rival
-
-
-def _again_if_fewer(
-    scene: Scene, projectors: _Projectors, cover: CameraCover
-) -> CameraCover:
-    """Take the paper's route once more for these axes, if fewer aren't ruled out."""
-    if cover.selection.lower_bound < cover.selection.needed:
-        again = cover_by_paper(scene, projectors, cover.candidates)
-        if again.selection.needed < cover.selection.needed:
-            return again
-    return cover
 
 
 def _counts(by: CamerasBy, cover: CameraCover, why: str) -> RouteCounts:

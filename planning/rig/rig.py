@@ -130,11 +130,8 @@ class Rig:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
         return light_of(self._projector).image_ring(self.ring_offset)
 
-    def notes(self, object_radius_m: float | None = None) -> tuple[str, ...]:
-        """Return what a user should know of these limits, a sentence each.
-
-        The depth that is sharp is compared with an object's radius [m], if given.
-        """
+    def notes(self) -> tuple[str, ...]:
+        """Return what a user should know of these limits, a sentence each."""
         limits = self.table.limits
         theta, tau = limits.projector_max_incidence_deg, limits.min_tangent_angle_deg
         sentences: list[str] = []
@@ -148,23 +145,7 @@ class Rig:
                 f"projector incidence up to {theta:g} degrees: errors triple at 75, "
                 f"and at 84 only 0.6 of the surface is measured"
             )
-        if object_radius_m is not None:
-            sentences += self._depth_notes(object_radius_m)
         return tuple(sentences)
-
-    def _depth_notes(self, radius: float) -> list[str]:
-        """Compare the rim of a ball, the farthest it shows, with what is sharp."""
-        centre = self.standoff_m + self.standoff_play_m + radius
-        return [
-            f"the {role} is sharp to {device.range_m[1]:.2f} m, and the rim of an "
-            f"object of radius {radius * 1e3:.0f} mm can be {far:.2f} m away"
-            for role, device in (
-                ("camera", self._camera),
-                ("projector", self._projector),
-            )
-            if (far := light_of(device).rim_distance(centre, radius))
-            > device.range_m[1]
-        ]
 
     def requirements(
         self,

@@ -22,7 +22,7 @@ from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples
-from planning.scene.patterns import code_surfaces, ring_coordinate
+from planning.scene.patterns import pattern_of
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
@@ -164,7 +164,7 @@ def _binding(
     return [
         np.stack(
             [
-                ring_coordinate(projector, points[user == p]),
+                pattern_of(projector).coordinate(points[user == p]),
                 draw.pitch[user == p, p],
             ]
         )
@@ -173,8 +173,8 @@ def _binding(
 
 
 def _lit_at(beam: RingBeam, samples: LitSamples, p: int) -> NDArray[np.float64]:
-    return ring_coordinate(
-        beam.projector, samples.target.samples.points[samples.lit[:, p]]
+    return pattern_of(beam.projector).coordinate(
+        samples.target.samples.points[samples.lit[:, p]]
     )
 
 
@@ -198,7 +198,7 @@ def rings_record(
     lit, error = crease_errors(scene, final, creases)
     # Rounding decides whether the last row lies inside the last ring.
     shone = beam.profile.points[:-1][beam.profile.lit[:-1]]
-    gaps = code_surfaces(final, shone).spacing
+    gaps = pattern_of(final).surfaces(shone).spacing
     errors = beam.errors_under(final) > tolerance_m(scene.requirements)
     return RingsRecord(
         spacing="uniform" if final is beam.projector else "curvature",

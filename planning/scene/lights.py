@@ -173,10 +173,6 @@ class DivergingLight:
         """Return what a gap of rings in [m] at the standoff is of R."""
         return gap / standoff
 
-    def rim_distance(self, distance: float, radius: float) -> float:
-        """Return how far the rim of a ball is, its middle at a distance [m]."""
-        return math.sqrt(distance**2 - radius**2)
-
     def off_axis(self, local: _Array) -> _Array:
         """Return the angle to the ray of the image's middle [deg]."""
         far = np.maximum(np.linalg.norm(local, axis=1), 1e-12)
@@ -282,10 +278,6 @@ class ParallelLight:
     def ring_step(self, gap: float, standoff: float) -> float:
         """Return what a gap of rings in [m] is of R."""
         return gap
-
-    def rim_distance(self, distance: float, radius: float) -> float:
-        """Return how deep the rim of a ball is: as deep as its middle."""
-        return distance
 
     def off_axis(self, local: _Array) -> _Array:
         """Return the distance from the beam's axis [mm]."""

@@ -11,7 +11,7 @@ from planning.model.requirements import TriangulationLimits
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED, PairQuality
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import CodeSurfaces, code_surfaces
+from planning.scene.patterns import CodeSurfaces, pattern_of
 
 from .camera_views import CameraView, camera_views, view_of
 from .lighting import lit_stages
@@ -50,12 +50,12 @@ class LitSamples:
             target,
             lit,
             tuple(light_on(projector, target) for projector in projectors),
-            tuple(code_surfaces(projector, points) for projector in projectors),
+            tuple(pattern_of(projector).surfaces(points) for projector in projectors),
         )
 
     def with_code(self, p: int, projector: PlannedProjector) -> "LitSamples":
         """Return the samples with the surfaces of equal code of projector p anew."""
-        surfaces = code_surfaces(projector, self.target.samples.points)
+        surfaces = pattern_of(projector).surfaces(self.target.samples.points)
         others = self.surfaces[:p], self.surfaces[p + 1 :]
         return replace(self, surfaces=(*others[0], surfaces, *others[1]))
 

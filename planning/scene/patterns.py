@@ -80,20 +80,6 @@ def pattern_of(projector: PlannedProjector) -> RingPattern:
     return PATTERNS[projector.pattern](projector)
 
 
-def code_surfaces(
-    projector: PlannedProjector, points: NDArray[np.float64]
-) -> CodeSurfaces:
-    """Return a projector's surfaces of equal code through points (n, 3)."""
-    return pattern_of(projector).surfaces(points)
-
-
-def ring_coordinate(
-    projector: PlannedProjector, points: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return each point's ring radius (parallel, [m]) or tangent (diverging), (n,)."""
-    return RingPattern(projector).coordinate(points)
-
-
 def inside_rings(projector: PlannedProjector, points: NDArray[np.float64]) -> bool:
     """Return whether all points (n, 3) are inside the largest ring."""
     pattern = RingPattern(projector)

@@ -30,7 +30,7 @@ from planning.scene import measurability
 from planning.scene.draws import Draw
 from planning.scene.lights import light_of, ring_frame
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns import code_surfaces, ring_coordinate
+from planning.scene.patterns import pattern_of
 from planning.scene.workspace.candidates import Candidates
 from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores
 
@@ -130,7 +130,7 @@ def test_no_axis_leaves_lit_samples_outside_the_last_ring(ball):
     assert np.array_equal(rows.lit, cover.samples.lit)
     views = AxisJudge.of(scene, cover.cameras, rows).views
     program = axis_program(scene, tight, 0, rows, views)
-    coordinate = ring_coordinate(tight[0], points[rows.lit[:, 0]])
+    coordinate = pattern_of(tight[0]).coordinate(points[rows.lit[:, 0]])
     inside = coordinate <= 0.99 * tight[0].ring_radii[-1]
     assert np.array_equal(axis_slack(program, program.start) >= 0.0, inside)
     assert not inside.all()
@@ -225,7 +225,7 @@ def test_the_program_scores_pairs_as_the_exact_predicate_does(ball):
         quality = measurability.pair_quality(
             samples.normals,
             rows.lights[1].take(chosen),
-            code_surfaces(fine[1], samples.points),
+            pattern_of(fine[1]).surfaces(samples.points),
             view.take(chosen),
             limits,
         )
@@ -260,7 +260,7 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
     samples = followed.stage.cover.samples
     points = samples.target.samples.points
     for p, rings in zip(followed.projectors, samples.surfaces, strict=True):
-        own = code_surfaces(p, points)
+        own = pattern_of(p).surfaces(points)
         assert np.array_equal(own.normals, rings.normals)
     count = len(cover.cameras)
     assert followed.stage.certificate.count == count

@@ -26,7 +26,7 @@ from planning.scene import measurability
 from planning.scene.draws import Draw
 from planning.scene.lights import ring_frame
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns import code_surfaces
+from planning.scene.patterns import pattern_of
 
 RADIUS = 0.1
 AWAY = 1.1
@@ -126,7 +126,7 @@ def test_gaps_on_lit_samples_lie_between_their_limits(bench, spaced):
     final = spaced.projectors[0]
     rows = lit_samples(scene, [even], scene.target_samples(Draw(4000, 78)))
     points = rows.target.samples.points
-    gap, before = (code_surfaces(p, points).spacing for p in (final, even))
+    gap, before = (pattern_of(p).surfaces(points).spacing for p in (final, even))
     assert np.all(gap <= before * (1.0 + 1e-9))
     assert gap.min() < 0.8 * before.min()
     target = scene.target_samples(Draw(4000, 79))

@@ -431,7 +431,8 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
     dark = np.all((points > low) & (points < high), axis=1)
     among = scene.among([lamp])
 
-    bodied = CameraInterference.of(among, (lamp,), eyes, rows, measured)
+    points = rows.target.samples.points
+    bodied = CameraInterference(eyes, points, measured, among, (lamp,), rows)
     assert not bodied.stand_together([0, 1])
     assert bodied.stand_together([1, 3])
     assert bodied.covers([1], [0, 1]).sum(axis=0).tolist() == [0, len(dark)]

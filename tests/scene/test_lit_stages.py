@@ -21,7 +21,7 @@ from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.lights import light_on, ring_frame
 from planning.scene.limits import projector_limits
-from planning.scene.patterns import ring_coordinate
+from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 from planning.scene.workspace.candidates import Candidates
 
@@ -103,7 +103,7 @@ def test_the_first_limit_that_fails_follows_from_the_rays(light):
         target = Target(samples, steep)
         found = lighting.first_failure(one, target, limits, None)
         ray = light_on(one, target)
-        inside = ring_coordinate(one, points) <= radii[-1]
+        inside = pattern_of(one).coordinate(points) <= radii[-1]
         holds = (
             inside & lighting.in_panel(one, points),
             (away >= 0.05) & (away <= 0.3),

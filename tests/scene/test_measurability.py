@@ -11,7 +11,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
 from planning.scene.limits import camera_limits, pair_limits
-from planning.scene.patterns import code_surfaces
+from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -65,7 +65,7 @@ def ring_value(source, point):
 
 def pair(source, camera, target):
     light = lighting.light_on(source, target)
-    rings = code_surfaces(source, target.samples.points)
+    rings = pattern_of(source).surfaces(target.samples.points)
     seen = measurability.view(camera, target, CameraLimits(np.radians(80)), None)
     return (
         measurability.pair_quality(target.samples.normals, light, rings, seen, LIMITS),
@@ -146,7 +146,7 @@ def test_pitch_is_the_distance_of_the_next_ring_in_the_image(
 def test_ring_normal_is_the_gradient_and_spacing_the_gap_over_its_length(light):
     source = projector(light, [0.05, -1.1, 0.1])
     point = np.array([0.11, 0.02, -0.07])
-    rings = code_surfaces(source, point[None])
+    rings = pattern_of(source).surfaces(point[None])
     step = 1e-6
     gradient = np.array(
         [

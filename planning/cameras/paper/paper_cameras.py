@@ -226,8 +226,9 @@ def cover_of(
     route: RouteCameras,
 ) -> CameraCover:
     """Return the route's cameras as a cover, bounded over candidates and themselves."""
-    among = CameraInterference.of(
-        scene, projectors, route.candidates.cameras, samples, route.measured
+    cameras, points = route.candidates.cameras, samples.target.samples.points
+    among = CameraInterference(
+        cameras, points, route.measured, scene, projectors, samples
     )
     return CameraCover(
         route.candidates,
