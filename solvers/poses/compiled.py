@@ -74,23 +74,20 @@ class IpoptRun:
     Attributes:
         x: Variables at the end.
         success: Whether IPOPT reports a local optimum.
-        multipliers: Of g, as CasADi signs them: df/dx + (dg/dx)^T multipliers +
-            bound_multipliers = 0, and 0 or less where a lower bound holds.
-        bound_multipliers: Of the bounds on x.
+        multipliers: Of g, as CasADi signs them: df/dx + (dg/dx)^T multipliers = 0 where
+            no bound on x holds, and 0 or less where a lower bound on g does.
     """
 
     x: NDArray[np.float64]
     success: bool
     multipliers: NDArray[np.float64]
-    bound_multipliers: NDArray[np.float64]
 
 
 def run_solver(solver: Any, **arguments: object) -> IpoptRun:  # noqa: ANN401
     """Run a compiled program; it never raises but on Ctrl-C, so check what it left."""
     with interruptible():
         result = solver(**arguments)
-    x, of_g, of_x = (
-        np.asarray(result[name], dtype=np.float64).ravel()
-        for name in ("x", "lam_g", "lam_x")
+    x, multipliers = (
+        np.asarray(result[name], dtype=np.float64).ravel() for name in ("x", "lam_g")
     )
-    return IpoptRun(x, bool(solver.stats()["success"]), of_g, of_x)
+    return IpoptRun(x, bool(solver.stats()["success"]), multipliers)

@@ -45,17 +45,13 @@ class PoseSolution:
             early or the start couldn't be improved, ``UNKNOWN`` if no pose held every
             limit.
         world_from_device: The pose, shape (4, 4); the start unless a better was found.
-        margin_rad: Least margin of any sample, see :func:`pose_margins`.
         slack: Least slack of the other limits, see :func:`pose_slack`.
-        n_active: Samples that the solver saw in the last round.
     """
 
     program: PoseProgram
     status: SolveStatus
     world_from_device: NDArray[np.float64]
-    margin_rad: float
     slack: float
-    n_active: int
 
     @property
     def moved(self) -> bool:
@@ -158,7 +154,7 @@ def solve_pose(
         status = SolveStatus.LOCALLY_OPTIMAL
     else:
         status = SolveStatus.FEASIBLE
-    return PoseSolution(program, status, best, best_margin, best_slack, active.size)
+    return PoseSolution(program, status, best, best_slack)
 
 
 def _globally_best(program: PoseProgram) -> PoseSolution | None:
@@ -178,8 +174,7 @@ def _globally_best(program: PoseProgram) -> PoseSolution | None:
     for offered in (start, pose):
         margin, slack = _figures(program, offered)
         if margin >= least and slack >= 0.0:
-            n = len(program.points)
-            return PoseSolution(program, SolveStatus.OPTIMAL, offered, margin, slack, n)
+            return PoseSolution(program, SolveStatus.OPTIMAL, offered, slack)
     return None
 
 
