@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from PIL import Image
 
 from geometry.files.interchange import to_trimesh
 from planning import RequirementError, Rig, RigPlan, load_mesh, load_rig, plan_rig
@@ -124,7 +125,7 @@ def main() -> int:
         print(f"<!-- {met} of {n} views meet an obstacle; {again.failures} -->")
         if options.pictures is not None:
             picture = draw_rig(plan, face_status=face_status(plan))
-            small = picture.resize((1000, 625)).quantize(64)
+            small = picture.resize((1000, 625)).quantize(192, dither=Image.Dither.NONE)
             save_picture(small, options.pictures / f"obstacles_{name}.png")
     return int(failed)
 
