@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from geometry.poses import look_at
 from planning.verify.reconstruction.arrays import Array
@@ -91,20 +92,8 @@ def placed_camera(
     pose = look_at(target + STANDOFF_M * direction, target, UP)
     middle = np.array([0.5 * (width - 1) - cx, 0.5 * (height - 1) - cy, f])
     # Device axes such that the ray of the middle pixel is where look_at's +z is.
-    pose[:3, :3] = pose[:3, :3] @ _turned_to_z(middle / np.linalg.norm(middle))
+    turn = Rotation.align_vectors([0.0, 0.0, 1.0], middle)[0].as_matrix()
+    pose[:3, :3] = pose[:3, :3] @ turn
     matrix = np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
     lens = (optics.distortion, 0.0, 0.0, 0.0, 0.0)
     return CameraCalibration(name, pose, matrix, CAMERA_PX, lens)
-
-
-def _turned_to_z(ray: Array) -> Array:
-    """Smallest rotation that takes a unit vector near +z to +z, shape (3, 3)."""
-    x, y, z = ray
-    share = 1.0 / (1.0 + z)
-    return np.array(
-        [
-            [1.0 - share * x * x, -share * x * y, -x],
-            [-share * x * y, 1.0 - share * y * y, -y],
-            [x, y, z],
-        ]
-    )
