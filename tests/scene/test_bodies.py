@@ -57,7 +57,7 @@ from planning.verify.audit.predicates.predicates import (
     light_steps,
     sight_steps,
 )
-from planning.verify.reconstruction.render.occluders import Both, obstacles_of
+from planning.verify.reconstruction.render.occluders import obstacles_of
 
 # ---- boxes
 
@@ -221,8 +221,9 @@ def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
     ways = points - starts
     reach = np.linalg.norm(ways, axis=1)
     rig = SimpleNamespace(projectors=[lamp], cameras=[eye], obstacles=())
-    caster = Both(scene.visibility.caster, obstacles_of(rig, "P1"))
-    hidden = caster.occluded(starts, ways / reach[:, None], 0.999 * reach)
+    ray = starts, ways / reach[:, None], 0.999 * reach
+    hidden = scene.visibility.caster.occluded(*ray)
+    hidden |= obstacles_of(rig, "P1").occluded(*ray)
     assert np.array_equal(hidden, dark)
     assert obstacles_of(rig, "C1") is None
 

@@ -18,6 +18,9 @@ Images = NDArray[np.uint8 | np.float32]
 class Columns:
     """A value whose arrays have one row for each of its items."""
 
+    def __len__(self) -> int:
+        return len(next(iter(self._columns().values())))
+
     def take(self, chosen: Mask | Indices) -> Self:
         """Return some of the items."""
         columns = self._columns()

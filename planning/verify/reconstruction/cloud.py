@@ -40,9 +40,6 @@ class Cloud(Columns):
     shift: Array
     noise_px: Array
 
-    def __len__(self) -> int:
-        return len(self.points)
-
     def of_devices(self, projector: int, camera: int) -> "Cloud":
         """Return the points with these indices of their devices."""
         return replace(

@@ -76,7 +76,7 @@ def compare(
     measured = nearest_distance(everything, samples, 1.01 * tau_m) <= tau_m
     everywhere = np.ones(len(measured), dtype=bool)
     by_limits, by_floors = (
-        (_by_any(by_camera), _widened(by_camera, samples, plan))
+        (np.any(by_camera, axis=0), _widened(by_camera, samples, plan))
         for by_camera in (prediction.claimed, prediction.possible)
     )
 
@@ -157,16 +157,12 @@ def _widened(by_camera: Mask, samples: SurfaceSamples, plan: Scanner) -> Mask:
     return nearest_distance(ideal, samples, 1.01 * tau_m) <= tau_m
 
 
-def _by_any(by_camera: Mask) -> Mask:
-    return np.asarray(by_camera.any(axis=0))
-
-
 def _shares(
     prediction: PredictedSamples, measured: Mask, area: Mask
 ) -> dict[str, float | None]:
     """Shares of a part of the surface; None where nothing of it was sampled."""
     weights = prediction.weights[area]
-    claimed = _by_any(prediction.claimed)[area]
+    claimed = np.any(prediction.claimed, axis=0)[area]
 
     def share(of: Mask, among: Mask) -> float | None:
         total = float(weights[among].sum())
@@ -183,7 +179,7 @@ def _shares(
 def _errors(accuracy: Accuracy | None, faces: Mask) -> dict[str, Any]:
     """Errors of the points whose nearest face is one of these."""
     near = None if accuracy is None else accuracy.take(faces[accuracy.faces])
-    if near is None or not len(near.distances):
+    if near is None or not len(near):
         return {"n_points": 0, "rms_m": None, "p95_m": None, "bias_m": None}
     errors = {"rms_m": near.rms_m, "p95_m": near.p95_m, "bias_m": near.bias_m}
-    return {"n_points": len(near.distances), **errors}
+    return {"n_points": len(near), **errors}

@@ -95,10 +95,10 @@ class Reconstruction:
             n_points=self.n_points,
             n_merged=self.n_merged,
             redundant_fraction=self.redundant_fraction,
-            accuracy_rms_m=accuracy and accuracy.rms_m,
-            accuracy_p95_m=accuracy and accuracy.p95_m,
-            accuracy_bias_m=accuracy and accuracy.bias_m,
-            accuracy_max_m=accuracy and accuracy.max_m,
+            accuracy_rms_m=None if accuracy is None else accuracy.rms_m,
+            accuracy_p95_m=None if accuracy is None else accuracy.p95_m,
+            accuracy_bias_m=None if accuracy is None else accuracy.bias_m,
+            accuracy_max_m=None if accuracy is None else accuracy.max_m,
             completeness=tuple(
                 CompletenessRecord(threshold_m=threshold, fraction=fraction)
                 for threshold, fraction in zip(

@@ -52,9 +52,6 @@ class ImageEdges(Columns):
     across: Array
     noise_px: Array
 
-    def __len__(self) -> int:
-        return len(self.pixels)
-
     @classmethod
     def nothing(cls) -> "ImageEdges":
         """Return no edges."""

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
+from geometry.rays.rays import RayCaster
 from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.decode.decode import CAUSES
-from planning.verify.reconstruction.render.occluders import Occluder
 from planning.verify.reconstruction.render.rendered_light import SHADOW_SLACK
 
 from .measured_clouds import REJECTED, MeasuredClouds
@@ -153,7 +153,7 @@ def _no_edges(supposed: Supposed, points: Array, normals: Array) -> str:
 
 
 def light_falls(
-    projector: ProjectorCalibration, caster: Occluder, points: Array, normals: Array
+    projector: ProjectorCalibration, caster: RayCaster, points: Array, normals: Array
 ) -> Mask:
     """Return whether a projector's rings light points [m] of the surface, shape (n,).
 

@@ -104,9 +104,6 @@ class Evidence(Columns):
     projector: Indices
     noise_px: Array
 
-    def __len__(self) -> int:
-        return len(self.radii)
-
     def index(self, role: Role) -> Indices:
         """Return which device of a role each edge is of, shape (n,)."""
         if role == "objects":

@@ -8,7 +8,6 @@ projector's gamma.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 
-from .ring_patterns import DrawnRings, Frame, RingsForCamera
+from .ring_patterns import DrawnRings, Frame
 
 _WHITE = 255.0
 
@@ -30,42 +29,27 @@ class PatternCanvas:
 
     Attributes:
         pattern: What is drawn.
-        discs: The same with the root disc of each camera, by its id.
-        x: Of pixel centres in the plane of the rings.
-        y: Likewise.
         edge: Ring edge that is nearest in the ring coordinate.
         within: Grey level of the part of the pixel that lies inside that edge.
         beyond: Of the part outside it; both together are the pixel in white.
+        outside: Of the part outside a camera's root disc, by its id: r.m > 0.
     """
 
     pattern: DrawnRings
-    discs: dict[str, RingsForCamera]
-    x: Array
-    y: Array
     edge: NDArray[np.intp]
     within: NDArray[np.uint8]
     beyond: NDArray[np.uint8]
+    outside: dict[str, NDArray[np.uint8]]
 
     def image(self, frame: Frame) -> NDArray[np.uint8]:
         """Return a frame's grey levels, 0 to 255, shape (h, w)."""
         if frame.kind == "root":
             assert frame.camera is not None
-            outside = self._outside[frame.camera]
+            outside = self.outside[frame.camera]
             return self.within + self.beyond - outside if frame.inverse else outside
         bright = self.pattern.bright(frame).astype(np.uint8)
         inside = self.within * bright[:-1].take(self.edge)
         return inside + self.beyond * bright[1:].take(self.edge)
-
-    @cached_property
-    def _outside(self) -> dict[str, NDArray[np.uint8]]:
-        """Where r.m > 0, by camera: outside its root disc."""
-        white = self.within + self.beyond
-        outside: dict[str, NDArray[np.uint8]] = {}
-        for camera, patterns in self.discs.items():
-            level = patterns.root_level(self.x, self.y)
-            share = _share(level, _slope(level)).astype(np.float32)
-            outside[camera] = np.rint(white * share).astype(np.uint8)
-        return outside
 
 
 def canvas(
@@ -88,8 +72,12 @@ def canvas(
         drawn = drawn * _share(projector.beam_radius - away, _slope(away))
     white = np.rint(_WHITE * drawn).astype(np.uint8)
     beyond = np.rint(white * _share(rho - radii[edge], slope)).astype(np.uint8)
-    discs = {camera.id: projector.pattern_for(camera) for camera in cameras}
-    return PatternCanvas(patterns, discs, x, y, edge, white - beyond, beyond)
+    outside: dict[str, NDArray[np.uint8]] = {}
+    for camera in cameras:
+        level = projector.pattern_for(camera).root_level(x, y)
+        share = _share(level, _slope(level)).astype(np.float32)
+        outside[camera.id] = np.rint(white * share).astype(np.uint8)
+    return PatternCanvas(patterns, edge, white - beyond, beyond, outside)
 
 
 def _slope(values: Array) -> Array:

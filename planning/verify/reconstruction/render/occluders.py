@@ -4,13 +4,11 @@ They are dark: light that meets one is lost, and a camera that looks at one sees
 nothing.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.verify.reconstruction.arrays import Array, Mask
+from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import DeviceCalibration
 from planning.verify.reconstruction.scanner import Scanner
 
@@ -18,22 +16,6 @@ from planning.verify.reconstruction.scanner import Scanner
 _QUADS = np.array(
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Both:
-    """The object and what stands before it."""
-
-    surface: RayCaster
-    obstacles: RayCaster
-
-    def occluded(self, origins: Array, directions: Array, distances: Array) -> Mask:
-        """Return whether either blocks each ray within its distance, shape (n,)."""
-        ray = origins, directions, distances
-        return self.surface.occluded(*ray) | self.obstacles.occluded(*ray)
-
-
-Occluder = RayCaster | Both
 
 
 def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:

@@ -100,13 +100,10 @@ class Photometry:
             return level
         rng = np.random.Generator(np.random.SFC64(np.random.SeedSequence(key)))
         noise = rng.standard_normal(level.shape, dtype=np.float32)
-        spread = level * np.float32(255.0 / self.full_well)
-        spread += np.float32(self.read_noise**2)
-        np.sqrt(spread, out=spread)
-        noise *= spread
-        level += noise
-        np.rint(level, out=level)
-        return np.clip(level, 0.0, 255.0, out=level).astype(np.uint8)
+        variance = level * np.float32(255.0 / self.full_well)
+        variance += np.float32(self.read_noise**2)
+        level += noise * np.sqrt(variance)
+        return np.clip(np.rint(level), 0.0, 255.0).astype(np.uint8)
 
 
 def _smooth(image: Grey, taps: Grey, first: int, last: int, out: Grey) -> None:

@@ -16,7 +16,7 @@ from planning.verify.reconstruction.decode.decode import (
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.scanner import Scanner
 
-from .occluders import Both, obstacles_of
+from .occluders import obstacles_of
 from .photometry import Photometry
 from .render import render_pair
 from .rendered_light import Shown
@@ -63,8 +63,8 @@ class RenderedScene:
         if projector is None:
             return None
         before = obstacles_of(self._truth, projector.id)
-        past = self._caster if before is None else Both(self._caster, before)
-        return Shown(projector, design, patterns, past, self._truth.projector_focus)
+        focus = self._truth.projector_focus
+        return Shown(projector, design, patterns, self._caster, focus, before)
 
 
 def decode_rendered(

@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from geometry.rays.rays import CHUNK, equal_parts
+from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
 from planning.verify.reconstruction.scanner import Defocus
 
-from .occluders import Occluder
 from .view import RenderedView
 
 # Standard deviation of the unit square that a pixel gathers light over.
@@ -47,15 +46,17 @@ class Shown:
         projector: As it really stands.
         design: As the patterns were drawn for it.
         patterns: What is drawn.
-        caster: Of the mesh, and the bodies, that really stand there.
+        caster: Of the mesh that really stands there.
         defocus: Of the projector; None: equally sharp everywhere.
+        obstacles: What stands before the mesh; None: nothing.
     """
 
     projector: ProjectorCalibration
     design: ProjectorCalibration
     patterns: RingsForCamera
-    caster: Occluder
+    caster: RayCaster
     defocus: Defocus | None = None
+    obstacles: RayCaster | None = None
 
     def light(self, seen: RenderedView, in_focus_m: float) -> RenderedLight:
         """Return its light on a view's samples, edges in focus blurred by so much."""
@@ -66,7 +67,7 @@ class Shown:
         light = RenderedLight.join(
             [self._light_on(seen, samples[some], in_focus_m) for some in parts]
         )
-        if not len(light.samples):
+        if not len(light):
             return light
         falloff = self.projector.light.falloff(light.depth)
         return replace(light, white=(light.white * falloff).astype(np.float32))
@@ -113,6 +114,9 @@ class Shown:
         able, pixels, depth = samples[drawn], pixels[drawn], depth[drawn]
         pose, points = projector.world_from_device, seen.points[able]
         starts, beams, reach = projector.light.aim(pose, points, depth)
-        lit = ~self.caster.occluded(starts, beams, reach * (1.0 - SHADOW_SLACK))
+        ray = starts, beams, reach * (1.0 - SHADOW_SLACK)
+        lit = ~self.caster.occluded(*ray)
+        if self.obstacles is not None:
+            lit &= ~self.obstacles.occluded(*ray)
         cosine = -np.einsum("ij,ij->i", beams, seen.normals[able])
         return able[lit], cosine[lit], pixels[lit], depth[lit]

@@ -107,7 +107,7 @@ def _possible(
     tolerance_m: float,
 ) -> _Crossings:
     """Those near the prior, in the panel, that the object leaves seen and lit."""
-    if len(met.ray) == 0:
+    if len(met) == 0:
         return met
     projector = pair.projector
     near = np.abs(closest_points(prior, met.points).distances) <= tolerance_m
