@@ -103,8 +103,7 @@ class CandidateSet:
 
     def extended(self, more: tuple[PlannedProjector, ...]) -> "CandidateSet":
         """Return these poses and more."""
-        stages = lit_stages(self.scene, more, self.samples)
-        return self.joined(replace(self, projectors=more, stages=stages))
+        return self.joined(CandidateSet.over(self.scene, self.samples, more))
 
     def joined(self, other: "CandidateSet") -> "CandidateSet":
         """Return both sets of poses, which are of the same samples, as one."""

@@ -17,12 +17,7 @@ from planning.model.document.certificates import (
 )
 
 from .conflicts import Interference, resolve_others
-from .selection import (
-    CandidateCover,
-    Marginals,
-    Selection,
-    marginals,
-)
+from .selection import CandidateCover, Selection, marginals
 
 _ByCount = Mapping[int, NDArray[np.int64]]
 # What a certificate says where chosen devices have bodies.
@@ -38,7 +33,8 @@ def certified(
 ) -> tuple[_ByCount, Certificate]:
     """Return the best candidates for each count, and the certificate of a selection.
 
-    They are those of `by_count`, where there are any, whose bodies are compatible.
+    They are those of `by_count`, where there are any, whose bodies are compatible. With
+    existing devices, bounds count them, and speak of covers that hold them.
     """
     others = marginals(cover, selection)
     if by_count is not None:
@@ -50,25 +46,9 @@ def certified(
     bodied = among is not None and among.bodied
     if among is not None:
         others = resolve_others(among, cover, others, len(selection.chosen))
-    proof = certificate(cover, selection, others, sample_area_m2, bodied=bodied)
-    return others.by_count, proof
-
-
-def certificate(
-    cover: CandidateCover,
-    selection: Selection,
-    others: Marginals,
-    sample_area_m2: float,
-    *,
-    bodied: bool = False,
-) -> Certificate:
-    """Return the plan's certificate: what was proved, and over what.
-
-    With existing devices, its bounds count them, and speak of covers that hold them.
-    """
     n_samples, n_candidates = cover.covers.shape
     count, existing = len(selection.chosen), cover.n_existing
-    by_count = tuple(
+    areas = tuple(
         CountArea(
             count=n,
             value_m2=covered * sample_area_m2,
@@ -89,16 +69,17 @@ def certificate(
         continuous=None,
         greedy_count=others.greedy,
         needed=NeededCount(count=selection.needed, lower_bound=selection.lower_bound),
-        by_count=by_count,
-        best_area=_best_area(by_count, count),
-        one_fewer=_one_fewer(by_count, count, existing),
+        by_count=areas,
+        best_area=_best_area(areas, count),
+        one_fewer=_one_fewer(areas, count, existing),
     )
     extras = {
         "given": existing or None,
         "but_for_bodies": selection.but_for_bodies,
         "bounds_leave_out": _BODIES_LEFT_OUT if bodied else None,
     }
-    return proof.changed(**{k: v for k, v in extras.items() if v is not None})
+    given = {key: value for key, value in extras.items() if value is not None}
+    return others.by_count, proof.changed(**given)
 
 
 def _best_area(by_count: tuple[CountArea, ...], count: int) -> BestArea:

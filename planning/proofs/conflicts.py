@@ -94,9 +94,7 @@ def resolve_conflicts(
     if np.array_equal(resolved, np.sort(chosen)) and covered == selection.n_covered:
         return selection
     smallest, met = resolved, covered >= selection.required
-    but_for_bodies = None
-    if len(resolved) > selection.needed:
-        but_for_bodies = selection.needed
+    costlier = len(resolved) > selection.needed
     if not met:
         # How many would do it, were more allowed.
         demand = replace(demand, required=selection.required, most=more)
@@ -104,8 +102,7 @@ def resolve_conflicts(
         cover_found = there >= selection.required
         fewest = enough if cover_found else selection.smallest
         smallest = max((fewest, resolved), key=len)
-        if not cover_found or len(enough) > selection.needed:
-            but_for_bodies = selection.needed
+        costlier |= not cover_found or len(enough) > selection.needed
     bound = selection.n_covered_bound
     if len(resolved) != len(chosen):
         _, bound = cover.most_covering(len(resolved), None, _BUDGET)
@@ -118,7 +115,7 @@ def resolve_conflicts(
         status=status,
         n_covered=covered,
         n_covered_bound=bound,
-        but_for_bodies=but_for_bodies,
+        but_for_bodies=selection.needed if costlier else None,
     )
 
 

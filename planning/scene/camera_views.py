@@ -48,10 +48,13 @@ def camera_views(
     """Return what each camera sees of samples."""
     offered: list[CameraView] = []
     wanted = np.zeros((len(cameras), len(target)), dtype=bool)
-    facing = _facing(cameras, target, scene.requirements.camera.max_incidence)
+    limits = scene.requirements.camera
+    facing = _facing(cameras, target, limits.max_incidence)
     for row, camera in enumerate(cameras):
         scene.check_cancelled()
-        sight = _in_the_open(scene, camera, target, np.flatnonzero(facing[row]))
+        some = np.flatnonzero(facing[row])
+        in_the_open = measurability.view(camera, target.take(some), limits, None)
+        sight = CameraView(some, in_the_open).take(np.flatnonzero(in_the_open.seen))
         wanted[row, sight.samples] = True
         offered.append(sight)
     samples = target.samples
@@ -62,16 +65,12 @@ def camera_views(
         samples.normals,
         candidates=wanted,
     )
-    clear = (
-        sight.take(np.flatnonzero(free[column, sight.samples]))
-        for column, sight in enumerate(offered)
-    )
-    if not scene.bodies:
-        return tuple(clear)
     views: list[CameraView] = []
-    for sight, camera in zip(clear, cameras, strict=True):
-        blocked = blocked_by(scene.bodies, camera, samples.points[sight.samples])
-        views.append(sight.take(np.flatnonzero(~blocked.any(axis=1))))
+    for sight, camera, row in zip(offered, cameras, free, strict=True):
+        clear = np.flatnonzero(row[sight.samples])
+        points = samples.points[sight.samples[clear]]
+        blocked = blocked_by(scene.bodies, camera, points).any(axis=1)
+        views.append(sight.take(clear[~blocked]))
     return tuple(views)
 
 
@@ -106,15 +105,6 @@ class CandidateViews:
         views = first + (camera_views(self._scene, rest, target) if rest else ())
         self._known.append((points, views))
         return views
-
-
-def _in_the_open(
-    scene: Scene, camera: PlannedCamera, target: Target, some: NDArray[np.int64]
-) -> CameraView:
-    """Return which of some samples a camera would see, were nothing in between."""
-    limits = scene.requirements.camera
-    seen = measurability.view(camera, target.take(some), limits, None)
-    return CameraView(some, seen).take(np.flatnonzero(seen.seen))
 
 
 def _facing(

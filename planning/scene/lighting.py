@@ -87,12 +87,22 @@ def lit_stages(
 
     scene.visibility.caster.share(fill, equal_parts(len(projectors), _SHARED))
     first = np.ascontiguousarray(stages.T)
+    points, normals = target.samples.points, target.samples.normals
     for kind in {projector.light: None for projector in projectors}:
         alike = [i for i, p in enumerate(projectors) if p.light == kind]
-        chosen = [projectors[i] for i in alike]
-        first[:, alike] = _with_shadows(scene, chosen, target, first[:, alike])
+        poses = np.stack([projectors[i].world_from_device for i in alike])
+        lit = first[:, alike] == LIT
+        seen = visibility_matrix(
+            scene.visibility,
+            poses[:, :3, 3],
+            points,
+            normals,
+            along=light_of(projectors[alike[0]].device).common_direction(poses),
+            candidates=np.ascontiguousarray(lit.T),
+        )
+        shadowed = lit & ~seen.T
+        first[:, alike] = np.where(shadowed, np.int8(OCCLUDED), first[:, alike])
     for column, projector in enumerate(projectors):
-        points = target.samples.points
         _mark_blocked(first[:, column], projector, points, scene.bodies)
     return first
 
@@ -102,26 +112,6 @@ def _ignoring_occlusion(
 ) -> NDArray[np.int8]:
     view = ProjectorView.of(projector, samples)
     return first_violated(PROJECTOR_LIMITS, view, limits, samples.points.shape[1])
-
-
-def _with_shadows(
-    scene: Scene,
-    projectors: Sequence[PlannedProjector],
-    target: Target,
-    first: NDArray[np.int8],
-) -> NDArray[np.int8]:
-    """Return the first failures of projectors of one light, occlusion included."""
-    poses = np.stack([projector.world_from_device for projector in projectors])
-    lit = first == LIT
-    seen = visibility_matrix(
-        scene.visibility,
-        poses[:, :3, 3],
-        target.samples.points,
-        target.samples.normals,
-        along=light_of(projectors[0].device).common_direction(poses),
-        candidates=np.ascontiguousarray(lit.T),
-    )
-    return np.where(lit & ~seen.T, np.int8(OCCLUDED), first)
 
 
 def _mark_blocked(

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from planning.proofs.candidate_certificate import certificate
+from planning.proofs.candidate_certificate import certified
 from planning.proofs.selection import CandidateCover, marginals, select_fewest
 
 
@@ -57,7 +57,7 @@ def test_too_few_allowed_gives_the_best_of_them_and_what_would_be_needed():
     others = marginals(cover, found)
     assert others.n_covered == {1: (5, 5), 2: (10, 10), 3: (15, 15), 4: (20, 20)}
     assert covers[:, others.by_count[4]].any(axis=1).all()
-    proof = certificate(cover, found, others, 0.5)
+    _, proof = certified(cover, found, 0.5)
     proof = proof.to_document()
     assert proof["one_fewer"] == {"upper_bound_m2": 2.5, "scope": "candidates"}
     assert proof["count"] == 2
