@@ -62,7 +62,7 @@ def move_axes(
         if not _differ(moved, kept):
             break
         again = cover_again(scene, moved, cover, by)
-        if _better(cover, again):
+        if _rank(cover) > _rank(again):
             break
         as_chosen = with_cameras(again, cover)
         if as_chosen is not None:
@@ -124,12 +124,7 @@ def _differ(a: Sequence[PlannedProjector], b: Sequence[PlannedProjector]) -> boo
     return any(new is not old for new, old in zip(a, b, strict=True))
 
 
-def _better(new: CameraCover, old: CameraCover) -> bool:
-    """Whether fewer cameras are needed, or as many measure more area."""
-    if new.selection.needed != old.selection.needed:
-        return new.selection.needed < old.selection.needed
-    a, b = (
-        cover.selection.n_covered * cover.samples.target.samples.weight
-        for cover in (new, old)
-    )
-    return a > b
+def _rank(cover: CameraCover) -> tuple[int, float]:
+    """Larger where fewer cameras are needed, or as many measure more area."""
+    selection, weight = cover.selection, cover.samples.target.samples.weight
+    return -selection.needed, selection.n_covered * weight
