@@ -71,7 +71,10 @@ def usable_mesh(
         raise MeshError(f"{path}: {error}") from None
     mesh, near, far = _without_far(TriangleMesh(vertices, faces))
     longest, stray = _longest_side(mesh)
-    name, scale = _scale(raw, longest, unit, size_mm)
+    name = unit or raw.unit or _DEFAULT_UNIT
+    scale = METRES[name]
+    if size_mm is not None:
+        name, scale = "size_mm", 1e-3 * size_mm / longest
     _check_size(path, longest, name, scale)
     mesh = TriangleMesh(mesh.vertices * scale, mesh.faces)
     # Orientation turns faces and keeps their order, so that the origin stays theirs.
@@ -115,15 +118,6 @@ def _longest_side(mesh: TriangleMesh) -> tuple[float, tuple[Repair, ...]]:
     count = int(outside.sum())
     repairs = (Repair(kind, count),) if count else ()
     return longest, repairs
-
-
-def _scale(
-    raw: RawMesh, longest: float, unit: str | None, size_mm: float | None
-) -> tuple[str, float]:
-    if size_mm is not None:
-        return "size_mm", 1e-3 * size_mm / longest
-    name = unit or raw.unit or _DEFAULT_UNIT
-    return name, METRES[name]
 
 
 def _check_size(path: str | Path, longest: float, unit: str, scale: float) -> None:

@@ -68,17 +68,13 @@ def face_pairs(edges: MeshEdges, *, manifold_only: bool = True) -> tuple[Ints, I
 def components(pairs: Ints, n: int) -> tuple[int, Ints]:
     """Return the number of connected components of n nodes, and each node's, (n,).
 
-    Components are numbered by their lowest node.
+    Components are numbered by their lowest node, as scipy meets them.
     """
     links = coo_array(
         (np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), (n, n)
     )
     count, label = connected_components(links, directed=False)
-    first = np.empty(count, dtype=np.int64)
-    first[label[::-1]] = np.arange(n)[::-1]
-    rank = np.empty(count, dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(count)
-    return int(count), rank[label]
+    return int(count), label.astype(np.int64)
 
 
 def used_vertices(faces: Ints, n: int) -> Mask:

@@ -5,9 +5,6 @@ sample. All in it is rational, so derivatives are exact and have no singular poi
 gap damps the axis itself. Every number in it is a parameter.
 """
 
-from functools import lru_cache
-from typing import Any
-
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -110,8 +107,10 @@ def run_ipopt(
         reach: Largest change of each coordinate of x.
         max_iterations: Limit of the run.
     """
-    slots, places = slots_for(len(pairs), _SLOTS), slots_for(len(held), _HELD_SLOTS)
-    solver = _solver(program.light, slots, places, max_iterations)
+    sizes = slots_for(len(pairs), _SLOTS), slots_for(len(held), _HELD_SLOTS)
+    solver = strict_solver(
+        build_axis_nlp, program.light, *sizes, max_iterations=max_iterations
+    )
     x0 = start / program.ring_radius
     return run_solver(
         solver,
@@ -129,8 +128,3 @@ def _scaled(program: AxisProgram, points: NDArray[np.float64]) -> NDArray[np.flo
     if program.light == "diverging":
         return points / np.linalg.norm(points, axis=1, keepdims=True)
     return points * [1.0, 1.0, 0.0] / program.ring_radius
-
-
-@lru_cache(maxsize=16)
-def _solver(light: Light, slots: int, places: int, max_iterations: int) -> Any:  # noqa: ANN401
-    return strict_solver("axis", build_axis_nlp(light, slots, places), max_iterations)

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from solvers.status import SolveStatus
 
 from .axis_problem import PITCH_POWER, AxisProgram
+from .compiled import local_status
 
 _ROUNDS = 10
 # Of a round, in units of the largest ring.
@@ -149,12 +150,7 @@ def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSoluti
         settled &= np.array_equal(pairs, _assigned(program, axis))
         if settled or (inside and gain < _SETTLED):
             break
-    if not best_slack >= 0.0:
-        status = SolveStatus.UNKNOWN
-    elif settled:
-        status = SolveStatus.LOCALLY_OPTIMAL
-    else:
-        status = SolveStatus.FEASIBLE
+    status = local_status(held=best_slack >= 0.0, settled=settled)
     return AxisSolution(program, status, best, best_value, best_slack)
 
 

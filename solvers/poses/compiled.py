@@ -1,13 +1,14 @@
 """IPOPT, silent, on programs that are compiled once for each kind of light and size."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.status import interruptible
+from solvers.status import SolveStatus, interruptible
 
 Light = Literal["diverging", "parallel"]
 
@@ -52,10 +53,14 @@ class Nlp:
     g: Any
 
 
-def strict_solver(name: str, nlp: Nlp, max_iterations: int) -> Any:  # noqa: ANN401
-    """Return the compiled program; the name is for CasADi's own messages."""
+@lru_cache(maxsize=32)
+def strict_solver(
+    build: Callable[..., Nlp], light: Light, *sizes: int, max_iterations: int
+) -> Any:  # noqa: ANN401
+    """Return the compiled program that is built for a kind of light and these sizes."""
     import casadi as ca
 
+    nlp = build(light, *sizes)
     options = SILENT | {
         "ipopt.max_iter": max_iterations,
         "ipopt.tol": 1e-9,
@@ -64,7 +69,14 @@ def strict_solver(name: str, nlp: Nlp, max_iterations: int) -> Any:  # noqa: ANN
         "ipopt.mu_strategy": "adaptive",
     }
     parts = {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}
-    return ca.nlpsol(name, "ipopt", parts, options)
+    return ca.nlpsol("strict", "ipopt", parts, options)
+
+
+def local_status(*, held: bool, settled: bool) -> SolveStatus:
+    """Return what an answer is whose limits are held, and that IPOPT settled on."""
+    if not held:
+        return SolveStatus.UNKNOWN
+    return SolveStatus.LOCALLY_OPTIMAL if settled else SolveStatus.FEASIBLE
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ Both are rational, so derivatives are exact and have no singular point nearby. A
 are. Every number in it is a parameter.
 """
 
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -178,7 +177,10 @@ def run_ipopt(
     slots = slots_for(active.size, _SLOTS)
     index = np.resize(active, slots)
     p, lower = pose_parameters(program, index)
-    solver = _solver(program.light, slots, max_iterations, n_planes_of(program))
+    sizes = slots, n_planes_of(program)
+    solver = strict_solver(
+        build_pose_nlp, program.light, *sizes, max_iterations=max_iterations
+    )
     reach = program.max_move_m / _size(program)
     box = np.array([*[reach] * 3, *[_MAX_GIBBS] * 3])
     return run_solver(
@@ -216,12 +218,6 @@ def variables_of(
     q = (pose[:3, 3] - start[:3, 3]) / _size(program)
     margin = float(np.min(pose_margins(program, pose)))
     return np.array([*q, *(twist / (1.0 + np.trace(turn))), margin])
-
-
-@lru_cache(maxsize=16)
-def _solver(light: Light, slots: int, max_iterations: int, n_planes: int) -> Any:  # noqa: ANN401
-    nlp = build_pose_nlp(light, slots, n_planes)
-    return strict_solver("pose", nlp, max_iterations)
 
 
 def _gibbs(s: Any) -> Any:  # noqa: ANN401

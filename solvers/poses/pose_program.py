@@ -28,6 +28,7 @@ from scipy.spatial.transform import Rotation
 
 from solvers.status import SolveStatus
 
+from .compiled import local_status
 from .pose_problem import PoseProgram, pose_margins
 
 _ROUNDS = 8
@@ -148,12 +149,8 @@ def solve_pose(
             settled = outcome.success
             break
         active = np.union1d(active, fresh)
-    if not best_slack >= 0.0:
-        status = SolveStatus.UNKNOWN
-    elif settled and slack >= 0.0 and margin >= best_margin - _SETTLED_RAD:
-        status = SolveStatus.LOCALLY_OPTIMAL
-    else:
-        status = SolveStatus.FEASIBLE
+    settled = settled and slack >= 0.0 and margin >= best_margin - _SETTLED_RAD
+    status = local_status(held=best_slack >= 0.0, settled=settled)
     return PoseSolution(program, status, best, best_slack)
 
 

@@ -152,6 +152,12 @@ def test_edges_borders_and_components_of_known_shapes() -> None:
     np.testing.assert_array_equal(label, np.repeat([0, 1], [12, 80]))
 
 
+def test_components_are_numbered_by_their_lowest_node() -> None:
+    count, label = components(np.array([[4, 1], [6, 0], [3, 6]]), 7)
+    assert count == 4
+    np.testing.assert_array_equal(label, [0, 1, 2, 0, 1, 3, 0])
+
+
 def test_faces_about_a_branching_edge_are_paired_only_on_request() -> None:
     faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     edges = mesh_edges(faces)

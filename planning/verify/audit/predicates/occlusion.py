@@ -130,11 +130,7 @@ class Hindrance:
 
     def meets(self, starts: Array, ends: Array) -> Mask:
         """Return which straight lines meet it more than 0.02 mm before their ends."""
-        way = ends - starts
-        length = np.linalg.norm(way, axis=1)
-        along = way / np.where(length > 0.0, length, 1.0)[:, None]
-        _, distance = self.caster.first_hits(starts, along)
-        return distance < length - _SLACK_M
+        return _hits(self.caster, starts, ends, _SLACK_M)
 
 
 def free_of(
@@ -154,14 +150,17 @@ def touches(block: Block, caster: RayCaster) -> bool:
     for k in range(3):
         if block.meets(corners[:, k], corners[:, (k + 1) % 3]).any():
             return True
-    starts, ends = block.edges
+    return bool(_hits(caster, *block.edges, 0.0).any())
+
+
+def _hits(caster: RayCaster, starts: Array, ends: Array, slack: float) -> Mask:
+    """Whether lines meet a mesh and the slack [m] before their ends, (n,)."""
     way = ends - starts
     length = np.linalg.norm(way, axis=1)
     # Of a body that rounding alone makes no edge is left.
-    long = length > 0.0
-    along = way[long] / length[long, None]
-    _, distance = caster.first_hits(starts[long], along)
-    return bool(np.any(distance <= length[long]))
+    along = way / np.where(length > 0.0, length, 1.0)[:, None]
+    _, distance = caster.first_hits(starts, along)
+    return (length > 0.0) & (distance <= length - slack)
 
 
 def _bodies(devices: Iterable[_Device]) -> tuple[Block, ...]:
