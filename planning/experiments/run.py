@@ -12,9 +12,7 @@ from planning.verify.reconstruction.reconstruct import conclude, reconstruct
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import Progress
 from planning.verify.reconstruction.scanner import Scanner
-from planning.verify.reconstruction.single_shot.single_shot import (
-    shoot_rig,
-)
+from planning.verify.reconstruction.single_shot.single_shot import shoot_rig
 
 from .ground_truth import (
     Errors,

@@ -142,9 +142,7 @@ def outcome_document(
     }
 
 
-def _device_document(
-    device: DeviceCalibration,
-) -> dict[str, Any]:
+def _device_document(device: DeviceCalibration) -> dict[str, Any]:
     """Pose and interior; of parallel light, pixels a metre on the diagonal of K."""
     return {
         "id": device.id,

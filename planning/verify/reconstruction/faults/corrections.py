@@ -52,8 +52,7 @@ class Correction:
 
     def concerns(self, evidence: Evidence) -> Mask:
         """Return which edges it bears on."""
-        index = evidence.index(self.role)
-        return (index == self.devices[0]) | (index == self.devices[-1])
+        return np.isin(evidence.index(self.role), self.devices)
 
     def repeats(self, other: "Correction") -> bool:
         """Return whether it is the other one again, or with more freedom."""

@@ -160,14 +160,12 @@ def light_falls(
     By ray casting; points and unit normals have shape (n, 3).
     """
     pixels, depth = projector.panel(points)
-    starts, beams, reach = projector.aim(points)
     with np.errstate(invalid="ignore", divide="ignore"):
         drawn = projector.ring_coordinate(points) <= projector.pattern.outer_radius
         lit = projector.in_panel(pixels) & (depth > 0.0) & drawn
-    lit &= -np.einsum("ij,ij->i", beams, normals) > _GLANCING
-    starts = np.broadcast_to(starts, points.shape)[lit]
-    stop = reach[lit] * (1.0 - SHADOW_SLACK)
-    lit[lit] = ~caster.occluded(np.ascontiguousarray(starts), beams[lit], stop)
+    lit &= projector.incidence_cosine(points, normals) > _GLANCING
+    starts, beams, reach = projector.aim(points[lit])
+    lit[lit] = ~caster.occluded(starts, beams, reach * (1.0 - SHADOW_SLACK))
     return lit
 
 
