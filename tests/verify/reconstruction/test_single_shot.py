@@ -153,7 +153,7 @@ def test_no_label_is_wrong_while_the_object_is_within_the_tolerance(
     prior = TriangleMesh(ball.vertices + move, ball.faces)
     # The ball's faces lie up to 0.2 mm inside it.
     tolerance = 1e-3 * (abs(off_mm) + 0.3)
-    found, rejected = labelled(pixels, RADII[light], pair, prior, tolerance_m=tolerance)
+    found, rejected = labelled(pixels, pair, prior, tolerance_m=tolerance)
     sure = found.rings >= 0
     assert np.mean(sure) > 0.7
     np.testing.assert_array_equal(found.rings[sure], ring[sure])
@@ -186,9 +186,7 @@ def test_labels_are_left_out_where_two_candidates_are_within_the_tolerance(ball)
             seen = (beyond < 0.0) | (np.linalg.norm(foot, axis=1) > BALL - tolerance)
             lit = (p[:, 1] < 0.0) | (np.hypot(p[:, 0], p[:, 2]) > BALL - tolerance)
             count += (away < tolerance) & seen & lit
-    found, rejected = labelled(
-        pixels, RADII["parallel"], pair, ball, tolerance_m=tolerance
-    )
+    found, rejected = labelled(pixels, pair, ball, tolerance_m=tolerance)
     same = np.mean((count > 1) == (found.rings < 0))
     assert 0.05 < np.mean(count > 1) < 0.95
     assert same > 0.99
@@ -201,8 +199,7 @@ def test_a_ring_outside_the_panel_is_no_candidate(ball):
     small = replace(pair.projector, beam_radius=0.045)
     less = PairCalibration(small, pair.camera)
     wide, narrow = (
-        labelled(pixels, RADII["parallel"], one, ball, tolerance_m=1e-3)[0].rings
-        for one in (pair, less)
+        labelled(pixels, one, ball, tolerance_m=1e-3)[0].rings for one in (pair, less)
     )
     assert np.mean(wide[ring == 4] == 4) > 0.5
     assert not np.any(narrow == 4)
@@ -212,9 +209,9 @@ def test_a_ring_outside_the_panel_is_no_candidate(ball):
 def test_a_prior_that_is_farther_off_than_the_tolerance_labels_nothing_right(ball):
     pair, pixels, ring, root, _ = ring_points("parallel")
     prior = TriangleMesh(ball.vertices + [0.0, 0.02, 0.0], ball.faces)
-    found, rejected = labelled(pixels, RADII["parallel"], pair, prior, tolerance_m=1e-3)
+    found, rejected = labelled(pixels, pair, prior, tolerance_m=1e-3)
     assert rejected["off_prior"] > 0.8 * len(pixels)
     right = (found.rings == ring) & (found.roots == root)
     assert np.mean(right) < 0.02
     with pytest.raises(ValueError, match="tolerance_m must be positive"):
-        labelled(pixels, RADII["parallel"], pair, prior, tolerance_m=0.0)
+        labelled(pixels, pair, prior, tolerance_m=0.0)

@@ -20,7 +20,6 @@ _ROOTS = (1, -1)
 
 def label_by_prior(
     lines: ImageEdges,
-    radii: Array,
     pair: PairCalibration,
     prior: TriangleMesh,
     *,
@@ -37,7 +36,6 @@ def label_by_prior(
 
     Args:
         lines: Points of lines in the camera's image.
-        radii: Of the rings, rising, shape (n_rings,).
         pair: Calibration of both devices.
         prior: What the object is known to lie near.
         tolerance_m: How near.
@@ -52,7 +50,7 @@ def label_by_prior(
     if not (tolerance_m > 0.0 and np.isfinite(tolerance_m)):
         raise ValueError(f"tolerance_m must be positive, got {tolerance_m} m")
     rays = pair.camera.rays(lines.pixels)
-    met = _candidates(rays, radii, pair, prior, tolerance_m)
+    met = _candidates(rays, pair, prior, tolerance_m)
     near = _possible(met, rays, pair, prior, tolerance_m)
     count = np.bincount(near.ray, minlength=len(lines))
     sure = near.take(count[near.ray] == 1)
@@ -77,7 +75,6 @@ class _Crossings(Columns):
 
 def _candidates(
     rays: Array,
-    radii: Array,
     pair: PairCalibration,
     prior: TriangleMesh,
     tolerance_m: float,
@@ -85,7 +82,7 @@ def _candidates(
     """Intersections of every ray with every ring in the prior's box."""
     low, high = prior.bounds[0] - tolerance_m, prior.bounds[1] + tolerance_m
     n, parts = len(rays), list[_Crossings]()
-    for ring, radius in enumerate(radii):
+    for ring, radius in enumerate(pair.projector.pattern.radii):
         for root in _ROOTS:
             side, on_ring = np.full(n, root, np.int8), np.full(n, radius)
             hits = intersect_rings(

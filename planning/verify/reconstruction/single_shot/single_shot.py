@@ -131,7 +131,6 @@ def shoot_rig(
             frames = render_lines(seen, [shown], scene.lenses[c], (seed, _STREAM, p, c))
             lines, rejected = label_by_prior(
                 find_lines(frames, _width_px(width, pair, prior)),
-                patterns.radii,
                 pair,
                 prior,
                 tolerance_m=tolerance_m,
