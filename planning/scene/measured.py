@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,7 +169,9 @@ def measured_by(
         views = camera_views(scene, cameras, lit.target)
     limits = scene.requirements.triangulation
     measured = np.zeros((len(lit.target), len(cameras)), dtype=bool)
-    for first, last in _chunks(views):
+    ends = np.cumsum([len(view.samples) for view in views])
+    starts = np.flatnonzero(np.diff(ends // _PAIRS, prepend=-1))
+    for first, last in pairwise([*starts.tolist(), len(views)]):
         scene.check_cancelled()
         column = np.repeat(
             np.arange(first, last), [len(s.samples) for s in views[first:last]]
@@ -181,18 +184,6 @@ def measured_by(
             open_places[pair.places[pair.measured]] = False
         measured[seen.samples, column] = ~open_places
     return measured
-
-
-def _chunks(views: Sequence[CameraView]) -> Iterator[tuple[int, int]]:
-    """Ranges of cameras that together see about `_PAIRS` samples, or of one."""
-    ends = np.cumsum([len(view.samples) for view in views])
-    first = 0
-    while first < len(views):
-        before = ends[first - 1] if first else 0
-        last = int(np.searchsorted(ends, before + _PAIRS, side="right"))
-        last = max(last, first + 1)
-        yield first, last
-        first = last
 
 
 def furthest_failure(
