@@ -64,7 +64,7 @@ def _checked(seeds: range) -> list[tuple[list[str], str]]:
 
 def _kinds(p: CoverProblem) -> list[str]:
     """Return what an instance is counted under."""
-    shares = p.required_weight / np.maximum(p.total_weights, 1e-300)
+    shares = p.required_weight / np.maximum(p.by_row_set(p.weights), 1e-300)
     return [
         "all",
         "full" if np.all(shares > 1 - 1e-9) else "partial",

@@ -78,10 +78,12 @@ def measure_shell(caster: RayCaster) -> MeshShell:
     inside_m2 = float(weight @ inside)
     lining = inside & np.isfinite(wall)
     wall_m = _weighted_median(wall[lining], weight[lining]) if lining.any() else None
+    arm = mesh.face_centroids - mesh.centre
+    height = np.einsum("ij,ij->i", arm, mesh.face_normals)
     return MeshShell(
         _kind(inside_m2 / mesh.area, wall_m, THIN * 2.0 * mesh.radius),
         wall_m,
-        _mean_wall(mesh),
+        float(2.0 / 3.0 * (mesh.face_areas @ height) / mesh.area),
         inside_m2,
         float(weight @ ~seen[of]),
     )
@@ -127,12 +129,6 @@ def _bodies(mesh: TriangleMesh) -> Ints:
     pairs = face_pairs(mesh.edges, manifold_only=False)[0]
     count, body = components(pairs, len(mesh.faces))
     return body if count <= _MAX_BODIES else np.zeros_like(body)
-
-
-def _mean_wall(mesh: TriangleMesh) -> float:
-    arm = mesh.face_centroids - mesh.centre
-    height = np.einsum("ij,ij->i", arm, mesh.face_normals)
-    return float(2.0 / 3.0 * (mesh.face_areas @ height) / mesh.area)
 
 
 def _weighted_median(values: Array, weights: Array) -> float:

@@ -52,7 +52,6 @@ class CellBound:
         by_multipliers: The part of the bound that they prove.
         most_weight: Weight that ``count`` - 1 poses serve at most, by them.
         cells_used: Cells that the tree was asked for.
-        tuples_met: Multisets of cells that were weighed.
     """
 
     problem: CellProblem
@@ -67,7 +66,6 @@ class CellBound:
     by_multipliers: float
     most_weight: float
     cells_used: int
-    tuples_met: int
 
 
 @on_one_thread
@@ -112,7 +110,6 @@ class _Proof:
         self.search = MultiplierSearch(self.whole, self.store, share)
         self.lower, self.proof = 0, "nothing is required of poses"
         self.survivor: NDArray[np.int64] | None = None
-        self.met = 0
 
     def run(self) -> CellBound:
         if not _reachable(self.whole, self.store):
@@ -139,7 +136,6 @@ class _Proof:
         answer = refute_tuples(
             self.whole, self.store, n_poses, self.search.multipliers, self.budget
         )
-        self.met += answer.met
         if answer.refuted:
             self.lower = n_poses + 1
             self.proof = f"multisets of {n_poses} cells by exhaustion"
@@ -175,7 +171,6 @@ class _Proof:
             by_multipliers=search.bound,
             most_weight=min(self.whole.in_unit(most), total),
             cells_used=self.store.size,
-            tuples_met=self.met,
         )
 
 

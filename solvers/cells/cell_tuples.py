@@ -35,12 +35,10 @@ class TupleAnswer:
         refuted: Whether no K poses reach the requirement.
         survivor: K cells of the store, with repetition, that may and can't be split;
             None if none was found.
-        met: Multisets that were weighed.
     """
 
     refuted: bool
     survivor: NDArray[np.int64] | None
-    met: int
 
 
 def refute_tuples(
@@ -56,26 +54,24 @@ def refute_tuples(
     """
     subtrees = Subtrees(whole, store, n_poses, multipliers)
     if subtrees.root == VOID:
-        return TupleAnswer(refuted=True, survivor=None, met=0)
+        return TupleAnswer(refuted=True, survivor=None)
     enough = Enough(whole, n_poses)
     start, _ = _weigh(np.full((1, n_poses), subtrees.root), subtrees, enough)
     stack = [start] if len(start) else []
-    met = 0
     while stack:
         nodes, ended = _split(stack.pop(), subtrees)
         # With the store full, what could be split looks as if it couldn't.
         if budget.exhausted or store.full:
-            return TupleAnswer(refuted=False, survivor=None, met=met)
+            return TupleAnswer(refuted=False, survivor=None)
         if ended is not None:
             cells = np.array(sorted(subtrees.cell(int(t)) for t in ended))
-            return TupleAnswer(refuted=False, survivor=cells, met=met)
-        met += len(nodes)
+            return TupleAnswer(refuted=False, survivor=cells)
         budget.spend(len(nodes) * (enough.units + _UNITS_PER_NODE) + 1e5)
         nodes, weights = _weigh(nodes, subtrees, enough)
         # The heaviest last, so that what may survive comes first.
         nodes = nodes[np.argsort(weights, kind="stable")]
         stack += [nodes[part] for part in parts(len(nodes), _BATCH)]
-    return TupleAnswer(refuted=True, survivor=None, met=met)
+    return TupleAnswer(refuted=True, survivor=None)
 
 
 class Enough:

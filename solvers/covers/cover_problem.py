@@ -103,11 +103,6 @@ class CoverProblem:
                 value.flags.writeable = False
             object.__setattr__(self, name, value)
 
-    @property
-    def total_weights(self) -> NDArray[np.float64]:
-        """Weight of all elements of each row set, shape (n_g,)."""
-        return self.by_row_set(self.weights)
-
     def by_row_set(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the sums of elements' values over each row set, shape (n_g,)."""
         return _sums(values, self.row_sets, self.n_row_sets)

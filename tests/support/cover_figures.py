@@ -10,6 +10,6 @@ def shortfall(solution):
     problem = solution.problem
     missing = problem.required_weight - problem.covered_weights(solution.selected)
     missing[missing <= forgiven(problem)] = 0.0
-    totals = problem.total_weights
+    totals = problem.by_row_set(problem.weights)
     shares = missing / np.where(totals > 0, totals, np.maximum(missing, 1e-300))
     return float(shares.max())

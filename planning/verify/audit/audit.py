@@ -77,11 +77,6 @@ class Audit:
     unmet: tuple[str, ...]
     case: AuditCase
 
-    @property
-    def passed(self) -> bool:
-        """Whether every claim held."""
-        return not self.failures
-
     @cached_property
     def areas(self) -> dict[str, dict[str, float]]:
         """Recomputed AREAS of `surface` and `target`, keys as in `coverage` [m²]."""
