@@ -24,7 +24,7 @@ from planning.rings.ring_radii import ring_gap, uniform_radii
 from planning.scene.bodies.clearance import check_existing_clearance
 from planning.scene.interest import Select, Weight, interest_of
 from planning.scene.lights import light_of, ring_frame
-from planning.scene.obstructions import Obstruction
+from planning.scene.placed_bodies import Obstruction
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
 

@@ -13,8 +13,7 @@ from planning.proofs.selection import Selection, select_fewest
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins
 from planning.scene.limits import projector_limits
-from planning.scene.obstructions import Obstruction
-from planning.scene.placed_bodies import PlacedBody
+from planning.scene.placed_bodies import Obstruction, PlacedBody
 from planning.scene.scene import Scene
 from solvers import solve_cover
 

@@ -20,8 +20,7 @@ from planning.scene.lighting import (
 from planning.scene.limits import camera_limits, pair_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, furthest_failure, measured_by
-from planning.scene.obstructions import Obstruction
-from planning.scene.placed_bodies import Device, blocked_by
+from planning.scene.placed_bodies import Device, Obstruction, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

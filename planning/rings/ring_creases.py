@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
 from planning.model.planned import PlannedProjector
-from planning.scene.lighting import first_failure
-from planning.scene.lights import light_on
+from planning.scene.lighting import first_failure, light_on
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns import pattern_of
 from planning.scene.scene import Scene

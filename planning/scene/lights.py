@@ -1,9 +1,7 @@
 """The two kinds of light, and all that differs between them for the planner.
 
 Diverging light starts at the optical centre; its rings are cones R = tan(angle to the
-ring axis). Parallel light starts all over the panel and runs along the device's +z; its
-rings are cylinders of radius R in [m]. A light belongs to a projector's optics and
-holds no pose.
+ring axis). Parallel light runs along the device's +z; rings are cylinders, R in [m].
 """
 
 import math
@@ -14,10 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from geometry.mesh.tensors import lengths
-from planning.model.planned import PlannedProjector
 from solvers.poses.axis_program import axis_direction
-
-from .samples import SampleArrays, Target
 
 _Array = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
@@ -303,25 +298,6 @@ def ring_frame(
     """
     light = light_of(device)
     return world_from_device @ light.ring_frame(light.ring_axis(offset, azimuth))
-
-
-@dataclass(frozen=True, eq=False)
-class LightOnSamples(SampleArrays):
-    """-N.L and |T1.L| (0 where T1 is arbitrary) of n samples, before occlusion."""
-
-    incidence_cos: _Array
-    tangent_cos: _Array
-
-
-def light_on(projector: PlannedProjector, target: Target) -> LightOnSamples:
-    """Return the light of a projector at samples, wherever they are."""
-    points, normals = target.samples.points, target.samples.normals
-    light = light_of(projector.device)
-    directions = light.directions(projector.world_from_device, points)
-    return LightOnSamples(
-        -np.einsum("ij,ij->i", normals, directions),
-        np.abs(np.einsum("ij,ij->i", target.steep, directions)),
-    )
 
 
 def _frame_along(z: _Array) -> _Array:

@@ -31,7 +31,7 @@ from planning.scene.limits.limit import first_violated
 from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality
 from planning.scene.patterns import CodeSurfaces
 
-from .lights import LightOnSamples
+from .lighting import LightOnSamples
 from .placed_bodies import Blocker, first_blocked
 from .samples import Target
 

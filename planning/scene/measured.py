@@ -15,8 +15,7 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns import CodeSurfaces, pattern_of
 
 from .camera_views import CameraView, camera_views, view_of
-from .lighting import lit_stages
-from .lights import LightOnSamples, light_on
+from .lighting import LightOnSamples, light_on, lit_stages
 from .measurability import first_pair_failure, pair_quality
 from .samples import Target
 from .scene import Scene

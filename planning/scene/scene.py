@@ -17,8 +17,14 @@ from planning.model.requirements import Requirements, Workspace
 from planning.scene.workspace.view_tiles import Site
 
 from .draws import DRAWS, Draw
-from .obstructions import Obstruction
-from .placed_bodies import Blocker, Device, PlacedBody, bodies_of, existing_bodies
+from .placed_bodies import (
+    Blocker,
+    Device,
+    Obstruction,
+    PlacedBody,
+    bodies_of,
+    existing_bodies,
+)
 from .samples import Target
 
 Kind = Literal["projector", "camera"]

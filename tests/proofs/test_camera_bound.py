@@ -32,7 +32,8 @@ from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
-from planning.scene.lights import LightOnSamples, ring_frame
+from planning.scene.lighting import LightOnSamples
+from planning.scene.lights import ring_frame
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.patterns import CodeSurfaces

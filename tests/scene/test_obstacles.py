@@ -20,7 +20,7 @@ from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.rig_picture import draw_rig
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
-from planning.scene.obstructions import Obstruction
+from planning.scene.placed_bodies import Obstruction
 from planning.verify.audit.audit import audit_plan
 from planning.verify.reconstruction.render.occluders import obstacles_of
 

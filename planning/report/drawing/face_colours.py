@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.plan import RigPlan
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.obstructions import Obstruction
+from planning.scene.placed_bodies import Obstruction
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

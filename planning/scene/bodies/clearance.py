@@ -7,13 +7,13 @@ import numpy as np
 
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene.obstructions import touches_mesh
 from planning.scene.placed_bodies import (
     CLEARANCE_M,
     Device,
     collide,
     existing_devices,
     placed_box,
+    touches_mesh,
 )
 from planning.scene.scene import Scene
 from planning.scene.workspace.admissible import broken_by_body
