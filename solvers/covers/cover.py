@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solvers.checked_numbers import set_names, whole_number
-from solvers.covers.bounds.reductions import ReducedCover, reduce_problem
+from solvers.covers.bounds.reductions import ReducedCover, forgiven, reduce_problem
 from solvers.covers.search.neighbourhood import greedy, prune
 from solvers.one_thread import on_one_thread
 from solvers.status import SolveStatus, WorkBudget
@@ -60,6 +60,15 @@ class CoverSolution:
     def covered_weight(self) -> float:
         """Weight that the selection covers, recomputed from the problem."""
         return self.problem.covered_weight(self.selected)
+
+    def shortfall(self) -> float:
+        """Return the largest missing share of a row set's weight; 0 if all are met."""
+        problem = self.problem
+        missing = problem.required_weight - problem.covered_weights(self.selected)
+        missing[missing <= forgiven(problem)] = 0.0
+        totals = problem.by_row_set(problem.weights)
+        shares = missing / np.where(totals > 0, totals, np.maximum(missing, 1e-300))
+        return float(shares.max())
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
-from support.cover_figures import shortfall
 
 from solvers import CoverProblem, solve_cover
 from solvers.covers.bounds import reductions
@@ -98,7 +97,7 @@ def test_equals_brute_force_whatever_the_budget(first):
                     problem.covered_weight(range(problem.costs.size))
                 )
                 continue
-            assert shortfall(solution) == 0.0, seed
+            assert solution.shortfall() == 0.0, seed
             assert solution.lower_bound <= best + 1e-9, seed
             if solution.status is SolveStatus.OPTIMAL or budget == 1e9:
                 assert solution.status is SolveStatus.OPTIMAL, seed
@@ -151,7 +150,7 @@ def test_the_most_weight_is_left_out_on_request_and_nothing_else():
         any_one = solve_cover(problem, heaviest=False)
         assert (any_one.status, any_one.lower_bound) == (best.status, best.lower_bound)
         assert (any_one.cost, any_one.proof) == (best.cost, best.proof)
-        assert shortfall(any_one) == 0.0
+        assert any_one.shortfall() == 0.0
         assert any_one.covered_weight <= best.covered_weight
         lighter += any_one.covered_weight < best.covered_weight
         few = [solve_cover(problem, max_sets=2, heaviest=h) for h in (True, False)]
@@ -205,7 +204,7 @@ def test_unreachable_weight_is_an_answer():
     solution = solve_cover(from_sets([{0}, {1}], 3, weights=np.array([1.0, 2.0, 5.0])))
     assert solution.status is SolveStatus.INFEASIBLE
     assert solution.covered_weight == 3.0
-    assert shortfall(solution) == pytest.approx(5 / 8)
+    assert solution.shortfall() == pytest.approx(5 / 8)
 
 
 def test_too_few_sets_allowed():
@@ -253,7 +252,7 @@ def test_what_the_search_forgives_is_no_shortfall():
         asked = total * (1.0 + missing)
         problem = CoverProblem(covers, weights, required_weight=asked)
         solution = solve_cover(problem)
-        assert (shortfall(solution) == 0.0) is served
+        assert (solution.shortfall() == 0.0) is served
         assert (solution.status is SolveStatus.OPTIMAL) is served
 
 
@@ -302,8 +301,8 @@ def test_many_columns_are_not_all_compared(monkeypatch):
 def test_shortfall_catches_a_dropped_set():
     good = solve_cover(from_sets([{0, 1}, {2}], 3))
     spoiled = dataclasses.replace(good, selected=good.selected[:1])
-    assert shortfall(good) == 0.0
-    assert shortfall(spoiled) == pytest.approx(1 / 3)
+    assert good.shortfall() == 0.0
+    assert spoiled.shortfall() == pytest.approx(1 / 3)
 
 
 @pytest.mark.parametrize("share", [0.9, 0.95])
@@ -339,7 +338,7 @@ def test_budget_zero_still_gives_a_cover_and_a_true_bound():
     best = solve_cover(problem)
     rough = solve_cover(problem, budget=0.0)
     assert best.status is SolveStatus.OPTIMAL
-    assert shortfall(rough) == 0.0
+    assert rough.shortfall() == 0.0
     assert rough.lower_bound <= best.cost <= rough.cost
     if rough.status is SolveStatus.FEASIBLE:
         assert "work budget" in rough.proof
@@ -350,7 +349,7 @@ def test_time_limit_cuts_and_says_so():
     problem = CoverProblem(covers, weights, min_coverage=1.0)
     best = solve_cover(problem)
     cut = solve_cover(problem, time_limit=0.0)
-    assert shortfall(cut) == 0.0
+    assert cut.shortfall() == 0.0
     assert cut.lower_bound <= best.cost
     assert cut.status is SolveStatus.FEASIBLE
     assert "time limit" in cut.proof
@@ -532,7 +531,7 @@ def test_published_covers_are_proved(name, set_cover_files):
     instance, covers, _ = published(set_cover_files, name)
     solution = solve_cover(CoverProblem(covers), budget=2e10)
     assert solution.status is SolveStatus.OPTIMAL
-    assert shortfall(solution) == 0.0
+    assert solution.shortfall() == 0.0
     assert solution.lower_bound == solution.cost == instance.fewest
 
 
@@ -540,7 +539,7 @@ def test_published_covers_are_proved(name, set_cover_files):
 def test_published_covers_are_nearly_reached_by_little_work(name, set_cover_files):
     instance, covers, _ = published(set_cover_files, name)
     solution = solve_cover(CoverProblem(covers), budget=2e9)
-    assert shortfall(solution) == 0.0
+    assert solution.shortfall() == 0.0
     assert solution.lower_bound <= instance.fewest <= solution.cost
     assert solution.cost <= instance.fewest + 1
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from support.cover_figures import shortfall
 
 from solvers import CoverProblem, solve_cover
 from solvers.covers.cover import solve_max_coverage
@@ -135,7 +134,7 @@ def _check_cover(solution, least, *, cut):
             problem.covered_weight(range(problem.costs.size))
         )
         return
-    assert shortfall(solution) == 0.0
+    assert solution.shortfall() == 0.0
     assert solution.lower_bound <= least * (1 + 1e-9)
     if not cut:
         assert solution.status is SolveStatus.OPTIMAL
