@@ -96,6 +96,9 @@ def main() -> int:
         return _compare(
             *(json.loads(p.read_text()) for p in (words.before, words.after))
         )
+    here = {"face.obj", "face.obj, room and bodies", "ranges"}
+    if unknown := set(words.names) - here - set(JOBS):
+        parser.error(f"no such job: {', '.join(sorted(unknown))}")
     machine = (
         f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, "
         f"python {platform.python_version()}"
