@@ -6,8 +6,9 @@ Usage: python -m benchmarks.bounds.attack_cameras [--meshes NAME ...] [--poses 2
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any):
 projectors as planned, three at most, and random admissible camera poses, aimed at or
 beside the object at any roll, against the cells that the bound on cameras rests on:
-those without shadows, those among shadows, and those by aim. What a pose measures is
-said by the predicates of `planning.verify.audit`, which share no code with the planner.
+those without shadows, those among shadows (of two sizes), and those by aim. What a pose
+measures is said by the predicates of `planning.verify.audit`, which share no code with
+the planner.
 
 `--lens long` narrows the cameras' field to a quarter, so that it binds.
 
@@ -194,12 +195,12 @@ def trees_of(
 ) -> dict[str, Tree]:
     """Return the planner's cells; without shadows only, where it leaves these out."""
     effort = Effort(finest=finest, aims=aims, maps=finest, budget=1.0, shadows=np.inf)
-    names = ("without shadows", "among shadows", "by aim")
+    names = ("without shadows", "among shadows", "among shadows, finer", "by aim")
     trees = camera_trees(scene, device, rows, effort)
     return {
         name: tree
         for name, (tree, shadows) in zip(names, trees, strict=False)
-        if shadows or name != "among shadows"
+        if shadows or not name.startswith("among")
     }
 
 
