@@ -1,7 +1,6 @@
 """What projectors light of samples: which limit fails first, and with what margin."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,29 +23,23 @@ from planning.scene.limits.projector_limits import (
 
 from .lights import light_of
 from .placed_bodies import Blocker, blocked_by, first_blocked
-from .samples import SampleArrays, SampleColumns, Target
+from .samples import LightOnSamples, SampleColumns, Target
 from .scene import Scene
 
 # Projectors that a thread takes on at a time.
 _SHARED = 32
 
 
-@dataclass(frozen=True, eq=False)
-class LightOnSamples(SampleArrays):
-    """-N.L and |T1.L| (0 where T1 is arbitrary) of n samples, before occlusion."""
-
-    incidence_cos: NDArray[np.float64]
-    tangent_cos: NDArray[np.float64]
-
-
 def light_on(projector: PlannedProjector, target: Target) -> LightOnSamples:
     """Return the light of a projector at samples, wherever they are."""
     points, normals = target.samples.points, target.samples.normals
     light = light_of(projector.device)
-    directions = light.directions(projector.world_from_device, points)
+    pose = projector.world_from_device
+    directions = light.directions(pose, points)
     return LightOnSamples(
         -np.einsum("ij,ij->i", normals, directions),
         np.abs(np.einsum("ij,ij->i", target.steep, directions)),
+        points - pose[:3, 3],
     )
 
 

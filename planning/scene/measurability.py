@@ -31,9 +31,8 @@ from planning.scene.limits.limit import first_violated
 from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality
 from planning.scene.patterns import CodeSurfaces
 
-from .lighting import LightOnSamples
 from .placed_bodies import Blocker, first_blocked
-from .samples import Target
+from .samples import LightOnSamples, Target
 
 
 def view(
@@ -90,7 +89,7 @@ def pair_quality(
     placement = (limits.ring_sigma_m or 0.0) * facing / safe
     pitch = surfaces.spacing * facing / np.maximum(seen.distances * g, 1e-15)
     sigma = np.hypot(spread, placement)
-    return PairQuality(conditioning, sigma, pitch)
+    return PairQuality(conditioning, sigma, pitch, seen, light)
 
 
 def first_pair_failure(

@@ -15,9 +15,9 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.patterns import CodeSurfaces, pattern_of
 
 from .camera_views import CameraView, camera_views, view_of
-from .lighting import LightOnSamples, light_on, lit_stages
+from .lighting import light_on, lit_stages
 from .measurability import first_pair_failure, pair_quality
-from .samples import Target
+from .samples import LightOnSamples, Target
 from .scene import Scene
 
 # Seen by several cameras and worked on together: many calls on few samples are slow,

@@ -58,6 +58,21 @@ class SampleArrays:
 
 
 @dataclass(frozen=True, eq=False)
+class LightOnSamples(SampleArrays):
+    """One projector's light on n samples, before occlusion.
+
+    Attributes:
+        incidence_cos: -N.L, shape (n,).
+        tangent_cos: |T1.L|, 0 where T1 is arbitrary, shape (n,).
+        offsets: From the projector's origin to them, in the world [m], shape (n, 3).
+    """
+
+    incidence_cos: NDArray[np.float64]
+    tangent_cos: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
 class SampleColumns:
     """Samples and T1, (3, n) each: rows of three are too short for numpy's loops."""
 

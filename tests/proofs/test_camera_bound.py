@@ -32,11 +32,11 @@ from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
-from planning.scene.lighting import LightOnSamples
 from planning.scene.lights import ring_frame
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.patterns import CodeSurfaces
+from planning.scene.samples import LightOnSamples
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
 
@@ -89,7 +89,7 @@ def everything_lit(scene, n):
     normals, one = target.samples.normals, np.ones(n)
     across = np.cross(normals, [0.3, 0.5, 0.8])
     across /= np.linalg.norm(across, axis=1)[:, None]
-    light = LightOnSamples(one, 0.0 * one)
+    light = LightOnSamples(one, 0.0 * one, np.zeros((n, 3)))
     lit = np.ones((n, 1), dtype=bool)
     return LitSamples(target, lit, (light,), (CodeSurfaces(across, 0.01 * one),))
 

@@ -181,6 +181,10 @@ def test_a_camera_on_the_thales_circle_is_blind():
     assert quality.conditioning[0] < 1e-12
     stage = measurability.first_pair_failure(quality, LIMITS)
     assert pair_limits.CAUSES[stage[0]] == "conditioning"
+    # A limit of pairs knows where both devices stand.
+    to_camera = quality.view.distances[:, None] * quality.view.rays
+    between = quality.light.offsets - to_camera
+    assert np.allclose(between, camera_at - source.world_from_device[:3, 3])
 
 
 def test_the_first_limit_that_fails_is_named_in_order():
@@ -188,6 +192,7 @@ def test_the_first_limit_that_fails_is_named_in_order():
         np.array([0.05, 0.5, 0.5, 0.5, np.nan]),
         np.array([9.0, 9.0, 1e-4, 1e-4, 1e-4]),
         np.array([0.1, 0.1, 0.1, 9.0, 9.0]),
+        *(None, None),
     )
     limits = TriangulationLimits(0.1, 0.1, max_sigma_m=1e-3, min_ring_pitch_px=6.0)
     stage = measurability.first_pair_failure(quality, limits)

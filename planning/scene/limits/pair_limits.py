@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from planning.model.requirements import TriangulationLimits
+from planning.scene.samples import LightOnSamples
 
-from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES
+from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES, ViewedSamples
 from .limit import (
     Array,
     Limit,
@@ -37,11 +38,15 @@ class PairQuality:
         conditioning: |r.m|, shape (n,).
         sigma: s_N in [m], shape (n,).
         pitch: Distance of neighbouring rings in the image in [px], shape (n,).
+        view: How the camera sees them: it stands at -t r from a sample.
+        light: That falls on them: the projector stands at minus its offsets.
     """
 
     conditioning: Array
     sigma: Array
     pitch: Array
+    view: ViewedSamples
+    light: LightOnSamples
 
 
 @dataclass(frozen=True, eq=False)
