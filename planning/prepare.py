@@ -92,14 +92,17 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
 
     Raises:
         InputError: If nothing is curved enough to be a target.
+        RigError: If an obstacle's file can't be read.
         InfeasibleLimitsError: If limits exclude each other.
     """
     mesh, rig = request.mesh, request.rig
+    # What the rig asks for in vain is told before the work.
+    requirements, radii = _resolve(request)
+    obstacles = rig.obstacles(requirements.workspace, mesh)
     with clock.stage("regions", "curvature and dominant regions"):
         field = principal_curvatures(mesh)
         regions = _regions(request, field)
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
-    requirements, radii = _resolve(request)
     scene = Scene(
         mesh,
         regions.face_region,
@@ -108,9 +111,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         request.seed,
         request.threads,
         clock.check,
-        obstructions=Obstruction.about(
-            mesh, rig.obstacles(requirements.workspace, mesh)
-        ),
+        obstructions=Obstruction.about(mesh, obstacles, request.threads),
     )
     template = PlannedProjector(
         "",

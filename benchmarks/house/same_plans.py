@@ -96,16 +96,16 @@ def main() -> int:
         return _compare(
             *(json.loads(p.read_text()) for p in (words.before, words.after))
         )
-    here = {"face.obj", "face.obj, room and bodies", "ranges"}
-    if unknown := set(words.names) - here - set(JOBS):
-        parser.error(f"no such job: {', '.join(sorted(unknown))}")
     machine = (
         f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, "
         f"python {platform.python_version()}"
     )
     jobs: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
-        for name, arguments in _jobs(Path(folder)):
+        offered = dict(_jobs(Path(folder)))
+        if unknown := set(words.names) - set(offered):
+            parser.error(f"no such job: {', '.join(sorted(unknown))}")
+        for name, arguments in offered.items():
             if not words.names or name in words.names:
                 jobs[name] = _planned(words.python, arguments, Path(folder, "out"))
                 print(f"{name}: {jobs[name]['wall_s']:.0f} s", file=sys.stderr)

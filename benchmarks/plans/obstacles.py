@@ -3,8 +3,9 @@
 Usage: python -m benchmarks.plans.obstacles [--pictures FOLDER] [--threads N]
 
 The rigs are `docs/use/rigs/*.toml`. Each plan is checked from pixels, `plan verify`
-audits it, and rays of trimesh are cast from every sample that a camera measures: none
-may meet an obstacle. Prints a table; returns 1 if a ray meets one or an audit fails.
+audits it, and rays of trimesh are cast to every measured sample, from the projectors
+that light it and the cameras that measure it: none may meet an obstacle. Prints a
+table; returns 1 if a ray meets one or an audit fails.
 """
 
 import argparse
@@ -52,14 +53,17 @@ def best(rig: Rig, threads: int) -> tuple[RigPlan, float]:
 
 
 def blocked_rays(plan: RigPlan) -> tuple[int, int]:
-    """Views of measured samples that meet an obstacle, and all of them."""
-    case = audit_plan(plan, n_samples=4000).case
+    """Light to measured samples and views of them that meet an obstacle, and all."""
+    actual = audit_plan(plan, n_samples=4000).case.actual
     solid = trimesh.util.concatenate(
         [to_trimesh(each.mesh) for each in plan.surface.obstacles]
     )
     met = n = 0
-    for camera, seen in zip(plan.cameras, case.actual.measured_by, strict=True):
-        start, points = camera.world_from_device[:3, 3], case.samples.points[seen]
+    for device, ends in (
+        *zip(plan.projectors, actual.lit_by & actual.measured, strict=True),
+        *zip(plan.cameras, actual.measured_by, strict=True),
+    ):
+        start, points = device.world_from_device[:3, 3], actual.samples.points[ends]
         ways = points - start
         length = np.linalg.norm(ways, axis=1)
         spots, ray, _ = solid.ray.intersects_location(
@@ -122,7 +126,10 @@ def main() -> int:
             plan.save(Path(folder) / "plan.json")
             again = audit_plan(RigPlan.load(Path(folder) / "plan.json"))
         failed = failed or met > 0 or not again.passed
-        print(f"<!-- {met} of {n} views meet an obstacle; {again.failures} -->")
+        print(
+            f"<!-- {met} of {n} rays of light and of sight meet an obstacle; "
+            f"{again.failures} -->"
+        )
         if options.pictures is not None:
             picture = draw_rig(plan, face_status=face_status(plan))
             small = picture.resize((1000, 625)).quantize(192, dither=Image.Dither.NONE)

@@ -12,6 +12,7 @@ from typing import IO
 
 from geometry.mesh.mesh import MeshError
 
+from .file_content import file_content
 from .formats import SUPPORTED
 
 # A small archive can unpack to more than any machine holds.
@@ -27,7 +28,7 @@ _DAMAGED = (
 def file_bytes(path: str | Path) -> bytes:
     """Return the bytes of a file as it is."""
     try:
-        data = Path(path).read_bytes()
+        data = file_content(path)
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file; check the path") from None
     except IsADirectoryError:
@@ -54,7 +55,7 @@ def unpacked(path: Path, data: bytes) -> _Unpacked:
         elif suffixes[-1] == "bz2":
             content = _at_most(_bunzipped(data))
         else:
-            return suffixes[-1], data, lambda name: (path.parent / name).read_bytes()
+            return suffixes[-1], data, lambda name: file_content(path.parent / name)
     except _DAMAGED as error:
         raise MeshError(f"{path}: can't be unpacked ({error})") from None
     return (suffixes[-2] if len(suffixes) > 1 else ""), content, None

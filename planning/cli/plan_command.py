@@ -70,7 +70,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         def keep(plan: RigPlan) -> None:
             with uninterrupted():
                 _save(plan, folder, report, patterns=not options["no_patterns"])
-            saved.append(plan)
+                saved.append(plan)
             report(f"written to {folder}, NOT CHECKED yet")
 
         try:

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
+from geometry.files.file_content import file_content
 from planning.model.document.coverage_records import Coverage
 from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
 
@@ -118,7 +119,7 @@ class RigPlan:
         """
         path = Path(path)
         with reading(path, PlanFileError):
-            content = path.read_bytes()
+            content = file_content(path)
         _require_plan(content, path)
         document = _document(content, str(path))
         surface = document.surface

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import Array, Ints, Mask
+from geometry.files.file_content import file_content
 from geometry.mesh.mesh import MeshError, TriangleMesh
+from geometry.mesh.topology import numbered
 
 from .errors import PlanFileError
 from .files import reading
@@ -39,6 +41,8 @@ _OBSTACLES: dict[str, tuple[str, tuple[int | str, ...]]] = {
     "obstacle_faces": ("iu", ("n", 3)),
     "obstacle_of_face": ("iu", ("n",)),
 }
+# Squares and cubes of what is larger by far overflow.
+_LARGEST = 1e9
 _BESIDE_MESH = list(_ARRAYS)[2:]
 # What numpy and zipfile raise on damaged archives, beside OSError and ValueError.
 _DAMAGED = (
@@ -132,7 +136,7 @@ class Surface:
         beside = "; the surface must stand beside the plan, "
         beside += "copy both from the output folder"
         with reading(path, PlanFileError, absent=beside):
-            content = path.read_bytes()
+            content = file_content(path)
         # Before it is unpacked: what was damaged on the way may break any reader.
         if sha256 not in (None, hashlib.sha256(content).hexdigest()):
             raise PlanFileError(
@@ -169,8 +173,9 @@ def _check_arrays(
             want in ("n", has) for want, has in zip(wanted, array.shape, strict=True)
         )
         fits &= array.dtype.kind in kinds
-        if not fits or (kinds == "f" and not np.isfinite(array).all()):
-            number = {"f": "finite floats", "iu": "integers", "U": "names"}[kinds]
+        if not fits or (kinds == "f" and not np.all(np.abs(array) < _LARGEST)):
+            floats = f"floats of less than {_LARGEST:g}"
+            number = {"f": floats, "iu": "integers", "U": "names"}[kinds]
             raise PlanFileError(
                 f"`{name}` must be ({', '.join(map(str, wanted))}) {number}, got "
                 f"{array.dtype} of shape {array.shape}; plan again"
@@ -200,12 +205,12 @@ def _unpacked(
         return ()
     if not (len(of_face) == len(faces) and np.all(np.isin(of_face, range(len(names))))):
         raise MeshError("`obstacle_of_face` must name an obstacle for each face")
-    if not np.all((faces >= 0) & (faces < len(vertices))):
-        raise MeshError("`obstacle_faces` must name vertices that there are")
     obstacles: list[Obstacle] = []
-    for index, name in enumerate(names.tolist()):
-        used, numbered = np.unique(faces[of_face == index], return_inverse=True)
-        obstacles.append(
-            Obstacle(name, TriangleMesh(vertices[used], numbered.reshape(-1, 3)))
-        )
+    try:
+        TriangleMesh(vertices, faces)
+        for index, name in enumerate(names.tolist()):
+            used, local = numbered(faces[of_face == index], len(vertices))
+            obstacles.append(Obstacle(name, TriangleMesh(vertices[used], local)))
+    except MeshError as error:
+        raise MeshError(f"`obstacle_vertices` and `obstacle_faces`: {error}") from None
     return tuple(obstacles)

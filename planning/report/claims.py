@@ -1,5 +1,6 @@
 """What a plan may claim: areas recomputed from its poses on fresh samples."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +21,7 @@ from planning.scene.lighting import (
 from planning.scene.limits import camera_limits, pair_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, furthest_failure, measured_by
-from planning.scene.placed_bodies import Device, Obstruction, blocked_by
+from planning.scene.placed_bodies import Blocker, Device, Obstruction, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -187,35 +188,41 @@ def _blocked(
 ) -> dict[str, dict[str, float]]:
     """Unmeasured area that bodies and obstacles keep light or a view from, by name.
 
-    Where nothing else stops a device of the plan; of obstacles also where nothing else
-    stops a reference projector, and none lights it. By key of `coverage`.
+    Where nothing else stops a device of the plan; of obstacles also where no reference
+    projector lights it, and nothing else stops one. By key of `coverage`.
     """
     if not scene.bodies:
         return {}
     samples = target.target
     stopped = np.zeros((len(samples), len(scene.bodies)), dtype=bool)
 
-    def note(device: Device, dark: NDArray[np.int64]) -> None:
+    def note(
+        device: Device, dark: NDArray[np.int64], bodies: Sequence[Blocker]
+    ) -> None:
         points = samples.samples.points[dark]
-        stopped[dark] |= blocked_by(scene.bodies, device, points)
+        # Obstacles come first among all bodies.
+        stopped[dark, : len(bodies)] |= blocked_by(bodies, device, points)
 
     for projector, first in zip(devices.projectors, target.first.T, strict=True):
         dark = ~target.measured & np.isin(first, _BETWEEN_LIGHT)
-        note(projector, np.flatnonzero(dark))
+        note(projector, np.flatnonzero(dark), scene.bodies)
     pending = np.flatnonzero(~target.measured & target.lit)
     for camera in devices.cameras:
         first = view_of(scene, camera, samples.take(pending)).first_violated
-        note(camera, pending[np.isin(first, _BETWEEN_VIEW)])
+        note(camera, pending[np.isin(first, _BETWEEN_VIEW)], scene.bodies)
     dark = np.flatnonzero(~target.lit)[target.furthest == projector_limits.OBSTRUCTED]
+    # As in `furthest_lit`: a reference projector stands among no planned device.
+    standing = scene.among(())
     for projector in devices.reference_projectors if len(dark) else ():
         first = first_failure(
             projector,
             samples.take(dark),
             scene.requirements.projector,
             scene.visibility,
-            bodies=scene.obstructions,
+            bodies=standing.bodies,
         )
-        note(projector, dark[first == projector_limits.OBSTRUCTED])
+        obstructed = dark[first == projector_limits.OBSTRUCTED]
+        note(projector, obstructed, scene.obstructions)
     blocked: dict[str, dict[str, float]] = {}
     every = (*devices.projectors, *devices.cameras)
     for body, column in zip(scene.bodies, stopped.T, strict=True):

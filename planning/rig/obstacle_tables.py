@@ -19,10 +19,12 @@ from planning.model.bodies import Box
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.obstacles import Obstacle
 from planning.model.requirements import Workspace
-from planning.model.table_types import Axis, Name, Positive, Sides, Table
+from planning.model.table_types import Axis, Name, Table
 
-from .workspace_tables import WorkspaceTable, turned
+from .workspace_tables import LARGEST_MM, WorkspaceTable, turned
 
+_Length = Annotated[float, Field(gt=0.0, le=LARGEST_MM)]
+_Sides = Annotated[list[_Length], Field(min_length=3, max_length=3)]
 # What each shape is told by, beside its place.
 _KEYS = {
     "box": {"size_mm"},
@@ -45,9 +47,9 @@ class ObstacleTable(Table):
     shape: Literal["box", "cylinder", "table", "mesh"]
     centre_mm: Axis | None = None
     turn_deg: Axis = Field(default=[0.0, 0.0, 0.0])
-    size_mm: Sides | None = None
-    radius_mm: Positive | None = None
-    height_mm: Positive | None = None
+    size_mm: _Sides | None = None
+    radius_mm: _Length | None = None
+    height_mm: _Length | None = None
     file: Name | None = None
     unit: Annotated[str, Field(pattern=f"^({'|'.join(UNITS)})$")] | None = None
 
@@ -78,30 +80,32 @@ class ObstacleTable(Table):
         `lowest_m` is the height of the object's lowest point over the centre [m].
 
         Raises:
-            RigError: If its file can't be read in `folder`.
+            RigError: If its file can't be read in `folder`, or it has no surface.
         """
         turn = turned(self.turn_deg)
         up = np.array(workspace.up)
         place = lowest_m * up
         if self.centre_mm is not None:
             place = 1e-3 * np.array(self.centre_mm)
-        local = self._local(folder)
+        try:
+            local = self._local(folder)
+        except MeshError as error:
+            raise RigError(f"obstacle {self.name!r}: {error}") from None
         if self.shape == "table":
             turn = turn @ _upright(up)
-            place = place - 0.5e-3 * (self.size_mm or [0.0] * 3)[2] * (turn @ [0, 0, 1])
         vertices = np.array(workspace.centre) + place + local.vertices @ turn.T
         return Obstacle(self.name, TriangleMesh(vertices, local.faces))
 
     def _local(self, folder: Path) -> TriangleMesh:
         if self.file is not None:
-            try:
-                return load_mesh(folder / self.file, unit=self.unit)
-            except MeshError as error:
-                raise RigError(f"obstacle {self.name!r}: {error}") from None
+            return load_mesh(folder / self.file, unit=self.unit)
         if self.radius_mm is not None and self.height_mm is not None:
             return primitives.cylinder(1e-3 * self.radius_mm, 1e-3 * self.height_mm)
         x, y, z = (1e-3 * side for side in self.size_mm or ())
-        return primitives.box((x, y, z))
+        box = primitives.box((x, y, z))
+        if self.shape == "table":
+            return TriangleMesh(box.vertices - [0.0, 0.0, 0.5 * z], box.faces)
+        return box
 
 
 def obstacles_of(

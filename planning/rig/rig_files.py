@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from geometry.files.file_content import file_content
 from planning.model.errors import RigError
 from planning.model.files import reading
 from planning.model.table_types import fault_words
@@ -134,7 +135,7 @@ def _is_path(name: str | Path) -> bool:
 def _read_file(path: Path) -> dict[str, Any]:
     presets = f"; give a rig file or a preset ({', '.join(preset_names())})"
     with reading(path, RigError, absent=presets):
-        content = path.read_bytes()
+        content = file_content(path)
     try:
         return tomllib.loads(content.decode())
     except ValueError as error:

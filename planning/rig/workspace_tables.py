@@ -23,6 +23,8 @@ _SHAPES = (
     ("cone", ("axis", "half_angle_deg"), ""),
     ("box", ("min_mm", "max_mm"), ", its two corners"),
 )
+# Rays are exact to a tenth of a micrometre for each metre of what they meet.
+LARGEST_MM = 1e5
 _IDENTITY: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -37,6 +39,15 @@ class KeepOutTable(Table):
     size_mm: Sides
     turn_deg: Axis = Field(default=[0.0, 0.0, 0.0])
     blocks: bool = True
+
+    @model_validator(mode="after")
+    def _check_blocks(self) -> Self:
+        if self.blocks and max(self.size_mm) > LARGEST_MM:
+            raise ValueError(
+                f"size_mm = {self.size_mm}: what stands in the way of light has sides "
+                f"of at most {LARGEST_MM:g} mm; write smaller ones, or blocks = false"
+            )
+        return self
 
     def box(self) -> Box:
         """Return the box in metres."""

@@ -111,6 +111,8 @@ def _move(
     """Move one axis if that is better; the judges then go by it."""
     scene, projector = judges[0].scene, moved[p]
     scene.check_cancelled()
+    if not judges[0].samples.lit[:, p].any():
+        return False
     light = light_of(projector.device)
     for axis in proposals(
         axis_program(scene, moved, p, judges[0].samples, judges[0].views)

@@ -9,12 +9,12 @@ import io
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.files.file_content import file_content
 from geometry.mesh.file_origin import FileOrigin
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.selected_regions import heaviest_faces
@@ -198,7 +198,7 @@ def _given(
     if where.startswith(_PROPERTY):
         return _property(origin, where.removeprefix(_PROPERTY), faces=faces), None
     try:
-        data = Path(where).read_bytes()
+        data = file_content(where)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{where}: can't be read ({reason}); check the path") from None

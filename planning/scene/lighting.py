@@ -134,6 +134,8 @@ def _mark_blocked(
     bodies: Sequence[Blocker],
 ) -> None:
     """Mark lit samples (n,) whose light meets a body or an obstacle."""
+    if not bodies:
+        return
     lit = np.flatnonzero(first == LIT)
     limits = BLOCKED, OBSTRUCTED
     first[lit] = first_blocked(bodies, projector, points[lit], limits, LIT)

@@ -45,15 +45,16 @@ class Obstruction:
     name: str
     mesh: TriangleMesh
     contact_m: float
+    threads: int = 2
 
     @classmethod
     def about(
-        cls, mesh: TriangleMesh, obstacles: Iterable[Obstacle]
+        cls, mesh: TriangleMesh, obstacles: Iterable[Obstacle], threads: int
     ) -> tuple["Obstruction", ...]:
         """Return what stands about an object."""
         low, high = mesh.bounds
         contact = _CONTACT * 0.5 * float(np.linalg.norm(high - low))
-        return tuple(cls(each.name, each.mesh, contact) for each in obstacles)
+        return tuple(cls(each.name, each.mesh, contact, threads) for each in obstacles)
 
     @property
     def words(self) -> str:
@@ -81,7 +82,7 @@ class Obstruction:
 
     @cached_property
     def _caster(self) -> RayCaster:
-        return RayCaster(self.mesh)
+        return RayCaster(self.mesh, threads=self.threads)
 
 
 def touches_mesh(box: OrientedBox, mesh: TriangleMesh) -> bool:
@@ -190,10 +191,12 @@ def blocked_by(
 
     The device's own body never does.
     """
+    blocked = np.zeros((len(points), len(bodies)), dtype=bool)
+    if not bodies:
+        return blocked
     pose = device.world_from_device
     local = transform(inverse(pose), points)
     starts = transform(pose, device.device.ray_starts(local))
-    blocked = np.zeros((len(points), len(bodies)), dtype=bool)
     for column, body in enumerate(bodies):
         if not body.is_of(device):
             blocked[:, column] = body.crossed(starts, points)

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from functools import partial
@@ -13,6 +14,7 @@ import pytest
 import planning
 from planning.cli.main import main
 from planning.cli.other_commands import write_sample
+from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -182,6 +184,29 @@ def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path)
     )
     assert done.returncode == 130
     assert not (tmp_path / "face-plan" / "plan.json").exists()
+
+
+def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
+    runs, tmp_path, monkeypatch, capsys
+):
+    folder, _ = runs
+    plan, saved = RigPlan.load(folder / "plan1" / "plan.json"), []
+
+    def made(*_, keep, **__):
+        try:
+            keep(plan)
+        except KeyboardInterrupt:
+            raise InterruptedPlanError(plan) from None
+
+    def save(plan, folder, *_, **__):
+        saved.append(folder)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr("planning.cli.plan_command.plan_rig", made)
+    monkeypatch.setattr("planning.cli.plan_command._save", save)
+    words = ["--mesh", folder / "face.obj", "--max-projectors", 3, "-o", tmp_path]
+    code, _, _ = in_process(monkeypatch, capsys, *words)
+    assert (code, saved) == (130, [tmp_path])
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Obstacles: what stands in the light is in the way for planner, audit and pixels."""
 
 from dataclasses import replace
+from io import BytesIO
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,10 +14,12 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes import primitives
 from geometry.shapes.clipping import clipped_to_ball
 from planning import RequirementError, load_rig, plan_rig
-from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.errors import InfeasibleLimitsError, PlanFileError, RigError
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
+from planning.model.surface import Surface
 from planning.report.drawing.face_colours import face_status
+from planning.report.drawing.obstacle_figures import obstacle_figures
 from planning.report.drawing.rig_picture import draw_rig
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
@@ -37,6 +40,10 @@ ROBOT = (
 POLE = (
     '[[obstacle]]\nname = "pole"\nshape = "cylinder"\ncentre_mm = [-90, 0, 200]\n'
     "radius_mm = 15\nheight_mm = 300\nturn_deg = [90, 0, 0]\n"
+)
+ARM = (
+    '[[obstacle]]\nname = "arm"\nshape = "mesh"\nfile = "arm.stl"\n'
+    "centre_mm = [0, 0, 0]\n"
 )
 BENCH = '[[obstacle]]\nname = "bench"\nshape = "table"\nsize_mm = [900, 700, 30]\n'
 
@@ -124,10 +131,26 @@ def test_a_table_lies_under_the_object_whatever_is_up(rig_of, up):
         ),
         (ROBOT + 'unit = "mm"\n', RigError, "write it beside file"),
         (
-            '[[obstacle]]\nname = "arm"\nshape = "mesh"\nfile = "none.stl"\n'
-            "centre_mm = [0, 0, 0]\n",
+            ARM.replace("arm.stl", "none.stl"),
             RigError,
             "obstacle 'arm'.*none.stl",
+        ),
+        (
+            ROBOT.replace("[80, 300, 60]", "[80, 3e5, 60]"),
+            RigError,
+            "size_mm.1.` = 300000.*less than or equal to 100000",
+        ),
+        (POLE.replace("= 300", "= 1e9"), RigError, "height_mm` = 1000000000"),
+        (
+            POLE.replace("= 15", "= 1e-12"),
+            RigError,
+            "obstacle 'pole': faces must be",
+        ),
+        (
+            '[[workspace.keep_out]]\nname = "beyond"\ncentre_mm = [0, 0, 1e6]\n'
+            "size_mm = [1e6, 1e6, 1e6]\n",
+            RigError,
+            "at most 100000 mm; write smaller ones, or blocks = false",
         ),
         (
             '[[workspace.keep_out]]\nname = "about it"\ncentre_mm = [0, 0, 0]\n'
@@ -140,6 +163,13 @@ def test_a_table_lies_under_the_object_whatever_is_up(rig_of, up):
 def test_bad_obstacles_are_refused(rig_of, text, error, message):
     with pytest.raises(error, match=message):
         standing(rig_of(text), plate())
+
+
+def test_a_file_that_is_missing_is_told_before_the_work(rig_of):
+    rig, said = rig_of(ARM.replace("arm.stl", "none.stl")), []
+    with pytest.raises(RigError, match=r"obstacle 'arm'.*none.stl"):
+        plan_rig(plate(), rig, max_projectors=1, progress=said.append)
+    assert not any("curvature" in line for line in said)
 
 
 def test_zones_block_unless_they_say_otherwise(rig_of):
@@ -206,24 +236,22 @@ def planned(tmp_path_factory, with_few_samples):
 def lines_of(plan):
     """Ends of each way of light and of sight to samples that a pair measures."""
     actual = audit_plan(plan, n_samples=3000).case.actual
+    lit = actual.lit_by & actual.measured
     for device, seen in (
-        *((p, actual.measured) for p in plan.projectors),
+        *zip(plan.projectors, lit, strict=True),
         *zip(plan.cameras, actual.measured_by, strict=True),
     ):
-        yield device, actual.samples.points[seen]
+        yield device.world_from_device[:3, 3], actual.samples.points[seen]
 
 
 def test_no_ray_of_a_measured_sample_meets_an_obstacle(planned):
-    """By trimesh's own rays, of every camera that measures."""
+    """By trimesh's own rays, of light and of sight."""
     assert audit_plan(planned, n_samples=3000).failures == ()
     solids = trimesh.util.concatenate(
         [to_trimesh(solid.mesh) for solid in planned.surface.obstacles]
     )
     n = 0
-    for device, points in lines_of(planned):
-        if device in planned.projectors:
-            continue
-        start = device.world_from_device[:3, 3]
+    for start, points in lines_of(planned):
         ways = points - start
         lengths = np.linalg.norm(ways, axis=1)
         spots, ray, _ = solids.ray.intersects_location(
@@ -232,7 +260,37 @@ def test_no_ray_of_a_measured_sample_meets_an_obstacle(planned):
         reach = np.linalg.norm(spots - start, axis=1)
         assert not np.any(reach < lengths[ray] - 1e-4)
         n += len(points)
-    assert n > 200
+    assert n > 400
+
+
+HOUSED = (
+    "[projector.body]\nsize_mm = [400, 400, 250]\ncentre_mm = [0, 0, -100]\n"
+    "[camera.body]\nsize_mm = [300, 300, 200]\ncentre_mm = [0, 0, -60]\n"
+)
+# It stands under the bench and looks away.
+STANDING = (
+    '[[existing]]\nname = "wall"\nkind = "projector"\n'
+    "position_mm = [0, 0, -800]\naim_mm = [0, 0, -2000]\n"
+)
+# Between that and the bench: what shines through it meets the housing first.
+SIGN = (
+    '[[obstacle]]\nname = "sign"\nshape = "box"\ncentre_mm = [0, 0, -500]\n'
+    "size_mm = [20, 20, 5]\n"
+)
+
+
+def test_housings_and_obstacles_are_told_apart(rig_of, with_few_samples):
+    """What the bench keeps all reference projectors from no housing is blamed for.
+
+    Nor is an obstacle that one of these projectors meets behind a housing.
+    """
+    rig = rig_of(HOUSED + BENCH + SIGN + STANDING + SMALL)
+    plan = best_plan(rig, plate(), with_few_samples)
+    coverage = plan.coverage
+    assert coverage.blocked_by_obstacle_m2["bench"] > 0.3 * coverage.target.area_m2
+    assert coverage.blocked_by_obstacle_m2["sign"] == 0.0
+    assert max(coverage.blocked_by_body_m2.values()) < 0.1 * coverage.target.area_m2
+    assert audit_plan(plan, n_samples=3000).failures == ()
 
 
 def test_what_they_cost_is_told_by_name(planned, rig_of, with_few_samples):
@@ -259,6 +317,34 @@ def test_they_are_drawn(planned):
         for plan in (planned, bare)
     )
     assert not np.array_equal(with_them, without)
+
+
+def test_one_that_is_called_like_forbidden_ground_is_drawn(rig_of, with_few_samples):
+    ground = BENCH.replace("[[obstacle]]", "[[workspace.keep_out]]").replace(
+        'shape = "table"', "blocks = false\ncentre_mm = [0, 0, -2000]"
+    )
+    plan = best_plan(rig_of(BENCH + ground + SMALL), plate(), with_few_samples)
+    assert [figure.name for figure in obstacle_figures(plan, 2.0)] == ["bench"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("obstacle_faces", np.zeros((0, 3), int), "obstacle_of_face"),
+        ("obstacle_of_face", np.array([7]), "name an obstacle for each face"),
+        ("obstacle_vertices", np.full((1, 3), 1e300), r"floats of less than 1e\+09"),
+        ("obstacle_vertices", np.zeros((1, 3)), "`obstacle_faces`: face indices span"),
+        ("obstacle_names", np.array(["a"] * 9), "`obstacle_faces`: faces must be"),
+    ],
+)
+def test_broken_arrays_of_obstacles_are_refused(
+    planned, tmp_path, name, value, message
+):
+    with np.load(BytesIO(planned.surface.content)) as archive:
+        arrays = {**archive, name: value}
+    np.savez(tmp_path / "surface.npz", **arrays)
+    with pytest.raises(PlanFileError, match=message):
+        Surface.load(tmp_path / "surface.npz")
 
 
 def test_surface_files_hold_them(planned, tmp_path):

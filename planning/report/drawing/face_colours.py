@@ -51,7 +51,7 @@ def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
         required,
         0,
         threads,
-        obstructions=Obstruction.about(mesh, surface.obstacles),
+        obstructions=Obstruction.about(mesh, surface.obstacles, threads),
     )
     scene = scene.among((*plan.projectors, *plan.cameras))
     faces = np.arange(len(mesh.faces))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.topology import face_pairs, mesh_edges
+from geometry.mesh.topology import face_pairs
 from planning.model.plan import RigPlan
 
 from .panel import Panel
@@ -34,7 +34,7 @@ class ObstacleFigure:
 
     def lines(self, towards: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the edges to draw for a viewer in a direction, (n, 2, 3) [m]."""
-        edges = mesh_edges(self.mesh.faces)
+        edges = self.mesh.edges
         pairs, shared = face_pairs(edges)
         normals = self.mesh.face_normals
         one, other = normals[pairs[:, 0]], normals[pairs[:, 1]]
@@ -46,22 +46,22 @@ class ObstacleFigure:
 
 
 def obstacle_figures(plan: RigPlan, reach_m: float) -> list[ObstacleFigure]:
-    """Return what is drawn of a plan's obstacles, keep-out zones left to zones.
+    """Return what is drawn of a plan's obstacles; zones that block are drawn as zones.
 
     Args:
         plan: The plan.
         reach_m: The picture follows them no farther from the workspace's centre.
     """
-    space = plan.requirements.workspace
-    centre, zones = np.array(space.centre), {zone.name for zone in space.keep_out}
+    centre = np.array(plan.requirements.workspace.centre)
+    # Zones come after them, perhaps under the same names.
+    n = len(plan.document.rig.obstacle)
     return [
         ObstacleFigure(
             solid.name,
             solid.mesh,
             centre + np.clip(solid.mesh.vertices - centre, -reach_m, reach_m),
         )
-        for solid in plan.surface.obstacles
-        if solid.name not in zones
+        for solid in plan.surface.obstacles[:n]
     ]
 
 

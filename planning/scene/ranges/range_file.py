@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from geometry.files.file_content import file_content
 from geometry.shapes.sight_lines import SightLines
 from planning.model.errors import InputError
 
@@ -57,7 +58,7 @@ def read_range_file(path: str | Path) -> RangeFile:
             the rule.
     """
     try:
-        data = Path(path).read_bytes()
+        data = file_content(path)
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "isn't text in UTF-8"

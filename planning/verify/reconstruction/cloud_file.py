@@ -133,6 +133,8 @@ class CloudFile:
 
 def is_cloud(path: Path) -> bool:
     """Return whether a file is a cloud that was written here."""
+    if not path.is_file():
+        return False
     try:
         with path.open("rb") as file:
             return file.read(512).split(b"\n")[2:3] == [_GENERATOR.encode()]

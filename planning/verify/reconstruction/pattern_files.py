@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from geometry.files.file_content import file_content
 from planning.model.errors import CapturesError
 from planning.model.files import write_together
 from planning.verify.reconstruction.arrays import Array
@@ -183,7 +184,7 @@ def check_patterns(scanner: Scanner, folder: Path) -> None:
 def _manifest(folder: Path) -> dict[str, Any]:
     """Return what the manifest in a folder says; nothing without one."""
     try:
-        manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+        manifest = json.loads(file_content(folder / _MANIFEST))
     except (OSError, ValueError):
         return {}
     return manifest if isinstance(manifest, dict) else {}

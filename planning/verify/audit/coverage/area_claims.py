@@ -1,11 +1,13 @@
 """Claims about areas: coverage, causes, and what each device contributes."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from geometry.arrays import Ints, Mask
+from geometry.arrays import Array, Ints, Mask
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import ROUNDING
@@ -26,6 +28,7 @@ from planning.verify.audit.predicates.predicates import (
     light_steps,
 )
 
+_Device = PlannedProjector | PlannedCamera | AuditProjector
 _CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
 
 
@@ -141,7 +144,7 @@ def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
     sight = np.isin(seen_lit, (CAMERA_BODY, SIGHT_OBSTACLE))
     stopped = [*(dark & light), *(dark & actual.lit & sight)]
     ways = [
-        (device.id, np.flatnonzero(flags), device)
+        _Ways.of(case, device.id, device, np.flatnonzero(flags))
         for device, flags in zip(devices, stopped, strict=True)
     ]
     beyond = [*ways, *_stopped_of_reference(case, dark)] if hindrances else []
@@ -156,17 +159,29 @@ def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
             continue
         for name, solid in solids.items():
             behind = np.zeros(len(dark), dtype=bool)
-            for whose, chosen, device in lines:
-                if whose != name or solids is hindrances:
-                    points = actual.samples.points[chosen]
-                    behind[chosen] |= solid.meets(light_starts(device, points), points)
+            for line in lines:
+                if line.device != name or solids is hindrances:
+                    behind[line.samples] |= solid.meets(line.starts, line.ends)
             case.estimator.audit(f"{key}.{name}", areas[name], behind, findings)
 
 
-def _stopped_of_reference(
-    case: AuditCase, dark: Mask
-) -> Iterator[tuple[str, Ints, AuditProjector]]:
-    """Yield each reference projector and the dark samples that obstacles keep it from.
+@dataclass(frozen=True, eq=False)
+class _Ways:
+    """Straight lines from a device, "" for one of a reference set, to samples (n,)."""
+
+    device: str
+    samples: Ints
+    starts: Array
+    ends: Array
+
+    @classmethod
+    def of(cls, case: AuditCase, name: str, device: _Device, samples: Ints) -> "_Ways":
+        ends = case.actual.samples.points[samples]
+        return cls(name, samples, light_starts(device, ends), ends)
+
+
+def _stopped_of_reference(case: AuditCase, dark: Mask) -> Iterator[_Ways]:
+    """Yield each reference projector's ways to dark samples that obstacles stop.
 
     Of those that no reference projector lights.
     """
@@ -176,4 +191,4 @@ def _stopped_of_reference(
     samples, limits = case.actual.samples.take(chosen), case.plan.requirements.projector
     for projector in reference_projectors(case.plan) if len(chosen) else ():
         steps = light_steps(projector, samples, limits, case.shadow)
-        yield "", chosen[steps == LIGHT_OBSTACLE], projector
+        yield _Ways.of(case, "", projector, chosen[steps == LIGHT_OBSTACLE])

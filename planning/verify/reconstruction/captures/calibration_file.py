@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 from scipy.spatial.transform import Rotation
 
+from geometry.files.file_content import file_content
 from planning.model.errors import CalibrationError
 from planning.model.files import reading
 from planning.model.table_types import (
@@ -165,7 +166,7 @@ def _measured_pose(device: _Device, planned: DeviceCalibration, plan: Scanner) -
 
 def _read(path: Path) -> _File:
     with reading(path, CalibrationError):
-        content = path.read_bytes()
+        content = file_content(path)
     try:
         return _File.model_validate(json.loads(content))
     except ValidationError as error:

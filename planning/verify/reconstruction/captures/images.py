@@ -1,5 +1,6 @@
 """Image files to grey levels: lossless ones of one camera's own size, or refused."""
 
+import io
 import warnings
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from geometry.files.file_content import file_content
 from planning.model.errors import CapturesError
 
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm")
@@ -31,7 +33,8 @@ def read_grey(path: Path, resolution: tuple[int, int]) -> NDArray[np.uint8 | np.
         with warnings.catch_warnings():
             # A file's size is held against the camera's before anything is unpacked.
             warnings.simplefilter("ignore")
-            with Image.open(path, formats=_KNOWN) as image:
+            content = io.BytesIO(file_content(path))
+            with Image.open(content, formats=_KNOWN) as image:
                 _require_fit(image, resolution, path)
                 image.load()
                 return _grey(image, path)
