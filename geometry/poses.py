@@ -92,3 +92,38 @@ def fibonacci_cap(
         + radius * np.cos(around)[:, None] * e1
         + radius * np.sin(around)[:, None] * e2
     )
+
+
+def horizontal_axes(up: Array) -> tuple[Array, Array]:
+    """Return the world axis after that of `up`, from which pan counts, and up x it."""
+    first = np.eye(3)[(int(np.argmax(np.abs(up))) + 1) % 3]
+    return first, np.cross(up, first)
+
+
+def pan_tilt_roll(turns: Array, up: Array) -> Array:
+    """Return the angles of devices about a world axis `up`, (..., 3, 3) to (..., 3).
+
+    With e1, e2 the `horizontal_axes` and x, z columns of the rotation::
+
+        pan = atan2(z.e2, z.e1),   tilt = asin(z.up)
+        roll = atan2(x.(z x level), x.level),   level = sin(pan) e1 - cos(pan) e2
+
+    in [rad]: pan turns about up, tilt raises the axis over the horizon, roll turns the
+    device clockwise as it looks. One that looks along up has roll 0.
+    """
+    first, second = horizontal_axes(up)
+    x, z = turns[..., :, 0], turns[..., :, 2]
+    sine = np.clip(z @ up, -1.0, 1.0)
+    upright = np.abs(sine) > 1.0 - 1e-12
+    pan = np.where(
+        upright,
+        np.arctan2(x @ first, -(x @ second)),
+        np.arctan2(z @ second, z @ first),
+    )
+    level = np.sin(pan)[..., None] * first - np.cos(pan)[..., None] * second
+    aside = np.einsum("...i,...i->...", x, np.cross(z, level))
+    roll = np.arctan2(aside, np.einsum("...i,...i->...", x, level))
+    angles: Array = np.stack(
+        [pan, np.arcsin(sine), np.where(upright, 0.0, roll)], axis=-1
+    )
+    return angles + 0.0

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import click
 
-from planning.cli.declared.other_declared import rigs, sample, schema, verify
+from planning.cli.declared.other_declared import rigs, sample, schema, show, verify
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
 
@@ -68,6 +68,7 @@ def commands() -> None:
     \b
     plan --mesh face.obj --max-projectors 3   plans, checks, writes ./face-plan/
     plan verify face-plan/plan.json           recomputes every claim, checks again
+    plan show face-plan/plan.json             every place in mesh axes, camera by camera
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
 
     Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
@@ -75,7 +76,7 @@ def commands() -> None:
     """  # noqa: D301 - click wants the character that \b stands for
 
 
-for _command in (rig_command, verify, reconstruct, rigs, schema, sample):
+for _command in (rig_command, verify, show, reconstruct, rigs, schema, sample):
     commands.add_command(_command)
 
 

@@ -11,7 +11,7 @@ from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.report.entries.device_entries import cost_record
 from planning.report.summary.check_lines import cost_lines
-from planning.report.summary.summary import aim_angles
+from planning.report.summary.device_lines import aim_angles
 from planning.scene.workspace.candidates import aimed_poses
 
 Z = np.array([0.0, 0.0, 1.0])

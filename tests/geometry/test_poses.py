@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.poses import fibonacci_cap, inverse, look_at, transform
+from geometry.poses import (
+    fibonacci_cap,
+    horizontal_axes,
+    inverse,
+    look_at,
+    pan_tilt_roll,
+    transform,
+)
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -95,3 +102,38 @@ def test_a_full_cap_is_the_sphere() -> None:
     np.testing.assert_allclose(sphere.mean(axis=0), 0.0, atol=1e-3)
     np.testing.assert_allclose(sphere.T @ sphere / 2000, np.eye(3) / 3, atol=1e-3)
     assert fibonacci_cap(1, UP, 0.1).shape == (1, 3)
+
+
+AXES = [np.array(v, dtype=float) for v in ([0, 0, 1], [0, 1, 0], [-1, 0, 0])]
+
+
+@pytest.mark.parametrize("up", AXES)
+@pytest.mark.parametrize("degrees", [-170.0, -30.0, 0.0, 90.0])
+def test_pan_tilt_and_roll_turn_a_device_that_looks_along_the_first_axis(up, degrees):
+    """About up, then about its level x, then clockwise about its own axis."""
+    first, second = horizontal_axes(up)
+    level = look_at(np.zeros(3), first, up)[:3, :3]
+    assert pan_tilt_roll(level, up) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    pan, tilt, roll = 0.7, -0.4, np.radians(degrees)
+    x = np.sin(pan) * first - np.cos(pan) * second
+    turns = [
+        Rotation.from_rotvec(pan * up),
+        Rotation.from_rotvec(tilt * x),
+    ]
+    aimed = (turns[1] * turns[0]).as_matrix() @ level
+    turn = Rotation.from_rotvec(roll * aimed[:, 2]).as_matrix() @ aimed
+    assert pan_tilt_roll(turn, up) == pytest.approx([pan, tilt, roll])
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_device_that_looks_along_up_has_all_its_turn_in_the_pan(side):
+    nearly, upright = (
+        look_at(np.zeros(3), np.array([c * 0.6, c * 0.8, side]), UP)[:3, :3]
+        for c in (1e-4, 0.0)
+    )
+    # The same turn about up, in small and in the limit.
+    x = nearly[:, 0] * [1.0, 1.0, 0.0]
+    upright = np.column_stack([x, np.cross([0.0, 0.0, side], x), [0.0, 0.0, side]])
+    expected = [np.arctan2(0.8, 0.6), side * np.pi / 2, 0.0]
+    assert pan_tilt_roll(upright, UP) == pytest.approx(expected)
+    assert pan_tilt_roll(nearly, UP) == pytest.approx(expected, abs=2e-4)

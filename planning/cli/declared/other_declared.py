@@ -1,4 +1,4 @@
-"""`plan verify`, `plan rigs`, `plan schema` and `plan sample`: their options."""
+"""`plan verify`, `show`, `rigs`, `schema` and `sample`: their options."""
 
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,19 @@ def verify(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.verify_command import verify_command
 
     run(lambda: verify_command(options), debug=options["debug"])
+
+
+@click.command()
+@click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
+@threads_option
+@output_options
+def show(**options: Any) -> None:  # noqa: ANN401
+    """Print what the summary leaves out: every place in the axes of the mesh, and of
+    each camera mm per pixel, image filled, distances, triangulation angles.
+    """  # noqa: D205 - click cuts the short help at a blank line
+    from planning.cli.show_command import show_command
+
+    run(lambda: show_command(options), debug=options["debug"])
 
 
 @click.command()

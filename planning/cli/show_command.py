@@ -1,0 +1,65 @@
+"""What `plan show` does: what the short summary leaves out, of a plan as written."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import click
+import numpy as np
+
+from geometry.parallel import n_threads
+from planning.model.plan import RigPlan
+from planning.model.words import labelled, percent
+from planning.report.summary.device_lines import device_lines
+from planning.report.summary.zone_lines import zone_lines
+from planning.verify.audit.devices.camera_figures import (
+    CameraFigures,
+    Spread,
+    camera_figures,
+)
+
+from .console import print_json
+
+
+def show_command(options: Mapping[str, Any]) -> int:
+    """Print places in the axes of the mesh, devices, and what each camera sees."""
+    plan = RigPlan.load(options["plan_file"])
+    cameras = camera_figures(plan, threads=options["threads"] or n_threads())
+    if options["as_json"]:
+        print_json({"cameras": [asdict(camera) for camera in cameras]})
+        return 0
+    lines = [*zone_lines(plan), *device_lines(plan), ""]
+    lines += [line for camera in cameras for line in _camera_lines(camera)]
+    click.echo("\n".join(lines))
+    return 0
+
+
+def _camera_lines(camera: CameraFigures) -> Iterator[str]:
+    pixel, distance = camera.pixel_m, camera.distance_m
+    filled = f"the object fills {percent(camera.filled)} of the image"
+    near, far = camera.sharp_m
+    sharp = f"sharp from {1e3 * near:.0f} to {1e3 * far:.0f} mm"
+    if pixel is None or distance is None:
+        yield from labelled(camera.id, [f"measures nothing; {filled}; {sharp}"])
+        return
+    low, middle, high = (1e3 * length for length in distance)
+    angles = [
+        f"triangulates with {name} {_degrees(spread)}"
+        for name, spread in camera.triangulation.items()
+    ]
+    yield from labelled(
+        camera.id,
+        [
+            f"{1e3 * pixel:.3f} mm per pixel at {middle:.0f} mm, the median of what it "
+            f"measures; {filled}",
+            f"measures from {low:.0f} to {high:.0f} mm, {sharp}",
+            *angles,
+        ],
+    )
+
+
+def _degrees(spread: Spread | None) -> str:
+    if spread is None:
+        return "nothing"
+    low, middle, high = np.degrees(spread)
+    return f"at {middle:.1f} degrees ({low:.1f} to {high:.1f})"

@@ -1,0 +1,71 @@
+"""Where every device stands and how its housing is turned, as one mounts it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.devices import turned_to
+from geometry.poses import horizontal_axes, pan_tilt_roll
+from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
+
+_AXES = "xyz"
+
+
+def device_lines(plan: RigPlan) -> list[str]:
+    """Return a line for each device: position, angles of housing and image, standoff.
+
+    The housing's axis is the optical axis, the device's +z. The middle of the image
+    looks elsewhere where the lens is shifted.
+    """
+    lines = [
+        "",
+        "     position x, y, z [mm]            housing's pan    tilt    roll    image "
+        "centre aims along      standoff",
+        "                                               [deg]   [deg]   [deg]    "
+        "azimuth  elevation [deg]   to centre [mm]",
+    ]
+    workspace = plan.requirements.workspace
+    centre, up = np.array(workspace.centre), np.array(workspace.up)
+    for device in (*plan.projectors, *plan.cameras):
+        pose = device.world_from_device
+        x, y, z = 1e3 * pose[:3, 3]
+        housing = np.degrees(pan_tilt_roll(pose[:3, :3], up))
+        # A roll of -0.0 is none.
+        pan, tilt, roll = np.round(housing, 1) + 0.0
+        azimuth, elevation, _ = aim_angles(device, up)
+        distance = 1e3 * np.linalg.norm(pose[:3, 3] - centre)
+        lines.append(
+            f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {pan:15.1f} {tilt:7.1f} "
+            f"{roll:7.1f}   {azimuth:8.1f} {elevation:10.1f}   {distance:18.1f}"
+            + (f"   existing: {device.existing}" if device.existing else "")
+        )
+    x, y, z = 1e3 * centre + 0.0
+    first = axis_name(horizontal_axes(up)[0])
+    return [
+        *lines,
+        f"     pan and azimuth count about {axis_name(up)} from {first}, tilt and "
+        f"elevation from the horizon; roll is clockwise as the device looks",
+        f"     in the axes of the mesh file; the object's centre is at {x:.1f}, "
+        f"{y:.1f}, {z:.1f} mm",
+    ]
+
+
+def aim_angles(
+    device: PlannedProjector | PlannedCamera, up: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return azimuth, elevation and roll of the middle of the image in degrees.
+
+    As `pan_tilt_roll` has them, had the middle ray been the optical axis.
+    """
+    straight = turned_to(device.device.middle_ray).T
+    angles = pan_tilt_roll(device.world_from_device[:3, :3] @ straight, up)
+    azimuth, elevation, roll = np.degrees(angles).tolist()
+    return azimuth, elevation, roll
+
+
+def axis_name(direction: Sequence[float] | NDArray[np.float64]) -> str:
+    """Return the world axis that a direction is nearest to, with its sign."""
+    index = int(np.argmax(np.abs(direction)))
+    return f"{'-' if direction[index] < 0 else '+'}{_AXES[index]}"

@@ -1,0 +1,105 @@
+"""What each camera of a plan sees of the object, by the audit's own predicates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Array, Ints
+from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera
+from planning.verify.audit.audit_samples import draw_samples
+from planning.verify.audit.predicates.audit_devices import (
+    AuditProjector,
+    audit_projectors,
+)
+from planning.verify.audit.predicates.audit_optics import dot, in_frame, towards
+from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.predicates.predicates import MEASURED
+from planning.verify.audit.predicates.recompute import recompute
+
+_N_SAMPLES = 20_000
+# Rays over the longer side of the image that tell how much of it the object fills.
+_ACROSS = 200
+
+Spread = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CameraFigures:
+    """One camera; lengths in [m], angles in [rad].
+
+    A spread is the least, the median and the largest over the samples that are
+    measured; None where none is.
+
+    Attributes:
+        id: As in the plan.
+        pixel_m: Side of a pixel across the axis, z / f, at the median of what it
+            measures.
+        filled: Share of its image that the object fills, seen past all obstacles.
+        distance_m: Spread of the distance of what it measures.
+        sharp_m: Nearest and farthest distance that is sharp.
+        triangulation: Spread of the angle between view and light, by projector.
+    """
+
+    id: str
+    pixel_m: float | None
+    filled: float
+    distance_m: Spread | None
+    sharp_m: tuple[float, float]
+    triangulation: dict[str, Spread | None]
+
+
+def camera_figures(plan: RigPlan, *, threads: int) -> tuple[CameraFigures, ...]:
+    """Recompute what each camera measures, on fresh samples of the whole surface."""
+    target, seed = plan.requirements.target, plan.document.seed
+    samples = draw_samples(plan.surface, target, _N_SAMPLES, seed)
+    shadow = Shadow.of(plan, threads=threads)
+    actual = recompute(plan, samples, shadow)
+    projectors = audit_projectors(plan)
+    figures: list[CameraFigures] = []
+    for c, camera in enumerate(plan.cameras):
+        local = in_frame(camera.world_from_device, samples.points)
+        mine = local[actual.measured_by[c]]
+        pairs = (np.flatnonzero(pair == MEASURED) for pair in actual.pairs[:, c])
+        angles = {
+            planned.id: _spread(_angles(light, camera, samples.points, both))
+            for planned, light, both in zip(
+                plan.projectors, projectors, pairs, strict=True
+            )
+        }
+        pixels = mine[:, 2] / camera.device.focal_px
+        figures.append(
+            CameraFigures(
+                camera.id,
+                float(np.median(pixels)) if len(mine) else None,
+                _filled(camera, shadow),
+                _spread(np.linalg.norm(mine, axis=1)),
+                camera.device.range_m,
+                angles,
+            )
+        )
+    return tuple(figures)
+
+
+def _angles(
+    projector: AuditProjector, camera: PlannedCamera, points: Array, chosen: Ints
+) -> Array:
+    light, _ = projector.light.to_points(points[chosen])
+    view, _ = towards(points[chosen], camera.world_from_device[:3, 3])
+    return np.arccos(np.clip(dot(light, view), -1.0, 1.0))
+
+
+def _filled(camera: PlannedCamera, shadow: Shadow) -> float:
+    size = np.array(camera.device.resolution)
+    columns, rows = np.ceil(_ACROSS * size / size.max()).astype(int)
+    u, v = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
+    pixels = np.column_stack([u.ravel(), v.ravel()]) / [columns, rows] * size - 0.5
+    turn, origin = camera.world_from_device[:3, :3], camera.world_from_device[:3, 3]
+    hit, _ = shadow.caster.first_hits(origin, camera.device.rays(pixels) @ turn.T)
+    return float(np.mean(hit >= 0))
+
+
+def _spread(values: Array) -> Spread | None:
+    if not len(values):
+        return None
+    return float(values.min()), float(np.median(values)), float(values.max())
