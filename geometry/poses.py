@@ -97,7 +97,7 @@ def fibonacci_cap(
 def horizontal_axes(up: Array) -> tuple[Array, Array]:
     """Return the world axis after that of `up`, from which pan counts, and up x it."""
     first = np.eye(3)[(int(np.argmax(np.abs(up))) + 1) % 3]
-    return first, np.cross(up, first)
+    return first, np.asarray(np.cross(up, first), dtype=np.float64)
 
 
 def pan_tilt_roll(turns: Array, up: Array) -> Array:
@@ -113,7 +113,7 @@ def pan_tilt_roll(turns: Array, up: Array) -> Array:
     """
     first, second = horizontal_axes(up)
     x, z = turns[..., :, 0], turns[..., :, 2]
-    sine = np.clip(z @ up, -1.0, 1.0)
+    sine: Array = np.clip(z @ up, -1.0, 1.0)
     upright = np.abs(sine) > 1.0 - 1e-12
     pan = np.where(
         upright,

@@ -75,6 +75,11 @@ class Box:
     half_m: Triple
     axes: Axes
 
+    def moved(self, by_m: Triple) -> "Box":
+        """Return the box displaced."""
+        (a, b, c), (x, y, z) = self.centre_m, by_m
+        return replace(self, centre_m=(a + x, b + y, c + z))
+
     def grown(self, by_m: float) -> "Box":
         """Return the box with every face moved outwards, or inwards if negative."""
         x, y, z = (max(half + by_m, 0.0) for half in self.half_m)

@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal
 
-from .bodies import Body, Box
+from .bodies import Body, Box, Triple
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
-_LEFT_OUT = (*_ZONES, "projector_standoff_m", "camera_standoff_m")
+_LEFT_OUT = (*_ZONES, "projector_standoff_m", "camera_standoff_m", "origin")
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,8 @@ class Workspace:
         projector_standoff_m: Of tiled placement, where the object overflows their
             field: distance of projectors from the surface [m]; else None.
         camera_standoff_m: The same of cameras.
+        origin: `mesh` where places of the rig file count from the origin of the mesh;
+            None: from `centre`. All places above count from `centre` either way.
     """
 
     centre: tuple[float, float, float]
@@ -138,6 +140,28 @@ class Workspace:
     mounting: tuple[Box, ...] = ()
     projector_standoff_m: float | None = None
     camera_standoff_m: float | None = None
+    origin: Literal["mesh"] | None = None
+
+    @property
+    def origin_m(self) -> Triple:
+        """Where places of the rig file count from, in the world [m]."""
+        return (0.0, 0.0, 0.0) if self.origin == "mesh" else self.centre
+
+    @property
+    def written(self) -> "Workspace":
+        """The workspace with floor and zones from `origin_m`, as in the rig file."""
+        return self if self.origin is None else self.moved(self.centre)
+
+    def moved(self, by_m: Triple) -> "Workspace":
+        """Return the workspace with floor and zones displaced, against its shell."""
+        rise = sum(a * b for a, b in zip(by_m, self.up, strict=True))
+        return replace(
+            self,
+            floor_m=None if self.floor_m is None else self.floor_m + rise,
+            box=None if self.box is None else self.box.moved(by_m),
+            keep_out=tuple(zone.moved(by_m) for zone in self.keep_out),
+            mounting=tuple(plane.moved(by_m) for plane in self.mounting),
+        )
 
     @property
     def whole_shell(self) -> "Workspace":

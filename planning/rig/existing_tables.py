@@ -53,13 +53,13 @@ class ExistingTable(Table):
 
     def pose(self, workspace: Workspace, device: DeviceModel) -> NDArray[np.float64]:
         """Return ``world_from_device`` of the rig's model in the world [m]."""
-        centre = np.array(workspace.centre)
+        origin = np.array(workspace.origin_m)
         if self.pose_mm is not None:
             pose = read_pose(self.pose_mm, "pose_mm")
-            pose[:3, 3] = centre + 1e-3 * pose[:3, 3]
+            pose[:3, 3] = origin + 1e-3 * pose[:3, 3]
             return pose
-        position = centre + 1e-3 * np.array(self.position_mm)
-        aim = centre + 1e-3 * np.array(self.aim_mm)
+        position = origin + 1e-3 * np.array(self.position_mm)
+        aim = origin + 1e-3 * np.array(self.aim_mm)
         up, roll = np.array(workspace.up), float(np.radians(self.roll_deg))
         return aimed_poses(position[None], aim, up, device, roll=roll)[0]
 

@@ -1,7 +1,6 @@
 """The schema of `[[obstacle]]`, and where obstacles stand in the world.
 
-Lengths are in millimetres and places are relative to the object's centre, in the axes
-of the mesh file.
+Lengths are in millimetres; places count from where those of `[workspace]` do.
 """
 
 from collections.abc import Sequence
@@ -66,7 +65,7 @@ class ObstacleTable(Table):
             raise ValueError("unit is of a file; write it beside file, or remove it")
         if self.centre_mm is None and self.shape != "table":
             raise ValueError(
-                "centre_mm is missing; write its place from the object's centre"
+                "centre_mm is missing; write its place, counted as in [workspace]"
             )
         return self
 
@@ -84,16 +83,16 @@ class ObstacleTable(Table):
         """
         turn = turned(self.turn_deg)
         up = np.array(workspace.up)
-        place = lowest_m * up
+        origin, place = workspace.centre, lowest_m * up
         if self.centre_mm is not None:
-            place = 1e-3 * np.array(self.centre_mm)
+            origin, place = workspace.origin_m, 1e-3 * np.array(self.centre_mm)
         try:
             local = self._local(folder)
         except MeshError as error:
             raise RigError(f"obstacle {self.name!r}: {error}") from None
         if self.shape == "table":
             turn = turn @ _upright(up)
-        vertices = np.array(workspace.centre) + place + local.vertices @ turn.T
+        vertices = np.array(origin) + place + local.vertices @ turn.T
         return Obstacle(self.name, TriangleMesh(vertices, local.faces))
 
     def _local(self, folder: Path) -> TriangleMesh:

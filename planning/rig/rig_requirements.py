@@ -124,8 +124,12 @@ def build_workspace(
         reference_ring_radius=reference_ring_radius,
         projector_standoff_m=standoff if overflowing[0] else None,
         camera_standoff_m=standoff if overflowing[1] else None,
+        origin="mesh" if spec.origin == "mesh" else None,
         **spec.zones(up_vector),
     )
+    if workspace.origin is not None:
+        x, y, z = workspace.centre
+        workspace = workspace.moved((-x, -y, -z))
     _check_floor(workspace)
     check_zones(workspace)
     return workspace
@@ -139,9 +143,10 @@ def _check_floor(workspace: Workspace) -> None:
     off_up = max(0.0, math.acos(cosine) - workspace.half_angle)
     near, far = workspace.projector_radius_m
     highest = math.cos(off_up) * (far if off_up < 0.5 * math.pi else near)
+    written = workspace.written.floor_m or 0.0
     if not highest >= workspace.floor_m:
         raise InfeasibleLimitsError(
-            f"workspace.floor_mm = {workspace.floor_m * 1e3:g} lies above the highest "
+            f"workspace.floor_mm = {written * 1e3:g} lies above the highest "
             f"position that shell and cone allow, {highest * 1e3:.0f} mm over the "
             f"object's centre; lower the floor or widen the cone"
         )

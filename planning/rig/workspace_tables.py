@@ -1,7 +1,7 @@
 """The schema of `[workspace]`: the part of the shell in which devices may stand.
 
-Lengths are in millimetres and places are relative to the object's centre, in the axes
-of the mesh file.
+Lengths are in millimetres and places are relative to the object's centre or, with
+`origin = "mesh"`, to the origin of the mesh file; in its axes either way.
 """
 
 from typing import Annotated, Any, Literal, Self, cast
@@ -105,6 +105,7 @@ class WorkspaceTable(Table):
     max_mm: Axis | None = None
     floor_mm: float | None = None
     up: UpName = "z"
+    origin: Literal["centre", "mesh"] = "centre"
     keep_out: list[KeepOutTable] = Field(default=[])
     mounting: list[MountingTable] = Field(default=[])
 
@@ -135,10 +136,12 @@ class WorkspaceTable(Table):
         """Return plain values as written; zones that aren't given have no key."""
         document = self.model_dump(mode="json")
         zones = ("min_mm", "max_mm", "keep_out", "mounting")
+        if self.origin == "centre":
+            del document["origin"]
         return {key: v for key, v in document.items() if v or key not in zones}
 
     def zones(self, up: Triple) -> dict[str, Any]:
-        """Return `box`, `keep_out` and `mounting` of `Workspace`, in metres.
+        """Return `box`, `keep_out` and `mounting` of `Workspace` as written, in metres.
 
         `up` is for planes that don't say where they run.
         """

@@ -25,13 +25,14 @@ def check_zones(workspace: Workspace) -> None:
     if workspace.box is not None:
         fault = _out_of_reach(workspace.box, workspace)
         if fault is not None:
+            low, high = _corners(workspace)
             raise InfeasibleLimitsError(
-                f"workspace.min_mm = {_corner(workspace.box, -1)} and max_mm = "
-                f"{_corner(workspace.box, 1)}: {fault}"
+                f"workspace.min_mm = {low} and max_mm = {high}: {fault}"
             )
+    written = workspace.written.mounting
     faults = [
-        f"workspace.mounting {plane.name!r} at {_mm(plane.centre_m)} mm: {fault}"
-        for plane in workspace.mounting
+        f"workspace.mounting {plane.name!r} at {_mm(there.centre_m)} mm: {fault}"
+        for plane, there in zip(workspace.mounting, written, strict=True)
         if (fault := _out_of_reach(plane, workspace)) is not None
     ]
     if faults and len(faults) == len(workspace.mounting):
@@ -67,7 +68,7 @@ def _limits(workspace: Workspace) -> list[tuple[str, Workspace]]:
     def blame(text: str, without: Workspace) -> None:
         blamed.append((f"workspace.{text}", without))
 
-    for k, zone in enumerate(workspace.keep_out):
+    for k, zone in enumerate(workspace.written.keep_out):
         size = " x ".join(f"{2e3 * half:g}" for half in zone.half_m)
         rest = workspace.keep_out[:k] + workspace.keep_out[k + 1 :]
         blame(
@@ -76,7 +77,7 @@ def _limits(workspace: Workspace) -> list[tuple[str, Workspace]]:
             replace(workspace, keep_out=rest),
         )
     if workspace.box is not None:
-        low, high = (_corner(workspace.box, side) for side in (-1, 1))
+        low, high = _corners(workspace)
         text = f"min_mm = {low}, max_mm = {high} (widen it)"
         blame(text, replace(workspace, box=None))
     if workspace.mounting:
@@ -84,7 +85,7 @@ def _limits(workspace: Workspace) -> list[tuple[str, Workspace]]:
         text = f"mounting {names} (move or extend it)"
         blame(text, replace(workspace, mounting=()))
     if workspace.floor_m is not None:
-        text = f"floor_mm = {1e3 * workspace.floor_m:g} (lower it)"
+        text = f"floor_mm = {_floor_mm(workspace):g} (lower it)"
         blame(text, replace(workspace, floor_m=None))
     if workspace.half_angle < np.pi:
         degrees = np.degrees(workspace.half_angle)
@@ -121,14 +122,23 @@ def _out_of_reach(box: Box, workspace: Workspace) -> str | None:
     if workspace.floor_m is not None and not top >= workspace.floor_m:
         return (
             f"it ends {1e3 * top:.0f} mm over the object's centre, under "
-            f"workspace.floor_mm = {1e3 * workspace.floor_m:g}; lower the floor or "
+            f"workspace.floor_mm = {_floor_mm(workspace):g}; lower the floor or "
             f"raise it"
         )
     return None
 
 
-def _corner(box: Box, side: int) -> str:
-    return _mm(np.array(box.centre_m) + side * np.array(box.half_m))
+def _corners(workspace: Workspace) -> list[str]:
+    """The corners of the room, as written."""
+    box = workspace.written.box
+    if box is None:
+        return []
+    middle, half = np.array(box.centre_m), np.array(box.half_m)
+    return [_mm(middle + side * half) for side in (-1, 1)]
+
+
+def _floor_mm(workspace: Workspace) -> float:
+    return 1e3 * (workspace.written.floor_m or 0.0)
 
 
 def _mm(lengths_m: NDArray[np.float64] | tuple[float, ...]) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
+from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
@@ -21,6 +22,7 @@ from .workspace_claims import (
     audit_ring_frames,
     outside_by,
 )
+from .zone_claims import origin_of
 
 _MODEL = ("resolution", "range_m", "K", "distortion", "pixel_pitch_m", "beam_radius")
 # Positions are written to 0.01 mm, typed rotations to four digits or more.
@@ -121,18 +123,17 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
                     "existing",
                     f"is a {kind.name}, but rig.existing {name!r} is a {table['kind']}",
                 )
-                space = case.plan.requirements.workspace
-                _audit_pose(device, table, space, below.at("world_from_device"))
+                _audit_pose(device, table, case.plan, below.at("world_from_device"))
 
 
 def _audit_pose(
-    device: _Device, table: Mapping[str, Any], space: Workspace, findings: AuditFindings
+    device: _Device, table: Mapping[str, Any], plan: RigPlan, findings: AuditFindings
 ) -> None:
     """Compare a pose with the one that was typed, or with position, aim and roll."""
     pose = device.world_from_device
     typed = None if table.get("pose_mm") is None else np.array(table["pose_mm"])
     place = np.array(table["position_mm"]) if typed is None else typed[:3, 3]
-    off = float(np.linalg.norm(pose[:3, 3] - (np.array(space.centre) + 1e-3 * place)))
+    off = float(np.linalg.norm(pose[:3, 3] - (origin_of(plan) + 1e-3 * place)))
     findings.holds(
         off <= _POSITION_M,
         "",
@@ -140,6 +141,7 @@ def _audit_pose(
     )
     if typed is None:
         towards = np.array(table["aim_mm"]) - place
+        space = plan.requirements.workspace
         _audit_aim(device, towards, table["roll_deg"], space, findings)
         return
     turned = float(np.abs(pose[:3, :3] - typed[:3, :3]).max())

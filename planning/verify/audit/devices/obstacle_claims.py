@@ -11,7 +11,7 @@ from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 
-from .zone_claims import turned
+from .zone_claims import origin_of, turned
 
 _ROUNDING = 1e-9
 # A prism of 64 sides has that much less surface than its cylinder, about.
@@ -45,19 +45,20 @@ def _audit_shape(
     """Compare extent in the shape's own frame, and area, with what is stated."""
     space = plan.requirements.workspace
     centre, up = np.array(space.centre), np.array(space.up)
+    origin = origin_of(plan)
     turn = turned(np.radians(table.get("turn_deg", [0.0, 0.0, 0.0])))
     middle = 1e-3 * np.array(table.get("centre_mm", [0.0, 0.0, 0.0]))
     sides, area = _sides_and_area(table)
     if table["shape"] == "table":
         if "centre_mm" not in table:
             heights = (plan.surface.mesh.corners.reshape(-1, 3) - centre) @ up
-            middle = heights.min() * up
+            origin, middle = centre, heights.min() * up
         third = int(np.argmax(np.abs(up)))
         axes = np.roll(np.eye(3), third - 2, axis=0)
         axes = axes if up[third] > 0.0 else axes @ np.diag([1.0, -1.0, -1.0])
         turn = turn @ axes
         middle = middle - 0.5 * sides[2] * turn[:, 2]
-    local = (obstacle.mesh.corners.reshape(-1, 3) - centre - middle) @ turn
+    local = (obstacle.mesh.corners.reshape(-1, 3) - origin - middle) @ turn
     ends = np.stack([local.min(axis=0), local.max(axis=0)])
     off = float(np.abs(ends - 0.5 * sides * [[-1.0], [1.0]]).max())
     key = f"obstacle {obstacle.name!r}"

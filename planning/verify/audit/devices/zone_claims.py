@@ -7,6 +7,7 @@ import numpy as np
 
 from geometry.arrays import Array
 from planning.model.bodies import Box
+from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
@@ -36,7 +37,14 @@ def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
     """Check that the zones are boxes, and floor, radii and zones those of the rig."""
     space, findings = case.plan.requirements.workspace, findings.at(_KEY)
     tables: Mapping[str, Any] = case.plan.document.rig.workspace
+    stated = tables.get("origin")
+    findings.holds(
+        space.origin == stated,
+        "origin",
+        f"{space.origin!r}, but rig.workspace states {stated!r}",
+    )
     _audit_shell(case, findings)
+    off = np.array(space.centre) - origin_of(case.plan)
     rooms = [_as_volume(tables)] if "min_mm" in tables else []
     for name, boxes, stated, same in (
         ("box", [] if space.box is None else [space.box], rooms, _audit_volume),
@@ -52,14 +60,15 @@ def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
             below = findings.at(name if name == "box" else f"{name}.{place}")
             _audit_box(box, below)
             if place < len(stated):
-                same(box, stated[place], below)
+                same(box, off, stated[place], below)
 
 
 def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
     """Compare floor and radii with the rig's: s + R -+ p, tiled from s - p."""
     space, rig = case.plan.requirements.workspace, case.plan.document.rig
     floor = rig.workspace.get("floor_mm")
-    stated = None if floor is None else 1e-3 * floor
+    off = np.array(space.centre) - origin_of(case.plan)
+    stated = None if floor is None else 1e-3 * floor - float(off @ np.array(space.up))
     findings.holds(
         not rig.workspace
         or (
@@ -83,6 +92,13 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
             name,
             f"{tiled!r} m, but rig.standoff_m is {standoff:g} m",
         )
+
+
+def origin_of(plan: RigPlan) -> Array:
+    """Return where places of the rig file count from, in the world, (3,) [m]."""
+    if plan.document.rig.workspace.get("origin") == "mesh":
+        return np.zeros(3)
+    return np.array(plan.requirements.workspace.centre)
 
 
 def _depth_inside(box: Box, offsets: Array) -> Array:
@@ -112,32 +128,37 @@ def _as_volume(table: Mapping[str, Any]) -> dict[str, Any]:
     return {"centre_mm": centre, "size_mm": high - low, "turn_deg": turn}
 
 
-def _audit_volume(box: Box, table: Mapping[str, Any], findings: AuditFindings) -> None:
+def _audit_volume(
+    box: Box, off: Array, table: Mapping[str, Any], findings: AuditFindings
+) -> None:
     turn = turned(np.radians(table["turn_deg"]))
     centre, size = (1e-3 * np.array(table[name]) for name in ("centre_mm", "size_mm"))
     stated = Block(box.name, turn, centre, 0.5 * size)
-    claimed = block_of_zone(box, np.zeros(3))
-    off = float(np.abs(claimed.corners - stated.corners).max())
+    claimed = block_of_zone(box, off)
+    error = float(np.abs(claimed.corners - stated.corners).max())
     findings.holds(
-        off <= _ROUNDING,
+        error <= _ROUNDING,
         "",
-        f"{box.name!r} differs from rig.workspace's by {1e3 * off:.3g} mm at a corner",
+        f"{box.name!r} differs from rig.workspace's by {1e3 * error:.3g} mm at a "
+        f"corner",
     )
 
 
-def _audit_plane(box: Box, table: Mapping[str, Any], findings: AuditFindings) -> None:
+def _audit_plane(
+    box: Box, off: Array, table: Mapping[str, Any], findings: AuditFindings
+) -> None:
     normal = np.array(table["normal"], dtype=np.float64)
     sizes = [*table["extent_mm"], table["thickness_mm"]]
     for name, claimed, truth in (
-        ("centre_m", box.centre_m, 1e-3 * np.array(table["centre_mm"])),
+        ("centre_m", off + box.centre_m, 1e-3 * np.array(table["centre_mm"])),
         ("half_m", box.half_m, 0.5e-3 * np.array(sizes)),
         ("axes.2", box.axes[2], normal / np.linalg.norm(normal)),
     ):
         findings.same(name, claimed, truth, "that of rig.workspace", _ROUNDING)
     if table.get("along") is not None:
-        off = float(np.dot(box.axes[1], table["along"]))
+        aside = float(np.dot(box.axes[1], table["along"]))
         findings.holds(
-            abs(off) <= _ROUNDING * float(np.linalg.norm(table["along"]))
+            abs(aside) <= _ROUNDING * float(np.linalg.norm(table["along"]))
             and np.dot(box.axes[0], table["along"]) > 0.0,
             "axes.0",
             f"{list(box.axes[0])} doesn't run along rig.workspace's {table['along']}",
