@@ -125,7 +125,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as folder:
             plan.save(Path(folder) / "plan.json")
             again = audit_plan(RigPlan.load(Path(folder) / "plan.json"))
-        failed = failed or met > 0 or not again.passed
+        failed = failed or met > 0 or bool(again.failures)
         print(
             f"<!-- {met} of {n} rays of light and of sight meet an obstacle; "
             f"{again.failures} -->"
