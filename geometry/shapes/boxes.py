@@ -8,6 +8,7 @@ products of their edges (the separating axes; Gottschalk, Lin and Manocha 1996).
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from geometry.arrays import Array, Mask
 
@@ -59,6 +60,14 @@ def boxes_overlap(a: OrientedBox, b: OrientedBox) -> bool:
     apart = np.abs(tried @ (b.centre - a.centre)) > reach
     # Of parallel edges the cross product is rounding, and separates nothing.
     return not np.any(apart & (np.einsum("ij,ij->i", tried, tried) > _PARALLEL))
+
+
+def box_gap(a: OrientedBox, b: OrientedBox) -> float:
+    """Return the distance of two boxes [m]: between their nearest points, 0 if any."""
+    # Places u in a and v in b are bounded in the boxes' own axes: least squares.
+    between, half = np.hstack([a.axes.T, -b.axes.T]), np.concatenate([a.half, b.half])
+    nearest = lsq_linear(between, b.centre - a.centre, (-half, half), tol=1e-14)
+    return float(np.linalg.norm(nearest.fun))
 
 
 def lines_cross(box: OrientedBox, starts: Array, ends: Array) -> Mask:

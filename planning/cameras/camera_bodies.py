@@ -7,6 +7,7 @@ sample dark aren't taken: what is lit is what the number of cameras was proved f
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,20 @@ class CameraInterference(Interference):
     scene: Scene
     projectors: tuple[PlannedProjector, ...]
     samples: LitSamples
+
+    @classmethod
+    def among(
+        cls,
+        scene: Scene,
+        projectors: tuple[PlannedProjector, ...],
+        samples: LitSamples,
+        cameras: Sequence[PlannedCamera],
+        measured: NDArray[np.bool_],
+    ) -> Self:
+        """Return cameras with what each measures, (n, m), among projectors."""
+        points = samples.target.samples.points
+        clearance = scene.requirements.workspace.clearance_m
+        return cls(cameras, points, measured, clearance, scene, projectors, samples)
 
     def covers(
         self, standing: Sequence[int], columns: Sequence[int]
@@ -96,9 +111,8 @@ def resolved_cover(
         InfeasibleLimitsError: If the body of every camera is in the way.
     """
     cameras, samples = cover.candidates.cameras, cover.samples
-    points = samples.target.samples.points
-    interference = CameraInterference(
-        cameras, points, cover.measured, scene, projectors, samples
+    interference = CameraInterference.among(
+        scene, projectors, samples, cameras, cover.measured
     )
     selection = resolve_conflicts(
         interference, candidate_cover(scene, cover.measured), cover.selection

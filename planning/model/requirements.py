@@ -13,7 +13,8 @@ from .bodies import Body, Box, Triple
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
-_LEFT_OUT = (*_ZONES, "projector_standoff_m", "camera_standoff_m", "origin")
+_STANDOFFS = ("projector_standoff_m", "camera_standoff_m")
+_LEFT_OUT = (*_ZONES, *_STANDOFFS, "origin", "clearance_m")
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,7 @@ class Workspace:
         camera_standoff_m: The same of cameras.
         origin: `mesh` where places of the rig file count from the origin of the mesh;
             None: from `centre`. All places above count from `centre` either way.
+        clearance_m: What housings keep between each other, unless both stand already.
     """
 
     centre: tuple[float, float, float]
@@ -141,6 +143,7 @@ class Workspace:
     projector_standoff_m: float | None = None
     camera_standoff_m: float | None = None
     origin: Literal["mesh"] | None = None
+    clearance_m: float = 0.0
 
     @property
     def origin_m(self) -> Triple:

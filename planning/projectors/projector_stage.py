@@ -57,7 +57,10 @@ class ProjectorStage(PlannedStage):
     def over(cls, candidates: CandidateSet, selection: Selection) -> "ProjectorStage":
         """Return the stage of a selection: compatible bodies and the certificate."""
         cover, samples = candidates.cover, candidates.samples.samples
-        among = Interference(candidates.projectors, samples.points, cover.covers)
+        clearance = candidates.scene.requirements.workspace.clearance_m
+        among = Interference(
+            candidates.projectors, samples.points, cover.covers, clearance
+        )
         selection = resolve_conflicts(among, cover, selection)
         others, proof = certified(cover, selection, samples.weight, among)
         kinds = {type(body) for body in candidates.scene.bodies}

@@ -38,11 +38,13 @@ class Interference:
         devices: The candidates.
         points: Samples in [m], shape (n, 3).
         covered: Which candidate covers which, but for bodies of others, shape (n, m).
+        clearance_m: What bodies keep between each other [m].
     """
 
     devices: Sequence[Device]
     points: NDArray[np.float64]
     covered: NDArray[np.bool_]
+    clearance_m: float
 
     @property
     def bodied(self) -> bool:
@@ -61,7 +63,7 @@ class Interference:
         covered = self.covered[:, columns]
         for k, column in enumerate(columns):
             device, at = self.devices[column], np.flatnonzero(covered[:, k])
-            if collide(device, bodies):
+            if collide(device, bodies, self.clearance_m):
                 covered[:, k] = False
                 continue
             blocked = blocked_by(bodies, device, self.points[at]).any(axis=1)
@@ -72,7 +74,7 @@ class Interference:
         """Return whether no bodies collide, and none takes what can't be spared."""
         devices = [self.devices[i] for i in chosen]
         bodies = bodies_of(devices)
-        return not any(collide(device, bodies) for device in devices)
+        return not any(collide(device, bodies, self.clearance_m) for device in devices)
 
 
 def resolve_conflicts(

@@ -209,11 +209,13 @@ class Rig:
         """
         table = self.table
         # No key where there are none.
-        listed = {
+        listed: dict[str, Any] = {
             key: [entry.to_document() for entry in getattr(table, key)]
             for key in ("existing", "obstacle")
             if getattr(table, key)
         }
+        if table.placement.clearance_mm:
+            listed["clearance_m"] = table.placement.clearance_mm * 1e-3
         return {
             "name": self.name,
             "description": table.description,

@@ -124,6 +124,7 @@ def build_workspace(
         reference_ring_radius=reference_ring_radius,
         projector_standoff_m=standoff if overflowing[0] else None,
         camera_standoff_m=standoff if overflowing[1] else None,
+        clearance_m=placement.clearance_mm * 1e-3,
         origin="mesh" if spec.origin == "mesh" else None,
         **spec.zones(up_vector),
     )

@@ -132,6 +132,7 @@ class PlacementTable(Table):
 
     standoff_mm: Positive = 1000.0
     standoff_play_mm: Annotated[float, Field(ge=0.0)] = 50.0
+    clearance_mm: Annotated[float, Field(ge=0.0)] = 0.0
     n_candidate_projectors: Annotated[int, Field(ge=1, le=MOST_POSES)] = 640
     n_candidate_cameras: Annotated[int, Field(ge=1, le=MOST_POSES)] = 480
     n_reference_projectors: Annotated[int, Field(ge=600, le=MOST_POSES)] = 640
@@ -225,6 +226,17 @@ class RigTable(Table):
     check: CheckTable = CheckTable()
     existing: list[ExistingTable] = Field(default=[])
     obstacle: list[ObstacleTable] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _check_clearance(self) -> Self:
+        devices = (self.camera, self.projector, self.parallel_projector, *self.existing)
+        clearance = self.placement.clearance_mm
+        if clearance and not any(device and device.body for device in devices):
+            raise ValueError(
+                f"placement.clearance_mm = {clearance:g} is between housings, and no "
+                f"device has one; write [camera.body] or [projector.body]"
+            )
+        return self
 
     @model_validator(mode="after")
     def _check_names(self) -> Self:

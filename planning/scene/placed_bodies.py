@@ -18,6 +18,7 @@ from geometry.poses import inverse, transform
 from geometry.rays.rays import RayCaster
 from geometry.shapes.boxes import (
     OrientedBox,
+    box_gap,
     boxes_overlap,
     lines_cross,
     triangles_touch,
@@ -94,12 +95,16 @@ def touches_mesh(box: OrientedBox, mesh: TriangleMesh) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class PlacedBody:
-    """A body in the world, with kind, pose and name (if it has one) of its device."""
+    """A body in the world, with kind, pose and name (if it has one) of its device.
+
+    `stands` says whether the device stands already.
+    """
 
     kind: str
     world_from_device: NDArray[np.float64]
     box: OrientedBox
     name: str = ""
+    stands: bool = False
 
     @property
     def words(self) -> str:
@@ -146,6 +151,7 @@ def bodies_of(devices: Iterable[Device]) -> tuple[PlacedBody, ...]:
             device.world_from_device,
             placed_box(device.body, device.world_from_device),
             device.id or device.existing,
+            bool(device.existing),
         )
         for device in devices
         if device.body is not None
@@ -178,7 +184,7 @@ def existing_bodies(required: Requirements) -> tuple[PlacedBody, ...]:
     """Return the bodies of the devices that stand already."""
     poses = [np.array(device.world_from_device) for device in required.existing]
     return tuple(
-        PlacedBody(device.kind, pose, placed_box(device.body, pose), device.name)
+        PlacedBody(device.kind, pose, placed_box(device.body, pose), device.name, True)
         for device, pose in zip(required.existing, poses, strict=True)
         if device.body is not None
     )
@@ -224,9 +230,23 @@ def first_blocked(
     return first
 
 
-def collide(device: Device, bodies: Sequence[Blocker]) -> list[Blocker]:
-    """Return the bodies and obstacles that a device's own body comes too near to."""
+def collide(
+    device: Device, bodies: Sequence[Blocker], clearance_m: float
+) -> list[Blocker]:
+    """Return the bodies and obstacles that a device's own body comes too near to.
+
+    Bodies keep the clearance [m], unless both stand already.
+    """
     if device.body is None:
         return []
     box = placed_box(device.body, device.world_from_device).grown(CLEARANCE_M)
-    return [body for body in bodies if not body.is_of(device) and body.touches(box)]
+    wide = box.grown(clearance_m)
+
+    def too_near(body: Blocker) -> bool:
+        if isinstance(body, Obstruction) or (body.stands and device.existing):
+            return body.touches(box)
+        if not body.touches(wide):
+            return False
+        return not clearance_m or box_gap(box, body.box) < clearance_m
+
+    return [body for body in bodies if not body.is_of(device) and too_near(body)]

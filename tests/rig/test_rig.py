@@ -372,6 +372,7 @@ def test_files_that_cannot_be_read(tmp_path, write):
     ("text", "message"),
     [
         ("[placement]\nstandoff_play_mm = 1000.0", "must be less than"),
+        ("[placement]\nclearance_mm = 13.0", "between housings, and no device has one"),
         ("[placement]\nn_reference_cameras = 10", "greater than or equal to 400"),
         ("[camera]\nrange_mm = [2000.0, 3000.0]", "no distance is sharp"),
         ("[camera.focus]\ndistance_mm = 5.0", "beyond the focal length"),

@@ -15,6 +15,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.boxes import (
     OrientedBox,
+    box_gap,
     boxes_overlap,
     lines_cross,
     triangles_touch,
@@ -339,13 +340,68 @@ def test_existing_bodies_that_overlap_are_refused(scene):
         checked(0.09)
 
 
+# ---- clearance
+
+
+def test_gaps_of_boxes_are_those_of_their_nearest_points():
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        a, b = random_box(rng, spread=1.5), random_box(rng, spread=1.5)
+        expected = np.sqrt(2.0) * gap(a, b)
+        assert box_gap(a, b) == pytest.approx(expected, abs=1e-7)
+        assert as_block(a).gap(as_block(b)) == pytest.approx(expected, abs=1e-6)
+    square = OrientedBox(np.zeros(3), np.eye(3), np.full(3, 0.5))
+    corner = replace(square, centre=np.array([1.03, 1.04, 0.2]))
+    assert box_gap(square, corner) == pytest.approx(0.05, abs=1e-9)
+    assert as_block(square).gap(as_block(corner)) == pytest.approx(0.05, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("aside", "down", "free"),
+    [
+        (0.1125, 0.0, False),
+        (0.1135, 0.0, True),
+        # Corner to corner 5 and 12 mm are 13: boxes grown by 13 mm would overlap.
+        (0.105, 0.0718, False),
+        (0.105, 0.0725, True),
+    ],
+)
+def test_housings_keep_the_clearance_between_nearest_points(scene, aside, down, free):
+    apart = with_space(scene, clearance_m=0.013)
+    beside = camera(0.02 + aside, 0.01 + down, name="C2")
+    among = apart.among([beside])
+    assert (lacks_clearance(among, camera()) == "") == free
+    assert lacks_clearance(scene.among([beside]), camera()) == ""
+    lit = shares((0, 50), (50, 100))
+    points = np.zeros((100, 3))
+    pair = [camera(), beside]
+    assert Interference(pair, points, lit, 0.013).stand_together([0, 1]) == free
+    assert Interference(pair, points, lit, 0.0).stand_together([0, 1])
+
+
+def test_the_clearance_binds_what_is_planned_and_nothing_but_housings(scene):
+    old = with_space(scene, clearance_m=0.05)
+    left, right = (
+        Existing(name, "camera", tuple(map(tuple, at(x, 0.0, 0.6).tolist())), HOUSING)
+        for name, x in (("left", 0.0), ("right", 0.11))
+    )
+    required = replace(old.requirements, existing=(left, right))
+    standing = replace(old, requirements=required)
+    check_existing_clearance(standing, projector(), camera())
+    near, far = camera(-0.12, 0.0), camera(-0.16, 0.0)
+    assert lacks_clearance(standing, near) == "the body of left"
+    assert lacks_clearance(standing, far) == ""
+    # The plate is 1 mm away.
+    assert lacks_clearance(standing, camera(-0.5, 0.0, 0.021)) == ""
+
+
 # ---- chosen devices among each other
 
 
 def interference_of(devices, lit):
     n = len(lit)
     points = np.column_stack([np.linspace(-0.2, 0.2, n), np.zeros((n, 2))])
-    return Interference(devices, points, lit)
+    return Interference(devices, points, lit, 0.0)
 
 
 def shares(*parts):
@@ -433,7 +489,7 @@ def test_cameras_in_the_beam_are_judged_by_the_light_they_take(scene):
     among = scene.among([lamp])
 
     points = rows.target.samples.points
-    bodied = CameraInterference(eyes, points, measured, among, (lamp,), rows)
+    bodied = CameraInterference.among(among, (lamp,), rows, eyes, measured)
     assert not bodied.stand_together([0, 1])
     assert bodied.stand_together([1, 3])
     assert bodied.covers([1], [0, 1]).sum(axis=0).tolist() == [0, len(dark)]

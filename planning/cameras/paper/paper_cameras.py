@@ -226,9 +226,9 @@ def cover_of(
     route: RouteCameras,
 ) -> CameraCover:
     """Return the route's cameras as a cover, bounded over candidates and themselves."""
-    cameras, points = route.candidates.cameras, samples.target.samples.points
-    among = CameraInterference(
-        cameras, points, route.measured, scene, projectors, samples
+    cameras = route.candidates.cameras
+    among = CameraInterference.among(
+        scene, projectors, samples, cameras, route.measured
     )
     return CameraCover(
         route.candidates,

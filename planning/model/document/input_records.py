@@ -135,6 +135,7 @@ class RigRecord(Part):
     notes: tuple[str, ...] = ()
     existing: tuple[dict[str, Any], ...] = ()
     obstacle: tuple[dict[str, Any], ...] = ()
+    clearance_m: float = 0.0
 
 
 class RangePoint(Part):

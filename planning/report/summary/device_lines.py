@@ -1,14 +1,17 @@
 """Where every device stands and how its housing is turned, as one mounts it."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import turned_to
 from geometry.poses import horizontal_axes, pan_tilt_roll
+from geometry.shapes.boxes import box_gap
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.scene.placed_bodies import bodies_of
 
 _AXES = "xyz"
 
@@ -50,6 +53,16 @@ def device_lines(plan: RigPlan) -> list[str]:
         f"     in the axes of the mesh file; the object's centre is at {x:.1f}, "
         f"{y:.1f}, {z:.1f} mm",
     ]
+
+
+def gap_lines(plan: RigPlan) -> list[str]:
+    """Return which two housings stand nearest to each other; none of fewer than two."""
+    boxes = bodies_of((*plan.projectors, *plan.cameras))
+    if len(boxes) < 2:
+        return []
+    gaps = [(box_gap(a.box, b.box), a, b) for a, b in combinations(boxes, 2)]
+    gap, a, b = min(gaps, key=lambda pair: pair[0])
+    return [f"     the nearest housings are {a.name} and {b.name}, {1e3 * gap:.1f} mm"]
 
 
 def aim_angles(

@@ -73,6 +73,8 @@ def _shell(space: Workspace) -> list[str]:
         below = name[0] == "-"
         height = -height if below else height
         lines.append(f"floor: {name[1]} {'<=' if below else '>='} {height:.1f}")
+    if space.clearance_m:
+        lines.append(f"housings {1e3 * space.clearance_m:g} apart or more")
     return lines
 
 

@@ -39,7 +39,7 @@ def lacks_clearance(scene: Scene, device: Device) -> str:
     workspace = scene.requirements.workspace
     if not device.existing and (broken := broken_by_body(workspace, box)):
         return broken
-    others = collide(device, scene.bodies)
+    others = collide(device, scene.bodies, workspace.clearance_m)
     return others[0].words if others else ""
 
 
@@ -106,9 +106,12 @@ def _no_room(scene: Scene, candidates: Sequence[Device]) -> str:
         f"{what} {100.0 * causes.count(what) / len(causes):.0f} %"
         for what in sorted(set(causes), key=lambda what: (-causes.count(what), what))
     )
+    apart = 1e3 * scene.requirements.workspace.clearance_m
+    near = f", or come nearer than {apart:g} mm to," if apart else ""
     return (
         f"no {kind} of {len(candidates)} poses has room for its body, which would "
-        f"touch or reach into {named}; make the body smaller, {_remedy(set(causes))}"
+        f"touch or reach into{near} {named}; make the body smaller, "
+        f"{_remedy(set(causes))}"
     )
 
 

@@ -60,16 +60,29 @@ def _audit_body(
 def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
     """Check that bodies keep off each other, the object, the floor and the zones.
 
-    Floor and zones don't bind existing devices.
+    Floor, zones and the clearance between two don't bind existing devices.
     """
+    space, stated = case.plan.requirements.workspace, case.plan.document.rig.clearance_m
+    findings.number(
+        "requirements.workspace.clearance_m", space.clearance_m, stated, _ROUNDING, "m"
+    )
     devices = (*case.plan.projectors, *case.plan.cameras)
     blocks = [(device, block_of(device)) for device in devices]
     solid = [(device, block.shrunk()) for device, block in blocks if block is not None]
-    for (_, one), (_, other) in combinations(solid, 2):
+    for (first, one), (second, other) in combinations(solid, 2):
         key = f"{one.name}.body"
         findings.holds(
             not one.overlaps(other), key, f"overlaps the body of {other.name}"
         )
+        if space.clearance_m and not (first.existing and second.existing):
+            # Both are smaller by what rounding may have brought them nearer.
+            apart = one.gap(other)
+            findings.holds(
+                apart >= space.clearance_m,
+                key,
+                f"stands {1e3 * apart:.4g} mm from the body of {other.name}, nearer "
+                f"than {1e3 * space.clearance_m:g} mm",
+            )
     obstacles = {f"obstacle {h.name!r}": h.caster for h in case.shadow.hindrances}
     for device, block in solid:
         below = findings.at(f"{device.id}.body")
@@ -80,7 +93,7 @@ def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
                 f"touches the {name}; it must stand off it",
             )
         if not device.existing:
-            _audit_zones(block, case.plan.requirements.workspace, below)
+            _audit_zones(block, space, below)
 
 
 def _audit_zones(block: Block, space: Workspace, findings: AuditFindings) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
@@ -76,6 +77,17 @@ class Block:
     def overlaps(self, other: "Block") -> bool:
         """Return whether two boxes share a point."""
         return bool(self.meets(*other.edges).any() or other.meets(*self.edges).any())
+
+    def gap(self, other: "Block") -> float:
+        """Return the distance of the nearest points of two boxes [m].
+
+        The least |x - y| over x = a + A u in one and y = b + B v in the other is a
+        least-squares problem with bounds, |u| and |v| at most half their sides.
+        """
+        system = np.hstack([self.turn, -other.turn])
+        reach = np.concatenate([self.half, other.half])
+        found = lsq_linear(system, other.middle - self.middle, (-reach, reach))
+        return float(np.sqrt(2.0 * found.cost))
 
     def shrunk(self) -> "Block":
         """Return the box less what rounding a position may have added."""
