@@ -7,13 +7,14 @@ from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.certificates import CamerasBy
-from planning.model.errors import TimeLimitError
+from planning.model.errors import InputError, TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
 from planning.report.assemble import write_plan
 from planning.report.entries.device_entries import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
+from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
 from planning.rig.wishes import TargetName, Wishes
 from planning.scene.interest import Select, Weight
@@ -22,6 +23,7 @@ from planning.verify.verification import verify_plan
 
 from .prepare import prepared, request_of
 from .stages import (
+    as_they_stand,
     bounded_cameras,
     bounded_projectors,
     first_projectors,
@@ -56,6 +58,7 @@ def plan_rig(
     progress: Report | None = None,
     command: Sequence[str] = (),
     keep: Keep | None = None,
+    fixed: Mounted | None = None,
 ) -> RigPlan:
     """Plan the projectors and cameras that measure a surface, and check the plan.
 
@@ -86,6 +89,7 @@ def plan_rig(
         progress: Receives a line when a stage begins.
         command: Words of the command line, for the record.
         keep: Receives the plan when it is made and not yet checked.
+        fixed: Devices that stay where they are and count, from `read_mounted`.
 
     Returns:
         The plan, every requirement met.
@@ -106,6 +110,7 @@ def plan_rig(
         accuracy_mm=accuracy_mm,
         up=up,
     )
+    rig = rig if fixed is None else fixed.on(rig)
     clock = Stopwatch(progress, time_limit=time_limit)
     request = replace(
         request_of(mesh, rig, wishes, clock, select=select, weight=weight),
@@ -114,12 +119,120 @@ def plan_rig(
         command=tuple(command),
         prove=prove,
         cameras_by=cameras_by,
+        mounted=fixed,
     )
     # BLAS must not split sums differently with another number of threads.
     with threadpool_limits(1):
         plan, partial = _planned(request, clock)
-        if check and not plan.document.truncated:
-            plan = _checked(plan, partial, clock, keep)
+        return _finished(plan, partial, clock, check=check, keep=keep)
+
+
+def evaluate_rig(
+    mesh: TriangleMesh,
+    rig: Rig,
+    devices: Mounted,
+    *,
+    target: TargetName | None = None,
+    select: Select | None = None,
+    weight: Weight | None = None,
+    dominant_coverage: float | None = None,
+    coverage: float | None = None,
+    min_reachable: float | None = None,
+    accuracy_mm: float | None = None,
+    up: str | None = None,
+    seed: int = 0,
+    threads: int = 2,
+    check: bool = True,
+    time_limit: float | None = None,
+    progress: Report | None = None,
+    command: Sequence[str] = (),
+    keep: Keep | None = None,
+) -> RigPlan:
+    """Return the plan of devices as they stand: what they measure, and its check.
+
+    No device is sought or moved, and nothing is proved of their number. Rings of
+    projectors that bring none are planned for them. Limits of the workspace that the
+    devices break are told, and refuse nothing.
+
+    Args:
+        mesh: The surface, in metres.
+        rig: Their optics, and the limits; its existing devices belong to them.
+        devices: From `read_mounted`.
+        target: As of `plan_rig`, like all that follow.
+        select: Faces that are the target.
+        weight: Of each vertex.
+        dominant_coverage: Lit / reachable by projectors.
+        coverage: Measured / reachable by cameras.
+        min_reachable: Reachable by projectors / target.
+        accuracy_mm: Largest standard deviation along the normal [mm].
+        up: Axis that points up.
+        seed: Of every random draw.
+        threads: Worker threads.
+        check: Whether the plan is audited and reconstructed from pixels.
+        time_limit: Wall time in [s].
+        progress: Receives a line when a stage begins.
+        command: Words of the command line, for the record.
+        keep: Receives the plan when it is made and not yet checked.
+
+    Returns:
+        The plan, every requirement met.
+
+    Raises:
+        InputError: If an argument can't be used, or there is no projector or no camera.
+        RequirementError: If a requirement is missed; it carries the plan.
+        TimeLimitError: If the time limit came first.
+    """
+    rig = devices.on(rig)
+    counts = {
+        kind: sum(table.kind == kind for table in rig.table.existing)
+        for kind in ("projector", "camera")
+    }
+    for kind, count in counts.items():
+        if not count:
+            raise InputError(
+                f"{devices.path}: holds no {kind}; a rig has one of either or more"
+            )
+    wishes = Wishes(
+        max_projectors=counts["projector"],
+        max_cameras=counts["camera"],
+        target=target,
+        dominant_coverage=dominant_coverage,
+        coverage=coverage,
+        min_reachable=min_reachable,
+        accuracy_mm=accuracy_mm,
+        up=up,
+    )
+    clock = Stopwatch(progress, time_limit=time_limit)
+    request = replace(
+        request_of(mesh, rig, wishes, clock, select=select, weight=weight),
+        seed=seed,
+        threads=threads,
+        command=tuple(command),
+        mounted=devices,
+        evaluates=True,
+    )
+    with threadpool_limits(1):
+        partial = as_they_stand(prepared(request, clock), clock)
+        plan = write_plan(partial, clock)
+        return _finished(plan, partial, clock, check=check, keep=keep)
+
+
+def _finished(
+    plan: RigPlan,
+    partial: PartialPlan,
+    clock: Stopwatch,
+    *,
+    check: bool,
+    keep: Keep | None,
+) -> RigPlan:
+    """Return a plan, checked if that is asked for, every requirement met.
+
+    Raises:
+        InterruptedPlanError: If the check is interrupted; it carries the plan as it is.
+        RequirementError: If a requirement is missed; it carries the plan.
+    """
+    if check and not plan.document.truncated:
+        plan = _checked(plan, partial, clock, keep)
     missed = shortfalls(plan)
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)

@@ -125,7 +125,8 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         pattern=requirements.pattern,
     )
     camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
-    check_existing_clearance(scene, template, camera)
+    if not request.evaluates:
+        check_existing_clearance(scene, template, camera)
     return Prepared(request, scene, regions, field.radius, template, camera)
 
 
@@ -160,6 +161,11 @@ def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
     if workspace.projector_standoff_m is not None:
         # What is looked at from beside reaches to the corners of the image.
         outer = corner
+    if request.mounted is not None:
+        requirements = request.mounted.with_rings(requirements)
+    for kept in requirements.existing:
+        # One outermost ring for all: that of the rings that stay.
+        outer = kept.ring_radii[-1] if kept.ring_radii else outer
     radii = uniform_radii(outer, light.ring_step(gap, rig.standoff_m))
     x, y, z = bearing(mesh, np.array(workspace.axis)).tolist()
     workspace = replace(

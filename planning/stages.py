@@ -3,7 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planning.cameras.camera_cover import NothingMeasuredError, camera_candidate_views
+import numpy as np
+
+from planning.cameras.camera_cover import (
+    CameraCover,
+    NothingMeasuredError,
+    camera_candidate_views,
+    candidate_cover,
+    measured_of,
+)
 from planning.cameras.camera_routes import widest_route
 from planning.cameras.camera_stage import follow_cameras, place_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
@@ -11,16 +19,24 @@ from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
-from planning.projectors.candidate_set import NothingLitError
+from planning.projectors.candidate_set import (
+    CandidateSet,
+    CandidateSource,
+    NothingLitError,
+)
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
-from planning.proofs.candidate_certificate import larger
+from planning.proofs.candidate_certificate import larger, unproved
+from planning.proofs.selection import CandidateCover, Selection
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
+from planning.rings.axis_moves import move_ring_axes
 from planning.rings.ring_stage import space_rings
+from planning.scene.draws import DRAWS
+from planning.scene.measured import lit_samples
 
 from .proofs import camera_bound, projector_bound
 
@@ -166,3 +182,56 @@ def one_device_more(
 def _bound_words(proof: Certificate) -> str:
     bound = proof.continuous
     return "" if bound is None else f"at least {bound.lower_bound}, {bound.proof}"
+
+
+def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
+    """Return the existing devices with their rings, and what candidates would reach."""
+    request, scene = ready.request, ready.scene
+    with clock.stage("projectors", "projectors: what they light as they stand"):
+        source = CandidateSource(scene, ready.template)
+        candidates = CandidateSet.over(
+            scene,
+            scene.target_samples(DRAWS.projectors),
+            source.lattice(request.rig.n_projector_poses),
+        )
+        projectors = candidates.projectors[: candidates.n_existing]
+        proof = unproved(candidates.cover, candidates.samples.samples.weight)
+        stage = ProjectorStage(
+            {len(projectors): projectors}, proof, projectors, candidates
+        )
+    with clock.stage("cameras", "cameras: what they measure as they stand"):
+        views = camera_candidate_views(scene, ready.camera, request.rig.n_camera_poses)
+        cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
+        target = scene.target_samples(DRAWS.cameras)
+        lit = lit_samples(scene, projectors, target)
+        projectors = move_ring_axes(scene, projectors, cameras, lit)
+        samples, measured = measured_of(scene, projectors, views, target)
+        cover = candidate_cover(scene, measured)
+        proof = unproved(cover, target.samples.weight)
+        camera_stage = CameraStage(
+            {len(cameras): cameras},
+            proof,
+            cameras,
+            CameraCover(views, samples, measured, _standing(cover)),
+        )
+    with clock.stage("rings", "rings: radii for the surface and the cameras"):
+        spacing = request.rig.ring_spacing
+        rings = space_rings(scene, projectors, cameras, spacing, samples)
+    return PartialPlan(ready, stage, projectors, camera_stage, cameras, rings=rings)
+
+
+def _standing(cover: CandidateCover) -> Selection:
+    """The existing devices as a selection that nothing was proved of."""
+    chosen = np.arange(cover.n_existing)
+    n_covered = cover.n_covered(chosen)
+    met = n_covered >= cover.required
+    return Selection(
+        chosen,
+        chosen,
+        0,
+        "feasible" if met else "infeasible",
+        "",
+        cover.required,
+        n_covered,
+        n_covered,
+    )

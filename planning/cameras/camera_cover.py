@@ -127,7 +127,7 @@ def confirmed_cover(
         if cover.selection.status == "infeasible":
             return cover
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
-        _, seen = _measured(scene, projectors, cover.candidates, fresh)
+        _, seen = measured_of(scene, projectors, cover.candidates, fresh)
         covered = seen[:, cover.selection.chosen].any(axis=1).sum()
         if covered >= scene.requirements.coverage * seen.any(axis=1).sum():
             return cover
@@ -150,19 +150,20 @@ def measured_samples(
             stop most samples.
     """
     target = target or scene.target_samples(DRAWS.cameras)
-    samples, measured = _measured(scene, projectors, candidates, target)
+    samples, measured = measured_of(scene, projectors, candidates, target)
     if not measured.any():
         message = _nothing_measured(scene, candidates.cameras, samples)
         raise NothingMeasuredError(message, candidates.cameras, samples)
     return samples, measured
 
 
-def _measured(
+def measured_of(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     candidates: CandidateViews,
     target: Target,
 ) -> tuple[LitSamples, NDArray[np.bool_]]:
+    """Return which of some samples are lit, and which candidate measures which."""
     samples = lit_samples(scene, projectors, target)
     views = candidates.on(samples.target)
     return samples, measured_by(scene, candidates.cameras, samples, views)

@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import click
 
+from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.other_declared import rigs, sample, schema, show, verify
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
@@ -67,6 +68,7 @@ def commands() -> None:
 
     \b
     plan --mesh face.obj --max-projectors 3   plans, checks, writes ./face-plan/
+    plan evaluate --mesh F --poses mounted.csv  what a rig measures as it stands
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
@@ -76,7 +78,10 @@ def commands() -> None:
     """  # noqa: D301 - click wants the character that \b stands for
 
 
-for _command in (rig_command, verify, show, reconstruct, rigs, schema, sample):
+for _command in (
+    *(rig_command, evaluate, verify, show, reconstruct),
+    *(rigs, schema, sample),
+):
     commands.add_command(_command)
 
 

@@ -1,8 +1,9 @@
 """What `plan --mesh` and `plan --ranges` do."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,14 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
-from planning.pipeline import plan_rig
+from planning.pipeline import evaluate_rig, plan_rig
 from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.picture_view import save_picture
 from planning.report.drawing.rig_picture import draw_rig
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.summary.summary import summary
-from planning.rig.rig import load_rig
+from planning.rig.mounted import read_mounted, split_fixed
+from planning.rig.rig import Rig, load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import read_ranges
 from planning.verify.reconstruction.pattern_files import write_patterns
@@ -28,10 +30,8 @@ from planning.verify.reconstruction.scanner import Scanner
 from .console import print_json, reporter, writable
 from .output_folder import OWNED, exchanged, uninterrupted
 
-# Options that `plan_rig` takes as they are.
+# Options that are taken as they are: by both, and where devices are sought.
 _ASKED = (
-    "max_projectors",
-    "max_cameras",
     "target",
     "dominant_coverage",
     "coverage",
@@ -39,9 +39,8 @@ _ASKED = (
     "accuracy_mm",
     "up",
     "seed",
-    "prove",
-    "cameras_by",
 )
+_PLANNED = ("max_projectors", "max_cameras", "prove", "cameras_by")
 
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
@@ -49,9 +48,11 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     begin = time.monotonic()
     report = reporter(quiet=options["quiet"])
     path = Path(options["ranges"] or options["meshes"][0])
-    folder = options["output"] or Path(f"{path.name.split('.')[0]}-plan")
+    result = "plan" if options["poses"] is None else "evaluation"
+    folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
     with writable(folder):
         rig = load_rig(options["rig_name"], light=options["light"])
+        make = _maker(options, rig)
         report(f"reading {path}")
         interest = None
         if options["ranges"] is not None:
@@ -74,9 +75,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
             report(f"written to {folder}, NOT CHECKED yet")
 
         try:
-            plan = plan_rig(
+            plan = make(
                 surface,
-                rig,
                 select=interest,
                 threads=options["threads"] or n_threads(),
                 check=not options["no_check"],
@@ -102,6 +102,19 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     else:
         click.echo(summary(plan, files, missed))
     return code
+
+
+def _maker(options: Mapping[str, Any], rig: Rig) -> Callable[..., RigPlan]:
+    """What plans with the rig, around fixed devices or not, or evaluates devices."""
+    if options["poses"] is not None:
+        devices = read_mounted(options["poses"], rig)
+        return partial(evaluate_rig, rig=rig, devices=devices)
+    fixed = None
+    if options["fixed"] is not None:
+        path, names = split_fixed(options["fixed"])
+        fixed = read_mounted(path, rig, names)
+    asked = {name: options[name] for name in _PLANNED}
+    return partial(plan_rig, rig=rig, fixed=fixed, **asked)
 
 
 def _interest(

@@ -47,12 +47,12 @@ class RigPlan:
 
     @cached_property
     def projectors(self) -> tuple[PlannedProjector, ...]:
-        """The projectors, in the order of their ids."""
+        """The projectors, in the order of the file."""
         return tuple(record.planned() for record in self.document.projectors)
 
     @cached_property
     def cameras(self) -> tuple[PlannedCamera, ...]:
-        """The cameras, in the order of their ids."""
+        """The cameras, in the order of the file."""
         return tuple(record.planned() for record in self.document.cameras)
 
     @property

@@ -24,6 +24,7 @@ class PlannedProjector:
         existing: Name of the device that stands already; empty: it is planned.
         body: Its housing; None: it takes no room.
         pattern: What it shows, as in `Requirements`.
+        keeps_rings: Whether its rings stay as they are.
     """
 
     id: str
@@ -35,6 +36,7 @@ class PlannedProjector:
     existing: str = ""
     body: Body | None = None
     pattern: Literal["rings", "dense", "none"] = "rings"
+    keeps_rings: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,8 @@ from .bodies import Body, Box, Triple
 _ZONES = ("box", "keep_out", "mounting")
 _STANDOFFS = ("projector_standoff_m", "camera_standoff_m")
 _LEFT_OUT = (*_ZONES, *_STANDOFFS, "origin", "clearance_m")
+# Of an existing device, likewise.
+_OF_ITS_OWN = ("body", "world_from_ring", "ring_radii")
 
 
 @dataclass(frozen=True)
@@ -206,19 +208,27 @@ class Existing:
         kind: `projector` or `camera`.
         world_from_device: Its pose, rows of a 4 x 4 matrix [m].
         body: Its own, or that of its kind; None: it has none.
+        world_from_ring: Ring frame of a projector whose rings stay, rows [m]; None:
+            its rings are planned.
+        ring_radii: Of these rings, as in `PlannedProjector`.
 
     Raises:
-        ValueError: If the pose isn't 4 x 4.
+        ValueError: If a pose isn't 4 x 4.
     """
 
     name: str
     kind: str
     world_from_device: tuple[tuple[float, ...], ...]
     body: Body | None = None
+    world_from_ring: tuple[tuple[float, ...], ...] | None = None
+    ring_radii: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if [len(row) for row in self.world_from_device] != [4] * 4:
-            raise ValueError("existing: world_from_device must be 4 x 4")
+        for rows in (self.world_from_device, self.world_from_ring or ((0.0,) * 4,) * 4):
+            if [len(row) for row in rows] != [4] * 4:
+                raise ValueError("existing: poses must be 4 x 4")
+        if (self.world_from_ring is None) != (not self.ring_radii):
+            raise ValueError("existing: world_from_ring and ring_radii go together")
 
 
 @dataclass(frozen=True)
@@ -258,7 +268,7 @@ class Requirements:
         """Return plain JSON values."""
         # By way of JSON, which turns tuples to lists and keeps every float.
         document = json.loads(json.dumps(asdict(self)))
-        devices = [(device, ("body",)) for device in document["existing"]]
+        devices = [(device, _OF_ITS_OWN) for device in document["existing"]]
         tables = [(document["workspace"], _LEFT_OUT), (document, ("existing",))]
         for table, names in devices + tables:
             for name in names:

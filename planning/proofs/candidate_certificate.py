@@ -24,6 +24,29 @@ _ByCount = Mapping[int, NDArray[np.int64]]
 _BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
 
 
+def unproved(cover: CandidateCover, sample_area_m2: float) -> Certificate:
+    """Return the certificate of existing devices alone, of whose number none is proved.
+
+    What is required is a share of what all candidates cover, as of any cover.
+    """
+    count = cover.n_existing
+    covered = cover.n_covered(np.arange(count))
+    area, met = covered * sample_area_m2, covered >= cover.required
+    return Certificate(
+        count=count,
+        status="feasible" if met else "infeasible",
+        required_m2=cover.required * sample_area_m2,
+        n_samples=len(cover.covers),
+        candidates=CandidateBound(lower_bound=0, n_candidates=cover.covers.shape[1]),
+        continuous=None,
+        greedy_count=count,
+        needed=NeededCount(count=count, lower_bound=0),
+        best_area=BestArea(value_m2=area, upper_bound_m2=area),
+        one_fewer=None,
+        given=count,
+    )
+
+
 def certified(
     cover: CandidateCover,
     selection: Selection,

@@ -9,7 +9,12 @@ from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
 from planning.model.document.certificates import Certificates
 from planning.model.document.device_records import BaselineRow
-from planning.model.document.input_records import RigRecord, SurfaceRecord, Units
+from planning.model.document.input_records import (
+    EvaluationRecord,
+    RigRecord,
+    SurfaceRecord,
+    Units,
+)
 from planning.model.document.plan_document import (
     FORMAT,
     VERSION,
@@ -24,6 +29,7 @@ from planning.model.surface import Surface
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
+from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
 from planning.scene.scene import Scene
 
@@ -88,17 +94,24 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     )
     if partial.request.ranges is not None:
         document = document.changed(ranges=ranges_record(*partial.request.ranges))
+    mounted = partial.request.mounted
+    if mounted is not None and partial.request.evaluates:
+        broken = violations(scene, (*devices.projectors, *devices.cameras))
+        evaluation = EvaluationRecord(
+            path=mounted.path, sha256=mounted.sha256, violations=broken
+        )
+        document = document.changed(evaluation=evaluation)
     return RigPlan(document, surface)
 
 
 def _rounded_devices(partial: PartialPlan) -> Devices:
     """The devices and the reference sets as they will be written."""
     projectors, cameras = partial.final_projectors, partial.cameras
+    lights = zip(projectors, entries.device_ids(projectors, "P"), strict=True)
+    views = zip(cameras, entries.device_ids(cameras, "C"), strict=True)
     return Devices(
-        tuple(
-            entries.rounded_projector(p, f"P{i}") for i, p in enumerate(projectors, 1)
-        ),
-        tuple(entries.rounded_camera(c, f"C{i}") for i, c in enumerate(cameras, 1)),
+        tuple(entries.rounded_projector(p, name) for p, name in lights),
+        tuple(entries.rounded_camera(c, name) for c, name in views),
         tuple(entries.rounded_projector(p, "") for p in partial.stage.reference),
         tuple(entries.rounded_camera(c, "") for c in partial.camera_stage.reference),
     )

@@ -8,6 +8,7 @@ from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
+from planning.rig.mounted import Mounted
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
@@ -25,6 +26,9 @@ class PlanRequest:
         interest: The user's own target; None: the dominant regions by curvature.
         ranges: The body whose sphere the mesh is, and what the rig's limits keep free
             for it; None: the mesh was known.
+        mounted: Devices that stay, which the rig holds already; None: none but those
+            of its file.
+        evaluates: Whether these are all there will be.
     """
 
     mesh: TriangleMesh
@@ -37,6 +41,8 @@ class PlanRequest:
     prove: bool = False
     ranges: tuple[RangedBody, Guard] | None = None
     cameras_by: CamerasBy = "both"
+    mounted: Mounted | None = None
+    evaluates: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,7 +50,7 @@ def move_ring_axes(
     whole way is tried, then a half and a quarter. A move counts only if no fewer
     samples are measured, neither of these nor of fresh ones, all that is lit of the
     surface stays inside the largest ring, and more are measured or the rms of s_N of
-    each sample's best pair falls.
+    each sample's best pair falls. Projectors that keep their rings keep the axis.
     """
     fresh = lit_samples(scene, projectors, scene.target_samples(DRAWS.axes))
     judges = [AxisJudge.of(scene, cameras, lit) for lit in (samples, fresh)]
@@ -58,8 +58,9 @@ def move_ring_axes(
     points = around.target.samples.points
     held = [points[around.lit[:, p]] for p in range(len(projectors))]
     moved = list(projectors)
+    free = [p for p, projector in enumerate(projectors) if not projector.keeps_rings]
     for _ in range(_SWEEPS):
-        if not any([_move(judges, moved, p, held[p]) for p in range(len(moved))]):
+        if not any([_move(judges, moved, p, held[p]) for p in free]):
             break
     return tuple(moved)
 

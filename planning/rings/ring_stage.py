@@ -29,8 +29,8 @@ from planning.scene.scene import Scene
 from .ring_creases import Creases, crease_errors, find_creases
 from .ring_limits import RingBeam, ring_beam
 from .ring_pitch import best_pitch, users
-from .ring_radii import least_pitch_px
-from .ring_spacing import spaced_radii
+from .ring_radii import least_pitch_px, uniform_radii
+from .ring_spacing import GapLimits, spaced_radii
 
 Spacing = Literal["uniform", "curvature"]
 
@@ -64,21 +64,29 @@ def space_rings(
 ) -> RingStage:
     """Return the projectors with rings spaced for the surface and the cameras.
 
-    A projector keeps its even rings where others would lose a measured sample.
+    A projector keeps its even rings where others would lose a measured sample. Those
+    that keep their rings are reported on.
 
     Where `spacing` is `uniform` rings stay, and are reported on. Fewer cameras were
     proved too few for the samples `proved`.
     """
     even = tuple(projectors)
+    steady = tuple(_evenly(projector) for projector in even)
     creases = find_creases(scene.mesh, 0.5 * scene.mesh.mean_edge)
-    beams = tuple(ring_beam(scene, projector, creases) for projector in even)
+    beams = tuple(ring_beam(scene, projector, creases) for projector in steady)
     if proved is not None:
         beams = tuple(b.with_lit(_lit_at(b, proved, p)) for p, b in enumerate(beams))
     final, losing = even, frozenset[int]()
     if spacing == "curvature":
         final, losing = _spaced(scene, even, cameras, beams)
     records = tuple(
-        rings_record(scene, beam, final[p], creases, kept_even=p in losing)
+        rings_record(
+            scene,
+            beam,
+            final[p],
+            creases,
+            kept_even=p in losing and not even[p].keeps_rings,
+        )
         for p, beam in enumerate(beams)
     )
     return RingStage(final, tuple(p.ring_radii for p in even), records)
@@ -117,10 +125,8 @@ def _spaced(
             for p, beam in enumerate(beams)
         )
         limits = [beams[p].limits(binding[p], least_px) for p in every]
-        final = tuple(
-            replace(p, ring_radii=spaced_radii(bound, len(p.ring_radii), tolerance))
-            for p, bound in zip(even, limits, strict=True)
-        )
+        pairs = zip(even, limits, strict=True)
+        final = tuple(_spaced_for(p, bound, tolerance) for p, bound in pairs)
         draw = _draw(scene, even, cameras, attempt)
         lost = _lost(scene, draw, final)
         if not lost.any():
@@ -132,7 +138,25 @@ def _spaced(
         kept |= set(np.flatnonzero((draw.pitch[lost] > 0).any(axis=0)).tolist())
         final = tuple(even[p] if p in kept else final[p] for p in every)
         lost = _lost(scene, draw, final)
-    return final, frozenset(kept)
+    return final, frozenset(p for p in kept if not even[p].keeps_rings)
+
+
+def _spaced_for(
+    projector: PlannedProjector, limits: GapLimits, tolerance_m: float
+) -> PlannedProjector:
+    """A projector with the rings that limits let it have, unless its own stay."""
+    if projector.keeps_rings:
+        return projector
+    radii = spaced_radii(limits, len(projector.ring_radii), tolerance_m)
+    return replace(projector, ring_radii=radii)
+
+
+def _evenly(projector: PlannedProjector) -> PlannedProjector:
+    """A projector whose rings stay, with as many at equal steps; others as they are."""
+    if not projector.keeps_rings:
+        return projector
+    outer, n = float(projector.ring_radii[-1]), len(projector.ring_radii)
+    return replace(projector, ring_radii=uniform_radii(outer, outer / n))
 
 
 def _draw(
@@ -200,8 +224,9 @@ def rings_record(
     shone = beam.profile.points[:-1][beam.profile.lit[:-1]]
     gaps = pattern_of(final).surfaces(shone).spacing
     errors = beam.errors_under(final) > tolerance_m(scene.requirements)
+    spaced = "uniform" if final is beam.projector else "curvature"
     return RingsRecord(
-        spacing="uniform" if final is beam.projector else "curvature",
+        spacing="kept" if final.keeps_rings else spaced,
         kept_even=kept_even,
         n_even=len(beam.projector.ring_radii),
         gap_m=(float(gaps.min()), float(gaps.max())) if len(gaps) else None,

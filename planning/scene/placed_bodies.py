@@ -27,7 +27,7 @@ from planning.model.bodies import Body
 from planning.model.device_poses import moved_to
 from planning.model.obstacles import Obstacle
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Requirements
+from planning.model.requirements import Existing, Requirements
 
 Device = PlannedProjector | PlannedCamera
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
@@ -165,14 +165,22 @@ def moves_bodies(devices: Iterable[Device]) -> bool:
 
 def existing_devices(required: Requirements, template: _D) -> tuple[_D, ...]:
     """Return the devices of a template's kind, with its optics, that stand already."""
-    return tuple(
-        replace(
-            moved_to(template, np.array(device.world_from_device)),
-            existing=device.name,
-            body=device.body,
+
+    def placed(device: Existing) -> _D:
+        pose = np.array(device.world_from_device)
+        stands = replace(
+            moved_to(template, pose), existing=device.name, body=device.body
         )
-        for device in required.existing_of(kind_of(template))
-    )
+        if isinstance(stands, PlannedCamera) or device.world_from_ring is None:
+            return stands
+        return replace(
+            stands,
+            world_from_ring=np.array(device.world_from_ring),
+            ring_radii=np.array(device.ring_radii),
+            keeps_rings=True,
+        )
+
+    return tuple(placed(device) for device in required.existing_of(kind_of(template)))
 
 
 def movable(devices: Sequence[_D]) -> list[_D]:

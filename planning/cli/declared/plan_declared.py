@@ -118,6 +118,12 @@ from planning.cli.console import Positive, output_options, run, threads_option
     help="Fewest of the candidates, the paper's largest baselines, or what is better.",
 )
 @click.option(
+    "--fixed",
+    metavar="plan.json[:P1,C1]",
+    help="Keep these devices of an earlier plan, or of a CSV file of poses, and plan "
+    "the rest; they count.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
@@ -145,6 +151,17 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""
     from planning.cli.plan_command import plan_command
 
+    check_options(options)
+    options["poses"] = None
+    run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
+
+
+def check_options(options: dict[str, Any]) -> None:
+    """Refuse options that exclude each other.
+
+    Raises:
+        click.UsageError: It names them.
+    """
     _check_source(options)
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
@@ -153,7 +170,6 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
         raise click.UsageError(
             f"--pattern {options['pattern']} isn't built yet: use rings"
         )
-    run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
 
 
 def _check_source(options: dict[str, Any]) -> None:

@@ -23,14 +23,15 @@ class RingsRecord(Part):
     """How the rings of a projector are spaced; gaps h and errors in [m].
 
     Attributes:
+        spacing: `kept`: as of the plan that the projector is from.
         kept_even: Whether they stay even since others would lose measured samples.
-        n_even: How many evenly spaced rings there were.
+        n_even: How many evenly spaced rings there were; of kept ones, as many.
         gap_m: Least and largest gap on the object; None: no ring lands on it.
         over_tolerance: Share of chords between rings that err by more than the accuracy
             that was asked for, or than the check's 95th percentile.
     """
 
-    spacing: Literal["uniform", "curvature"]
+    spacing: Literal["uniform", "curvature", "kept"]
     kept_even: bool
     n_even: int
     gap_m: Interval | None

@@ -1,12 +1,24 @@
 """What a plan was made from: `meshes`, `surface`, `rig` and `ranges`."""
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
 from planning.model.bodies import Body
 
 from .part import Interval, Matrix3, Part, Resolution, Vector3
+
+Limit = Literal[
+    "standoff",
+    "cone",
+    "floor",
+    "box",
+    "mounting",
+    "keep_out",
+    "range",
+    "body",
+    "clearance",
+]
 
 
 class Units(Part):
@@ -136,6 +148,30 @@ class RigRecord(Part):
     existing: tuple[dict[str, Any], ...] = ()
     obstacle: tuple[dict[str, Any], ...] = ()
     clearance_m: float = 0.0
+
+
+class ViolationRecord(Part):
+    """A limit of where devices may stand that one of an evaluated rig breaks.
+
+    Attributes:
+        device: Its id.
+        limit: Of its position, of its body, or its range, in which no vertex lies.
+        what: The zone, or what the body touches.
+        by_m: How far; None: it touches.
+    """
+
+    device: str
+    limit: Limit
+    what: str = ""
+    by_m: float | None
+
+
+class EvaluationRecord(Part):
+    """Where the poses of a rig as it stands are from, and which limits they break."""
+
+    path: str
+    sha256: str
+    violations: tuple[ViolationRecord, ...] = ()
 
 
 class RangePoint(Part):

@@ -18,7 +18,14 @@ from .coverage_records import (
     RegionRecord,
 )
 from .device_records import BaselineRow, CameraRecord, ProjectorRecord
-from .input_records import MeshRecord, RangesRecord, RigRecord, SurfaceRecord, Units
+from .input_records import (
+    EvaluationRecord,
+    MeshRecord,
+    RangesRecord,
+    RigRecord,
+    SurfaceRecord,
+    Units,
+)
 from .part import Part
 
 FORMAT = "ringrig-plan"
@@ -72,6 +79,7 @@ class PlanDocument(Part):
     certificates: Certificates
     baselines: tuple[BaselineRow, ...]
     ranges: RangesRecord | None = None
+    evaluation: EvaluationRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     cost: CostRecord
     members: tuple[MemberRecord, ...]

@@ -1,7 +1,9 @@
 """Devices as they will be written; records of mesh, target, coverage and cost."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from itertools import count
 from math import prod
 from typing import Any
 
@@ -35,6 +37,17 @@ from planning.scene.scene import Scene
 # those that place cameras.
 _PROJECTOR_STAGES = ("regions", "projectors", "bounds", "projector_poses", "rings")
 _CAMERA_STAGES = ("cameras", "baselines")
+
+
+def device_ids(
+    devices: Sequence[PlannedProjector | PlannedCamera], letter: str
+) -> list[str]:
+    """Return P1, P2 and so on; one that stands already under such a name keeps it."""
+    numbered = re.compile(rf"{letter}[1-9]\d*")
+    kept = {d.existing for d in devices if numbered.fullmatch(d.existing)}
+    every = (f"{letter}{number}" for number in count(1))
+    spare = (name for name in every if name not in kept)
+    return [d.existing if d.existing in kept else next(spare) for d in devices]
 
 
 def rounded_projector(projector: PlannedProjector, name: str) -> PlannedProjector:

@@ -20,6 +20,13 @@ _EXCLUDED = {
 def proof_lines(plan: RigPlan) -> list[str]:
     """Return what was proved of both counts, and over what."""
     requirements, proofs = plan.requirements, plan.document.certificates
+    if plan.document.evaluation is not None:
+        return [
+            "",
+            "GIVEN    these devices as they stand: none was sought or moved, and "
+            "nothing is proved of their number",
+            f"         {_regions(plan)}",
+        ]
     poses = light_of(plan.projectors[0].device).bounded_over
     return [
         "",

@@ -75,6 +75,8 @@ def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:
 def _remedy(rings: RingsRecord) -> str:
     if rings.spacing == "uniform" and not rings.kept_even:
         return 'write spacing = "curvature" under [rings]'
+    if rings.spacing == "kept":
+        return "its rings are as they were; its pose in a CSV file lets them change"
     return (
         "finer rings can't be told apart; a longer focal length, more views, or a "
         "second sequence with shifted radii would help"

@@ -14,6 +14,7 @@ from .coverage_lines import coverage_lines, marginal_lines
 from .device_lines import axis_name, device_lines
 from .proof_lines import proof_lines
 from .ring_lines import range_lines, ring_lines
+from .warning_lines import warning_lines
 
 
 def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
@@ -27,13 +28,14 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     lines = [
         _head(plan),
         *device_lines(plan),
+        *warning_lines(plan),
         *proof_lines(plan),
         *coverage_lines(plan),
         *range_lines(plan.document),
         *ring_lines(plan),
-        *marginal_lines(plan),
+        *(() if plan.document.evaluation else marginal_lines(plan)),
         *check_lines(plan),
-        *cost_lines(plan.document.cost),
+        *(() if plan.document.evaluation else cost_lines(plan.document.cost)),
         *(f"MISSED   {line}" for line in missed),
         *labelled("files", files),
     ]
@@ -42,13 +44,15 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
 
 def _head(plan: RigPlan) -> str:
     document, workspace = plan.document, plan.requirements.workspace
-    mesh = document.meshes[0]
+    mesh, evaluation = document.meshes[0], document.evaluation
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = "; TRUNCATED" if document.truncated else ""
     cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
     return (
-        f"PLAN     {count_words(len(plan.projectors), 'projector')}, "
-        f"{count_words(len(plan.cameras), 'camera')} for "
+        f"{'AS BUILT' if evaluation else 'PLAN':<9}"
+        f"{count_words(len(plan.projectors), 'projector')}, "
+        f"{count_words(len(plan.cameras), 'camera')}"
+        f"{f' of {evaluation.path}' if evaluation else ''} for "
         f"{mesh.path}{cut}\n"
         f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
         f"{_unit(mesh)}, up {axis_name(workspace.up)}; rig {document.rig.name}, "

@@ -38,7 +38,7 @@ def lacks_clearance(scene: Scene, device: Device) -> str:
         return "the object"
     workspace = scene.requirements.workspace
     if not device.existing and (broken := broken_by_body(workspace, box)):
-        return broken
+        return broken[0]
     others = collide(device, scene.bodies, workspace.clearance_m)
     return others[0].words if others else ""
 

@@ -94,21 +94,21 @@ def may_be_admissible(
     return possible
 
 
-def broken_by_body(workspace: Workspace, box: OrientedBox) -> str:
-    """Return what a body in the world reaches into or through; empty if nothing."""
+def broken_by_body(workspace: Workspace, box: OrientedBox) -> tuple[str, ...]:
+    """Return what a body in the world reaches into or through."""
     centre = np.array(workspace.centre)
+    broken: list[str] = []
     if workspace.floor_m is not None:
         heights = (box.corners - centre) @ np.array(workspace.up)
-        if not np.all(heights >= workspace.floor_m):
-            return "the floor"
+        broken += [] if np.all(heights >= workspace.floor_m) else ["the floor"]
     if workspace.box is not None:
         inside = np.abs(_in_world(workspace.box, centre).local(box.corners))
-        if not np.all(inside <= np.array(workspace.box.half_m)):
-            return "the walls of the room"
+        kept = np.all(inside <= np.array(workspace.box.half_m))
+        broken += [] if kept else ["the walls of the room"]
     for zone in workspace.keep_out:
         if boxes_overlap(_in_world(zone, centre), box):
-            return f"the keep-out volume {zone.name!r}"
-    return ""
+            broken.append(f"the keep-out volume {zone.name!r}")
+    return tuple(broken)
 
 
 def _in_world(zone: Box, centre: _Array) -> OrientedBox:

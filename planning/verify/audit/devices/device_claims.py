@@ -10,7 +10,7 @@ from geometry.devices import PinholeModel
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Workspace
+from planning.model.requirements import Existing, Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_optics import pixels_of
@@ -109,6 +109,8 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
                     f"that of the existing {device.name!r}",
                     SAME_POSE,
                 )
+                if device.ring_radii:
+                    _audit_kept_rings(planned, device, findings.at(planned.id))
         findings.holds(
             kind.proof.given == len(stated),
             f"certificates.{kind.name}s.given",
@@ -126,6 +128,20 @@ def audit_existing(case: AuditCase, findings: AuditFindings) -> None:
                 _audit_pose(device, table, case.plan, below.at("world_from_device"))
 
 
+def _audit_kept_rings(
+    planned: _Device, device: Existing, findings: AuditFindings
+) -> None:
+    """Compare the rings of a projector with those that were to stay."""
+    if not findings.holds(
+        isinstance(planned, PlannedProjector), "rings", "stay, but a camera has none"
+    ):
+        return
+    for name in ("world_from_ring", "ring_radii"):
+        claimed, truth = getattr(planned, name).tolist(), getattr(device, name)
+        whose = f"that of the existing {device.name!r}"
+        findings.same(name, claimed, truth, whose, SAME_POSE)
+
+
 def _audit_pose(
     device: _Device, table: Mapping[str, Any], plan: RigPlan, findings: AuditFindings
 ) -> None:
@@ -133,16 +149,16 @@ def _audit_pose(
     pose = device.world_from_device
     typed = None if table.get("pose_mm") is None else np.array(table["pose_mm"])
     place = np.array(table["position_mm"]) if typed is None else typed[:3, 3]
-    off = float(np.linalg.norm(pose[:3, 3] - (origin_of(plan) + 1e-3 * place)))
+    own = np.zeros(3) if table.get("origin") == "mesh" else origin_of(plan)
+    off = float(np.linalg.norm(pose[:3, 3] - (own + 1e-3 * place)))
     findings.holds(
         off <= _POSITION_M,
         "",
         f"stands {1e3 * off:.3g} mm from where rig.existing has {device.existing!r}",
     )
     if typed is None:
-        towards = np.array(table["aim_mm"]) - place
         space = plan.requirements.workspace
-        _audit_aim(device, towards, table["roll_deg"], space, findings)
+        _audit_aim(device, table, place, space, findings)
         return
     turned = float(np.abs(pose[:3, :3] - typed[:3, :3]).max())
     findings.holds(
@@ -154,17 +170,30 @@ def _audit_pose(
 
 def _audit_aim(
     device: _Device,
-    towards: Array,
-    roll_deg: float,
+    table: Mapping[str, Any],
+    place: Array,
     space: Workspace,
     findings: AuditFindings,
 ) -> None:
-    """The aim is the middle of the image, and the image is turned by the roll."""
-    turn = device.world_from_device[:3, :3]
-    towards = towards / np.linalg.norm(towards)
+    """The image is turned by the roll, and the aim is its middle.
+
+    Angles are of the optical axis: pan about up from the world axis after it, tilt
+    over the horizon.
+    """
+    turn, roll_deg = device.world_from_device[:3, :3], table["roll_deg"]
+    of_axis = table.get("aim_mm") is None
+    if of_axis:
+        up, first = np.array(space.up), int(np.argmax(np.abs(space.up))) + 1
+        pan, tilt = np.radians(table["pan_deg"]), np.radians(table["tilt_deg"])
+        ahead = np.roll(np.eye(3)[0], first)
+        level = np.cos(pan) * ahead + np.sin(pan) * np.cross(up, ahead)
+        towards = np.cos(tilt) * level + np.sin(tilt) * up
+    else:
+        towards = np.array(table["aim_mm"]) - place
+        towards = towards / np.linalg.norm(towards)
     middle = turn.T @ towards
     model = device.device
-    if isinstance(model, PinholeModel):
+    if isinstance(model, PinholeModel) and not of_axis:
         centre = 0.5 * (np.array(model.resolution) - 1.0)
         off = float(np.linalg.norm(pixels_of(model, middle[None])[0] - centre))
         aimed = off <= _PIXEL and middle[2] > 0.0
@@ -172,7 +201,10 @@ def _audit_aim(
         off, middle = float(np.linalg.norm(middle - [0.0, 0.0, 1.0])), np.eye(3)[2]
         aimed = off <= _ROLL_RAD
     if not findings.holds(
-        aimed, "", f"the aim of {device.existing!r} misses the image centre, {off:.3g}"
+        aimed,
+        "",
+        f"the aim of {device.existing!r} misses "
+        f"{'the optical axis' if of_axis else 'the image centre'}, {off:.3g}",
     ):
         return
     level = np.cross(towards, space.up)

@@ -24,13 +24,19 @@ def zone_excess(offsets: Array, space: Workspace) -> list[Array]:
     beyond; inside a keep-out volume by the nearest face. Offsets (n, 3) are positions
     less the centre of the workspace.
     """
-    excess = [_depth_inside(zone, offsets) for zone in space.keep_out]
+    excess = [depth_inside(zone, offsets) for zone in space.keep_out]
     if space.box is not None:
-        excess.append(-_depth_inside(space.box, offsets))
+        excess.append(-depth_inside(space.box, offsets))
     if space.mounting:
-        beyond = [-_depth_inside(plane, offsets) for plane in space.mounting]
+        beyond = [-depth_inside(plane, offsets) for plane in space.mounting]
         excess.append(np.min(beyond, axis=0))
     return excess
+
+
+def depth_inside(box: Box, offsets: Array) -> Array:
+    """Return the least distance to any of six planes, negative beyond one, (n,) [m]."""
+    block = block_of_zone(box, np.zeros(3))
+    return np.min(block.half - np.abs(block.local(offsets)), axis=1)
 
 
 def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
@@ -99,12 +105,6 @@ def origin_of(plan: RigPlan) -> Array:
     if plan.document.rig.workspace.get("origin") == "mesh":
         return np.zeros(3)
     return np.array(plan.requirements.workspace.centre)
-
-
-def _depth_inside(box: Box, offsets: Array) -> Array:
-    """Least distance to any of the six planes, negative beyond one, shape (n,)."""
-    block = block_of_zone(box, np.zeros(3))
-    return np.min(block.half - np.abs(block.local(offsets)), axis=1)
 
 
 def _audit_box(box: Box, findings: AuditFindings) -> None:

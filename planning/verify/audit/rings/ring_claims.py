@@ -43,6 +43,7 @@ def audit_rings(case: AuditCase, findings: AuditFindings) -> None:
     if all(record.rings is None and record.ring_shares is None for record in records):
         return
     creases = creases_of(case.plan.surface)
+    kept = {e.name for e in case.plan.requirements.existing if e.ring_radii}
     for record, projector in zip(records, case.projectors, strict=True):
         shares, rings, below = record.ring_shares, record.rings, findings.at(record.id)
         if shares is None:
@@ -52,6 +53,13 @@ def audit_rings(case: AuditCase, findings: AuditFindings) -> None:
         if rings is None:
             below.holds(case.plan.document.truncated, "rings", "is missing")
         else:
+            stay = record.name in kept
+            below.holds(
+                stay == (rings.spacing == "kept"),
+                "rings.spacing",
+                f"{rings.spacing!r} is claimed, but requirements.existing says "
+                f"{'otherwise' if stay else 'nothing of its rings'}",
+            )
             _audit_spacing(rings, projector, creases, case, below.at("rings"))
 
 
@@ -65,7 +73,7 @@ def _audit_spacing(
     wish = case.plan.document.rig.rings.get("spacing")
     spacing, count = rings.spacing, rings.n_even
     findings.holds(
-        spacing == "uniform" or wish != "uniform",
+        spacing != "curvature" or wish != "uniform",
         "spacing",
         f"{spacing!r} is claimed, but rig.rings.spacing is {wish!r}",
     )
@@ -116,7 +124,7 @@ def _audit_gaps(
     wide = replace(grid.projector, radii=even).ring_spacing(points)
     share = float(np.mean(gaps > wide * (1.0 + ROUNDING)))
     findings.holds(
-        share <= POINT,
+        share <= POINT or rings.spacing == "kept",
         "n_even",
         f"{len(even)} even rings stand closer than the plan's on {100 * share:.3g} % "
         f"of its light on the surface, nowhere may they",

@@ -1,0 +1,35 @@
+"""What an evaluated rig doesn't keep of where devices may stand, for a person."""
+
+from planning.model.document.input_records import ViolationRecord
+from planning.model.plan import RigPlan
+from planning.model.words import labelled
+
+_WORDS = {
+    "standoff": "stands {by} mm nearer or farther than the rig lets devices stand",
+    "cone": "stands {by} mm outside the cone of positions",
+    "floor": "stands {by} mm below the floor",
+    "box": "stands {by} mm outside the room",
+    "mounting": "stands {by} mm off {what}",
+    "keep_out": "stands {by} mm inside the keep-out volume {what!r}",
+    "range": "has the whole object {by} mm out of its range",
+    "clearance": "stands {by} mm too near to {what}",
+    "body": "its body touches or reaches into {what}",
+}
+
+
+def warning_lines(plan: RigPlan) -> list[str]:
+    """Return a line for each limit that a device of an evaluated rig breaks."""
+    evaluation = plan.document.evaluation
+    if evaluation is None or not evaluation.violations:
+        return []
+    devices = (*plan.projectors, *plan.cameras)
+    names = {device.id: device.existing for device in devices}
+
+    def words(broken: ViolationRecord) -> str:
+        by_mm = f"{1e3 * (broken.by_m or 0.0):.1f}"
+        called = names[broken.device]
+        name = f" ({called})" if called != broken.device else ""
+        what = _WORDS[broken.limit].format(by=by_mm, what=broken.what)
+        return f"{broken.device}{name} {what}"
+
+    return ["", *labelled("WARNING", [words(v) for v in evaluation.violations])]
