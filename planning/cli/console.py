@@ -12,11 +12,12 @@ import tempfile
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 import click
 
 from planning.model.progress import Report
+from planning.model.shares import percent_as_share
 
 _Command = Callable[..., Any]
 # As in sysexits.h: a bug of ours, nothing that the user did.
@@ -64,10 +65,49 @@ class Finite(click.FloatRange):
 
 
 class Positive(Finite):
-    """A positive number, perhaps with a largest."""
+    """A positive number."""
 
-    def __init__(self, largest: float | None = None) -> None:
-        super().__init__(0.0, largest, min_open=True)
+    def __init__(self) -> None:
+        super().__init__(0.0, min_open=True)
+
+
+class Share(Finite):
+    """A share over 0 and at most 1, in percent if it says so: 0.95, 95% or "95 %"."""
+
+    def __init__(self) -> None:
+        super().__init__(0.0, 1.0, min_open=True)
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401
+        """Return the share, or fail as usage."""
+        share = value
+        with suppress(ValueError):
+            share = percent_as_share(value)
+            if share is value and 1.0 < float(value) <= 100.0:
+                self.fail(f"{value} is over 1; did you mean {value}%?", param, ctx)
+        return super().convert(share, param, ctx)
+
+
+class PlanFile(click.Path):
+    """A plan file; of a folder the plan.json in it."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401
+        """Return the path of the file, whether or not there is one."""
+        path = cast(Path, super().convert(value, param, ctx))
+        # os.path answers for names that the system refuses; Path raises.
+        return path / "plan.json" if os.path.isdir(path) else path
 
 
 def reporter(*, quiet: bool) -> Report:
@@ -153,6 +193,7 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
 
 
 def stop(message: str, code: int) -> NoReturn:
-    """Write one line to stderr and leave with an exit code."""
-    click.echo(f"plan: {' '.join(message.split())}", err=True)
+    """Write a line to stderr for each line of a message; leave with an exit code."""
+    for line in message.splitlines():
+        click.echo(f"plan: {' '.join(line.split())}", err=True)
     sys.exit(code)

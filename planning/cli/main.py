@@ -28,9 +28,14 @@ class _DefaultGroup(click.Group):
     default = "rig"
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put the default command in front of options that belong to it."""
+        """Put the default command in front of what belongs to it: options or a file."""
         group_options = ("--help", "-h", "--version")
-        if args and args[0].startswith("-") and args[0] not in group_options:
+        first = args[0] if args else ""
+        named = os.path.exists(first) or any(c in first for c in "./\\")
+        if (first.startswith("-") or named) and first not in (
+            *group_options,
+            *self.commands,
+        ):
             args = [self.default, *args]
         return super().parse_args(ctx, args)
 

@@ -9,8 +9,10 @@ from pydantic_core import ErrorDetails
 
 from geometry.arrays import Array
 
+from .shares import percent_as_share
+
 Positive = Annotated[float, Field(gt=0.0)]
-Share = Annotated[float, Field(gt=0.0, le=1.0)]
+Share = Annotated[float, BeforeValidator(percent_as_share), Field(gt=0.0, le=1.0)]
 Acute = Annotated[float, Field(gt=0.0, lt=90.0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 PositivePair = Annotated[list[Positive], Field(min_length=2, max_length=2)]

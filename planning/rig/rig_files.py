@@ -6,6 +6,7 @@ what to do.
 
 import difflib
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -178,22 +179,25 @@ def _fault(entry: ErrorDetails) -> str:
 
 
 def _nearest_key(loc: tuple[int | str, ...]) -> str:
-    """Say which key of the same table may have been meant."""
-    model: type[BaseModel] = RigTable
-    for part in loc[:-1]:
-        if isinstance(part, str):  # a number is a place in a list of tables
-            model = _table_of(model, part)
-    known = list(model.model_fields)
-    close = difflib.get_close_matches(str(loc[-1]), known, n=1)
+    """Say in which table a key belongs, or which of the same may have been meant."""
+    # A number is a place in a list of tables.
+    table = ".".join(part for part in loc[:-1] if isinstance(part, str))
+    tables, key = dict(_tables("", RigTable)), str(loc[-1])
+    homes = [name for name, known in tables.items() if key in known]
+    if "" in homes:
+        return "it belongs above the first table"
+    if homes:
+        return f"it belongs in [{'] or ['.join(homes)}]"
+    known = tables[table]
+    close = difflib.get_close_matches(key, known, n=1)
     return f"did you mean {close[0]}?" if close else f"keys here: {', '.join(known)}"
 
 
-def _table_of(model: type[BaseModel], key: str) -> type[BaseModel]:
-    """Return the table type that a field holds, bare, beside None or in a list."""
-    annotation: Any = model.model_fields[key].annotation
-    options = getattr(annotation, "__args__", (annotation,))
-    return next(
-        kind
-        for kind in options
-        if isinstance(kind, type) and issubclass(kind, BaseModel)
-    )
+def _tables(name: str, model: type[BaseModel]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the keys of a table by its name, and of all tables within it."""
+    yield name, list(model.model_fields)
+    for key, field in model.model_fields.items():
+        # A field holds a table bare, beside None or in a list.
+        for kind in getattr(field.annotation, "__args__", (field.annotation,)):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                yield from _tables(f"{name}.{key}".removeprefix("."), kind)

@@ -136,7 +136,7 @@ def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(
     runs, tmp_path, monkeypatch, capsys
 ):
     folder, _ = runs
-    good = run("verify", "plan1/plan.json", "--mesh", "face.obj", "--json", cwd=folder)
+    good = run("verify", "plan1", "--mesh", "face.obj", "--json", cwd=folder)
     assert good.returncode == 0, good.stderr
     assert json.loads(good.stdout)["passed"] is True
     spoiled = tmp_path / "plan.json"
@@ -273,7 +273,24 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
             5,
             "time limit",
         ),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "--coverage", "95"],
+            2,
+            "95 is over 1; did you mean 95%",
+        ),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "--coverage", "195 %"],
+            2,
+            "1.95 is not in the range",
+        ),
+        # A file is what is planned; another one would be a second mesh.
+        (["FACE"], 2, "--max-projectors"),
+        (["no.obj", "--max-projectors", 3], 3, "no.obj: no such file"),
+        (["--max-projectors", 3, "no.obj"], 3, "no.obj: no such file"),
+        (["FACE", "--mesh", "FACE", "--max-projectors", 3], 2, "aren't built yet"),
         (["verify", "no.json"], 3, "no such file"),
+        (["verify", "."], 3, r"plan\.json: no such file"),
+        (["reconstruct", "."], 3, r"plan\.json: no such file"),
         (["vrify"], 2, "verify"),
         (["export", "plan.json", "--to", "ros"], 2, "isn't built yet"),
         (["report", "plan.json"], 2, "isn't built yet"),
@@ -292,6 +309,32 @@ def test_errors_are_one_line_with_the_documented_code(
     assert out == ""
     assert len(err.splitlines()) == 1
     assert re.search(message, err)
+
+
+def test_each_fault_of_a_rig_file_has_a_line(face, tmp_path, monkeypatch, capsys):
+    (tmp_path / "rig.toml").write_text('base = "default"\n[lens]\n[limits]\nx = 1\n')
+    words = [face, "--max-projectors", 3, "--rig", tmp_path / "rig.toml"]
+    code, out, err = in_process(monkeypatch, capsys, *words, "-o", tmp_path / "o")
+    assert (code, out) == (3, "")
+    assert [line.split("`")[1] for line in err.splitlines()] == ["limits.x", "lens"]
+    assert all(line.startswith("plan: ") for line in err.splitlines())
+
+
+@pytest.mark.parametrize(("written", "share"), [("90%", 0.9), ("85 %", 0.85)])
+def test_a_share_may_be_given_in_percent(
+    written, share, face, tmp_path, monkeypatch, capsys
+):
+    asked = {}
+
+    def plan_rig(*_, **options):
+        asked.update(options)
+        raise planning.InputError("enough")
+
+    monkeypatch.setattr("planning.cli.plan_command.plan_rig", plan_rig)
+    words = [face, "--max-projectors", 3, "--coverage", written, "-o", tmp_path / "o"]
+    assert in_process(monkeypatch, capsys, *words)[0] == 3
+    assert asked["coverage"] == share
+    assert asked["dominant_coverage"] is None
 
 
 def test_an_empty_mesh_is_refused_in_one_line(tmp_path, monkeypatch, capsys):

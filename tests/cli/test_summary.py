@@ -1,16 +1,19 @@
 """Angles as a designer reads them off the printout, and eq. (8)."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
+from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.report.entries.device_entries import cost_record
 from planning.report.summary.check_lines import cost_lines
+from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.device_lines import aim_angles
 from planning.scene.workspace.candidates import aimed_poses
 
@@ -125,6 +128,17 @@ def test_eq_8_is_unknown_without_a_check():
     assert cost.C is None
     assert cost.t4 == 2
     assert cost_lines(cost) == []
+
+
+def test_of_a_whole_surface_one_sampling_is_told(handmade):
+    plan = handmade.build_plan()
+    for target, columns in (("dominant", 2), ("surface", 1)):
+        asked = replace(plan.requirements, target=target)
+        told = RigPlan(plan.document.changed(requirements=asked), plan.surface)
+        rows = [line for line in coverage_lines(told) if "reachable by pr" in line]
+        assert rows[0].count("cm²") == columns
+        titles = "\n".join(coverage_lines(told)).splitlines()[1].split("  ")
+        assert sum("surface" in title for title in titles) == 1
 
 
 def test_stages_are_timed_on_the_wall_and_on_the_processor():

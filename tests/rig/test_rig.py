@@ -326,6 +326,34 @@ def test_one_fault_gives_one_line(write, old, new, message):
     assert "rig.toml: " in text
 
 
+@pytest.mark.parametrize(
+    ("table", "key", "home"),
+    [
+        ("[limits]", "coverage = 0.9", r"belongs in \[requirements\]$"),
+        (
+            "[limits]",
+            "f_number = 2.0",
+            r"in \[camera\.focus\] or \[proj",
+        ),
+        ("[limits]", 'along = "x"', r"belongs in \[workspace\.mounting\]$"),
+        ("[limits]", 'light = "parallel"', "belongs above the first table$"),
+        ("[rings]", "max_sigma_mm = 1.0", r"belongs in \[limits\]$"),
+    ],
+)
+def test_a_key_in_the_wrong_table_is_told_where_it_belongs(write, table, key, home):
+    with pytest.raises(RigError, match=home):
+        load_rig(write(f"{MINIMAL}\n{table}\n{key}\n"))
+
+
+def test_a_share_may_be_written_in_percent(write):
+    text = MINIMAL + '[requirements]\ncoverage = "92.5 %"\nmin_reachable = "80%"\n'
+    shares = read_rig(write(text)).requirements
+    assert (shares.coverage, shares.min_reachable) == (0.925, 0.8)
+    for wrong in ('"x%"', '"120 %"', '"0.9"', "90"):
+        with pytest.raises(RigError, match=r"requirements\.coverage"):
+            read_rig(write(text.replace('"92.5 %"', wrong)))
+
+
 def test_every_fault_is_reported_at_once(write):
     text = MINIMAL.replace("1.5", "nan").replace("800.0", "-800.0") + "[lense]\n"
     with pytest.raises(RigError) as caught:

@@ -5,11 +5,17 @@ from typing import Any
 
 import click
 
-from planning.cli.console import debug_option, output_options, run, threads_option
+from planning.cli.console import (
+    PlanFile,
+    debug_option,
+    output_options,
+    run,
+    threads_option,
+)
 
 
 @click.command()
-@click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
+@click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
 @click.option(
     "--mesh",
     type=click.Path(path_type=Path),
@@ -18,7 +24,7 @@ from planning.cli.console import debug_option, output_options, run, threads_opti
 )
 @click.option(
     "--truth",
-    type=click.Path(path_type=Path),
+    type=PlanFile(),
     metavar="other-plan.json",
     help="Render with another plan's devices and surface: what really stands there.",
 )
@@ -35,7 +41,7 @@ def verify(**options: Any) -> None:  # noqa: ANN401
 
 
 @click.command()
-@click.argument("plan_file", type=click.Path(path_type=Path), metavar="DIR/plan.json")
+@click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
 @threads_option
 @output_options
 def show(**options: Any) -> None:  # noqa: ANN401

@@ -7,10 +7,17 @@ from typing import Any
 
 import click
 
-from planning.cli.console import Positive, output_options, run, threads_option
+from planning.cli.console import (
+    Positive,
+    Share,
+    output_options,
+    run,
+    threads_option,
+)
 
 
 @click.command("rig")
+@click.argument("files", nargs=-1, metavar="[FILE]")
 @click.option(
     "--mesh",
     "meshes",
@@ -88,19 +95,19 @@ from planning.cli.console import Positive, output_options, run, threads_option
 )
 @click.option(
     "--dominant-coverage",
-    type=Positive(1.0),
+    type=Share(),
     metavar="F",
     help="Lit share of the reachable target [default: 0.90].",
 )
 @click.option(
     "--coverage",
-    type=Positive(1.0),
+    type=Share(),
     metavar="F",
     help="Measured share of the reachable target [default: 0.95].",
 )
 @click.option(
     "--min-reachable",
-    type=Positive(1.0),
+    type=Share(),
     metavar="F",
     help="Share of the target that must be reachable [default: 0.90].",
 )
@@ -157,11 +164,12 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
 
 
 def check_options(options: dict[str, Any]) -> None:
-    """Refuse options that exclude each other.
+    """Join the meshes that were given, and refuse options that exclude each other.
 
     Raises:
         click.UsageError: It names them.
     """
+    options["meshes"] += options.pop("files")
     _check_source(options)
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")

@@ -5,14 +5,21 @@ from typing import Any
 
 import click
 
-from planning.cli.console import Finite, Positive, output_options, run, threads_option
+from planning.cli.console import (
+    Finite,
+    PlanFile,
+    Positive,
+    output_options,
+    run,
+    threads_option,
+)
 
 
 @click.command()
 @click.argument(
     "plan_file",
-    type=click.Path(path_type=Path),
-    metavar="[DIR/plan.json]",
+    type=PlanFile(),
+    metavar="[DIR[/plan.json]]",
     required=False,
 )
 @click.option(

@@ -24,11 +24,15 @@ def coverage_lines(plan: RigPlan) -> list[str]:
     coverage, document = plan.coverage, plan.document
     target, surface = coverage.target, coverage.surface
     chosen = "your selection" if user_selection(plan) else plan.requirements.target
+    columns = {f"target ({chosen})": target, "whole surface": surface}
+    if chosen == "surface":
+        # One surface: that it was sampled twice is no news.
+        columns = {"whole surface": target}
     lit = _ratio(target.lit_m2, target.reachable_by_projectors_m2)
     measured = _ratio(target.measured_m2, target.reachable_by_cameras_m2)
-    table = [f"{'':<25}{'target (' + chosen + ')':>24}{'whole surface':>24}"]
+    table = [f"{'':<25}{''.join(f'{title:>24}' for title in columns)}"]
     for label, key in _ROWS.items():
-        cells = (area_cell(getattr(a, key), a.area_m2) for a in (target, surface))
+        cells = (area_cell(getattr(a, key), a.area_m2) for a in columns.values())
         table.append(f"{label:<25}{''.join(f'{cell:>24}' for cell in cells)}")
     lines = [
         f"lit / reachable by projectors {lit}, measured / reachable by "

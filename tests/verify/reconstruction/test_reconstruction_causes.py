@@ -46,6 +46,14 @@ def failures(plan: RigPlan, claims: dict[str, Any], truth: RigPlan | None = None
     return reconstruct_plan(plan, seed=0, truth=truth, **claims).failures
 
 
+def said_once(words: str, failures: tuple[str, ...]) -> bool:
+    """Whether the first failure says why, and each other one that it is the same."""
+    first, *others = failures
+    again = [text for text in others if text.endswith("; likely as above")]
+    repeated = [text for text in others if re.search(words, text)]
+    return bool(re.search(words, first)) and again == others and not repeated
+
+
 def test_two_projectors_on_at_once_are_named(plan, claims):
     apart = Scanner.of(plan)
     together = replace(apart, groups=(frozenset({"P1", "P2"}),))
@@ -55,7 +63,7 @@ def test_two_projectors_on_at_once_are_named(plan, claims):
     words = (
         r"P1 saturates lit pixels, \d+ % in C\d.*: P2 lights them too, on at the same"
     )
-    assert all(re.search(words, text) for text in found), found
+    assert said_once(words, found), found
     # A plan that fires them together itself isn't rendered so: its images are apart.
     assert reconstruct(together, seed=0, expected=expected).failures == ()
 
@@ -73,7 +81,7 @@ def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
     found = failures(plan, claims)
     words = r"P1 with C2: \d+ % of the points took the wrong one of the two roots"
     assert found
-    assert all(re.search(words, text) for text in found), found
+    assert said_once(words, found), found
 
 
 def test_only_a_point_whose_ray_meets_its_ring_on_the_mesh_has_a_wrong_root(plan):
@@ -139,7 +147,7 @@ def test_samples_where_the_roots_meet_are_said_to_be_left_out(plan, claims):
     assert every["predicted"].sum() > 10
     found = failures(blind, every)
     assert found
-    assert all("`conditioning`, the rays run along" in text for text in found), found
+    assert said_once("`conditioning`, the rays run along", found), found
 
 
 def test_a_hidden_region_is_named_with_its_share(plan, claims):
@@ -169,7 +177,7 @@ def test_where_no_light_falls_is_said(plan, claims):
     back = {"samples": samples, "predicted": samples.normals[:, 1] > 0.8}
     found = failures(plan, back)
     assert found
-    assert all("no projector's light falls on most of them" in t for t in found), found
+    assert said_once("no projector's light falls on most of them", found), found
 
 
 def test_surface_met_at_grazing_incidence_is_said(plan, claims):
@@ -185,7 +193,7 @@ def test_surface_met_at_grazing_incidence_is_said(plan, claims):
     found = failures(plan, {"samples": samples, "predicted": grazed})
     assert found
     words = r"P\d meets them at 8\d degrees \(median\), at grazing incidence"
-    assert all(re.search(words, text) for text in found), found
+    assert said_once(words, found), found
 
 
 def test_every_cause_of_the_decoder_has_words(plan):

@@ -130,7 +130,7 @@ def _lightable(case: AuditCase, samples: AuditSamples) -> Mask:
         limits.max_incidence + MARGIN_SLACK, limits.min_tangent_angle - MARGIN_SLACK
     )
     steps = [light_steps(p, samples, relaxed, case.shadow) for p in case.projectors]
-    return np.array(steps).reshape(-1, len(samples)) >= OCCLUDED
+    return np.array(steps).reshape(len(steps), len(samples)) >= OCCLUDED
 
 
 def _audit_size(case: AuditCase, region: RegionRecord, findings: AuditFindings) -> None:

@@ -14,7 +14,7 @@ _SATURATED_SHARE = 0.02
 
 
 def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str, ...]:
-    """Return failures of a check with what their likely causes are.
+    """Return failures of a check with what their likely causes are, each told once.
 
     What is wrong with devices or object as a whole explains every failure: dark
     devices, labels that contradict each other, wrong roots, a changed pose, optics or
@@ -33,10 +33,15 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
     inaccurate = causes or [where_inaccurate(plan, measured.cloud)]
     # So `judge` words that something is missing.
     absent = "predicted measured"
-    return tuple(
-        "; ".join([clause, *(incomplete if absent in clause else inaccurate)])
-        for clause in failures
-    )
+    sentences: list[str] = []
+    told: set[str] = set()
+    for clause in failures:
+        likely = incomplete if absent in clause else inaccurate
+        again = ["likely as above"] if told.intersection(likely) else []
+        fresh = [cause for cause in likely if cause not in told]
+        sentences.append("; ".join([clause, *fresh, *again]))
+        told.update(likely)
+    return tuple(sentences)
 
 
 def _unordered(measured: MeasuredClouds) -> list[str]:
