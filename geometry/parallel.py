@@ -1,13 +1,17 @@
 """Run independent pieces of work on all cores; results don't depend on how many."""
 
 import os
-from collections.abc import Callable, Iterable
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+_ABANDONABLE = "ringrig-pairs"
 
 
 def n_threads() -> int:
@@ -43,10 +47,29 @@ def mapped(
     try:
         drain()
     finally:
+        # Where this one failed, the others begin nothing more.
+        deque(queue, maxlen=0)
         for other in others:
             if not other.cancel():
                 other.result()
     return [results[index] for index in range(len(todo))]
+
+
+@contextmanager
+def abandonable(threads: int) -> Generator[ThreadPoolExecutor]:
+    """Give threads for long pieces of work; none is waited for after an exception."""
+    pool = ThreadPoolExecutor(threads, thread_name_prefix=_ABANDONABLE)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+def abandoned() -> bool:
+    """Return whether work goes on that nobody waits for."""
+    return any(t.name.startswith(_ABANDONABLE) for t in threading.enumerate())
 
 
 @cache

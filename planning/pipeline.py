@@ -1,6 +1,8 @@
 """From mesh to checked plan, read top to bottom like the paper's III to VI."""
 
+import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -33,6 +35,8 @@ from .stages import (
 )
 
 Keep = Callable[[RigPlan], None]
+# Time kept for writing, in times that writing the first plan took.
+_WRITING = 1.25
 
 
 def plan_rig(
@@ -88,7 +92,8 @@ def plan_rig(
         time_limit: Wall time in [s] that cuts the run; the plan is then `truncated`.
         progress: Receives a line when a stage begins.
         command: Words of the command line, for the record.
-        keep: Receives the plan when it is made and not yet checked.
+        keep: Receives the plan when it is made and not yet checked; with a time limit
+            also the first one, before its poses are improved.
         fixed: Devices that stay where they are and count, from `read_mounted`.
 
     Returns:
@@ -112,18 +117,18 @@ def plan_rig(
     )
     rig = rig if fixed is None else fixed.on(rig)
     clock = Stopwatch(progress, time_limit=time_limit)
-    request = replace(
-        request_of(mesh, rig, wishes, clock, select=select, weight=weight),
-        seed=seed,
-        threads=threads,
-        command=tuple(command),
-        prove=prove,
-        cameras_by=cameras_by,
-        mounted=fixed,
-    )
     # BLAS must not split sums differently with another number of threads.
-    with threadpool_limits(1):
-        plan, partial = _planned(request, clock)
+    with clock.ticking(), threadpool_limits(1):
+        request = replace(
+            request_of(mesh, rig, wishes, clock, select=select, weight=weight),
+            seed=seed,
+            threads=threads,
+            command=tuple(command),
+            prove=prove,
+            cameras_by=cameras_by,
+            mounted=fixed,
+        )
+        plan, partial = _planned(request, clock, keep)
         return _finished(plan, partial, clock, check=check, keep=keep)
 
 
@@ -203,15 +208,15 @@ def evaluate_rig(
         up=up,
     )
     clock = Stopwatch(progress, time_limit=time_limit)
-    request = replace(
-        request_of(mesh, rig, wishes, clock, select=select, weight=weight),
-        seed=seed,
-        threads=threads,
-        command=tuple(command),
-        mounted=devices,
-        evaluates=True,
-    )
-    with threadpool_limits(1):
+    with clock.ticking(), threadpool_limits(1):
+        request = replace(
+            request_of(mesh, rig, wishes, clock, select=select, weight=weight),
+            seed=seed,
+            threads=threads,
+            command=tuple(command),
+            mounted=devices,
+            evaluates=True,
+        )
         partial = as_they_stand(prepared(request, clock), clock)
         plan = write_plan(partial, clock)
         return _finished(plan, partial, clock, check=check, keep=keep)
@@ -233,18 +238,36 @@ def _finished(
     """
     if check and not plan.document.truncated:
         plan = _checked(plan, partial, clock, keep)
-    missed = shortfalls(plan)
-    if check and plan.document.reconstruction is None:
-        missed += ("the check wasn't made: the time limit came first",)
-    if missed:
+    if missed := missed_by(plan, check=check):
         raise RequirementError(plan, missed)
     return plan
 
 
-def _planned(request: PlanRequest, clock: Stopwatch) -> tuple[RigPlan, PartialPlan]:
-    """Devices, rings and proofs; one device more where fresh samples fall short."""
-    partial = larger = _first_plan(request, clock)
+def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
+    """Return what of the requirements a plan misses, and the check if it was wanted."""
+    missed = shortfalls(plan)
+    if check and plan.document.reconstruction is None:
+        missed += ("the check wasn't made: the time limit came first",)
+    return missed
+
+
+def _planned(
+    request: PlanRequest, clock: Stopwatch, keep: Keep | None
+) -> tuple[RigPlan, PartialPlan]:
+    """Devices, rings and proofs; one device more where fresh samples fall short.
+
+    With a time limit the first devices are written at once: that shows how long it
+    takes, and stands if there is no time to write better ones.
+
+    Raises:
+        InterruptedPlanError: If planning is interrupted; it carries the best plan.
+        TimeLimitError: If the time limit came before any plan was written.
+    """
+    partial = larger = begun = _first_plan(request, clock)
+    first = None
     try:
+        if clock.limited:
+            first = _first_kept(begun, clock, keep)
         while True:
             partial = polished(larger, clock)
             partial = bounded_cameras(partial, clock)
@@ -252,8 +275,28 @@ def _planned(request: PlanRequest, clock: Stopwatch) -> tuple[RigPlan, PartialPl
             larger = one_device_more(partial, plan, clock)
             if larger is None:
                 return plan, partial
-    except (KeyboardInterrupt, TimeLimitError) as cut:
-        return _interrupted(partial, clock, cut), partial
+    except KeyboardInterrupt:
+        clock.lift()
+        cut = replace(partial, truncated=True)
+        raise InterruptedPlanError(write_plan(cut, clock)) from None
+    except TimeLimitError:
+        clock.extend()
+        if first is None:
+            raise
+        with suppress(TimeLimitError):
+            if partial is not begun:
+                first = write_plan(replace(partial, truncated=True), clock)
+        return first, partial
+
+
+def _first_kept(partial: PartialPlan, clock: Stopwatch, keep: Keep | None) -> RigPlan:
+    """Write a plan that stands if the run is cut, and reserve time for another."""
+    begin = time.monotonic()
+    plan = write_plan(replace(partial, truncated=True), clock)
+    if keep is not None:
+        keep(plan)
+    clock.reserve(_WRITING * (time.monotonic() - begin))
+    return plan
 
 
 def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
@@ -301,14 +344,3 @@ def _checked(
         cost=cost_record(plan.cameras, greedy, seconds),
     )
     return RigPlan(document, plan.surface)
-
-
-def _interrupted(
-    partial: PartialPlan, clock: Stopwatch, cut: KeyboardInterrupt | TimeLimitError
-) -> RigPlan:
-    """Write the best plan so far, marked truncated."""
-    clock.lift()
-    plan = write_plan(replace(partial, truncated=True), clock)
-    if isinstance(cut, KeyboardInterrupt):
-        raise InterruptedPlanError(plan) from None
-    return plan

@@ -164,12 +164,18 @@ def stop_signals(handler: Callable[[int, Any], Any]) -> Generator[None]:
 def run(command: Callable[[], int], *, debug: bool) -> None:
     """Run a command; turn our own errors into one line and the documented exit code."""
     from geometry.mesh.mesh import MeshError
+    from geometry.parallel import abandoned
     from planning.model.errors import PlanningError
 
     try:
         for number in _STOPS:
             signal.signal(number, signal.default_int_handler)
-        sys.exit(command())
+        code = command()
+        if abandoned():
+            # What was cut must not be waited for, nor what an interpreter tidies up.
+            sys.stdout.flush()
+            os._exit(code)
+        sys.exit(code)
     except KeyboardInterrupt:
         stop("interrupted before a first plan stood; nothing was written", 130)
     except BrokenPipeError:

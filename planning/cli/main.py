@@ -5,6 +5,7 @@ Heavy packages are imported inside the commands, so that `plan --help` stays qui
 
 import os
 import sys
+import time
 from typing import NoReturn
 
 import click
@@ -112,13 +113,15 @@ for _name, _purpose in _NOT_BUILT.items():
 
 def main() -> None:
     """Run the command line; the entry point of `plan`."""
+    # Time limits count from here: imports take seconds on a busy machine.
+    begin = time.monotonic()
     # Sums must not be split differently on another number of cores; set before numpy
     # and IPOPT are loaded. Rays have threads of their own.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
     try:
         with stop_signals(_quit):
-            sys.exit(commands.main(prog_name="plan", standalone_mode=False))
+            sys.exit(commands.main(prog_name="plan", standalone_mode=False, obj=begin))
     except click.exceptions.NoArgsIsHelpError as error:
         error.show()
         sys.exit(error.exit_code)

@@ -1,15 +1,21 @@
 """Progress, stage times, and the limits that end a run early."""
 
+import math
+import signal
+import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from types import FrameType
 
 from .errors import TimeLimitError
 
 Report = Callable[[str], None]
 
-# What planning may take of a time limit; the rest is for writing what was planned.
-_PLANNING = 0.8
+# A run with a time limit looks at the clock so often [s] ...
+_TICK_S = 0.1
+# ... and is cut again where the first cut was swallowed, or is still cleaning up [s].
+_AGAIN_S = 1.0
 
 
 class Stopwatch:
@@ -18,20 +24,58 @@ class Stopwatch:
     Args:
         report: Receives one line when a stage begins; None for silence.
         time_limit: Wall time in [s] after which `check` raises; None for no limit.
+        begin: When that time began, on the monotonic clock [s]; None: now.
 
     Attributes:
+        limited: Whether there is a time limit.
         seconds: Wall time of each stage [s].
         processor: Processor time of each stage, over all threads [s].
     """
 
     def __init__(
-        self, report: Report | None = None, *, time_limit: float | None = None
+        self,
+        report: Report | None = None,
+        *,
+        time_limit: float | None = None,
+        begin: float | None = None,
     ) -> None:
         self._report = report
-        self._begin = time.monotonic()
-        self._limit = None if time_limit is None else _PLANNING * time_limit
+        self._begin = time.monotonic() if begin is None else begin
+        self._limit = self._deadline = math.inf if time_limit is None else time_limit
+        self._next_cut = -math.inf
+        self.limited = time_limit is not None
         self.seconds: dict[str, float] = {}
         self.processor: dict[str, float] = {}
+
+    @contextmanager
+    def ticking(self) -> Generator[None]:
+        """Raise within, as `check` does, wherever the main thread is by then.
+
+        In another thread, and where systems have no timer, only `check` raises.
+        """
+        main = threading.current_thread() is threading.main_thread()
+        if not (self.limited and main and hasattr(signal, "setitimer")):
+            yield
+            return
+        self._next_cut = -math.inf
+        handler = signal.signal(signal.SIGALRM, self._tick)
+        timer = signal.setitimer(signal.ITIMER_REAL, _TICK_S, _TICK_S)
+        try:
+            yield
+        finally:
+            self._next_cut = math.inf
+            signal.setitimer(signal.ITIMER_REAL, *timer)
+            signal.signal(signal.SIGALRM, handler)
+
+    def _tick(self, _: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if now < self._next_cut or _indivisible(frame):
+            return
+        try:
+            self.check()
+        except TimeLimitError:
+            self._next_cut = now + _AGAIN_S
+            raise
 
     @contextmanager
     def stage(self, name: str, line: str) -> Generator[None]:
@@ -62,20 +106,53 @@ class Stopwatch:
         self.check()
         self.say(line)
 
+    @property
+    def remaining(self) -> float | None:
+        """What is left of the time limit [s], more than nothing; None: no limit."""
+        left = self._limit - (time.monotonic() - self._begin)
+        return max(left, 1e-9) if self.limited else None
+
     def check(self) -> None:
         """Raise TimeLimitError once the time limit has passed."""
         spent = time.monotonic() - self._begin
-        if self._limit is not None and spent > self._limit:
+        if spent > self._deadline:
             raise TimeLimitError(
-                f"the time limit came before a first plan stood, after {spent:.1f} s "
-                f"of planning; allow more (--time-limit)"
+                f"the time limit came before a first plan was written, after "
+                f"{spent:.1f} s; allow more (--time-limit)"
             )
+
+    def reserve(self, seconds: float) -> None:
+        """Keep so much of the time limit for writing what was planned."""
+        self._deadline = self._limit - seconds
 
     def extend(self) -> None:
         """Give all of the time limit: what was planned is written."""
-        if self._limit is not None:
-            self._limit /= _PLANNING
+        self._deadline = self._limit
 
     def lift(self) -> None:
         """Let the rest run whatever the time: a plan is being saved."""
-        self._limit = None
+        self._deadline = math.inf
+
+
+@contextmanager
+def untimed() -> Generator[None]:
+    """Let no time limit cut what is done within."""
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+    _, every = signal.getitimer(signal.ITIMER_REAL)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, every, every)
+
+
+def _indivisible(frame: FrameType | None) -> bool:
+    """Whether code runs that takes exceptions ill: imports, and solvers of CasADi."""
+    while frame is not None:
+        name = frame.f_code.co_filename
+        if name.startswith("<frozen importlib") or name.endswith("casadi.py"):
+            return True
+        frame = frame.f_back
+    return False

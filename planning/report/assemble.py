@@ -40,19 +40,24 @@ from .partial_plan import PartialPlan
 
 
 def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
-    """Round the poses, recompute every claim from them, and write the document."""
+    """Round the poses, recompute every claim from them, and write the document.
+
+    A plan that was cut goes without advice.
+    """
     devices = _rounded_devices(partial)
     scene = partial.scene
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
         marginal = marginal_records(partial, devices, claims)
     among = scene.among((*devices.projectors, *devices.cameras))
-    coverage = with_relaxations(partial, devices, claims, clock)
+    coverage, certificates = claims.coverage, _certificates(partial)
+    if not partial.truncated:
+        coverage = with_relaxations(partial, devices, claims, clock)
+        certificates = with_fewer_needed(certificates, partial, clock)
     regions = entries.region_records(partial.ready.regions, claims)
     overlaps, schedule = overlap_records(among, devices.projectors)
     surface = _surface(scene, devices)
     requirements = _final_requirements(among, claims, devices)
-    certificates = with_fewer_needed(_certificates(partial), partial, clock)
     document = PlanDocument(
         format=FORMAT,
         version=VERSION,

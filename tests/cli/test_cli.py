@@ -15,6 +15,7 @@ import planning
 from planning.cli.main import main
 from planning.cli.other_commands import write_sample
 from planning.model.plan import InterruptedPlanError, RigPlan
+from planning.report.drawing.rig_picture import draw_rig
 from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -198,15 +199,16 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         except KeyboardInterrupt:
             raise InterruptedPlanError(plan) from None
 
-    def save(plan, folder, *_, **__):
-        saved.append(folder)
+    def draw(plan, **options):
+        saved.append(plan)
         os.kill(os.getpid(), signal.SIGTERM)
+        return draw_rig(plan, **options)
 
     monkeypatch.setattr("planning.cli.plan_command.plan_rig", made)
-    monkeypatch.setattr("planning.cli.plan_command._save", save)
+    monkeypatch.setattr("planning.cli.saved_plans.draw_rig", draw)
     words = ["--mesh", folder / "face.obj", "--max-projectors", 3, "-o", tmp_path]
     code, _, _ = in_process(monkeypatch, capsys, *words)
-    assert (code, saved) == (130, [tmp_path])
+    assert (code, saved) == (130, [plan])
 
 
 @pytest.mark.parametrize(

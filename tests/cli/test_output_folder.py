@@ -1,13 +1,18 @@
 """A plan's folder changes as a whole, whatever comes in between."""
 
+import json
 import os
 import signal
 import sys
 
 import pytest
+from PIL import Image
 
 from planning.cli import output_folder
 from planning.cli.output_folder import exchanged, uninterrupted
+from planning.cli.saved_plans import SavedPlans
+from planning.model.plan import RigPlan
+from planning.model.progress import Stopwatch
 
 MANIFEST = '{"format": "ringrig-patterns"}'
 
@@ -130,3 +135,22 @@ def test_this_system_exchanges_folders_in_one_step(tmp_path):
         (place / "name").write_text(place.name)
     assert output_folder._exchange(one, other)
     assert (one / "name").read_text() == "other"
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_a_plan_that_comes_too_late_leaves_the_one_before(handmade, tmp_path, late):
+    """Whole, patterns and picture too; in time it takes its place."""
+    old = RigPlan.load(handmade.save(handmade.build_plan(), tmp_path))
+    new = RigPlan(old.document.changed(seed=old.document.seed + 1), old.surface)
+    folder = tmp_path / "out"
+    saved = SavedPlans(folder, lambda line: None, patterns=True)
+    saved.keep(old)
+    clock = Stopwatch(time_limit=1e-3 if late else 1e3)
+    stands = saved.finish(new, clock)
+    assert stands is (old if late else new)
+    digest = stands.digest
+    assert RigPlan.load(folder / "plan.json").digest == digest
+    manifest = json.loads((folder / "patterns" / "sequence.json").read_text())
+    assert manifest["plan"] == digest
+    assert Image.open(folder / "rig.png").text["ringrig-plan"] == digest
+    assert not list(tmp_path.glob(".out.*"))

@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 from contextlib import redirect_stdout
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -258,6 +259,40 @@ def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     text = summary(plan, [], caught.value.shortfalls)
     assert "NOT CHECKED (the run was cut)" in text
     assert "--no-check" not in text
+
+
+@pytest.mark.usefixtures("few_samples")
+@pytest.mark.parametrize(
+    ("line", "nth", "stands"),
+    [
+        ("baselines", 1, "first"),
+        ("bounds over all poses of the cameras", 1, "other"),
+        ("coverage, recomputed", 2, "first"),
+        ("coverage, recomputed", 1, "none"),
+    ],
+)
+def test_a_time_limit_leaves_the_last_plan_that_was_written(quick, line, nth, stands):
+    """Cut at the nth time of a line of progress, and at each that is like it."""
+    kept, said = [], []
+
+    def cut(words):
+        said.append(words.startswith(line))
+        if said[-1] and sum(said) >= nth:
+            raise TimeLimitError("the time limit came")
+
+    run = partial(quick, progress=cut, time_limit=1e4, keep=kept.append)
+    if stands == "none":
+        with pytest.raises(TimeLimitError):
+            run()
+        assert kept == []
+        return
+    with pytest.raises(RequirementError, match="check wasn't made") as caught:
+        run()
+    assert len(kept) == 1
+    assert (caught.value.plan is kept[0]) == (stands == "first")
+    for plan in (kept[0], caught.value.plan):
+        assert plan.document.truncated
+        assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
 def test_a_plate_without_curvature_has_no_dominant_region():

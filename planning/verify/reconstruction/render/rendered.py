@@ -2,10 +2,10 @@
 
 import time
 from collections.abc import Callable, Generator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from threading import Lock
 
+from geometry.parallel import abandonable
 from geometry.rays.rays import RayCaster
 from planning.verify.reconstruction.decode.decode import (
     Decoded,
@@ -112,7 +112,7 @@ def decode_rendered(
         with spent.on("decode"):
             return decode(frames, one.patterns, known[pair], **plan.limits.decoder)
 
-    with ThreadPoolExecutor(threads) as pool:
+    with abandonable(threads) as pool:
         views = list(pool.map(look, range(len(plan.cameras))))
     return over_pairs(plan, measure, threads=threads, progress=progress)
 
@@ -127,7 +127,7 @@ def over_pairs(
     """Measure every pair, in any order and thread, and report how many are done."""
     keys = [pair for pair, _ in scanner.pairs()]
     measured: Pairs = []
-    with ThreadPoolExecutor(threads) as pool:
+    with abandonable(threads) as pool:
         for pair, decoded in zip(keys, pool.map(measure, keys), strict=True):
             measured.append((pair, decoded))
             if progress is not None:

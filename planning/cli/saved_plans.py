@@ -1,0 +1,77 @@
+"""The plans that a run writes into its folder, of which the last stands there."""
+
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from planning.model.errors import TimeLimitError
+from planning.model.plan import RigPlan
+from planning.model.progress import Report, Stopwatch, untimed
+from planning.report.drawing.face_colours import face_status
+from planning.report.drawing.picture_view import save_picture
+from planning.report.drawing.rig_picture import draw_rig
+from planning.verify.reconstruction.pattern_files import write_patterns
+from planning.verify.reconstruction.scanner import Scanner
+
+from .output_folder import OWNED, exchanged, uninterrupted
+
+
+class SavedPlans:
+    """Saves plans whole, each in the place of the one before.
+
+    Args:
+        folder: Where they go.
+        report: Receives a line before what takes long.
+        patterns: Whether the images to project are written too.
+    """
+
+    def __init__(self, folder: Path, report: Report, *, patterns: bool) -> None:
+        self._folder, self._report, self._patterns = folder, report, patterns
+        self.last: RigPlan | None = None
+
+    @property
+    def files(self) -> list[str]:
+        """What stands in the folder of a plan."""
+        paths = [self._folder / name for name in OWNED]
+        return [str(path) for path in paths if path.exists()]
+
+    def keep(self, plan: RigPlan) -> None:
+        """Save a plan that isn't checked; Ctrl-C waits until it is saved.
+
+        Raises:
+            TimeLimitError: If the time limit came first; the one before stands.
+        """
+        with uninterrupted():
+            self._save(plan)
+        self._report(f"written to {self._folder}, NOT CHECKED yet")
+
+    def finish(self, plan: RigPlan, clock: Stopwatch) -> RigPlan:
+        """Save how a run ended, and return the plan that stands in the folder.
+
+        Raises:
+            TimeLimitError: If the time limit came first, and none stands.
+        """
+        # The work is done: a second Ctrl-C must not lose it.
+        with suppress(KeyboardInterrupt), uninterrupted():
+            if self.last is not None and self.last.digest == plan.digest:
+                plan.save(self._folder / "plan.json")
+                return plan
+            try:
+                with clock.ticking():
+                    self._save(plan)
+            except TimeLimitError:
+                if self.last is None:
+                    raise
+        return self.last or plan
+
+    def _save(self, plan: RigPlan) -> None:
+        with ExitStack() as quiet:
+            with exchanged(self._folder) as fresh:
+                plan.save(fresh / "plan.json")
+                self._report("drawing")
+                picture = draw_rig(plan, face_status=face_status(plan))
+                save_picture(picture, fresh / "rig.png", plan.digest)
+                if self._patterns:
+                    write_patterns(Scanner.of(plan), fresh)
+                # No cut between what stands there and what is known of it.
+                quiet.enter_context(untimed())
+            self.last = plan

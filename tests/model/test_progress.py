@@ -1,0 +1,129 @@
+"""A time limit cuts whatever the main thread does, but for what must stay whole."""
+
+import signal
+import sys
+import time
+
+import pytest
+
+from geometry.parallel import abandonable, abandoned, mapped
+from planning.model.errors import TimeLimitError
+from planning.model.progress import Stopwatch, untimed
+
+pytestmark = pytest.mark.skipif(
+    not hasattr(signal, "setitimer"), reason="no timers there"
+)
+
+
+def spin(seconds):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        pass
+
+
+def cut(work, time_limit=0.3):
+    """Seconds until work is cut."""
+    clock = Stopwatch(time_limit=time_limit)
+    begin = time.monotonic()
+    with pytest.raises(TimeLimitError), clock.ticking():
+        work(clock)
+    return time.monotonic() - begin
+
+
+def test_what_never_looks_at_the_clock_is_cut():
+    before = signal.getsignal(signal.SIGALRM)
+    assert 0.3 <= cut(lambda _: spin(20.0)) < 5.0
+    assert signal.getsignal(signal.SIGALRM) == before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_a_cut_that_is_swallowed_comes_again():
+    def swallows(_):
+        try:
+            spin(20.0)
+        except TimeLimitError:
+            spin(20.0)
+
+    assert cut(swallows) < 8.0
+
+
+def test_a_reserve_ends_planning_earlier_and_is_given_back():
+    def plans(clock):
+        clock.reserve(100.0)
+        try:
+            spin(20.0)
+        except TimeLimitError:
+            clock.extend()
+            raise TimeLimitError(f"{clock.remaining:.0f} s left") from None
+
+    clock = Stopwatch(time_limit=101.0)
+    with pytest.raises(TimeLimitError, match=r"(9\d|100) s left"), clock.ticking():
+        plans(clock)
+
+
+def test_what_must_stay_whole_is_cut_afterwards():
+    done = []
+
+    def exchanges(_):
+        with untimed():
+            spin(1.0)
+            done.append(True)
+        spin(20.0)
+
+    assert 1.0 <= cut(exchanges) < 6.0
+    assert done == [True]
+
+
+def test_imports_are_not_cut_in_two(tmp_path, monkeypatch):
+    (tmp_path / "slow_to_import.py").write_text(
+        "import time\nend = time.monotonic() + 1.0\n"
+        "while time.monotonic() < end:\n    pass\nwhole = True\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def imports(_):
+        __import__("slow_to_import")
+        spin(20.0)
+
+    assert 1.0 <= cut(imports) < 6.0
+    assert sys.modules["slow_to_import"].whole
+
+
+def test_without_a_limit_nothing_ticks():
+    clock = Stopwatch()
+    with clock.ticking():
+        assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    clock.check()
+    assert clock.remaining is None
+
+
+def test_nobody_waits_for_work_that_was_cut():
+    begin = time.monotonic()
+
+    def fails():
+        with abandonable(2) as pool:
+            pool.submit(time.sleep, 2.0)
+            raise TimeLimitError
+
+    with pytest.raises(TimeLimitError):
+        fails()
+    assert time.monotonic() - begin < 1.5
+    assert abandoned()
+    with abandonable(2) as pool:
+        assert list(pool.map(abs, [-1, -2])) == [1, 2]
+    time.sleep(2.5)
+    assert not abandoned()
+
+
+def test_a_failure_begins_no_more_work():
+    begun = []
+
+    def work(item):
+        begun.append(item)
+        time.sleep(0.05)
+        if item == 0:
+            raise ValueError("first")
+
+    with pytest.raises(ValueError, match="first"):
+        mapped(work, range(200), threads=2)
+    assert len(begun) < 20
