@@ -10,7 +10,7 @@ import numpy as np
 from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
-from planning.report.summary.device_lines import device_lines, gap_lines
+from planning.report.summary.device_lines import device_lines, gap_lines, mount_lines
 from planning.report.summary.zone_lines import zone_lines
 from planning.verify.audit.devices.camera_figures import (
     CameraFigures,
@@ -28,7 +28,8 @@ def show_command(options: Mapping[str, Any]) -> int:
     if options["as_json"]:
         print_json({"cameras": [asdict(camera) for camera in cameras]})
         return 0
-    lines = [*zone_lines(plan), *device_lines(plan), *gap_lines(plan), ""]
+    lines = [*zone_lines(plan), *device_lines(plan), *gap_lines(plan)]
+    lines += [*mount_lines(plan), ""]
     lines += [line for camera in cameras for line in _camera_lines(camera)]
     click.echo("\n".join(lines))
     return 0

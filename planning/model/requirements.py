@@ -10,11 +10,13 @@ from math import pi
 from typing import Any, Literal
 
 from .bodies import Body, Box, Triple
+from .mounts import Mount
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
 _STANDOFFS = ("projector_standoff_m", "camera_standoff_m")
-_LEFT_OUT = (*_ZONES, *_STANDOFFS, "origin", "clearance_m")
+_MOUNTS = ("projector_mount", "camera_mount")
+_LEFT_OUT = (*_ZONES, *_STANDOFFS, *_MOUNTS, "origin", "clearance_m")
 # Of an existing device, likewise.
 _OF_ITS_OWN = ("body", "world_from_ring", "ring_radii")
 
@@ -125,6 +127,8 @@ class Workspace:
         origin: `mesh` where places of the rig file count from the origin of the mesh;
             None: from `centre`. All places above count from `centre` either way.
         clearance_m: What housings keep between each other, unless both stand already.
+        projector_mount: Where projectors are fastened; None: it isn't said.
+        camera_mount: The same of cameras.
     """
 
     centre: tuple[float, float, float]
@@ -146,6 +150,8 @@ class Workspace:
     camera_standoff_m: float | None = None
     origin: Literal["mesh"] | None = None
     clearance_m: float = 0.0
+    projector_mount: Mount | None = None
+    camera_mount: Mount | None = None
 
     @property
     def origin_m(self) -> Triple:

@@ -72,7 +72,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         requirements=requirements,
         regions=regions,
         projectors=entries.projector_records(among, devices, partial.rings, claims),
-        cameras=entries.camera_records(devices.cameras, claims),
+        cameras=entries.camera_records(among, devices.cameras, claims),
         coverage=coverage,
         overlaps=overlaps,
         firing_schedule=schedule,

@@ -18,6 +18,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.bodies import Body
 from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.mounts import Mount
 from planning.model.obstacles import Obstacle
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.lights import light_of
@@ -126,6 +127,11 @@ class Rig:
         """Return the body of a camera, None where none is given."""
         return Body.of(self.table.camera.body)
 
+    def mounts(self) -> dict[str, Mount | None]:
+        """Return `projector_mount` and `camera_mount` of `Workspace`."""
+        tables = {"projector": self._projector_table, "camera": self.table.camera}
+        return {f"{kind}_mount": Mount.of(each.mount) for kind, each in tables.items()}
+
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
         return light_of(self._projector).image_ring(self.ring_offset)
@@ -178,6 +184,7 @@ class Rig:
                 not camera.holds_ball(object_radius_m, middle_m),
             ),
         )
+        workspace = replace(workspace, **self.mounts())
         required = build_requirements(self.table, wishes, workspace, tau_m=tau_m)
         devices = {
             "projector": (projector, self.projector_body()),

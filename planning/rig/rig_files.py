@@ -118,8 +118,8 @@ def _lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, A
     if isinstance(focus, dict):
         replaced |= {f"focus.{key}" for key in focus}
         device["focus"] = {**base.get("focus", {}), **focus}
-    if "body" in given:
-        replaced |= {key for key in base.get("sources", {}) if key.startswith("body.")}
+    whole = tuple(f"{key}." for key in ("body", "mount") if key in given)
+    replaced |= {key for key in base.get("sources", {}) if key.startswith(whole)}
     sources = {k: v for k, v in base.get("sources", {}).items() if k not in replaced}
     newer = given.get("sources", {})
     device |= {key: given[key] for key in given if key not in ("focus", "sources")}

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from planning.model.bodies import BodyTable
+from planning.model.mounts import MountTable
 from planning.model.table_types import (
     Acute,
     Limit,
@@ -42,10 +43,11 @@ class FocusTable(Table):
 
 
 class SourcedTable(Table):
-    """A device whose figures name their sources, with a body if one is given."""
+    """A device whose figures name their sources, perhaps with body and mount."""
 
     name: Name
     body: BodyTable | None = None
+    mount: MountTable | None = None
     sources: dict[str, Name] = Field(default={})
 
     def figures(self) -> tuple[str, ...]:

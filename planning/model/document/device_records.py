@@ -61,6 +61,7 @@ class ProjectorRecord(Part):
         pixel_pitch_m: Side of a pixel of the panel, parallel light.
         min_margin_rad: Least margin over the samples assigned to it; None: none are.
         lit_area_m2: Area that it lights.
+        world_from_mount: Pose of its thread or flange; None: the rig doesn't say.
         rings: None: the run was cut before they were spaced.
     """
 
@@ -77,6 +78,7 @@ class ProjectorRecord(Part):
     min_margin_rad: float | None
     lit_area_m2: float
     body: Body | None = None
+    world_from_mount: Pose | None = None
     existing: bool = False
     name: str = ""
     rings: RingsRecord | None = None
@@ -120,6 +122,7 @@ class CameraRecord(Part):
         distortion: k1, k2, p1, p2, k3.
         seen_area_m2: Area that it measures.
         sole_area_m2: Area that no other camera measures.
+        world_from_mount: As of projectors.
     """
 
     id: str
@@ -131,6 +134,7 @@ class CameraRecord(Part):
     seen_area_m2: float
     sole_area_m2: float
     body: Body | None = None
+    world_from_mount: Pose | None = None
     existing: bool = False
     name: str = ""
 

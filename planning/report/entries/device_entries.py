@@ -26,11 +26,14 @@ from planning.model.document.input_records import (
     SelectionRecord,
 )
 from planning.model.document.plan_document import CostRecord
+from planning.model.mounts import Mount
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.claims import Claims, Devices
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
+from planning.scene.mounts import device_from_mount
+from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 
 # Stages of planning that place light, with what they need to know of the surface, and
@@ -80,6 +83,7 @@ def projector_records(
             min_margin_rad=claims.min_margin_rad[p],
             lit_area_m2=claims.lit_area_m2[p],
         ).changed(
+            **_mounted(scene.requirements.workspace.projector_mount, projector),
             rings=None if rings is None else rings.records[p],
             ring_shares=ring_shares(scene, projector, devices.cameras),
         )
@@ -88,7 +92,7 @@ def projector_records(
 
 
 def camera_records(
-    cameras: Sequence[PlannedCamera], claims: Claims
+    scene: Scene, cameras: Sequence[PlannedCamera], claims: Claims
 ) -> tuple[CameraRecord, ...]:
     """Return the plan's `cameras`."""
     return tuple(
@@ -96,9 +100,17 @@ def camera_records(
             camera,
             seen_area_m2=claims.seen_area_m2[c],
             sole_area_m2=claims.sole_area_m2[c],
-        )
+        ).changed(**_mounted(scene.requirements.workspace.camera_mount, camera))
         for c, camera in enumerate(cameras)
     )
+
+
+def _mounted(mount: Mount | None, device: Device) -> dict[str, Any]:
+    """The pose of a device's mount; no key where the rig doesn't have it."""
+    if mount is None:
+        return {}
+    pose = device.world_from_device @ device_from_mount(mount)
+    return {"world_from_mount": (np.round(pose, DECIMALS) + 0.0).tolist()}
 
 
 def mesh_record(mesh: TriangleMesh, shell: MeshShell) -> MeshRecord:

@@ -55,6 +55,30 @@ def device_lines(plan: RigPlan) -> list[str]:
     ]
 
 
+def mount_lines(plan: RigPlan) -> list[str]:
+    """Return where mounts are and point to, a line each; none that the rig lacks."""
+    lines: list[str] = []
+    for record in (*plan.document.projectors, *plan.document.cameras):
+        if record.world_from_mount is not None:
+            pose = np.array(record.world_from_mount)
+            x, y, z = 1e3 * pose[:3, 3] + 0.0
+            ways = "   ".join(_direction(pose[:3, axis]) for axis in (2, 0))
+            lines.append(f"{record.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}   {ways}")
+    if not lines:
+        return []
+    return [
+        "",
+        "     mount x, y, z [mm]              axis, out of the device     forward, "
+        "square to it",
+        *lines,
+    ]
+
+
+def _direction(vector: NDArray[np.float64]) -> str:
+    x, y, z = np.round(vector, 4) + 0.0
+    return f"({x:7.4f}, {y:7.4f}, {z:7.4f})"
+
+
 def gap_lines(plan: RigPlan) -> list[str]:
     """Return which two housings stand nearest to each other; none of fewer than two."""
     boxes = bodies_of((*plan.projectors, *plan.cameras))

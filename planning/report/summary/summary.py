@@ -11,7 +11,7 @@ from planning.model.words import count_words, labelled, percent
 
 from .check_lines import check_lines, cost_lines, unchecked
 from .coverage_lines import coverage_lines, marginal_lines
-from .device_lines import axis_name, device_lines
+from .device_lines import axis_name, device_lines, mount_lines
 from .proof_lines import proof_lines
 from .ring_lines import range_lines, ring_lines
 from .warning_lines import warning_lines
@@ -28,6 +28,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     lines = [
         _head(plan),
         *device_lines(plan),
+        *mount_lines(plan),
         *warning_lines(plan),
         *proof_lines(plan),
         *coverage_lines(plan),

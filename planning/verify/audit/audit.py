@@ -28,6 +28,7 @@ from planning.verify.audit.coverage.region_claims import audit_margins, audit_re
 from planning.verify.audit.devices.body_claims import audit_bodies, audit_clearance
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
 from planning.verify.audit.devices.evaluation_claims import audit_evaluation
+from planning.verify.audit.devices.mount_claims import audit_mounts
 from planning.verify.audit.devices.obstacle_claims import audit_obstacles
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
@@ -45,6 +46,7 @@ _CLAIMS = (
     audit_bodies,
     audit_clearance,
     audit_evaluation,
+    audit_mounts,
     audit_obstacles,
     audit_areas,
     audit_inside,

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from planning.report.summary.device_lines import mount_lines
 from planning.verify.audit.audit import audit_plan
 
 BODY = {"centre_m": [0.0, 0.0, -0.05], "half_m": [0.03, 0.03, 0.075]}
@@ -64,3 +65,77 @@ def test_another_clearance_than_the_rigs_is_named(plan, handmade):
     assert any(
         "workspace.clearance_m: claimed 0 m, recomputed 0.013 m" in f for f in found
     )
+
+
+MOUNT = {"offset_mm": [0.0, 30.0, -40.0], "axis": [0.0, 2.0, 0.0]}
+
+
+def with_mounts(document):
+    """Threads 30 mm below and 40 mm behind the optical centres of cameras."""
+    document["rig"]["camera"].setdefault("figures", {})["mount"] = MOUNT
+    document["requirements"]["workspace"]["camera_mount"] = {
+        "offset_m": [0.0, 0.03, -0.04],
+        "axis": [0.0, 1.0, 0.0],
+    }
+    for camera in document["cameras"]:
+        pose = np.array(camera["world_from_device"])
+        x, y, z = pose[:3, :3].T
+        mount = np.eye(4)
+        # Out of the device is down, forward is forward.
+        mount[:3, :3] = np.column_stack([z, x, y])
+        mount[:3, 3] = pose[:3, 3] + 0.03 * y - 0.04 * z
+        camera["world_from_mount"] = mount.tolist()
+
+
+def test_mounts_stand_where_devices_put_them(plan, handmade):
+    mounted = handmade.tampered(plan, with_mounts)
+    assert audit_plan(mounted, n_samples=20_000).failures == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            lambda d: d["cameras"][1]["world_from_mount"][0].__setitem__(3, 0.5),
+            "C2.world_from_mount: claimed",
+        ),
+        (
+            lambda d: d["cameras"][0].pop("world_from_mount"),
+            "C1.world_from_mount: claimed None",
+        ),
+        (
+            lambda d: d["requirements"]["workspace"]["camera_mount"].update(
+                offset_m=[0.0, 0.03, 0.04]
+            ),
+            "camera_mount.offset_m: claimed",
+        ),
+        (
+            lambda d: d["requirements"]["workspace"].pop("camera_mount"),
+            "camera_mount: None is claimed, but the rig file has",
+        ),
+    ],
+)
+def test_a_mount_elsewhere_is_named(plan, handmade, change, sentence):
+    def both(document):
+        with_mounts(document)
+        change(document)
+
+    found = failures(handmade.tampered(plan, both))
+    assert any(sentence in failure for failure in found), found
+
+
+def test_the_summary_says_where_mounts_are(plan, handmade):
+    mounted = handmade.tampered(plan, with_mounts)
+    assert mount_lines(plan) == []
+    _, head, first, second = mount_lines(mounted)
+    assert "mount x, y, z [mm]" in head
+    assert (first[:2], second[:2]) == ("C1", "C2")
+    numbers = [
+        float(word)
+        for word in first[2:].replace("(", "").replace(")", "").replace(",", "").split()
+    ]
+    turn = mounted.cameras[0].world_from_device[:3, :3]
+    position = 1e3 * (mounted.cameras[0].world_from_device @ [0, 0.03, -0.04, 1])[:3]
+    assert numbers[:3] == pytest.approx(position, abs=0.05)
+    assert numbers[3:6] == pytest.approx(turn[:, 1], abs=1e-4)
+    assert numbers[6:] == pytest.approx(turn[:, 2], abs=1e-4)
