@@ -110,6 +110,27 @@ class PlanFile(click.Path):
         return path / "plan.json" if os.path.isdir(path) else path
 
 
+def signed_limits(
+    context: click.Context, option: click.Parameter, value: str | None
+) -> tuple[float, float] | None:
+    """Read LOW,HIGH about zero, or one number for both sides: in mm, returned in m."""
+    if value is None:
+        return None
+    try:
+        numbers = [float(word) for word in value.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1:
+        numbers = [-numbers[0], numbers[0]]
+    finite = all(math.isfinite(number) for number in numbers)
+    if len(numbers) != 2 or not finite or not numbers[0] < 0.0 < numbers[1]:
+        raise click.BadParameter(
+            f"{value!r} must be a lower and an upper limit in mm about zero, as "
+            f"-0.2,0.5, or one positive number for both sides"
+        )
+    return 1e-3 * numbers[0], 1e-3 * numbers[1]
+
+
 def reporter(*, quiet: bool) -> Report:
     """Return what writes a line of progress to stderr, or nothing."""
 

@@ -20,7 +20,8 @@ from planning.verify.reconstruction.pattern_files import is_patterns
 from .console import stop_signals
 
 # What a run writes, and what of an older plan doesn't stay beside a new one.
-OWNED = ("plan.json", "surface.npz", "rig.png", "patterns", "cloud.ply")
+_CLOUDS = ("cloud.ply", "deviation.ply")
+OWNED = ("plan.json", "surface.npz", "rig.png", "patterns", *_CLOUDS)
 # `renameat2` and `renamex_np` exchange two entries under these flags.
 _EXCHANGE, _SWAP, _HERE = 2, 2, -100
 # What is younger may be what another run is writing just now [s].
@@ -116,7 +117,7 @@ def _bring_others(old: Path, folder: Path) -> None:
 
 def _is_ours(entry: Path) -> bool:
     """Whether an earlier run wrote an entry of a folder."""
-    if entry.name == "cloud.ply":
+    if entry.name in _CLOUDS:
         return is_cloud(entry)
     if entry.name == "patterns":
         return is_patterns(entry)

@@ -24,6 +24,10 @@ from planning.verify.reconstruction.captures.captured import (
 )
 from planning.verify.reconstruction.captures.captures import CaptureFolder
 from planning.verify.reconstruction.check.accuracy import Expected
+from planning.verify.reconstruction.check.deviation import (
+    Deviation,
+    measure_deviation,
+)
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.cloud_file import (
     CloudFile,
@@ -38,8 +42,9 @@ from planning.verify.reconstruction.single_shot.single_shot import (
 from planning.verify.verification import bare
 
 from .console import print_json, reporter, writable
+from .deviation_table import deviation_lines
 
-CLOUD = "cloud.ply"
+CLOUD, DEVIATION = "cloud.ply", "deviation.ply"
 # How near the object is taken to lie to the mesh that labels single images.
 _PRIOR_MM = 1.0
 
@@ -62,12 +67,37 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
         try:
             result = _reconstruct(plan, scanner, options, report)
         except CapturesError:
-            remove_cloud(folder / CLOUD)
+            for name in (CLOUD, DEVIATION):
+                remove_cloud(folder / name)
             raise
         unit = LengthUnit.of(plan.document.meshes[0])
-        file = save_cloud(result, unit, folder / CLOUD)
-    _print(plan, result, file, folder / CLOUD, as_json=options["as_json"])
+        file = save_cloud(result, unit, folder / CLOUD, plan.digest)
+        written = {CLOUD: file} if file else {}
+        deviation = _deviation(result, scanner, options)
+        if deviation is None:
+            remove_cloud(folder / DEVIATION)
+        else:
+            written[DEVIATION] = CloudFile.of_deviation(
+                result.merged, deviation, unit, plan.digest
+            )
+            written[DEVIATION].save(folder / DEVIATION)
+    files = {folder / name: file for name, file in written.items()}
+    if options["as_json"]:
+        print_json(_document(result, deviation, files))
+    else:
+        click.echo(_summary(plan, result, deviation, files))
     return 0 if result.passed else 1
+
+
+def _deviation(
+    result: Reconstruction, scanner: Scanner, options: Mapping[str, Any]
+) -> Deviation | None:
+    """Hold captured points against the mesh; simulated ones if it is asked for."""
+    align, limits = options["align"], options["deviation_limits"]
+    wanted = options["captures"] is not None or align or limits
+    if not wanted or not result.n_merged:
+        return None
+    return measure_deviation(result.merged, scanner, align or "best-fit", limits)
 
 
 def _reconstruct(
@@ -115,50 +145,51 @@ def _reconstruct(
 
 
 def save_cloud(
-    result: Reconstruction, unit: LengthUnit, path: Path
+    result: Reconstruction, unit: LengthUnit, path: Path, digest: str = ""
 ) -> CloudFile | None:
     """Write the cloud; without points none, and none of an earlier run stays."""
     if not result.n_merged:
         remove_cloud(path)
         return None
-    file = CloudFile.of(result.merged, unit)
+    file = CloudFile.of(result.merged, unit, digest)
     file.save(path)
     return file
 
 
-def _print(
-    plan: RigPlan,
-    result: Reconstruction,
-    file: CloudFile | None,
-    path: Path,
-    *,
-    as_json: bool,
-) -> None:
-    if not as_json:
-        click.echo(_summary(plan, result, file, path))
-        return
+def _document(
+    result: Reconstruction, deviation: Deviation | None, files: dict[Path, CloudFile]
+) -> dict[str, Any]:
+    cloud = next(iter(files.items()), None)
     document = result.to_document() | {
         "pairs": [vars(pair) for pair in result.pairs],
-        "cloud": None if file is None else str(path),
-        "unit": None if file is None else file.unit.name,
-        "colour_range": None if file is None else list(file.limits),
+        "cloud": None if cloud is None else str(cloud[0]),
+        "unit": None if cloud is None else cloud[1].unit.name,
+        "colour_range": None if cloud is None else list(cloud[1].limits),
     }
-    print_json(document)
+    if deviation is not None:
+        document["deviation"] = deviation.to_document()
+    return document
 
 
 def _summary(
-    plan: RigPlan, result: Reconstruction, file: CloudFile | None, path: Path
+    plan: RigPlan,
+    result: Reconstruction,
+    deviation: Deviation | None,
+    files: dict[Path, CloudFile],
 ) -> str:
     """Return the result in a few lines; the verdict is the last."""
     lines = [_pair_line(pair) for pair in result.pairs]
     lines += _figures(plan, result)
-    if file is None:
+    if not files:
         lines.append("cloud    none was written")
-    else:
+    for path, file in files.items():
         lines += [
-            f"cloud    {path}: {len(file.rows)} points, positions in {file.unit.name}",
-            f"colours  sigma along the normal: {file.legend}",
+            f"{path.stem:<9}{path}: {len(file.rows)} points, positions in "
+            f"{file.unit.name}",
+            f"colours  {file.scale.column} along the normal: {file.legend}",
         ]
+    if deviation is not None:
+        lines += deviation_lines(deviation)
     lines += [f"not met: {sentence}" for sentence in result.failures]
     missed = count_words(len(result.failures), "failure")
     lines.append(

@@ -115,6 +115,52 @@ def rows_of(path: Path) -> np.ndarray:
     return np.frombuffer(content, dtype=fields)
 
 
+def test_captures_are_held_against_the_mesh(folder, simulated, tmp_path):
+    """As they were measured, and moved onto it; in the mesh's unit, inches."""
+    images = ["--captures", folder / "captures", "--quiet", "--json"]
+    limits = ["--deviation-limits", "-0.05,0.1"]
+    code, out, _ = run(folder / "plan.json", *images, "-o", tmp_path / "fit")
+    assert code == 0
+    fit = json.loads(out)["deviation"]
+    assert np.allclose(fit["mesh_from_measured"], np.eye(4), atol=2e-4)
+    assert fit["limits_m"] is None
+    words = ["--align", "none", *limits, "-o", tmp_path / "none"]
+    code, out, _ = run(folder / "plan.json", *images, *words)
+    plain = json.loads(out)["deviation"]
+    assert plain["mesh_from_measured"] == np.eye(4).tolist()
+    assert plain["limits_m"] == pytest.approx([-5e-5, 1e-4])
+    assert sum(row["n_points"] for row in plain["regions"]) == plain["n_points"]
+    rows = rows_of(tmp_path / "none" / "deviation.ply")
+    away_m = 0.0254 * rows["deviation"]
+    places = 0.0254 * np.stack([rows[a] for a in "xyz"], axis=1)
+    surface = RigPlan.load(folder / "plan.json").surface.mesh
+    assert np.allclose(closest_points(surface, places).distances, away_m, atol=1e-8)
+    assert plain["rms_m"] == pytest.approx(np.sqrt(np.mean(away_m**2)), rel=1e-4)
+    outside = np.mean((away_m < -5e-5) | (away_m > 1e-4))
+    assert plain["outside"] == pytest.approx(outside, abs=2 / len(rows))
+    # Blue is inside, red outside, white on the mesh.
+    assert np.all(rows["blue"][away_m < -5e-5] > rows["red"][away_m < -5e-5])
+    assert np.all(rows["red"][away_m > 5e-5] > rows["blue"][away_m > 5e-5])
+    header = header_of(tmp_path / "none" / "deviation.ply")
+    assert header[2] == "comment ringrig cloud"
+    assert any("colour RdBu by deviation, -0.0019685 to 0.003937" in h for h in header)
+
+
+def test_an_older_map_does_not_stay(folder, simulated, tmp_path):
+    images = ["--captures", folder / "captures", "--quiet", "-o", tmp_path]
+    run(folder / "plan.json", *images)
+    assert {path.name for path in tmp_path.iterdir()} == {"cloud.ply", "deviation.ply"}
+    run(folder / "plan.json", "--quiet", "-o", tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"cloud.ply"}
+
+
+@pytest.mark.parametrize("limits", ["0", "0.1,0.2", "a", "1,2,3", "nan", "-1,inf", ""])
+def test_limits_are_about_zero(folder, limits):
+    code, _, err = run(folder / "plan.json", "--deviation-limits", limits)
+    assert code == 2
+    assert "about zero" in err
+
+
 def test_the_header_tells_unit_and_colours(folder, simulated):
     path = folder / "one" / "cloud.ply"
     header = header_of(path)
@@ -220,7 +266,7 @@ def test_a_calibration_moves_devices_in_simulation_and_captures(
     words = ["-o", tmp_path / "three", "--quiet"]
     code, out, _ = run(folder / "plan.json", *words, *images)
     assert code == 1
-    assert "P1 with C1: left out: its points lie " in out
+    assert "P1 with C1: doubtful: where P1 with C2 measured the same spots, " in out
 
 
 def test_a_cloud_of_someone_else_is_not_removed(folder, simulated, tmp_path):

@@ -11,6 +11,7 @@ from planning.cli.console import (
     Positive,
     output_options,
     run,
+    signed_limits,
     threads_option,
 )
 
@@ -95,6 +96,19 @@ from planning.cli.console import (
     help="Poses and optics as measured after mounting [default: the plan's].",
 )
 @click.option(
+    "--align",
+    type=click.Choice(["none", "best-fit"]),
+    help="Of deviation.ply, which says where captured points deviate from the mesh: as "
+    "they were measured, or moved onto it as a rigid body [default: best-fit].",
+)
+@click.option(
+    "--deviation-limits",
+    callback=signed_limits,
+    metavar="MM|LOW,HIGH",
+    help="What points may deviate by, in mm: ends of the colour scale of "
+    "deviation.ply, and each region's share outside.",
+)
+@click.option(
     "--seed", type=click.IntRange(0), help="Of samples and noise [default: the plan's]."
 )
 @threads_option
@@ -127,7 +141,13 @@ def _check_reconstruct(options: dict[str, Any]) -> None:
         raise click.UsageError("give DIR/plan.json, or --experiment box or face")
     if not options["single_shot"] and options["prior_mm"] is not None:
         raise click.UsageError("--prior-mm goes with --single-shot")
-    plan_only = ("captures", "save_captures", "calibration")
+    plan_only = (
+        "captures",
+        "save_captures",
+        "calibration",
+        "align",
+        "deviation_limits",
+    )
     experiment_only = ("light", "variant", "ambient", "distortion", "second_sequence")
     for name in plan_only if experiment else experiment_only:
         if _is_set(options, name):

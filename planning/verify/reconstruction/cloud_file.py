@@ -1,30 +1,25 @@
-"""`cloud.ply`: the merged cloud, coloured by the uncertainty of each point.
+"""`cloud.ply` and `deviation.ply`: points coloured by uncertainty, or by deviation.
 
 Positions are in the unit and axes of the mesh file, so that both lie on each other in
 any viewer; the header's comments say so and give the scale to metres.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.document.input_records import MeshRecord
 from planning.model.files import write_atomically
+from planning.verify.reconstruction.check.deviation import Deviation
 from planning.verify.reconstruction.check.merge import Merged
 
 from .arrays import Array
 
 _GENERATOR = "comment ringrig cloud"
-_FIELDS = (
-    *((name, "<f8") for name in ("x", "y", "z")),
-    *((name, "<f4") for name in ("nx", "ny", "nz", "sigma")),
-    *((name, "u1") for name in ("red", "green", "blue")),
-)
-_ROW = np.dtype(list(_FIELDS))
-_PLY_TYPES = {"<f8": "double", "<f4": "float", "u1": "uchar"}
+_PLY_TYPES = {"<f8": "double", "<f4": "float", "|u1": "uchar"}
 
 # Every seventeenth of the 256 colours of viridis (S. van der Walt, N. Smith, CC0);
 # lightness rises evenly, so that colour blindness loses nothing.
@@ -32,9 +27,46 @@ _VIRIDIS = (
     "440154 481a6c 472f7d 414487 39568c 31688e 2a788e 23888e "
     "1f988b 22a884 35b779 54c568 7ad151 a5db36 d2e21b fde725"
 )
-_NAMES = ((0.0, "violet"), (0.5, "teal"), (1.0, "yellow"))
+# RdBu of ColorBrewer (C. Brewer, M. Harrower), reversed: safe for colour blindness too.
+_BLUE_TO_RED = "2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b"
 # Values beyond these quantiles take the colours of the ends.
 _ENDS = (0.02, 0.98)
+_WIDEST = 0.95
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """What the colours of a file mean.
+
+    Attributes:
+        column: The property that they tell.
+        words: What that is.
+        name: Of the palette.
+        palette: Colours from end to end, as RRGGBB apart by spaces.
+        names: What the colours at shares of the way are called.
+    """
+
+    column: str
+    words: str
+    name: str
+    palette: str
+    names: tuple[tuple[float, str], ...]
+
+
+_BY_SIGMA = ColourScale(
+    "sigma",
+    "standard deviation along the normal",
+    "viridis",
+    _VIRIDIS,
+    ((0.0, "violet"), (0.5, "teal"), (1.0, "yellow")),
+)
+_BY_DEVIATION = ColourScale(
+    "deviation",
+    "signed distance from the mesh, outside positive",
+    "RdBu",
+    _BLUE_TO_RED,
+    ((0.0, "blue"), (0.5, "white"), (1.0, "red")),
+)
 
 
 @dataclass(frozen=True)
@@ -58,19 +90,23 @@ class LengthUnit:
 
 @dataclass(frozen=True, eq=False)
 class CloudFile:
-    """What `cloud.ply` holds.
+    """What a file of points holds.
 
     Attributes:
-        rows: Points, normals, sigma and colours, one a row.
-        unit: Of positions and sigma.
-        limits: Sigma at both ends of the colour scale, in that unit.
+        rows: Positions, normals, sigma, perhaps the deviation, and colours.
+        unit: Of all lengths.
+        scale: What the colours tell.
+        limits: That at both ends of the colour scale, in that unit.
         digest: Of the plan by which it was measured.
+        notes: What else the header says.
     """
 
     rows: NDArray[np.void]
     unit: LengthUnit
+    scale: ColourScale
     limits: tuple[float, float]
     digest: str = ""
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, merged: Merged, unit: LengthUnit, digest: str = "") -> "CloudFile":
@@ -80,21 +116,50 @@ class CloudFile:
         normal could give: the length of the point's move with its edge, times the
         edge's noise.
         """
-        cloud = merged.cloud
-        known = np.isfinite(merged.normals[:, 0])
-        largest = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
-        sigma = np.where(known, merged.sigma, largest) / unit.in_m
-        low, high = np.quantile(sigma, _ENDS).tolist() if len(cloud) else (0.0, 1.0)
-        rows = np.empty(len(cloud), dtype=_ROW)
-        normals = np.where(known[:, None], merged.normals, 0.0)
-        for axis, name in enumerate("xyz"):
-            rows[name] = cloud.points[:, axis] / unit.in_m
-            rows[f"n{name}"] = normals[:, axis]
-        rows["sigma"] = sigma
-        shades = np.rint(ramp(_VIRIDIS, (sigma - low) / max(high - low, 1e-300)))
-        for channel, name in enumerate(("red", "green", "blue")):
-            rows[name] = shades[:, channel]
-        return cls(rows, unit, (low, high), digest)
+        sigma = _sigma(merged) / unit.in_m
+        low, high = np.quantile(sigma, _ENDS).tolist() if len(sigma) else (0.0, 1.0)
+        columns = _columns(merged.cloud.points, merged.normals, sigma, unit)
+        return cls._coloured(columns, unit, _BY_SIGMA, (low, high), digest)
+
+    @classmethod
+    def of_deviation(
+        cls, merged: Merged, deviation: Deviation, unit: LengthUnit, digest: str = ""
+    ) -> "CloudFile":
+        """Lay out where a cloud deviates, at the places that its fit gave it.
+
+        Without limits the colours end where 95 % of the points are within.
+        """
+        away = deviation.distances / unit.in_m
+        widest = float(np.quantile(np.abs(away), _WIDEST))
+        low, high = deviation.limits_m or (-widest * unit.in_m, widest * unit.in_m)
+        sigma = _sigma(merged) / unit.in_m
+        columns = _columns(deviation.points, deviation.normals, sigma, unit)
+        columns["deviation"] = away.astype("<f4")
+        limits = low / unit.in_m, high / unit.in_m
+        pose = deviation.mesh_from_measured[:3].ravel().tolist()
+        moved = "moved before, rows of [R | t] in m: " + " ".join(map(repr, pose))
+        file = cls._coloured(columns, unit, _BY_DEVIATION, limits, digest)
+        return replace(file, notes=(moved,))
+
+    @classmethod
+    def _coloured(
+        cls,
+        columns: dict[str, NDArray[Any]],
+        unit: LengthUnit,
+        scale: ColourScale,
+        limits: tuple[float, float],
+        digest: str,
+    ) -> "CloudFile":
+        low, high = limits
+        shares = (columns[scale.column] - low) / max(high - low, 1e-300)
+        shades = np.rint(ramp(scale.palette, shares)).astype("u1")
+        channels = ("red", "green", "blue")
+        columns |= dict(zip(channels, shades.T, strict=True))
+        kinds = [(name, column.dtype) for name, column in columns.items()]
+        rows = np.empty(len(shades), dtype=kinds)
+        for name, column in columns.items():
+            rows[name] = column
+        return cls(rows, unit, scale, limits, digest)
 
     @property
     def legend(self) -> str:
@@ -102,7 +167,7 @@ class CloudFile:
         low, high = self.limits
         return ", ".join(
             f"{name} {low + share * (high - low):.4g} {self.unit.name}"
-            for share, name in _NAMES
+            for share, name in self.scale.names
         )
 
     def save(self, path: Path) -> None:
@@ -121,14 +186,35 @@ class CloudFile:
             _GENERATOR,
             f"comment unit {self.unit.name}, {self.unit.in_m!r} m; axes of the mesh",
             *([f"comment plan {self.digest}"] if self.digest else []),
-            "comment sigma: standard deviation along the normal, same unit",
-            f"comment colour viridis by sigma, {low:.6g} to {high:.6g}: {self.legend}",
+            f"comment {self.scale.column}: {self.scale.words}, same unit",
+            f"comment colour {self.scale.name} by {self.scale.column}, {low:.6g} to "
+            f"{high:.6g}: {self.legend}",
+            *(f"comment {note}" for note in self.notes),
             f"element vertex {len(self.rows)}",
-            *(f"property {_PLY_TYPES[kind]} {name}" for name, kind in _FIELDS),
+            *(
+                f"property {_PLY_TYPES[self.rows.dtype[name].str]} {name}"
+                for name in self.rows.dtype.names or ()
+            ),
             "end_header",
         ]
         file.write("".join(f"{line}\n" for line in header).encode("ascii"))
         file.write(self.rows.tobytes())
+
+
+def _sigma(merged: Merged) -> Array:
+    """Standard deviations along the normal, without one the largest, (n,) [m]."""
+    cloud = merged.cloud
+    largest = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
+    return np.where(np.isfinite(merged.normals[:, 0]), merged.sigma, largest)
+
+
+def _columns(
+    points: Array, normals: Array, sigma: Array, unit: LengthUnit
+) -> dict[str, NDArray[Any]]:
+    normals = np.where(np.isfinite(normals), normals, 0.0)
+    columns = {name: points[:, k] / unit.in_m for k, name in enumerate("xyz")}
+    columns |= {f"n{name}": normals[:, k].astype("<f4") for k, name in enumerate("xyz")}
+    return columns | {"sigma": sigma.astype("<f4")}
 
 
 def is_cloud(path: Path) -> bool:

@@ -1,22 +1,20 @@
-"""Pairs of devices whose points something else confirms: the mesh, or another pair.
+"""Pairs of devices that contradict others, and what their points are worth.
 
 Images that were mixed up among cameras or projectors can decode without a fault, and
-every point is wrong. No cloud is made of what nothing confirms.
+every point is wrong. What the majority contradicts is left out; what is doubtful loses
+certainty, not its points.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import closest_points
 from planning.verify.reconstruction.arrays import Array, Mask
-from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import (
     CAUSES,
@@ -26,36 +24,37 @@ from planning.verify.reconstruction.decode.decode import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
+from .agreement import AGREE_PX, Agreement, upper_px
+
 _MM = 1e3
-# Points of a pair that are looked at, and the fewest that say anything.
+# Beyond this residual images are of other devices, or poses of another rig [px]; below
+# it a calibration is off.
+_FOREIGN_PX = 2.0
+# Points of a pair that are held against the mesh.
 _LOOKED_AT = 2000
-_FEWEST = 30
-# Two pairs saw one spot if their edges lie this near in an image [px].
-_SAME_SPOT_PX = 0.5
-# Points are looked for this far beside an edge of their own ring [px].
-_BESIDE_PX = 30.0
-_RING_APART_PX = 1000.0
-# Of one spot two pairs may differ by this many times the limit of the mean error: half
-# a pixel beside the spot lies nearer or farther on slanted surface.
-_APART = 3.0
-# Points this many times the limit from the mesh are stray; a pair whose share of them
-# is larger has seen a dent, or something is wrong with its images.
+# Points this many times the limit of the mean error from the mesh are stray; a pair
+# whose share of them is larger has seen a dent, or something is wrong with its images.
 _STRAY = 10.0
 _FEW_STRAYS = 0.005
-_FEWEST_STRAYS = 10
+_FEWEST_SEEN = 10
 _OTHER_OBJECT = (
-    "the pairs agree with each other, but not with the mesh of the plan: the object "
-    "differs from it, or stands elsewhere"
+    "the points don't lie on the mesh of the plan: the object differs from it, or "
+    "stands elsewhere"
 )
+_FOREIGN = (
+    "images of other devices, or exchanged, or poses that aren't those of the plan or "
+    "the calibration"
+)
+_INACCURATE = "a pose or optics aren't quite those of the plan or the calibration"
 
 
 @dataclass(frozen=True, eq=False)
 class Confirmed:
-    """Pairs with the points that something confirms.
+    """Pairs with the points that are kept.
 
     Attributes:
-        pairs: What each pair gave, without the others.
-        reasons: Of each pair that lost points, in words.
+        pairs: What each pair gave, without the others; sigma counts what is doubtful.
+        reasons: Of each pair that lost points or certainty, in words.
         remark: What the pairs together say of the object; None: nothing.
     """
 
@@ -64,50 +63,172 @@ class Confirmed:
     remark: str | None = None
 
 
-def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
-    """Leave out the pairs that neither the mesh nor a confirmed pair confirms.
+@dataclass(frozen=True, eq=False)
+class _Verdict:
+    """What is wrong with some points of a pair.
 
-    The mesh confirms a pair whose median distance from it keeps the limit. A pair that
-    is off, though every confirmed pair that saw the same spots agrees with it, has seen
-    a dent. If the mesh confirms none, but all pairs agree with each other, the object
-    isn't the mesh; two pairs at least, of other cameras and other projectors. Where a
-    confirmed pair has many points far from the mesh, these too need another pair.
+    Attributes:
+        words: What is said of it.
+        points: Which of them, shape (n,).
+        doubt_px: How far their edges may be off [px]; None: they are left out.
     """
-    limit = plan.limits.check.max_rms_m
-    clouds = {key: pair.cloud for key, pair in pairs if len(pair.cloud)}
-    errors = {
-        key: _distances(plan.mesh, cloud.thinned(_LOOKED_AT))
-        for key, cloud in clouds.items()
+
+    words: str
+    points: Mask
+    doubt_px: float | None = None
+
+
+def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
+    """Leave out the pairs that the others contradict, and doubt those that are off.
+
+    The pairs that are believed are what remains when those that differ from more than
+    they agree with have gone, the one farthest from the mesh first. Of the others those
+    that differ by over `_FOREIGN_PX` are left out; the rest keep their points, and that
+    difference counts as noise of their edges, but those are left out that have points
+    nobody doubts within tau. So does `AGREE_PX` where neither the mesh nor another pair
+    says anything, unless points lie farther away than the object is large. Many points
+    of a pair on the mesh that are far from it need another pair.
+    """
+    clouds = {
+        key: pair.cloud.of_devices(*key) for key, pair in pairs if len(pair.cloud)
     }
-    medians = {key: float(np.median(error)) for key, error in errors.items()}
-    good = {key for key, median in medians.items() if median <= limit}
-    off = medians.keys() - good
-    witnesses = _Witnesses(clouds, plan.cameras, _APART * limit)
-    if not good and witnesses.agree_all():
-        return Confirmed(pairs, {}, _OTHER_OBJECT)
-    kept: Pairs = []
-    reasons: dict[PairIndex, str] = {}
-    for key, pair in pairs:
-        unconfirmed = np.zeros(len(pair.cloud), dtype=bool)
-        if key in off and not witnesses.confirm(key, good):
-            unconfirmed[:] = True
-            reasons[key] = (
-                f"left out: its points lie {_MM * medians[key]:.3g} mm off the mesh "
-                f"(median), and no other pair confirms them: images of other devices, "
-                f"or exchanged, or poses that aren't those of the plan or the "
-                f"calibration"
+    judge = _Judge(plan, Agreement(plan, clouds))
+    verdicts = {key: verdict for key in clouds if (verdict := judge.verdict(key))}
+    sure = [cloud for key, cloud in clouds.items() if key not in verdicts]
+    near = _Near(sure, plan.limits.check.tau_m)
+    kept = [
+        (key, _after(pair, verdicts[key], near) if key in verdicts else pair)
+        for key, pair in pairs
+    ]
+    limit = plan.limits.check.max_rms_m
+    off = [judge.median_m[key] > limit for key, pair in kept if len(pair.cloud)]
+    return Confirmed(
+        kept,
+        {key: verdict.words for key, verdict in verdicts.items()},
+        _OTHER_OBJECT if off and all(off) else None,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    """Which pairs are believed, and why the others aren't."""
+
+    plan: Scanner
+    agreement: Agreement
+
+    @cached_property
+    def error_m(self) -> dict[PairIndex, Array]:
+        """Distances of some points of each pair from the mesh [m]."""
+        return {
+            key: _distances(self.plan.mesh, cloud.thinned(_LOOKED_AT))
+            for key, cloud in self.agreement.clouds.items()
+        }
+
+    @cached_property
+    def median_m(self) -> dict[PairIndex, float]:
+        """Median distance of each pair from the mesh [m]."""
+        return {key: float(np.median(error)) for key, error in self.error_m.items()}
+
+    @cached_property
+    def believed(self) -> set[PairIndex]:
+        """The pairs that agree wherever two of them measured the same spots."""
+        every = self.agreement.clouds.keys()
+        believed = set(every)
+
+        def differs(key: PairIndex) -> tuple[int, float]:
+            away = [px > AGREE_PX for px in self._residuals(key, believed).values()]
+            return 2 * sum(away) - len(away), self.median_m[key]
+
+        while differ := {k for k in believed if self._worst_px(k, believed) > AGREE_PX}:
+            believed.remove(max(differ, key=differs))
+        for key in sorted(every - believed):
+            if 0.0 <= self._worst_px(key, believed) <= AGREE_PX:
+                believed.add(key)
+        return believed
+
+    def verdict(self, key: PairIndex) -> _Verdict | None:
+        """Return what is wrong with a pair; None: nothing."""
+        known = self.median_m[key] <= self.plan.limits.check.max_rms_m
+        against = self._residuals(key, self.believed)
+        if key in self.believed:
+            if known:
+                return self._strays(key)
+            if against:
+                return None
+        # Nobody who is believed saw its spots: whoever did, then.
+        against = against or self._residuals(key, self.agreement.clouds.keys())
+        everywhere = np.ones(len(self.agreement.clouds[key]), dtype=bool)
+        if against:
+            other = max(against, key=lambda one: against[one])
+            px, name = against[other], self.plan.name(other)
+        else:
+            px = self._seen_px(self.agreement.clouds[key], key, self.believed)
+            name = "other pairs"
+        if px is None:
+            return self._alone(key, everywhere)
+        where = f"where {name} measured the same spots, edges are {px:.2g} px off"
+        if px > _FOREIGN_PX:
+            return _Verdict(f"left out: {where}: {_FOREIGN}", everywhere)
+        if px > AGREE_PX:
+            words = f"doubtful: {where}, which its sigma counts: {_INACCURATE}"
+            return _Verdict(words, everywhere, px)
+        return None
+
+    def _residuals(
+        self, key: PairIndex, among: Set[PairIndex]
+    ) -> dict[PairIndex, float]:
+        both = {other: frozenset((key, other)) for other in sorted(among - {key})}
+        known = self.agreement.residuals
+        return {other: known[two] for other, two in both.items() if two in known}
+
+    def _worst_px(self, key: PairIndex, among: Set[PairIndex]) -> float:
+        """Return the largest residual of a pair, -1 without any."""
+        return max(self._residuals(key, among).values(), default=-1.0)
+
+    def _seen_px(
+        self, points: Cloud, of: PairIndex, others: Set[PairIndex]
+    ) -> float | None:
+        """Return the residual of points that others must have seen; None: too few."""
+        seen = self.agreement.evidence(points, of, others)
+        return upper_px(seen) if len(seen) >= _FEWEST_SEEN else None
+
+    def _alone(self, key: PairIndex, everywhere: Mask) -> _Verdict:
+        low, high = self.plan.mesh.bounds
+        far = self.median_m[key] > 0.5 * float(np.linalg.norm(high - low))
+        where = (
+            f"its points lie {_MM * self.median_m[key]:.3g} mm off the mesh (median), "
+            f"and no other pair confirms them"
+        )
+        if far:
+            return _Verdict(f"left out: {where}: {_FOREIGN}", everywhere)
+        return _Verdict(
+            f"doubtful: {where}; its sigma counts that", everywhere, AGREE_PX
+        )
+
+    def _strays(self, key: PairIndex) -> _Verdict | None:
+        stray_m = _STRAY * self.plan.limits.check.max_rms_m
+        if not np.mean(self.error_m[key] > stray_m) > _FEW_STRAYS:
+            return None
+        cloud = self.agreement.clouds[key]
+        stray = _distances(self.plan.mesh, cloud) > stray_m
+        others = self.believed & {
+            k for k, m in self.median_m.items() if m <= self.plan.limits.check.max_rms_m
+        }
+        seen_px = self._seen_px(cloud.take(stray), key, others)
+        if seen_px is None:
+            why, px = (
+                "doubtful: far off the mesh, and no other pair confirms them",
+                AGREE_PX,
             )
-        if key in good and np.mean(errors[key] > _STRAY * limit) > _FEW_STRAYS:
-            far = _distances(plan.mesh, pair.cloud) > _STRAY * limit
-            strays = pair.cloud.take(far)
-            if not witnesses.saw(strays, key, good):
-                unconfirmed = far
-                reasons[key] = (
-                    f"{len(strays)} of its {len(pair.cloud)} points are left out: far "
-                    f"off the mesh, and no other pair confirms them"
-                )
-        kept.append((key, _without(pair, unconfirmed) if key in reasons else pair))
-    return Confirmed(kept, reasons)
+        elif seen_px > AGREE_PX:
+            why, px = (
+                "left out: far off the mesh, and other pairs contradict them",
+                None,
+            )
+        else:
+            return None
+        count = int(np.count_nonzero(stray))
+        return _Verdict(f"{count} of its {len(cloud)} points are {why}", stray, px)
 
 
 def _distances(mesh: TriangleMesh, cloud: Cloud) -> Array:
@@ -115,92 +236,35 @@ def _distances(mesh: TriangleMesh, cloud: Cloud) -> Array:
     return np.abs(closest_points(mesh, cloud.points).distances)
 
 
-def _without(pair: Decoded, unconfirmed: Mask) -> Decoded:
-    """Return a pair without some of its points, those counted as unconfirmed."""
-    why = pair.rejected | {"unconfirmed": int(np.count_nonzero(unconfirmed))}
-    outcomes = pair.outcomes.copy()
-    outcomes[np.flatnonzero(outcomes < 0)[unconfirmed]] = CAUSES.index("unconfirmed")
-    cloud = pair.cloud.take(~unconfirmed)
-    return replace(pair, cloud=cloud, rejected=why, outcomes=outcomes)
-
-
 @dataclass(frozen=True, eq=False)
-class _Witnesses:
-    """Clouds of pairs, held against each other where they show the same spots."""
+class _Near:
+    """Points that nobody doubts, and how near to them others aren't needed [m]."""
 
-    clouds: dict[PairIndex, Cloud]
-    cameras: Sequence[CameraCalibration]
-    tolerance_m: float
+    clouds: Sequence[Cloud]
+    reach_m: float
 
-    @cached_property
-    def agree(self) -> dict[frozenset[PairIndex], bool]:
-        """Whether each two pairs that saw the same spots agree on them."""
-        agree: dict[frozenset[PairIndex], bool] = {}
-        for one, other in combinations(sorted(self.clouds), 2):
-            differences = np.concatenate(
-                [
-                    self._differences(a, self.clouds[a], b)
-                    for a, b in ((one, other), (other, one))
-                ]
+    def covers(self, cloud: Cloud) -> Mask:
+        """Return which points have one of them near that was seen from their side."""
+        covered = np.zeros(len(cloud), dtype=bool)
+        for sure in self.clouds:
+            away, nearest = KDTree(sure.points).query(
+                cloud.points, distance_upper_bound=self.reach_m
             )
-            if len(differences) >= _FEWEST:
-                median = float(np.median(differences))
-                agree[frozenset((one, other))] = median <= self.tolerance_m
-        return agree
+            hit = np.flatnonzero(np.isfinite(away))
+            rays = sure.rays[np.asarray(nearest)[hit]]
+            covered[hit] |= np.einsum("ij,ij->i", rays, cloud.rays[hit]) > 0.0
+        return covered
 
-    def agree_all(self) -> bool:
-        """Whether several cameras and projectors agree, each pair with some other."""
-        keys = sorted(self.clouds)
-        if len({p for p, _ in keys}) < 2 or len({c for _, c in keys}) < 2:
-            return False
-        links = np.array(
-            [[frozenset((a, b)) in self.agree for b in keys] for a in keys]
-        )
-        connected = connected_components(links, directed=False)[0] == 1
-        return connected and all(self.agree.values())
 
-    def confirm(self, key: PairIndex, good: set[PairIndex]) -> bool:
-        """Whether a pair agrees with every confirmed one that saw the same spots."""
-        both = [frozenset((key, other)) for other in good]
-        verdicts = [self.agree[one] for one in both if one in self.agree]
-        return bool(verdicts) and all(verdicts)
-
-    def saw(self, strays: Cloud, key: PairIndex, good: set[PairIndex]) -> bool:
-        """Whether other confirmed pairs measured stray points of a pair alike."""
-        differences = np.concatenate(
-            [
-                np.zeros(0),
-                *(self._differences(key, strays, k) for k in sorted(good - {key})),
-            ]
-        )
-        enough = len(differences) >= _FEWEST_STRAYS
-        return enough and bool(np.median(differences) <= self.tolerance_m)
-
-    def _differences(self, key: PairIndex, seen: Cloud, other: PairIndex) -> Array:
-        """How far points of a pair are from another's, as its camera sees them [m].
-
-        Where the other's show on an edge, the difference of distance. On an edge of the
-        same ring of one projector that is no news, since both lie on its surface: there
-        counts how far beside the edge they show.
-        """
-        cloud, camera = self.clouds[other], self.cameras[key[1]]
-        same = key[0] == other[0]
-        pixels = camera.project(cloud.points)
-        shown = np.flatnonzero(np.isfinite(pixels[:, 0]))
-        if len(shown) == 0:
-            return np.zeros(0)
-        # A third coordinate keeps rings of one projector apart.
-        apart = _RING_APART_PX * same
-        tree = KDTree(np.column_stack([pixels[shown], apart * cloud.ring[shown]]))
-        beside, nearest = tree.query(
-            np.column_stack([seen.pixels, apart * seen.ring]),
-            distance_upper_bound=_BESIDE_PX if same else _SAME_SPOT_PX,
-        )
-        hit = np.isfinite(beside)
-        beside, others = np.asarray(beside)[hit], shown[np.asarray(nearest)[hit]]
-        reach, further = (
-            np.sqrt(np.sum((points - camera.centre) ** 2, axis=1))
-            for points in (seen.points[hit], cloud.points[others])
-        )
-        deep = np.where(beside <= _SAME_SPOT_PX, np.abs(reach - further), 0.0)
-        return np.maximum(deep, beside * reach / camera.focal_px) if same else deep
+def _after(pair: Decoded, verdict: _Verdict, near: _Near) -> Decoded:
+    """Return a pair without some of its points, and with less certain ones."""
+    gone = verdict.points
+    if verdict.doubt_px is not None:
+        doubted = np.where(verdict.points, verdict.doubt_px, 0.0)
+        noise_px = np.hypot(pair.cloud.noise_px, doubted)
+        pair = replace(pair, cloud=replace(pair.cloud, noise_px=noise_px))
+        gone = verdict.points & near.covers(pair.cloud)
+    why = pair.rejected | {"unconfirmed": int(np.count_nonzero(gone))}
+    outcomes = pair.outcomes.copy()
+    outcomes[np.flatnonzero(outcomes < 0)[gone]] = CAUSES.index("unconfirmed")
+    return replace(pair, cloud=pair.cloud.take(~gone), rejected=why, outcomes=outcomes)

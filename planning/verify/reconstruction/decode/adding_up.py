@@ -28,6 +28,8 @@ _MOST_BROKEN = 0.2
 # A frame that moved by d leaves a rest of -d . grad I; edges move by half of d [px].
 _MOST_MOVED_PX = 0.1
 _MOVED_SIGMAS = 8.0
+# Variance of a sum of four frames that are rounded to grey levels of 255.
+_ROUNDING = 4.0 / 12.0
 
 
 def broken_pixels(stack: Images, good: Mask, names: Sequence[str]) -> Mask:
@@ -156,4 +158,6 @@ def _least_squares(terms: Array, rest: Grey) -> tuple[Array, Array]:
     factors = -normal @ (terms @ rest)
     residual = rest + factors @ terms
     variance = float(residual @ residual) / max(1, len(rest) - len(terms))
+    # Without noise the rest is 0 but where a frame differs from white and black.
+    variance = max(variance, _ROUNDING)
     return factors, np.sqrt(variance * np.maximum(np.diag(normal), 0.0))

@@ -22,6 +22,8 @@ _MOST_CLIPPED = 0.5
 # Pixels left out, and codes that no annulus has, are worth a word from these shares on.
 _WORTH_A_WORD = 0.01
 _MOST_STRANGE = 0.02
+# A frame shows a pattern if more than this share is bright, and is dark.
+_PLAIN = 0.01
 _SURE = 0.25
 # Pixels beyond the lit ones that the decoder needs about them.
 _MARGIN_PX = 4
@@ -51,7 +53,7 @@ def inspect(
     window, corner = _lit_part(stack)
     lit = _lit(window)
     clipped = _clipped(window, lit, names)
-    _require_different(window, names)
+    _require_different(window, lit, names)
     good = lit & ~clipped
     broken = broken_pixels(window, good, names)
     _require_codes(window, good & ~broken, patterns)
@@ -143,12 +145,19 @@ def _piled_level(white: Images) -> float:
     return float(levels[-1])
 
 
-def _require_different(stack: Images, names: Sequence[str]) -> None:
-    """Refuse two frames of the same pixels: noise makes any two differ."""
+def _require_different(stack: Images, lit: Mask, names: Sequence[str]) -> None:
+    """Refuse two frames of the same pixels, unless both are white or black all over.
+
+    Without noise a bit that is the same everywhere equals white or black, and so does
+    a root disc that this camera doesn't see. No two bits draw the same pattern.
+    """
+    half = 0.5 * (stack[0][lit].astype(np.float32) + stack[1][lit])
     seen: dict[int, int] = {}
     for k, image in enumerate(stack):
         before = seen.setdefault(hash(image.tobytes()), k)
-        if before != k and np.array_equal(image, stack[before]):
+        bright = float(np.mean(image[lit] > half))
+        drawn = _PLAIN < bright < 1.0 - _PLAIN
+        if before != k and drawn and np.array_equal(image, stack[before]):
             raise CapturesError(
                 f"{names[before]} and {names[k]} are the same image; take it again"
             )

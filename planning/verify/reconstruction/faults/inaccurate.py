@@ -38,23 +38,12 @@ def where_inaccurate(plan: Scanner, cloud: Cloud) -> str:
     )
     nearest = closest_points(mesh, few.points)
     error = np.abs(nearest.distances)
-    grazing = _grazing(plan, few, nearest.faces, error > limit)
-    if grazing:
-        return (
-            f"the points that are off were lit at grazing incidence, where edges "
-            f"smear: {', '.join(grazing)} (median)"
-        )
     pairs = sorted({*zip(few.projector.tolist(), few.camera.tolist(), strict=True)})
     medians = {
         (p, c): float(np.median(error[(few.projector == p) & (few.camera == c)]))
         for p, c in pairs
     }
     off = {pair for pair, median in medians.items() if median > limit}
-    if not off:
-        return (
-            "most points of every pair are accurate: the rest, or the surface that is "
-            "missing, lies where few rings reach"
-        )
     if len(off) == len(medians):
         return (
             f"every pair of devices is off (median error "
@@ -62,6 +51,17 @@ def where_inaccurate(plan: Scanner, cloud: Cloud) -> str:
             f"mm), and no change of one device, nor of the object's place or size, "
             f"explains it: the object isn't the mesh of the plan, or several devices "
             f"differ"
+        )
+    grazing = _grazing(plan, few, nearest.faces, error > limit)
+    if grazing:
+        return (
+            f"the points that are off were lit at grazing incidence, where edges "
+            f"smear: {', '.join(grazing)} (median)"
+        )
+    if not off:
+        return (
+            "most points of every pair are accurate: the rest, or the surface that is "
+            "missing, lies where few rings reach"
         )
     return _name_devices(off, medians, plan)
 
