@@ -37,8 +37,13 @@ def mapped(
     queue = iter(range(len(todo)))
 
     def drain() -> None:
-        for index in queue:
-            results[index] = function(todo[index])
+        try:
+            for index in queue:
+                results[index] = function(todo[index])
+        except BaseException:
+            # Where one fails, the others begin nothing more.
+            deque(queue, maxlen=0)
+            raise
 
     helpers = min(threads or n_threads(), len(todo)) - 1
     others = [_pool(os.getpid()).submit(drain) for _ in range(helpers)]
@@ -47,8 +52,6 @@ def mapped(
     try:
         drain()
     finally:
-        # Where this one failed, the others begin nothing more.
-        deque(queue, maxlen=0)
         for other in others:
             if not other.cancel():
                 other.result()

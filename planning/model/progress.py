@@ -16,6 +16,8 @@ Report = Callable[[str], None]
 _TICK_S = 0.1
 # ... and is cut again where the first cut was swallowed, or is still cleaning up [s].
 _AGAIN_S = 1.0
+# Not in a solver of CasADi, which warns of exceptions, nor amid an import.
+_WHOLE = "casadi.py", "<frozen importlib._bootstrap>"
 
 
 class Stopwatch:
@@ -69,7 +71,9 @@ class Stopwatch:
 
     def _tick(self, _: int, frame: FrameType | None) -> None:
         now = time.monotonic()
-        if now < self._next_cut or _indivisible(frame):
+        # What was planned is still to be written, with whole packages.
+        whole = _WHOLE if self._deadline < self._limit else _WHOLE[:1]
+        if now < self._next_cut or _runs(frame, whole):
             return
         try:
             self.check()
@@ -148,11 +152,10 @@ def untimed() -> Generator[None]:
         signal.setitimer(signal.ITIMER_REAL, every, every)
 
 
-def _indivisible(frame: FrameType | None) -> bool:
-    """Whether code runs that takes exceptions ill: imports, and solvers of CasADi."""
+def _runs(frame: FrameType | None, files: tuple[str, ...]) -> bool:
+    """Whether code of these files runs, or is waited for."""
     while frame is not None:
-        name = frame.f_code.co_filename
-        if name.startswith("<frozen importlib") or name.endswith("casadi.py"):
+        if frame.f_code.co_filename.endswith(files):
             return True
         frame = frame.f_back
     return False

@@ -74,19 +74,25 @@ def test_what_must_stay_whole_is_cut_afterwards():
     assert done == [True]
 
 
-def test_imports_are_not_cut_in_two(tmp_path, monkeypatch):
-    (tmp_path / "slow_to_import.py").write_text(
-        "import time\nend = time.monotonic() + 1.0\n"
-        "while time.monotonic() < end:\n    pass\nwhole = True\n"
+@pytest.mark.parametrize("reserved", [0.0, 100.0])
+def test_imports_stay_whole_while_a_plan_is_to_be_written(
+    tmp_path, monkeypatch, reserved
+):
+    """Without a reserve nothing follows a cut, and nothing waits for an import."""
+    name = f"slow_to_import_{reserved:.0f}"
+    (tmp_path / f"{name}.py").write_text(
+        "import time\nend = time.monotonic() + 2.0\n"
+        "while time.monotonic() < end:\n    pass\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
 
-    def imports(_):
-        __import__("slow_to_import")
+    def imports(clock):
+        clock.reserve(reserved)
+        __import__(name)
         spin(20.0)
 
-    assert 1.0 <= cut(imports) < 6.0
-    assert sys.modules["slow_to_import"].whole
+    spent = cut(imports, time_limit=reserved + 0.3)
+    assert (spent >= 2.0) == (name in sys.modules) == (reserved > 0.0)
 
 
 def test_without_a_limit_nothing_ticks():
