@@ -161,6 +161,7 @@ def _document(
 ) -> dict[str, Any]:
     cloud = next(iter(files.items()), None)
     document = result.to_document() | {
+        "remarks": list(result.remarks),
         "pairs": [vars(pair) for pair in result.pairs],
         "cloud": None if cloud is None else str(cloud[0]),
         "unit": None if cloud is None else cloud[1].unit.name,
@@ -190,6 +191,7 @@ def _summary(
         ]
     if deviation is not None:
         lines += deviation_lines(deviation)
+    lines += [f"note: {sentence}" for sentence in result.remarks]
     lines += [f"not met: {sentence}" for sentence in result.failures]
     missed = count_words(len(result.failures), "failure")
     lines.append(

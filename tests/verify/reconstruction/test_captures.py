@@ -259,7 +259,7 @@ def test_over_exposed_images_lose_what_is_clipped(job):
 
     found = job.after(brighter(1.4), (1, 0))
     assert_no_wrong_point(found)
-    assert "of the lit pixels are clipped and left out" in found.failures[0]
+    assert "of the lit pixels are clipped and left out" in found.remarks[0]
     before, after = (r.pairs[1].lit_pixels for r in (job.good, found))
     assert 0.5 * before < after < 0.97 * before
     found = job.after(brighter(5.0), (1, 0))
@@ -270,7 +270,7 @@ def test_a_sensor_that_is_full_before_its_numbers_are(job):
     """Levels pile up at 150, far below 250."""
     found = job.after(lambda s: np.minimum(s, 150), (1, 0))
     assert_no_wrong_point(found)
-    assert "of the lit pixels are clipped and left out" in found.failures[0]
+    assert "of the lit pixels are clipped and left out" in found.remarks[0]
     before, after = (r.pairs[1].lit_pixels for r in (job.good, found))
     assert after < 0.9 * before
 
@@ -292,7 +292,7 @@ def test_a_damaged_part_of_a_frame_is_left_out_and_the_rest_measured(job):
 
     found = job.after(spoiled)
     assert_no_wrong_point(found)
-    assert "don't add up to white and black" in found.failures[0]
+    assert "don't add up to white and black" in found.remarks[0]
     assert found.pairs[0].n_points > 1000
 
 
@@ -632,7 +632,7 @@ def test_colours_are_clipped_where_one_channel_is(copied):
         Image.fromarray(np.clip(np.rint(tinted), 0, 255).astype(np.uint8)).save(path)
     found = reconstruct_captured(folder, expected, threads=1)
     assert_no_wrong_point(found)
-    assert "of the lit pixels are clipped" in found.failures[0]
+    assert "of the lit pixels are clipped" in found.remarks[0]
 
 
 def test_missing_folders_are_named_with_what_is_there(copied):

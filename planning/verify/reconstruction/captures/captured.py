@@ -170,6 +170,14 @@ class _Inspection:
         more = f"; the other {others} pairs can't be used either" if others else ""
         raise CapturesError(f"{self._plan.name(pair)}: {why}{more}")
 
+    def remarks(self) -> tuple[str, ...]:
+        """Return a sentence for each reason why pixels of a pair were left out."""
+        return tuple(
+            f"{self._plan.name(pair)}: {why}"
+            for pair, reasons in sorted(self._notes.items())
+            for why in reasons
+        )
+
     def sentences(
         self, pairs: Pairs, confirmed: Confirmed, expected: Expected
     ) -> tuple[str, ...]:
@@ -178,31 +186,28 @@ class _Inspection:
         reasons = [
             f"{self._plan.name(pair)}: {why}"
             for pair, decoded in pairs
-            for why in self._reasons(
-                pair, decoded, confirmed, float(expected.by_pair[pair])
-            )
+            if (why := self._reason(pair, decoded, confirmed, expected.by_pair[pair]))
         ]
         return (*reasons, confirmed.remark) if confirmed.remark else tuple(reasons)
 
-    def _reasons(
+    def _reason(
         self, pair: PairIndex, decoded: Decoded, confirmed: Confirmed, share: float
-    ) -> list[str]:
+    ) -> str | None:
         should = f"it should measure {share:.0%} of the target"
         refused = self._refused.get(pair)
         if isinstance(refused, DarkError):
-            return [f"left out: {refused} ({should})"] if share >= _MISSED else []
+            return f"left out: {refused} ({should})" if share >= _MISSED else None
         if refused is not None:
-            return [f"left out: {refused}"]
-        reasons = list(self._notes.get(pair, ()))
+            return f"left out: {refused}"
         if pair in confirmed.reasons:
-            reasons.append(confirmed.reasons[pair])
-        elif not len(decoded.cloud) and (
+            return confirmed.reasons[pair]
+        if len(decoded.cloud) or not (
             share >= _MISSED or decoded.rejected.get("labels")
         ):
-            count = PairCount.of(self._plan, pair, decoded)
-            why = rejection((count,)) or "no ring edge was decoded"
-            reasons.append(f"gave no point: {why} ({should})")
-        return reasons
+            return None
+        count = PairCount.of(self._plan, pair, decoded)
+        why = rejection((count,)) or "no ring edge was decoded"
+        return f"gave no point: {why} ({should})"
 
 
 def _concluded(
@@ -224,4 +229,6 @@ def _concluded(
         spent=spent,
     )
     sentences = inspection.sentences(pairs, confirmed, expected)
-    return replace(result, failures=sentences + result.failures)
+    return replace(
+        result, failures=sentences + result.failures, remarks=inspection.remarks()
+    )

@@ -55,6 +55,7 @@ class Reconstruction:
         failures: One sentence for each limit that isn't kept.
         seconds: Processor time of `render`, `decode` and `merge` over all pairs [s].
         comparison: With a plan's prediction; None if none was given.
+        remarks: What was left out of images, limits being kept or not.
     """
 
     everything: Cloud
@@ -66,6 +67,7 @@ class Reconstruction:
     failures: tuple[str, ...]
     seconds: dict[str, float]
     comparison: Comparison | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:

@@ -20,14 +20,14 @@ _MOST_BENT = 0.05
 # A frame brighter or darker than the rest by this share shifts edges by half of it,
 # about a fiftieth of a pixel.
 _MOST_DRIFT = 0.03
-# A pixel breaks the rule if its rest exceeds this share of its contrast and this many
-# standard deviations; a frame does if more than that share of its pixels do.
+# What is found must exceed this many standard deviations of the noise, too.
+_SIGMAS = 8.0
+# A pixel breaks the rule if its rest exceeds this share of its contrast; a frame does
+# if more than that share of its pixels do.
 _REST_SHARE = 0.1
-_REST_SIGMAS = 8.0
 _MOST_BROKEN = 0.2
 # A frame that moved by d leaves a rest of -d . grad I; edges move by half of d [px].
 _MOST_MOVED_PX = 0.1
-_MOVED_SIGMAS = 8.0
 # Variance of a sum of four frames that are rounded to grey levels of 255.
 _ROUNDING = 4.0 / 12.0
 
@@ -49,11 +49,11 @@ def broken_pixels(stack: Images, good: Mask, names: Sequence[str]) -> Mask:
     _require_linear(pairs, rests, contrast)
     spreads = [float(np.median(np.abs(rest))) for rest in rests]
     spread = max(1.0, 1.4826 * float(np.median(spreads)))
-    wrong = np.abs(rests) > _REST_SHARE * contrast + _REST_SIGMAS * spread
+    wrong = np.abs(rests) > _REST_SHARE * contrast + _SIGMAS * spread
     shares = wrong.mean(axis=1) if n else np.zeros(len(rests))
     if np.any(shares > _MOST_BROKEN):
         raise CapturesError(_which_broke(shares, names))
-    _require_one_exposure(pairs, rests, white - black, names)
+    _require_one_exposure(pairs, rests, white - black, spread, names)
     broken = np.zeros(good.shape, dtype=bool)
     broken[good] = wrong.any(axis=0)
     _require_still(stack, good & ~broken, rests[:, ~broken[good]], names)
@@ -98,18 +98,24 @@ def _which_broke(shares: Array, names: Sequence[str]) -> str:
 
 
 def _require_one_exposure(
-    pairs: Grey, rests: Grey, contrast: Grey, names: Sequence[str]
+    pairs: Grey, rests: Grey, contrast: Grey, spread: float, names: Sequence[str]
 ) -> None:
-    """Refuse frames brighter or darker than the rest, by the pixels that they light."""
+    """Refuse frames brighter or darker than the rest, by the pixels that they light.
+
+    Beyond the noise of a median over them, the rests of pixels having this spread.
+    """
     drift = np.zeros(pairs.shape[:2])
     typical = 0.5 * float(np.median(contrast))
     for b, (frame, inverse) in enumerate(pairs):
         surely = _SURELY * contrast
         for side, bright in enumerate((frame - inverse, inverse - frame)):
             bright = (bright >= surely) & (contrast >= typical)
-            if np.count_nonzero(bright) >= _FEWEST_BRIGHT:
+            n = np.count_nonzero(bright)
+            if n >= _FEWEST_BRIGHT:
                 rest = float(np.median(rests[b][bright]))
-                drift[b, side] = rest / float(np.median(contrast[bright]))
+                noise = _SIGMAS * spread / np.sqrt(n)
+                sure = np.sign(rest) * max(abs(rest) - noise, 0.0)
+                drift[b, side] = sure / float(np.median(contrast[bright]))
     off = np.abs(drift) > _MOST_DRIFT
     if not off.any():
         return
@@ -137,7 +143,7 @@ def _require_still(
         terms = np.concatenate([_gradient(stack[2 + 2 * b], good), white])
         moved, sigma = _least_squares(terms, np.asarray(rest))
         off = np.maximum(np.hypot(*moved[:2]), np.hypot(*moved[2:]))
-        surely = np.abs(moved) > np.maximum(_MOST_MOVED_PX, _MOVED_SIGMAS * sigma)
+        surely = np.abs(moved) > np.maximum(_MOST_MOVED_PX, _SIGMAS * sigma)
         if surely.any():
             raise CapturesError(
                 f"{names[2 + 2 * b]}, its inverse or {names[0]} moved by {off:.2g} px "
