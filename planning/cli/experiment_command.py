@@ -28,6 +28,7 @@ from planning.experiments.table import outcome_document, outcome_lines
 from planning.model.files import write_atomically
 from planning.report.drawing.picture_view import save_picture
 from planning.verify.reconstruction.cloud_file import LengthUnit
+from planning.verify.reconstruction.render.countdown import countdown
 
 from .console import print_json, reporter, writable
 from .reconstruct_command import CLOUD, save_cloud
@@ -53,7 +54,9 @@ def experiment_command(options: Mapping[str, Any]) -> int:
             seed=seed,
             threads=threads,
             tolerance_m=1e-3 * near_mm if options["single_shot"] else None,
-            progress=lambda done, total: report(f"pair {done} of {total}"),
+            progress=countdown(
+                report, n_cameras=len(experiment.scanner.cameras), threads=threads
+            ),
         )
         both = None
         if options["second_sequence"]:

@@ -33,14 +33,16 @@ _ASKED = (
     "up",
     "seed",
 )
+# Of a time limit: the rest is for the interpreter, which begins and ends beside it.
+_OURS = 0.95
 _PLANNED = ("max_projectors", "max_cameras", "prove", "cameras_by")
 
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan, write the output folder, print the result; return the exit code."""
-    # The time limit counts from when the process began.
-    begin = click.get_current_context().obj
-    clock = Stopwatch(time_limit=options["time_limit"], begin=begin)
+    begin, limit = click.get_current_context().obj, options["time_limit"]
+    limit = None if limit is None else _OURS * limit
+    clock = Stopwatch(time_limit=limit, begin=begin)
     report = reporter(quiet=options["quiet"])
     path = Path(options["ranges"] or options["meshes"][0])
     result = "plan" if options["poses"] is None else "evaluation"

@@ -35,6 +35,7 @@ from planning.verify.reconstruction.cloud_file import (
     remove_cloud,
 )
 from planning.verify.reconstruction.pattern_files import check_patterns
+from planning.verify.reconstruction.render.countdown import countdown
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
@@ -114,10 +115,7 @@ def _reconstruct(
     report("predicting what the plan's poses measure")
     predicted = predict_measured(plan, seed=seed, threads=threads)
     expected = Expected(bare(predicted.samples), predicted.measured, predicted.by_pair)
-
-    def progress(done: int, total: int) -> None:
-        report(f"pair {done} of {total}")
-
+    progress = countdown(report, n_cameras=len(scanner.cameras), threads=threads)
     if options["single_shot"]:
         return reconstruct_single_shot(
             scanner,

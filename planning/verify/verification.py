@@ -1,7 +1,5 @@
 """`plan verify`: the audit of every claim, then the simulated reconstruction."""
 
-import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,6 +19,7 @@ from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.comparison import PredictedSamples, compare
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.reconstruct import reconstruct
+from planning.verify.reconstruction.render.countdown import countdown
 from planning.verify.reconstruction.scanner import Scanner
 
 _MM = 1e3
@@ -200,7 +199,11 @@ def _reconstruct(
         threads=threads,
         truth=standing,
         expected=Expected(samples, case.actual.measured),
-        progress=_countdown(say),
+        progress=countdown(
+            lambda line: say(f"pixels: {line}"),
+            n_cameras=len(believed.cameras),
+            threads=threads,
+        ),
     )
     possible = possible_at_floors(plan, case.samples, threads=threads)
     prediction = PredictedSamples(
@@ -208,18 +211,6 @@ def _reconstruct(
     )
     compared = compare(believed, prediction, pixels.everything, pixels.accuracy)
     return replace(pixels, comparison=compared)
-
-
-def _countdown(say: Callable[[str], None]) -> Callable[[int, int], None]:
-    """Say how many pairs are done, and how long the others will take."""
-    begin = time.monotonic()
-
-    def pair_done(done: int, total: int) -> None:
-        left = (time.monotonic() - begin) * (total - done) / done
-        more = f", about {math.ceil(left)} s more" if done < total else ""
-        say(f"pixels: pair {done} of {total}{more}")
-
-    return pair_done
 
 
 def bare(samples: AuditSamples) -> SurfaceSamples:

@@ -1,6 +1,7 @@
 """`verify_plan`: audit, mesh and pixels together, from memory and from files."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -36,6 +37,8 @@ def test_a_true_plan_is_verified_down_to_the_pixels(verified):
     assert found.reconstruction.passed
     assert found.reconstruction.n_merged > 10_000
     assert lines[0].startswith("audit: ")
+    assert re.fullmatch(r"pixels: 4 pairs on 2 threads, about \d+ s", lines[1])
+    assert lines[2].startswith("pixels: pair 1 of 4, about ")
     assert lines[-1] == "pixels: pair 4 of 4"
     document = json.loads(json.dumps(found.to_document(), allow_nan=False))
     assert document["passed"] is True

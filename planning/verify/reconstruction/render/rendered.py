@@ -22,6 +22,7 @@ from .render import render_pair
 from .rendered_light import Shown
 from .view import RenderedView, view
 
+# Called with the pairs done and their total; with 0 before the first of them.
 Progress = Callable[[int, int], None]
 # From a projector, a camera and what it took to what is decoded; None: nothing.
 Develop = Callable[[int, int, Frames], Frames | None]
@@ -114,6 +115,8 @@ def decode_rendered(
 
     with abandonable(threads) as pool:
         views = list(pool.map(look, range(len(plan.cameras))))
+    if progress is not None:
+        progress(0, len(known))
     return over_pairs(plan, measure, threads=threads, progress=progress)
 
 
