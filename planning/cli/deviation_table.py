@@ -36,7 +36,7 @@ def deviation_lines(deviation: Deviation) -> list[str]:
     shown = len(_HEADING) - (limits is None)
     return [
         f"deviation from the mesh, outside positive, {fit}",
-        *("".join(f"{cell:>10}" for cell in row[:shown]) for row in rows),
+        *("".join(f"{cell:>11}" for cell in row[:shown]) for row in rows),
     ]
 
 

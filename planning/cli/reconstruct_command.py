@@ -180,12 +180,12 @@ def _summary(
     lines = [_pair_line(pair) for pair in result.pairs]
     lines += _figures(plan, result)
     if not files:
-        lines.append("cloud    none was written")
+        lines.append("cloud     none was written")
     for path, file in files.items():
         lines += [
-            f"{path.stem:<9}{path}: {len(file.rows)} points, positions in "
+            f"{path.stem:<10}{path}: {len(file.rows)} points, positions in "
             f"{file.unit.name}",
-            f"colours  {file.scale.column} along the normal: {file.legend}",
+            f"colours   {file.scale.column} along the normal: {file.legend}",
         ]
     if deviation is not None:
         lines += deviation_lines(deviation)
@@ -219,7 +219,7 @@ def _figures(plan: RigPlan, result: Reconstruction) -> list[str]:
     )
     missing = complete.predicted_missing
     lines = [
-        f"merged   {result.n_merged} points of {result.n_points}, "
+        f"merged    {result.n_merged} points of {result.n_points}, "
         f"{result.redundant_fraction:.1%} redundant",
         "accuracy against the mesh: "
         f"{error_words(accuracy.rms_m, accuracy.p95_m, accuracy.bias_m, limits)}, "
