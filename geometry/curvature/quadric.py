@@ -1,5 +1,7 @@
 """Curvature tensors from libigl's quadrics, fitted to two rings about each vertex."""
 
+from collections.abc import Iterator
+
 import igl
 import numpy as np
 
@@ -15,6 +17,8 @@ RINGS = 2
 _MOST_TURN = np.pi
 # A vertex normal shorter than this share of its faces' area is none.
 _CANCELLED = 1e-6
+# Vertices in one call of libigl, which nothing can cut: half a second's work.
+_AT_ONCE = 50_000
 
 
 def fit_quadrics(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask, Mask]:
@@ -54,16 +58,41 @@ def _fit(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask]:
     used, local = numbered(_with_normals(vertices, faces), n)
     if len(used) == 0:
         return k, ways, fitted
-    first, second, k_first, k_second, bad = igl.principal_curvature(
-        np.ascontiguousarray(vertices[used]), local, radius=RINGS, useKring=True
-    )
-    k[:, used] = np.stack([k_first, k_second])
-    ways[:, used] = np.stack([first, second])
-    fitted[used] = True
-    fitted[used[np.array(bad, dtype=np.int64)]] = False
+    for near, patch, mine in _slabs(vertices[used], local):
+        first, second, k_first, k_second, bad = igl.principal_curvature(
+            np.ascontiguousarray(vertices[used[near]]),
+            patch,
+            radius=RINGS,
+            useKring=True,
+        )
+        good = mine.copy()
+        good[np.array(bad, dtype=np.int64)] = False
+        own = used[near[mine]]
+        k[:, own] = np.stack([k_first, k_second])[:, mine]
+        ways[:, own] = np.stack([first, second])[:, mine]
+        fitted[used[near[good]]] = True
     fitted &= np.all(np.isfinite(k), axis=0) & np.all(np.isfinite(ways), axis=(0, 2))
     k[:, ~fitted], ways[:, ~fitted] = 0.0, 0.0
     return k, ways, fitted
+
+
+def _slabs(points: Array, faces: Ints) -> Iterator[tuple[Ints, Ints, Mask]]:
+    """Cut a mesh into slabs with what a fit in them looks at: the same fits in parts.
+
+    Vertices of each, its faces in their numbers, and which vertices are its own.
+    """
+    n = len(points)
+    along = points[:, np.argmax(np.ptp(points, axis=0))]
+    order = np.argsort(along, kind="stable")
+    for part in np.array_split(order, -(-n // _AT_ONCE)):
+        own = np.zeros(n, dtype=bool)
+        own[part] = True
+        near = own.copy()
+        # One ring more, for the normals of the outermost.
+        for _ in range(RINGS + 1):
+            near[faces[near[faces].any(axis=1)]] = True
+        used, patch = numbered(faces[near[faces].all(axis=1)], n)
+        yield used, patch, own[used]
 
 
 def _shortest_edges(vertices: Array, faces: Ints) -> Array:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import parallel
+from geometry.curvature import quadric
 from geometry.curvature.curvature import principal_curvatures
 from geometry.curvature.quadric import fit_quadrics
 from geometry.mesh.diffusion import diffused, surface_laplacian
@@ -40,6 +41,24 @@ def test_what_no_mesh_can_carry_is_taken_from_around_it() -> None:
     away = np.linalg.norm(ball.vertices - ball.vertices[spike], axis=1)
     far = away > 8.0 * ball.mean_edge
     np.testing.assert_allclose(found.k_max[far], clean.k_max[far], rtol=1e-3)
+
+
+@pytest.mark.parametrize("at_once", [100, 700])
+def test_fits_in_parts_are_the_same_to_the_last_digit(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a rough shape that bends back on itself, with holes and an odd vertex."""
+    ball = sphere(1.0, subdivisions=4)
+    rng = np.random.default_rng(3)
+    x, y, z = ball.vertices.T
+    bent = np.column_stack([x + 0.8 * z * z, 0.4 * y, z])
+    bent = (bent + 0.01 * rng.normal(size=bent.shape)) / ball.mean_edge
+    faces = ball.faces[rng.random(len(ball.faces)) > 0.02]
+    whole = fit_quadrics(bent, faces)
+    monkeypatch.setattr(quadric, "_AT_ONCE", at_once)
+    for one, other in zip(whole, fit_quadrics(bent, faces), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert 2000 < np.count_nonzero(whole[2])
 
 
 @pytest.mark.parametrize("cores", [2, 3])
