@@ -142,3 +142,17 @@ def turned_by(pan: float, tilt: float, roll: float, up: Array) -> Array:
     level = np.sin(pan) * e1 - np.cos(pan) * e2
     x = np.cos(roll) * level + np.sin(roll) * np.cross(z, level)
     return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def turns_of(angles: Array, up: Array) -> Array:
+    """Return the rotations of devices of a pan, tilt and roll, (..., 3) to (..., 3, 3).
+
+    The inverse of `pan_tilt_roll`.
+    """
+    first, second = horizontal_axes(up)
+    pan, tilt, roll = (angles[..., k, None] for k in range(3))
+    level = np.sin(pan) * first - np.cos(pan) * second
+    heading = np.cos(pan) * first + np.sin(pan) * second
+    z = np.cos(tilt) * heading + np.sin(tilt) * up
+    x = np.cos(roll) * level + np.sin(roll) * np.cross(z, level)
+    return np.stack([x, np.cross(z, x), z], axis=-1)

@@ -9,8 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal
 
-from .bodies import Body, Box, Triple
-from .mounts import Mount
+from .bodies import Body, Box, Mount, Triple
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
@@ -157,6 +156,20 @@ class Workspace:
     def origin_m(self) -> Triple:
         """Where places of the rig file count from, in the world [m]."""
         return (0.0, 0.0, 0.0) if self.origin == "mesh" else self.centre
+
+    def mount_of(self, kind: str) -> Mount | None:
+        """Return the mount of a `projector` or a `camera`."""
+        return self.projector_mount if kind == "projector" else self.camera_mount
+
+    @property
+    def free_mounts(self) -> "Workspace":
+        """The same workspace with mounts that can be set to anything."""
+        one, other = self.projector_mount, self.camera_mount
+        return replace(
+            self,
+            projector_mount=None if one is None else one.free,
+            camera_mount=None if other is None else other.free,
+        )
 
     @property
     def written(self) -> "Workspace":

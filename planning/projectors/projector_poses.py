@@ -19,6 +19,7 @@ from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.admissible import half_spaces
+from planning.scene.workspace.mount_settings import settable
 from solvers.poses.pose_problem import PoseProgram, pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 
@@ -164,6 +165,10 @@ def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
         pose = _part_of_the_way(
             projector.world_from_device, solution.world_from_device, step
         )
+        settings = settable(state.scene.requirements.workspace, projector, pose[None])
+        if not len(settings):
+            continue
+        pose = settings[0]
         # On a straight way between two poses the shell may be left in between.
         inside = float(pose_slack(program, pose).min()) >= 0.0
         if not (inside and float(pose_margins(program, pose).min()) > before + _GAIN):

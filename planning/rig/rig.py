@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.bodies import Body
+from planning.model.bodies import Body, Mount
 from planning.model.errors import InfeasibleLimitsError, RigError
-from planning.model.mounts import Mount
 from planning.model.obstacles import Obstacle
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.lights import light_of

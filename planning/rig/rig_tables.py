@@ -8,8 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from planning.model.bodies import BodyTable
-from planning.model.mounts import MountTable
+from planning.model.bodies import BodyTable, MountTable
 from planning.model.table_types import (
     Acute,
     Limit,

@@ -9,6 +9,7 @@ from geometry.poses import (
     look_at,
     pan_tilt_roll,
     transform,
+    turns_of,
 )
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -137,3 +138,15 @@ def test_a_device_that_looks_along_up_has_all_its_turn_in_the_pan(side):
     expected = [np.arctan2(0.8, 0.6), side * np.pi / 2, 0.0]
     assert pan_tilt_roll(upright, UP) == pytest.approx(expected)
     assert pan_tilt_roll(nearly, UP) == pytest.approx(expected, abs=2e-4)
+
+
+@pytest.mark.parametrize("up", AXES)
+def test_turns_are_those_of_their_angles(up):
+    rng = np.random.default_rng(5)
+    half = np.array([np.pi, np.pi / 2, np.pi])
+    angles = rng.uniform(-half, half, size=(40, 3))
+    turns = turns_of(angles, up)
+    assert pan_tilt_roll(turns, up) == pytest.approx(angles)
+    identity = np.broadcast_to(np.eye(3), turns.shape)
+    assert turns @ np.swapaxes(turns, 1, 2) == pytest.approx(identity)
+    assert np.linalg.det(turns) == pytest.approx(1.0)

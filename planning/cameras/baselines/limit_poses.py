@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
+from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import admissible
+from planning.scene.workspace.mount_settings import settable
 
 from .baseline_limits import BaselineLimits
 from .baseline_rows import check_seam
@@ -69,7 +71,8 @@ def limit_poses(
         for share in shares_past:
             turn = _last_turn(slack, share, now, bisections)
             if turn is not None and _may_stand(moved(turn), space):
-                limit.append(moved(turn))
+                poses = settable(space, two, moved(turn).world_from_device[None])
+                limit += [moved_to(two, pose) for pose in poses]
     return limit
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
 from planning.scene.workspace.admissible import admissible
+from planning.scene.workspace.mount_settings import settable
 from solvers.poses.baseline_problem import smallest_baseline
 
 from .baseline_limits import BaselineLimits, RingsOnSurface
@@ -98,6 +99,8 @@ class BaselineSearch:
         self._pairs = neighbouring_pairs(self._measured, self.surface)
         self._groups = len(overlap_components(self._measured))
         self._free = np.array([not camera.existing for camera in self.cameras])
+        mount = self.limits.workspace.camera_mount
+        self._stepped = mount is not None and mount.is_stepped
 
     def run(self) -> WidestBaselines:
         """Return the cameras where no further move is taken, or the budget is spent."""
@@ -178,6 +181,11 @@ class BaselineSearch:
         looks = zip(centres, self._aims, self._rolls, strict=True)
         poses = np.stack([look_at(c, aim, up, roll=float(r)) for c, aim, r in looks])
         poses[~self._free] = self._poses[~self._free]
+        if self._stepped:
+            settings = self._settable(poses)
+            if settings is None or not self._gains(settings[:, :3, 3]):
+                return False, none
+            poses, centres = settings, settings[:, :3, 3]
         measured = self._evaluate(poses)
         lost = np.flatnonzero(self._measured.any(axis=1) & ~measured.any(axis=1))
         if _count(measured) < self._floor:
@@ -193,6 +201,16 @@ class BaselineSearch:
             return False, none
         self._poses, self._measured, self._pairs = poses, measured, pairs
         return True, none
+
+    def _settable(self, poses: _Array) -> _Array | None:
+        """The poses that mounts can be set to next to these; None: one has none."""
+        space, found = self.limits.workspace, poses.copy()
+        for c in map(int, np.flatnonzero(self._free)):
+            setting = settable(space, self.cameras[c], poses[[c]])
+            if not len(setting):
+                return None
+            found[c] = setting[0]
+        return found
 
     def _between(self, centres: _Array, share: _Array) -> _Array:
         start = self._poses[:, :3, 3]

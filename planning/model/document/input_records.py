@@ -97,7 +97,7 @@ class FiguresRecord(Part):
     """Figures of a device as its rig file writes them, of either light."""
 
     body: dict[str, list[float]] | None = None
-    mount: dict[str, list[float]] | None = None
+    mount: dict[str, list[float] | float] | None = None
     resolution_px: Resolution | None = None
     focal_px: Interval | None = None
     focal_mm: float | None = None

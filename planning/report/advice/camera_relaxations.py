@@ -32,9 +32,9 @@ from planning.scene.workspace.candidates import Candidates
 
 from .demands import Demands, demands
 from .least_changes import (
-    ANYWHERE,
     Share,
     enough,
+    larger_workspaces,
     least_changes,
     least_enough,
     relaxations_of_cameras,
@@ -68,15 +68,15 @@ def out_of_reach(
     for moved, rest in among.less_one_obstacle():
         gained = measured_by_any(rest, devices.reference_cameras, unmeasured)
         changes[f"{moved} out of the way"] = int(gained.sum())
-    whole = required.workspace.whole_shell
-    if whole != required.workspace and share.wanted > 0:
+    larger = larger_workspaces(required.workspace, "camera") if share.wanted > 0 else ()
+    for change, whole in larger:
         camera = devices.reference_cameras[0]
         site = scene.site("camera", camera.device)
         site_there = None if site is None else replace(site, workspace=whole)
         anywhere = Candidates(camera, whole, site_there).over(
             required.workspace.n_reference_cameras
         )
-        changes[ANYWHERE] = int(measured_by_any(among, anywhere, unmeasured).sum())
+        changes[change] = int(measured_by_any(among, anywhere, unmeasured).sum())
     counts = np.bincount(asked.furthest[out], minlength=MEASURED)
     by_cause = {
         cause: float(target.samples.weight * count)

@@ -1,7 +1,7 @@
 """How limits of a rig may give way, and by how little, by what samples ask."""
 
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import DeviceModel, PinholeModel
 from planning.model.document.coverage_records import Relaxation
-from planning.model.requirements import Requirements
+from planning.model.requirements import Requirements, Workspace
 from planning.proofs.selection import cover_problem
 from planning.rig import optics
 from planning.rig.rig import Rig
@@ -21,6 +21,7 @@ from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 from solvers import solve_max_coverage
 
 ANYWHERE = "the whole shell as workspace"
+ANY_SETTING = "a mount of any roll, pan, tilt and place"
 # Less isn't worth telling.
 _GAIN = 0.01
 # Counted work of each cover, of which no proof is asked.
@@ -50,6 +51,17 @@ class Share:
             for change, gain in ranked
             if gain >= _GAIN * self.n
         )
+
+
+def larger_workspaces(
+    workspace: Workspace, kind: str
+) -> Iterator[tuple[str, Workspace]]:
+    """Yield changes of the workspace of a `projector` or a `camera`, and what it is."""
+    if workspace.whole_shell != workspace:
+        yield ANYWHERE, workspace.whole_shell
+    mount = workspace.mount_of(kind)
+    if mount is not None and mount.is_stepped:
+        yield ANY_SETTING, workspace.free_mounts
 
 
 def least_changes(

@@ -25,9 +25,9 @@ from planning.scene.workspace.view_tiles import Site
 
 from .demands import light_demands
 from .least_changes import (
-    ANYWHERE,
     Share,
     enough,
+    larger_workspaces,
     least_changes,
     least_enough,
     relaxations_of_projectors,
@@ -55,15 +55,14 @@ def reachability_relaxations(
     for moved, rest in scene.less_one_obstacle():
         furthest = furthest_lit(rest, reference, dark)
         gained[f"{moved} out of the way"] = int((furthest == LIT).sum())
-    whole = workspace.whole_shell
-    if whole != workspace:
+    for change, larger in larger_workspaces(workspace, "projector"):
         site = scene.site("projector", reference[0].device)
-        site_there = None if site is None else replace(site, workspace=whole)
-        anywhere = Candidates(reference[0], whole, site_there).over(
+        site_there = None if site is None else replace(site, workspace=larger)
+        anywhere = Candidates(reference[0], larger, site_there).over(
             len(reference) if site is None else workspace.n_reference_projectors
         )
         still_dark = furthest_lit(scene, anywhere, target) < LIT
-        gained[ANYWHERE] = len(dark) - int(still_dark.sum())
+        gained[change] = len(dark) - int(still_dark.sum())
     return share.gains(gained)
 
 

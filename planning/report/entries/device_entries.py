@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import MeshSource, TriangleMesh
 from geometry.regions.regions import DominantRegions
 from geometry.repair.hollow import MeshShell
+from planning.model.bodies import Mount
 from planning.model.device_poses import DECIMALS, rounded_pose
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.document.device_records import (
@@ -26,15 +27,14 @@ from planning.model.document.input_records import (
     SelectionRecord,
 )
 from planning.model.document.plan_document import CostRecord
-from planning.model.mounts import Mount
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.claims import Claims, Devices
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
-from planning.scene.mounts import device_from_mount
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
+from planning.scene.workspace.mount_settings import device_from_mount
 
 # Stages of planning that place light, with what they need to know of the surface, and
 # those that place cameras.
@@ -107,9 +107,10 @@ def camera_records(
 
 def _mounted(mount: Mount | None, device: Device) -> dict[str, Any]:
     """The pose of a device's mount; no key where the rig doesn't have it."""
-    if mount is None:
+    frame = None if mount is None else device_from_mount(mount)
+    if frame is None:
         return {}
-    pose = device.world_from_device @ device_from_mount(mount)
+    pose = device.world_from_device @ frame
     return {"world_from_mount": (np.round(pose, DECIMALS) + 0.0).tolist()}
 
 

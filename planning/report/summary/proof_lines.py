@@ -30,9 +30,9 @@ def proof_lines(plan: RigPlan) -> list[str]:
     poses = light_of(plan.projectors[0].device).bounded_over
     return [
         "",
-        _proof("projector", proofs.projectors, requirements.dominant_coverage, "light"),
+        _proof(plan, "projector", requirements.dominant_coverage, "light"),
         _continuous(proofs.projectors, poses),
-        _proof("camera", proofs.cameras, requirements.coverage, "measure")
+        _proof(plan, "camera", requirements.coverage, "measure")
         + " (given these projectors)",
         _continuous(proofs.cameras, "position, aim and roll"),
         *route_lines(proofs.cameras),
@@ -98,11 +98,15 @@ def _excluded(proof: Certificate) -> list[str]:
     ]
 
 
-def _proof(kind: str, proof: Certificate, share: float, verb: str) -> str:
+def _proof(plan: RigPlan, kind: str, share: float, verb: str) -> str:
+    proof: Certificate = getattr(plan.document.certificates, f"{kind}s")
+    mount = plan.requirements.workspace.mount_of(kind)
+    stepped = mount is not None and mount.is_stepped
     candidates, needed, count = proof.candidates, proof.needed, proof.count
     scope = (
         f"to {verb} {100 * share:g} % of what the {candidates.n_candidates} "
-        f"candidate poses reach of {proof.n_samples} samples{_given(proof)}"
+        f"candidate poses{' that mounts can be set to' * stepped} reach of "
+        f"{proof.n_samples} samples{_given(proof)}"
     )
     name = f"{kind}s"
     if needed.count > count:

@@ -41,8 +41,9 @@ def _reachable(document: PlanDocument, requirements: Requirements) -> Iterator[s
     """Whether enough of the target, and of what is lit, is within reach."""
     coverage, least = document.coverage, requirements.min_reachable
     areas, unlit = coverage.target, coverage.unreachable_by_cause
-    for what, deed, reached, whole, why, relaxations in (
+    for kind, what, deed, reached, whole, why, relaxations in (
         (
+            "projector",
             "the target",
             "lit",
             areas.reachable_by_projectors_m2,
@@ -51,6 +52,7 @@ def _reachable(document: PlanDocument, requirements: Requirements) -> Iterator[s
             coverage.relaxations,
         ),
         (
+            "camera",
             "what is lit",
             "measured",
             areas.reachable_by_cameras_m2,
@@ -62,9 +64,12 @@ def _reachable(document: PlanDocument, requirements: Requirements) -> Iterator[s
         if reached >= least * whole:
             continue
         share = reached / whole
+        mount = requirements.workspace.mount_of(kind)
+        stepped = mount is not None and mount.is_stepped
         yield (
             f"only {percent(share)} of {what} can be {deed} from anywhere in the "
-            f"workspace, {percent(least)} is required (--min-reachable); "
+            f"workspace{' that mounts can be set to' * stepped}, {percent(least)} is "
+            f"required (--min-reachable); "
             f"{area_words(whole - reached)} of {area_words(whole)} can't be{why}. "
             f"What would help: {_steps(relaxations, share)}"
         )

@@ -17,7 +17,9 @@ from planning.model.device_poses import moved_to
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
+from planning.scene.placed_bodies import kind_of
 
+from .mount_settings import settable
 from .shell_positions import Range, shell_positions, towards
 from .view_tiles import Site, poses_beside, tiled_poses
 from .zone_conflicts import no_position
@@ -82,7 +84,14 @@ class Candidates(Generic[_D]):
             poses = np.concatenate([poses, _tiled(self.site, n, rolls)])
         if not len(poses):
             raise InfeasibleLimitsError(no_position(self.workspace, self._radius_m))
-        return self._at(poses)
+        candidates = self._at(poses)
+        if not candidates:
+            raise InfeasibleLimitsError(
+                f"the mount of the {kind_of(self.template)} can be set to none of "
+                f"{len(poses)} poses in the workspace; use a finer grid_mm, "
+                f"pan_step_deg or tilt_step_deg, other roll_deg, or widen the workspace"
+            )
+        return candidates
 
     def towards(self, directions: _Array) -> tuple[_D, ...]:
         """Return admissible ones in directions from the centre, unit, shape (n, 3)."""
@@ -129,11 +138,18 @@ class Candidates(Generic[_D]):
 
     @property
     def rolls(self) -> tuple[float, ...]:
-        """Upright, and on its side if that shows more of the object [rad]."""
+        """Upright, and on its side if that shows more of the object [rad].
+
+        Of the rolls that its mount allows all of them, or the first.
+        """
         distance = 0.5 * (self._shell[0] + self._shell[1])
         radius = self.workspace.object_radius_m
         on_side = self.template.device.holds_more_on_side(radius, distance)
-        return (0.0, 0.5 * np.pi) if on_side else (0.0,)
+        mount = self.workspace.mount_of(kind_of(self.template))
+        rolls = (0.0, 0.5 * np.pi)
+        if mount is not None and mount.rolls:
+            rolls = mount.rolls
+        return rolls if on_side else rolls[:1]
 
     @property
     def _radius_m(self) -> Range:
@@ -160,6 +176,7 @@ class Candidates(Generic[_D]):
 
     def _at(self, poses: _Array) -> tuple[_D, ...]:
         plain = replace(self.template, existing="")
+        poses = settable(self.workspace, plain, poses)
         return tuple(moved_to(plain, pose) for pose in poses)
 
     def _spacing(self, n_positions: int) -> float:

@@ -48,7 +48,7 @@ def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
             f"{len(kind.poses)}",
         )
         key = f"surface.npz reference_{kind.name}s"
-        movable = _movable(kind, case.plan)
+        movable = movable_references(kind, case.plan)
         audit_poses(key, movable, findings)
         excess = outside_by(movable[:, :3, 3], kind.shell, space)
         count = int((~(excess <= POSITION_M)).sum())
@@ -130,8 +130,8 @@ def _audit_values(space: Workspace, findings: AuditFindings) -> None:
     )
 
 
-def _movable(kind: DeviceKind, plan: RigPlan) -> Array:
-    """The reference poses (n, 4, 4) that aren't those of existing devices."""
+def movable_references(kind: DeviceKind, plan: RigPlan) -> Array:
+    """Return the reference poses (n, 4, 4) that aren't those of existing devices."""
     movable = np.ones(len(kind.poses), dtype=bool)
     for device in plan.requirements.existing_of(kind.name):
         off = np.abs(kind.poses - np.array(device.world_from_device)).max(axis=(1, 2))
