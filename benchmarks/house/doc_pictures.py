@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from benchmarks.house.same_plans import range_observations
+from benchmarks.pixels.other_objects import beside, dented, expected_of, with_object
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.rays.proximity import closest_points
@@ -33,6 +34,9 @@ from planning.report.drawing.picture_view import (
     fitted,
 )
 from planning.report.drawing.shader import Shader
+from planning.verify.reconstruction.captures.captured import reconstruct_rendered
+from planning.verify.reconstruction.captures.captures import CaptureFolder
+from planning.verify.reconstruction.scanner import Scanner
 
 Colours = NDArray[np.float64]
 
@@ -150,6 +154,21 @@ def errors(job: Job) -> Image.Image:
     signed = closest_points(job.mesh, points).distances
     colours = _signed(signed, 6e-5)
     return _beside(*(_points(job, points, colours, side) for side in (FRONT, SIDE)))
+
+
+def deviation(job: Job) -> Image.Image:
+    """The map of a head without a piece of 3 cm that stood 10 mm beside its place."""
+    truth = with_object(job.plan, beside(dented(job.mesh)))
+    scanner, folder = Scanner.of(job.plan), job.folder / "dented"
+    save = CaptureFolder(folder, scanner)
+    stood = Scanner.of(truth)
+    reconstruct_rendered(scanner, expected_of(job.plan), seed=0, truth=stood, save=save)
+    words = ["--captures", str(folder), "--deviation-limits", "0.5", "--quiet"]
+    _command("reconstruct", str(job.folder / "plan.json"), *words, "-o", str(folder))
+    points, colours = read_cloud(folder / "deviation.ply")
+    there = RayCaster(dented(job.mesh))
+    sides = (FRONT, SIDE)
+    return _beside(*(_points(job, points, colours, side, there) for side in sides))
 
 
 def turned(job: Job) -> Image.Image:
@@ -302,6 +321,7 @@ PICTURES: dict[str, Callable[[Job], Image.Image]] = {
     "captured_frames": images,
     "cloud_sigma": cloud,
     "cloud_errors": errors,
+    "deviation": deviation,
     "turned": turned,
     "outside": outside,
     "shadows": shadows,
@@ -437,13 +457,15 @@ def _points(
     points: NDArray[np.float64],
     colours: Colours,
     direction: tuple[float, ...],
+    there: RayCaster | None = None,
 ) -> Image.Image:
     """Points on the dark object; those behind it are left out."""
+    caster = there or job.caster
     view = _view(job.mesh.corners.reshape(-1, 3), direction, SIZE)
-    picture = np.asarray(_shaded(job.caster, DARK).shade(view)).copy()
+    picture = np.asarray(_shaded(caster, DARK).shade(view)).copy()
     ray = np.broadcast_to(view.to_viewer, points.shape)
     reach = np.full(len(points), 4.0 * job.mesh.reach)
-    hidden = job.caster.occluded(points + 2e-3 * ray, ray, reach)
+    hidden = caster.occluded(points + 2e-3 * ray, ray, reach)
     pixels = np.rint(view.project(points[~hidden])).astype(int)
     for shift in ((0, 0), (1, 0), (0, 1), (1, 1)):
         u, v = np.clip(pixels + shift, 0, np.array(view.size) - 1).T

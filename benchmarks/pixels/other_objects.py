@@ -117,8 +117,12 @@ def objects(mesh: TriangleMesh) -> Iterator[tuple[str, TriangleMesh]]:
         yield f"waves of {amplitude} mm", waved(mesh, 1e-3 * amplitude)
     yield "3 cm missing", dented(mesh)
     yield "3 cm added", with_ball(mesh)
-    beside = mesh.vertices + np.array([SHIFT_M, 0.0, 0.0])
-    yield "10 mm beside its place", TriangleMesh(beside, mesh.faces)
+    yield "10 mm beside its place", beside(mesh)
+
+
+def beside(mesh: TriangleMesh) -> TriangleMesh:
+    """The same, moved along x."""
+    return TriangleMesh(mesh.vertices + np.array([SHIFT_M, 0.0, 0.0]), mesh.faces)
 
 
 def with_object(plan: RigPlan, mesh: TriangleMesh) -> RigPlan:
