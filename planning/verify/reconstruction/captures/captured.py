@@ -101,7 +101,7 @@ def reconstruct_captured(
     """Reconstruct from images that cameras took.
 
     A pair whose images can't be read, or contradict each other, is left out and said
-    to be; so is one whose points nothing confirms.
+    to be; so is one that the others contradict.
 
     Args:
         folder: The images, and the plan for which the patterns were drawn.
@@ -218,7 +218,7 @@ def _concluded(
     spent: Spent,
     photometry: Photometry | None = None,
 ) -> Reconstruction:
-    """Leave out what nothing confirms, merge, judge, and say what is missing."""
+    """Leave out what others contradict, merge, judge, and say what is missing."""
     confirmed = confirm(pairs, plan)
     result = conclude(
         plan,

@@ -15,7 +15,7 @@ from .supposed import Supposed
 REJECTED = {
     "labels": "the codes contradict the patterns: frames out of order or of another "
     "projector, or two projectors on at once",
-    "unconfirmed": "neither the mesh nor another pair confirms the points",
+    "unconfirmed": "other pairs contradict the points, or have surer ones there",
     "off_prior": "no ring meets the rays near the prior mesh",
     "ambiguous": "several rings meet the rays near the prior mesh: fewer rings or a "
     "better prior would tell them apart",
