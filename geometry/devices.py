@@ -87,14 +87,17 @@ class PinholeModel:
         """As of `ParallelModel`: the light of a lens is bounded by its image alone."""
         return np.inf
 
+    @property
+    def half_angle(self) -> float:
+        """Angle from the middle of the image to the nearest middle of its sides."""
+        corners = self.corners.reshape(2, 2, 2)
+        rays = self.rays(np.concatenate([corners.mean(axis=0), corners.mean(axis=1)]))
+        return float(np.arccos(np.clip(rays @ self.middle_ray, -1.0, 1.0)).min())
+
     def holds_ball(self, radius: float, distance: float) -> bool:
         """Return whether a sphere about the aim, so far away, lies inside the image."""
-        width, height = self.resolution
-        x, y = (width - 1) / 2, (height - 1) / 2
-        edges = np.array([[-0.5, y], [x, -0.5], [width - 0.5, y], [x, height - 0.5]])
-        half_angle = np.arccos(np.clip(self.rays(edges) @ self.middle_ray, -1.0, 1.0))
         return bool(
-            radius < distance and np.arcsin(radius / distance) <= half_angle.min()
+            radius < distance and np.arcsin(radius / distance) <= self.half_angle
         )
 
     def holds_more_on_side(self, radius: float, distance: float) -> bool:

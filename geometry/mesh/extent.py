@@ -22,17 +22,28 @@ def main_bodies(faces: Ints, areas: Array) -> Mask:
     each has under 1 % of the largest one's area and all of them together under 1 % of
     the whole: a floating fragment must not decide where the object is.
     """
-    links = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    count, label = components(links, int(faces.max()) + 1)
-    body = label[faces[:, 0]]
-    area = np.bincount(body, areas, count)
+    body, area = _bodies(faces, areas)
     order = np.argsort(area, kind="stable")
     small = (np.cumsum(area[order]) < _SMALL * area.sum()) & (
         area[order] < _SMALL * area.max()
     )
-    kept = np.ones(count, dtype=bool)
+    kept = np.ones(len(area), dtype=bool)
     kept[order[small]] = False
     return kept[body]
+
+
+def body_areas(faces: Ints, areas: Array) -> Array:
+    """Return the area of each body, the largest first; `areas` are those of faces."""
+    _, area = _bodies(faces, areas)
+    return np.sort(area[area > 0.0])[::-1]
+
+
+def _bodies(faces: Ints, areas: Array) -> tuple[Ints, Array]:
+    """Return the body of each face, and the area of each body."""
+    links = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    count, label = components(links, int(faces.max()) + 1)
+    body = label[faces[:, 0]]
+    return body, np.bincount(body, areas, count).astype(np.float64)
 
 
 def enclosing_ball(points: Array) -> tuple[Array, float]:

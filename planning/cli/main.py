@@ -11,7 +11,14 @@ from typing import NoReturn
 import click
 
 from planning.cli.declared.evaluate_declared import evaluate
-from planning.cli.declared.other_declared import rigs, sample, schema, show, verify
+from planning.cli.declared.other_declared import (
+    lens,
+    rigs,
+    sample,
+    schema,
+    show,
+    verify,
+)
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
 
@@ -77,6 +84,7 @@ def commands() -> None:
     plan evaluate --mesh F --poses mounted.csv  what a rig measures as it stands
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
+    plan lens --mesh face.obj                 which lens and focus suit an object
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
 
     Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
@@ -86,7 +94,7 @@ def commands() -> None:
 
 for _command in (
     *(rig_command, evaluate, verify, show, reconstruct),
-    *(rigs, schema, sample),
+    *(lens, rigs, schema, sample),
 ):
     commands.add_command(_command)
 

@@ -21,6 +21,7 @@ from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 
 from .console import print_json, reporter, writable
+from .object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
 # Options that are taken as they are: by both, and where devices are sought.
@@ -53,7 +54,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
             make = _maker(options, rig)
-            surface, interest = _read(path, options, report)
+            surface, interest = _read(path, options, rig, report)
         try:
             plan = make(
                 surface,
@@ -96,7 +97,7 @@ def _maker(options: Mapping[str, Any], rig: Rig) -> Callable[..., RigPlan]:
 
 
 def _read(
-    path: Path, options: Mapping[str, Any], report: Report
+    path: Path, options: Mapping[str, Any], rig: Rig, report: Report
 ) -> tuple[TriangleMesh | RangedBody, Interest | None]:
     """Read what is to be measured, and which part of it is the user's own target."""
     report(f"reading {path}")
@@ -107,7 +108,7 @@ def _read(
         return body, None
     mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
     interest, chosen = _interest(options, mesh)
-    for line in (*_size_lines(mesh), *chosen):
+    for line in (*size_lines(mesh), *optics_lines(rig, mesh), *chosen):
         report(line)
     return mesh, interest
 
@@ -130,15 +131,3 @@ def _interest(
     if interest.n_removed:
         lines.append(f"  {interest.n_removed} chosen faces were removed by repair")
     return interest, lines
-
-
-def _size_lines(mesh: TriangleMesh) -> list[str]:
-    source = mesh.source
-    if source is None:
-        return []
-    x, y, z = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
-    return [
-        f"{source.path}: {x:.1f} x {y:.1f} x {z:.1f} mm (unit {source.unit}), "
-        f"{len(mesh.faces)} faces",
-        *(f"  repaired: {repair.kind}, {repair.count}" for repair in source.repairs),
-    ]

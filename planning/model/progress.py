@@ -18,6 +18,8 @@ _TICK_S = 0.1
 _AGAIN_S = 1.0
 # Not in a solver of CasADi, which warns of exceptions, nor amid an import.
 _WHOLE = "casadi.py", "<frozen importlib._bootstrap>"
+# A stage that has said nothing for so long says that it still runs [s].
+_SILENCE_S = 30.0
 
 
 class Stopwatch:
@@ -45,6 +47,7 @@ class Stopwatch:
         self._begin = time.monotonic() if begin is None else begin
         self._limit = self._deadline = math.inf if time_limit is None else time_limit
         self._next_cut = -math.inf
+        self._said = time.monotonic()
         self.limited = time_limit is not None
         self.seconds: dict[str, float] = {}
         self.processor: dict[str, float] = {}
@@ -91,17 +94,30 @@ class Stopwatch:
         self.check()
         self.say(line)
         begin, worked = time.monotonic(), time.process_time()
+        ended = threading.Event()
+        teller = threading.Thread(target=self._tell, args=(line, ended), daemon=True)
+        teller.start()
         try:
             yield
         finally:
+            ended.set()
+            teller.join()
             for times, spent in (
                 (self.seconds, time.monotonic() - begin),
                 (self.processor, time.process_time() - worked),
             ):
                 times[name] = round(times.get(name, 0.0) + spent, 3)
 
+    def _tell(self, line: str, ended: threading.Event) -> None:
+        """Say in a thread of its own how long a stage has run, when nothing else is."""
+        begin = time.monotonic()
+        while not ended.wait(self._said + _SILENCE_S - time.monotonic()):
+            if time.monotonic() - self._said >= _SILENCE_S:
+                self.say(f"  {line}: {time.monotonic() - begin:.0f} s so far")
+
     def say(self, line: str) -> None:
         """Report one line of progress."""
+        self._said = time.monotonic()
         if self._report is not None:
             self._report(line)
 

@@ -63,6 +63,41 @@ def depth_of_field(
     return near, far
 
 
+def least_stop(
+    focal_m: float, blur_m: float, near_m: float, far_m: float
+) -> tuple[float, float]:
+    """Return the least f-number that is sharp from near to far, and its focus distance.
+
+    Both ends of `depth_of_field`, solved for N and s::
+
+        s = 2 near far / (near + far)
+        N = f^2 (far - near) / (c (s - f) (far + near))
+
+    Raises:
+        ValueError: If the near end isn't beyond the focal length, or not the nearer.
+    """
+    if not focal_m < near_m <= far_m:
+        raise ValueError(
+            f"sharp from {near_m} to {far_m} m: must rise, beyond the focal length of "
+            f"{focal_m} m"
+        )
+    focus = 2.0 * near_m * far_m / (near_m + far_m)
+    beyond = blur_m * (focus - focal_m) * (far_m + near_m)
+    return focal_m * focal_m * (far_m - near_m) / beyond, focus
+
+
+def longest_sharp(f_number: float, blur_m: float, near_m: float, far_m: float) -> float:
+    """Return the longest focal length that is sharp from near to far, in [m].
+
+    `least_stop` solved for f, with k = N c (far + near) / (far - near)::
+
+        f^2 + k f - k s = 0
+    """
+    focus = 2.0 * near_m * far_m / (near_m + far_m)
+    k = f_number * blur_m * (far_m + near_m) / (far_m - near_m)
+    return 0.5 * (math.sqrt(k * k + 4.0 * k * focus) - k)
+
+
 def blur_diameter(
     focal_m: float, f_number: float, focus_m: float, distance_m: _Length
 ) -> _Length:

@@ -23,6 +23,7 @@ from planning.model.requirements import Requirements, Workspace
 from planning.scene.lights import light_of
 
 from .existing_tables import build_existing, check_existing
+from .lens_fit import LensFit, check_field, unsharp
 from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
 from .rig_files import read_rig, rig_folder
@@ -31,12 +32,17 @@ from .rig_tables import ParallelTable, PinholeTable, RigTable
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
+DEVICE_ROLES = "camera", "projector"
 
 _WARN_INCIDENCE_DEG = 70.0
 
 
-def load_rig(name: str | Path = "default", light: Light | None = None) -> "Rig":
+def load_rig(
+    name: str | Path = "default", light: Light | None = None, *, checked: bool = True
+) -> "Rig":
     """Load a preset by its name, or a rig file by its path; None: the rig's light.
+
+    Unless `checked`, devices needn't be sharp at the standoff.
 
     Raises:
         RigError: One line for each fault: where it is, the value, the rule, what to do.
@@ -46,7 +52,8 @@ def load_rig(name: str | Path = "default", light: Light | None = None) -> "Rig":
         raise RigError(f"light = {light!r} must be 'diverging' or 'parallel'")
     table = read_rig(name)
     rig = Rig(table, light or table.light, rig_folder(name))
-    _check_devices(rig)
+    if checked:
+        _check_devices(rig)
     return rig
 
 
@@ -131,6 +138,16 @@ class Rig:
         tables = {"projector": self._projector_table, "camera": self.table.camera}
         return {f"{kind}_mount": Mount.of(each.mount) for kind, each in tables.items()}
 
+    def fit(
+        self, role: str, radius_m: float = 0.0, shadow_m2: float | None = None
+    ) -> LensFit:
+        """Return how `camera` or `projector` suits an object, see `LensFit`."""
+        projects = role == "projector"
+        table = self._projector_table if projects else self.table.camera
+        device = self._projector if projects else self._camera
+        stands = self.standoff_m, self.standoff_play_m
+        return LensFit(role, table, device, *stands, radius_m, shadow_m2)
+
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
         return light_of(self._projector).image_ring(self.ring_offset)
@@ -184,6 +201,8 @@ class Rig:
             ),
         )
         workspace = replace(workspace, **self.mounts())
+        for role in DEVICE_ROLES:
+            check_field(self.fit(role, object_radius_m))
         required = build_requirements(self.table, wishes, workspace, tau_m=tau_m)
         devices = {
             "projector": (projector, self.projector_body()),
@@ -286,11 +305,7 @@ def _check_devices(rig: Rig) -> None:
     for role, device in devices.items():
         low, high = device.range_m
         if not low <= rig.standoff_m <= high:
-            raise InfeasibleLimitsError(
-                f"rig {rig.name}: placement.standoff_mm = {rig.standoff_m * 1e3:g} is "
-                f"outside the distances at which the {role} is sharp, {low * 1e3:.0f} "
-                f"to {high * 1e3:.0f} mm; move the standoff or refocus"
-            )
+            raise InfeasibleLimitsError(f"rig {rig.name}: {unsharp(rig.fit(role))}")
     if not math.isfinite(rig.outer_ring_radius()):
         raise RigError(
             f"rig {rig.name}: rings.tilt_deg = {rig.table.rings.tilt_deg:g} turns the "

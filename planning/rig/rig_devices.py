@@ -13,6 +13,8 @@ from planning.model.errors import RigError
 from . import optics
 from .rig_tables import ParallelTable, PinholeTable
 
+# Projectors of the shortest throw look 60 degrees or so off their axes.
+_FARTHEST_OFF = math.radians(75.0)
 _UNSAID = "stated in the rig file, without a source"
 
 
@@ -32,6 +34,17 @@ def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
     k1, k2, p1, p2, k3 = table.distortion
     camera_matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     camera_matrix.setflags(write=False)
+    off = math.atan(
+        math.hypot((cx - (width - 1) / 2) / fx, (cy - (height - 1) / 2) / fy)
+    )
+    if not off <= _FARTHEST_OFF:
+        raise RigError(
+            f"[{role}] the principal point ({cx:g}, {cy:g}) lies "
+            f"{math.degrees(off):.1f} degrees off the middle of an image of {width} x "
+            f"{height} px, where no lens draws one; at most "
+            f"{math.degrees(_FARTHEST_OFF):.0f}, correct principal_point_px or "
+            f"vertical_offset_percent"
+        )
     return PinholeModel(
         camera_matrix,
         (width, height),

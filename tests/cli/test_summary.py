@@ -15,6 +15,7 @@ from planning.report.entries.device_entries import cost_record
 from planning.report.summary.check_lines import cost_lines
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.device_lines import aim_angles
+from planning.report.summary.summary import summary
 from planning.scene.workspace.candidates import aimed_poses
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -141,6 +142,19 @@ def test_of_a_whole_surface_one_sampling_is_told(handmade):
         assert sum("surface" in title for title in titles) == 1
 
 
+@pytest.mark.parametrize(("share", "warned"), [(0.099, True), (0.101, False)])
+def test_the_first_line_warns_of_an_object_lost_in_the_field(handmade, share, warned):
+    plan = handmade.build_plan()
+    across = 2.0 * plan.requirements.workspace.object_radius_m
+    field_at_1_m = 2.0 * plan.cameras[0].device.half_rectangle(1.0).min()
+    rig = plan.document.rig.changed(standoff_m=across / share / field_at_1_m)
+    told = summary(RigPlan(plan.document.changed(rig=rig), plan.surface), [], [])
+    first, *others = told.splitlines()
+    words = f"WARNING: it is {1e3 * across:.3g} mm across in a camera's field"
+    assert (words in first) == warned
+    assert not any(words in line for line in others)
+
+
 def test_stages_are_timed_on_the_wall_and_on_the_processor():
     clock = Stopwatch()
     for _ in range(2):
@@ -152,3 +166,19 @@ def test_stages_are_timed_on_the_wall_and_on_the_processor():
                 pass
     assert clock.seconds["nap"] >= 0.12 > 0.06 > clock.processor["nap"]
     assert clock.processor["work"] >= 0.12
+
+
+def test_a_stage_that_says_nothing_says_that_it_still_runs(monkeypatch):
+    monkeypatch.setattr("planning.model.progress._SILENCE_S", 0.1)
+    said = []
+    clock = Stopwatch(said.append)
+    with clock.stage("nap", "sleeps"):
+        time.sleep(0.25)
+    with clock.stage("talk", "talks"):
+        for _ in range(5):
+            time.sleep(0.05)
+            clock.say("a line")
+    time.sleep(0.15)
+    assert said[0] == "sleeps"
+    assert said[1:3] == ["  sleeps: 0 s so far"] * 2
+    assert said[3:] == ["talks", *["a line"] * 5]

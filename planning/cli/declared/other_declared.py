@@ -13,6 +13,11 @@ from planning.cli.console import (
     threads_option,
 )
 
+from .plan_declared import rig_command
+
+# What says which object and which rig there are.
+_OF_OBJECTS = ("meshes", "files", "unit", "size_mm", "rig_name", "light")
+
 
 @click.command()
 @click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
@@ -51,6 +56,23 @@ def show(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.show_command import show_command
 
     run(lambda: show_command(options), debug=options["debug"])
+
+
+@click.command(
+    params=[p for p in rig_command.params if p.name in _OF_OBJECTS],
+)
+@debug_option
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def lens(**options: Any) -> None:  # noqa: ANN401
+    """Say which lens, throw, f-number and focus suit an object, without planning."""
+    from planning.cli.lens_command import lens_command
+
+    meshes = (*options.pop("meshes"), *options.pop("files"))
+    if len(meshes) != 1 or not meshes[0]:
+        raise click.UsageError(f"give --mesh FILE, one; {len(meshes)} were given")
+    if options["unit"] and options["size_mm"] is not None:
+        raise click.UsageError("give --unit or --size-mm, not both")
+    run(lambda: lens_command(options | {"mesh": meshes[0]}), debug=options["debug"])
 
 
 @click.command()

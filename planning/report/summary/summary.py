@@ -16,6 +16,9 @@ from .proof_lines import proof_lines
 from .ring_lines import range_lines, ring_lines
 from .warning_lines import warning_lines
 
+# An object under this share of the field is taken to be in another unit.
+_TINY = 0.1
+
 
 def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     """Return the plan as text, in millimetres, degrees and square centimetres.
@@ -49,6 +52,7 @@ def _head(plan: RigPlan) -> str:
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = "; TRUNCATED" if document.truncated else ""
     cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
+    cut += _lost_in_field(plan)
     return (
         f"{'AS BUILT' if evaluation else 'PLAN':<9}"
         f"{count_words(len(plan.projectors), 'projector')}, "
@@ -60,6 +64,21 @@ def _head(plan: RigPlan) -> str:
         f"{document.rig.light} light\n"
         f"{shell_line(mesh)}"
         f"         devices may stand in {_where(workspace)}"
+    )
+
+
+def _lost_in_field(plan: RigPlan) -> str:
+    """Return a warning where the object is tiny in a camera's field: a wrong unit?"""
+    standoff = plan.document.rig.standoff_m
+    if standoff is None or not plan.cameras:
+        return ""
+    across = 2.0 * plan.requirements.workspace.object_radius_m
+    field = 2.0 * float(plan.cameras[0].device.half_rectangle(standoff).min())
+    if not across < _TINY * field:
+        return ""
+    return (
+        f"; WARNING: it is {1e3 * across:.3g} mm across in a camera's field of "
+        f"{1e3 * field:.0f} mm, is its unit right?"
     )
 
 

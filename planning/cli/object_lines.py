@@ -1,0 +1,51 @@
+"""What is said of an object before anything is planned: its size, and what suits it."""
+
+from collections.abc import Iterator
+
+from scipy.spatial import ConvexHull
+
+from geometry.mesh.extent import body_areas
+from geometry.mesh.mesh import TriangleMesh
+from planning.model.words import percent
+from planning.rig.lens_fit import LensFit, optics_notes
+from planning.rig.rig import DEVICE_ROLES, Rig
+
+# So many bodies are told one by one.
+_MOST_BODIES = 4
+
+
+def size_lines(mesh: TriangleMesh) -> Iterator[str]:
+    """Yield size and unit, what was repaired, and how many bodies there are."""
+    source = mesh.source
+    if source is not None:
+        x, y, z = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
+        yield (
+            f"{source.path}: {x:.1f} x {y:.1f} x {z:.1f} mm (unit {source.unit}), "
+            f"{len(mesh.faces)} faces"
+        )
+        for repair in source.repairs:
+            yield f"  repaired: {repair.kind}, {repair.count}"
+    areas = body_areas(mesh.faces, mesh.face_areas)
+    if len(areas) > 1:
+        shares = [percent(area / mesh.area) for area in areas[:_MOST_BODIES]]
+        more = ", ..." if len(areas) > _MOST_BODIES else ""
+        yield (
+            f"  {len(areas)} bodies that share no vertex, of {', '.join(shares)}{more} "
+            f"of the area: all are planned for"
+        )
+
+
+def fits_of(rig: Rig, mesh: TriangleMesh) -> tuple[LensFit, ...]:
+    """Return how the camera and the projector of a rig suit an object.
+
+    A convex body's shadow is a quarter of its surface, as a mean over all directions
+    (Cauchy); the object's is that of its convex hull.
+    """
+    # Joggled, so that a flat plate has a hull, of both its sides.
+    shadow = ConvexHull(mesh.vertices, qhull_options="QJ").area / 4.0
+    return tuple(rig.fit(role, mesh.radius, float(shadow)) for role in DEVICE_ROLES)
+
+
+def optics_lines(rig: Rig, mesh: TriangleMesh) -> list[str]:
+    """Return a line for each device whose optics leave most of its image unused."""
+    return [f"  {note}" for note in optics_notes(fits_of(rig, mesh))]
