@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.poses import transform
+from geometry.rays.proximity import closest_points
 from geometry.shapes.primitives import sphere
 from planning.cli.deviation_table import deviation_lines
 from planning.verify.reconstruction.check.deviation import (
@@ -59,6 +60,14 @@ def test_a_ball_is_shifted_and_not_turned():
     pose = best_fit(ball, points, NOISE_M)
     assert pose[:3, 3] == pytest.approx([-2e-3, 0, 0], abs=2e-5)
     assert np.abs(pose[:3, :3] - np.eye(3)).max() < 1e-3
+
+
+@pytest.mark.parametrize("times", [1, 5])
+def test_a_single_point_is_shifted_and_not_turned(waved, times):
+    point = np.repeat(1.02 * sample_surface(waved, 1, seed=0).points, times, axis=0)
+    pose = best_fit(waved, point, NOISE_M)
+    assert np.abs(closest_points(waved, transform(pose, point)).distances).max() < 1e-7
+    assert np.abs(pose[:3, :3] - np.eye(3)).max() < 1e-6
 
 
 def plate_map(limits_m=None, align="none"):

@@ -155,7 +155,8 @@ def best_fit(mesh: TriangleMesh, points: Array, noise_m: float) -> Array:
     """
     few = points[:: -(-len(points) // _FITTED)]
     centre = few.mean(axis=0)
-    size = float(np.sqrt(np.mean(np.sum((few - centre) ** 2, axis=1))))
+    # One point has no size, and any turn about it is as good: the smallest is none.
+    size = max(float(np.sqrt(np.mean(np.sum((few - centre) ** 2, axis=1)))), noise_m)
 
     def moved(motion: Array, these: Array) -> Array:
         turn = Rotation.from_rotvec(motion[3:] / size)
