@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from geometry.arrays import Array, Ints
 
 from .gltf_buffers import PACKED, QUANTIZED, Buffers, Fetch, Tree, item
+from .polygons import strip_triangles
 from .reading import FormatError, RawMesh, ScenePart, joined
 
 # Required extensions that leave the triangles as the core format stores them.
@@ -160,14 +161,11 @@ def _primitive(
     order = order.astype(np.int64)
     if mode == _TRIANGLES and len(order) % 3 == 0:
         return points.astype(np.float64), order.reshape(-1, 3)
-    if mode == _STRIP and len(order) >= 3:
-        faces = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
-        faces[1::2, :2] = faces[1::2, 1::-1]
-    elif mode == _FAN and len(order) >= 3:
+    if mode == _STRIP and len(order) >= 3 and order.min() >= 0:
+        return points.astype(np.float64), strip_triangles(order)
+    if mode == _FAN and len(order) >= 3:
         hub = np.full(len(order) - 2, order[0])
         faces = np.stack([hub, order[1:-1], order[2:]], axis=1)
-    else:
-        raise FormatError(f"{len(order)} corners make no triangles in mode {mode}")
-    # Triangles of no area join strips to one another.
-    a, b, c = faces.T
-    return points.astype(np.float64), faces[(a != b) & (b != c) & (c != a)]
+        a, b, c = faces.T
+        return points.astype(np.float64), faces[(a != b) & (b != c) & (c != a)]
+    raise FormatError(f"{len(order)} corners make no triangles in mode {mode}")

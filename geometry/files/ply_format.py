@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from geometry.arrays import Ints
 
 from .ply_header import PlyElement, PlyLists, PlyProperty, read_header, shortened
-from .polygons import triangulated
+from .polygons import strip_triangles, triangulated
 from .reading import FormatError, RawMesh, numbers, whole
 
 _CORNERS = ("vertex_indices", "vertex_index")
@@ -23,8 +23,6 @@ def read_ply(data: bytes) -> RawMesh:
 
 
 def _surface(elements: dict[str, PlyElement]) -> RawMesh:
-    if any(name.startswith("tristrip") for name in elements):
-        raise FormatError("it stores triangle strips, which aren't read; store faces")
     if "vertex" not in elements:
         raise FormatError("its header declares no vertices")
     of_vertices = dict(elements["vertex"].scalars)
@@ -32,11 +30,15 @@ def _surface(elements: dict[str, PlyElement]) -> RawMesh:
         raise FormatError("its vertices have no x, y and z")
     points = np.stack([of_vertices.pop(axis) for axis in "xyz"], axis=1)
     face = elements.get("face", PlyElement("face", 0))
-    named = [face.lists[name] for name in _CORNERS if name in face.lists]
-    if face.count and len(named) != 1:
-        raise FormatError("its faces have no list vertex_indices")
-    none = np.empty(0, np.int64)
-    corners = named[0] if face.count else PlyLists(none, none)
+    named = [elements[name] for name in elements if name.startswith("tristrip")]
+    strips = named[0] if named else PlyElement("tristrips", 0)
+    if strips.count and face.count:
+        raise FormatError("it stores faces and triangle strips; keep one of them")
+    if strips.count:
+        faces = strip_triangles(_separated(_corners(strips), len(points)))
+        threes = np.full(len(faces), 3, np.int64)
+        return triangulated(points, threes, faces.reshape(-1), of_vertices)
+    corners = _corners(face)
     if not np.all(corners.lengths >= 3):
         at = int(np.argmin(corners.lengths))
         raise FormatError(
@@ -44,6 +46,27 @@ def _surface(elements: dict[str, PlyElement]) -> RawMesh:
         )
     values, lengths = whole(corners.values), corners.lengths
     return triangulated(points, lengths, values, of_vertices, face.scalars)
+
+
+def _corners(element: PlyElement) -> PlyLists:
+    """Return the one list of vertices that faces or strips have; none of no rows."""
+    if not element.count:
+        return PlyLists(np.empty(0, np.int64), np.empty(0, np.int64))
+    named = [element.lists[name] for name in _CORNERS if name in element.lists]
+    if len(named) != 1:
+        raise FormatError(f"its element '{element.name}' has no list vertex_indices")
+    return named[0]
+
+
+def _separated(strips: PlyLists, n_vertices: int) -> Ints:
+    """Return the strips of all rows end to end, -1 between them as within a row."""
+    values = whole(strips.values)
+    outside = np.flatnonzero((values < -1) | (values >= n_vertices))
+    if len(outside):
+        raise FormatError(
+            f"a triangle strip names vertex {values[outside[0]]}, of {n_vertices}"
+        )
+    return np.insert(values, np.cumsum(strips.lengths)[:-1], -1)
 
 
 class _Cursor:

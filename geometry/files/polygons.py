@@ -24,6 +24,30 @@ def end_to_end(polygons: Sequence[Sequence[int]]) -> tuple[Ints, Ints]:
     return sizes, np.fromiter(corners, np.int64, int(sizes.sum()))
 
 
+def strip_triangles(corners: Ints) -> Ints:
+    """Return the triangles of strips, (m, 3): each corner with the two before it.
+
+    Every other triangle of a strip is turned, from its second on; -1 ends a strip.
+    Triangles of no area, which join strips to one another, are left out.
+
+    Raises:
+        FormatError: If a strip has one or two corners.
+    """
+    ends = np.concatenate([[-1], np.flatnonzero(corners == -1), [len(corners)]])
+    lengths = np.diff(ends) - 1
+    if np.any((lengths == 1) | (lengths == 2)):
+        short = int(lengths[(lengths == 1) | (lengths == 2)][0])
+        raise FormatError(
+            f"a triangle strip has {short} corners, must have three or more"
+        )
+    faces = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    place = np.arange(len(faces)) - np.repeat(ends[:-1] + 1, lengths + 1)[: len(faces)]
+    turned = place % 2 == 1
+    faces[turned, :2] = faces[turned, 1::-1]
+    a, b, c = faces.T
+    return faces[(a != b) & (b != c) & (c != a) & np.all(faces != -1, axis=1)]
+
+
 def triangulated(
     points: Array,
     sizes: Ints,

@@ -12,6 +12,7 @@ import pytest
 import trimesh
 from support.plain_shapes import box
 
+from geometry.files.ply_format import read_ply
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.shapes.primitives import sphere
@@ -230,6 +231,84 @@ PLY_STRIP = (
     "property float z\nelement tristrips 1\nproperty list int int vertex_indices\n"
     "end_header\n0 0 0\n30 0 0\n0 30 0\n3 0 1 2\n"
 )
+
+
+def triangles_one_by_one(rows):
+    """What strips mean: a loop over corners, each triangle turned to face one side."""
+    found = []
+    for row in rows:
+        strip = []
+        for corner in row:
+            strip = [] if corner == -1 else [*strip, corner]
+            if len(strip) >= 3 and len(set(strip[-3:])) == 3:
+                a, b, c = strip[-3:]
+                found.append((a, b, c) if len(strip) % 2 else (b, a, c))
+    return found
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[0, 1, 2]],
+        [[0, 1, 2, 3, 4, 5]],
+        [[0, 1, 2, -1, 2, 1, 3, 5]],
+        [[0, 1, 2, 3, -1, 4, 5, 0], [3, 4, 5, 0, 1]],
+        [[-1, 0, 1, 2, -1, -1, 1, 2, 3, -1]],
+        # Turns its corner by naming one twice.
+        [[0, 1, 2, 3, 3, 4, 4, 5, 1]],
+        [[], [0, 1, 2], [], [5, 4, 3, 2, 1, 0]],
+    ],
+)
+@pytest.mark.parametrize("order", ["ascii", "binary_big_endian"])
+def test_triangle_strips_of_ply_files_are_triangles(rows, order):
+    points = [(0, 0, 0), (9, 0, 1), (3, 8, 0), (9, 9, 4), (1, 2, 7), (5, 5, 5)]
+    head = (
+        f"ply\nformat {order} 1.0\nelement vertex 6\nproperty float x\nproperty float y"
+        f"\nproperty float z\nelement tristrips {len(rows)}\n"
+        "property list int int vertex_indices\nend_header\n"
+    ).encode()
+    if order == "ascii":
+        lines = [*points, *((len(row), *row) for row in rows)]
+        body = "".join(" ".join(map(str, line)) + "\n" for line in lines).encode()
+    else:
+        body = np.array(points, ">f4").tobytes()
+        body += b"".join(np.array([len(row), *row], ">i4").tobytes() for row in rows)
+    raw = read_ply(head + body)
+    assert [tuple(face) for face in raw.faces] == triangles_one_by_one(rows)
+
+
+def test_a_torus_in_strips_is_the_same_surface(tmp_path):
+    """As scanners' files store it: all strips in one list, with -1 between."""
+    n, m = 24, 12
+    u, v = (2 * np.pi * np.arange(k) / k for k in (n, m))
+    ring = 30.0 + 10.0 * np.cos(v)
+    x, y = (np.outer(f(u), ring).ravel() for f in (np.cos, np.sin))
+    z = np.tile(10.0 * np.sin(v), n)
+    strips = []
+    for i in range(n):
+        for j in range(m + 1):
+            strips += [i * m + j % m, (i + 1) % n * m + j % m]
+        strips.append(-1)
+    text = (
+        f"ply\nformat ascii 1.0\nelement vertex {n * m}\nproperty float x\n"
+        "property float y\nproperty float z\nelement tristrips 1\n"
+        "property list int int vertex_indices\nend_header\n"
+    )
+    text += "".join(f"{a} {b} {c}\n" for a, b, c in zip(x, y, z, strict=True))
+    text += " ".join(map(str, [len(strips), *strips])) + "\n"
+    raw = read_ply(text.encode())
+    assert len(raw.faces) == 2 * n * m
+    # Each edge once either way: closed, and wound alike.
+    edges = raw.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    assert len({tuple(edge) for edge in edges}) == len(edges)
+    assert {tuple(edge) for edge in edges} == {tuple(edge) for edge in edges[:, ::-1]}
+    mesh = load_mesh(write(tmp_path / "torus.ply", text))
+    assert mesh.source.repairs == ()
+    corners = mesh.vertices[mesh.faces]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    assert volume / 6.0 == pytest.approx(2 * np.pi**2 * 0.03 * 0.01**2, rel=0.08)
+
+
 PLY_POINTS = (
     "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
     "property float z\nend_header\n0 0 0\n30 0 0\n"
@@ -243,7 +322,20 @@ STL_TWO = "solid a\n" + 2 * (
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.ply", PLY_STRIP, "triangle strips"),
+        ("a.ply", PLY_STRIP.replace("3 0 1 2", "2 0 1"), "strip has 2 corners"),
+        ("a.ply", PLY_STRIP.replace("3 0 1 2", "5 0 1 2 -1 1"), "has 1 corners"),
+        ("a.ply", PLY_STRIP.replace("3 0 1 2", "4 0 1 2 -2"), "vertex -2, of 3"),
+        ("a.ply", PLY_STRIP.replace("3 0 1 2", "4 0 1 2 3"), "vertex 3, of 3"),
+        ("a.ply", PLY_STRIP.replace("vertex_indices", "corners"), "no list vertex_i"),
+        (
+            "a.ply",
+            PLY_STRIP.replace(
+                "end_header",
+                "element face 1\nproperty list int int vertex_indices\nend_header",
+            )
+            + "3 0 1 2\n",
+            "faces and triangle strips",
+        ),
         ("a.ply", PLY_POINTS, "2 points and no faces"),
         ("a.ply", "hello", "no PLY header"),
         ("a.ply", "", r"the file is empty \(0 bytes\)"),
