@@ -15,9 +15,11 @@ from planning.cameras.camera_cover import (
 from planning.cameras.camera_routes import widest_route
 from planning.cameras.camera_stage import follow_cameras, place_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
+from planning.model.device_poses import moved_to
 from planning.model.document.certificates import Certificate
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import (
     CandidateSet,
@@ -35,8 +37,10 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.ring_stage import space_rings
+from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.measured import lit_samples
+from planning.scene.placed_bodies import existing_devices
 
 from .proofs import camera_bound, projector_bound
 
@@ -188,19 +192,15 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
     """Return the existing devices with their rings, and what candidates would reach."""
     request, scene = ready.request, ready.scene
     with clock.stage("projectors", "projectors: what they light as they stand"):
-        source = CandidateSource(scene, ready.template)
-        candidates = CandidateSet.over(
-            scene,
-            scene.target_samples(DRAWS.projectors),
-            source.lattice(request.rig.n_projector_poses),
-        )
+        offered, views = _offered(ready)
+        samples = scene.target_samples(DRAWS.projectors)
+        candidates = CandidateSet.over(scene, samples, offered)
         projectors = candidates.projectors[: candidates.n_existing]
         proof = unproved(candidates.cover, candidates.samples.samples.weight)
         stage = ProjectorStage(
             {len(projectors): projectors}, proof, projectors, candidates
         )
     with clock.stage("cameras", "cameras: what they measure as they stand"):
-        views = camera_candidate_views(scene, ready.camera, request.rig.n_camera_poses)
         cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
         target = scene.target_samples(DRAWS.cameras)
         lit = lit_samples(scene, projectors, target)
@@ -218,6 +218,30 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
         spacing = request.rig.ring_spacing
         rings = space_rings(scene, projectors, cameras, spacing, samples)
     return PartialPlan(ready, stage, projectors, camera_stage, cameras, rings=rings)
+
+
+def _offered(ready: Prepared) -> tuple[tuple[PlannedProjector, ...], CandidateViews]:
+    """Existing devices and poses that define what is reachable: a plan's own, or new.
+
+    A plan's devices reach what they reached there.
+    """
+    scene, rig, mounted = ready.scene, ready.request.rig, ready.request.mounted
+    required = scene.requirements
+    known = None if mounted is None else mounted.reference(required.workspace)
+    if known is None:
+        source = CandidateSource(scene, ready.template)
+        views = camera_candidate_views(scene, ready.camera, rig.n_camera_poses)
+        return source.lattice(rig.n_projector_poses), views
+    frames = zip(known.reference_projectors, known.reference_rings, strict=True)
+    projectors = (
+        replace(ready.template, world_from_device=pose, world_from_ring=ring)
+        for pose, ring in frames
+    )
+    cameras = (moved_to(ready.camera, pose) for pose in known.reference_cameras)
+    return (
+        (*existing_devices(required, ready.template), *projectors),
+        CandidateViews(scene, (*existing_devices(required, ready.camera), *cameras)),
+    )
 
 
 def _standing(cover: CandidateCover) -> Selection:

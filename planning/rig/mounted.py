@@ -18,7 +18,8 @@ from planning.model.csv_rows import CsvRow, read_csv
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Existing, Requirements
+from planning.model.requirements import Existing, Requirements, Workspace
+from planning.model.surface import Surface
 from planning.model.table_types import fault_words
 from planning.scene.placed_bodies import Device, kind_of
 
@@ -47,12 +48,14 @@ class Mounted:
         sha256: Of that file.
         tables: Their poses, one entry of `[[existing]]` each.
         rings: Ring frame and radii of projectors whose rings stay, by name.
+        plan: Whose devices they are; None: of no plan.
     """
 
     path: str
     sha256: str
     tables: tuple[ExistingTable, ...]
     rings: Mapping[str, PlannedProjector] = field(default_factory=dict)
+    plan: RigPlan | None = None
 
     def count(self, kind: str) -> int:
         """Return how many are a `projector` or a `camera`."""
@@ -81,6 +84,22 @@ class Mounted:
             raise InputError(f"{self.path} and rig {rig.name}: {error}") from None
         return replace(rig, table=rig.table.model_copy(update={"existing": tables}))
 
+    def reference(self, workspace: Workspace) -> Surface | None:
+        """Return what holds the reference poses of their plan, if they are of this one.
+
+        Poses that it may offer as well define what is reachable as they did there.
+        """
+        if self.plan is None:
+            return None
+        # What only becomes known of the poses and their rings, as they are.
+        same = replace(
+            self.plan.requirements.workspace,
+            n_reference_projectors=workspace.n_reference_projectors,
+            n_reference_cameras=workspace.n_reference_cameras,
+            reference_ring_radius=workspace.reference_ring_radius,
+        )
+        return self.plan.surface if same == workspace else None
+
     def with_rings(self, required: Requirements) -> Requirements:
         """Return requirements whose existing projectors have the rings that stay."""
 
@@ -101,13 +120,15 @@ def read_mounted(
     """Read poses from a CSV file, or the devices of a `plan.json` with their rings.
 
     Args:
-        path: The file; `docs/use/evaluate.md` has the columns.
+        path: The file, or the folder of a plan; `docs/use/evaluate.md` has the columns.
         rig: Whose optics a plan's devices must have.
         only: Names of the devices that are taken; None: all.
 
     Raises:
         InputError: If the file can't be used; of a CSV file it names the line.
     """
+    if Path(path).is_dir():
+        path = Path(path) / "plan.json"
     if Path(path).suffix.lower() == ".json":
         return _of_plan(Path(path), rig, only)
     table = read_csv(path, REQUIRED, OPTIONAL)
@@ -210,7 +231,7 @@ def _of_plan(path: Path, rig: Rig, only: Sequence[str] | None) -> Mounted:
         if isinstance(device, PlannedProjector) and name in spaced:
             rings[called] = device
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return Mounted(str(path), digest, tuple(tables), rings)
+    return Mounted(str(path), digest, tuple(tables), rings, plan)
 
 
 def _chosen(names: list[str], only: Sequence[str] | None, path: str) -> Sequence[str]:

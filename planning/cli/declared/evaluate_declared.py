@@ -29,6 +29,8 @@ def evaluate(**options: Any) -> None:  # noqa: ANN401
     """
     from planning.cli.plan_command import plan_command
 
+    if not options["meshes"]:
+        raise click.UsageError("give --mesh FILE")
     options |= dict.fromkeys(_OF_PLANS)
     check_options(options)
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

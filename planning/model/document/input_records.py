@@ -157,7 +157,7 @@ class ViolationRecord(Part):
     Attributes:
         device: Its id.
         limit: Of its position, of its body, or its range, in which no vertex lies.
-        what: The zone, or what the body touches.
+        what: The zone, what the body touches, or `too near` and `too far`.
         by_m: How far; None: it touches.
     """
 

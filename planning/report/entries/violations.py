@@ -44,8 +44,9 @@ def _of_position(scene: Scene, device: Device) -> Iterator[ViolationRecord]:
     for limit, what, by_m in _excesses(space, shell, offset):
         if by_m > _TYPED_M:
             yield ViolationRecord(device=device.id, limit=limit, what=what, by_m=by_m)
-    if (by_m := _out(scene, device)) > _TYPED_M:
-        yield ViolationRecord(device=device.id, limit="range", by_m=by_m)
+    for what, by_m in _out(scene, device):
+        if by_m > _TYPED_M:
+            yield ViolationRecord(device=device.id, limit="range", what=what, by_m=by_m)
 
 
 def _excesses(
@@ -56,7 +57,8 @@ def _excesses(
     A zone is left by the farthest face, and entered by the nearest one.
     """
     distance = float(np.linalg.norm(offset))
-    yield "standoff", "", max(shell[0] - distance, distance - shell[1])
+    yield "standoff", "too near", shell[0] - distance
+    yield "standoff", "too far", distance - shell[1]
     along = float(offset @ np.array(space.axis))
     across = float(np.linalg.norm(offset - along * np.array(space.axis)))
     beyond = float(np.arctan2(across, along)) - space.half_angle
@@ -78,12 +80,13 @@ def _beyond(box: Box, offset: NDArray[np.float64]) -> float:
     return float(np.max(np.abs(local) - np.array(box.half_m)))
 
 
-def _out(scene: Scene, device: Device) -> float:
+def _out(scene: Scene, device: Device) -> Iterator[tuple[str, float]]:
     """How far out of a device's range the whole object lies [m]; <= 0 if not all."""
     local = transform(inverse(device.world_from_device), scene.mesh.vertices)
     lengths = np.linalg.norm(local - device.device.ray_starts(local), axis=1)
     low, high = device.device.range_m
-    return max(low - float(lengths.max()), float(lengths.min()) - high)
+    yield "too near", low - float(lengths.max())
+    yield "too far", float(lengths.min()) - high
 
 
 def _of_body(
@@ -101,7 +104,8 @@ def _of_body(
     for name in names:
         yield ViolationRecord(device=device.id, limit="body", what=name, by_m=None)
     for body in bodies:
-        if (gap := box_gap(box, body.box)) > 0.0 and (by_m := apart - gap) > _TYPED_M:
+        by_m = apart - box_gap(box, body.box)
+        if body.words not in names and by_m > _TYPED_M:
             yield ViolationRecord(
                 device=device.id, limit="clearance", what=body.words, by_m=by_m
             )

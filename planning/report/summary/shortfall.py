@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import Coverage, Relaxation
+from planning.model.document.input_records import EvaluationRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
@@ -133,7 +134,7 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[str
             f"{percent(required)} is required; {area_words(whole - covered)} of "
             f"{area_words(whole)} are left{_bodies(document.coverage, proof)}. "
             f"{_why(kind, document.coverage)}What would help: "
-            f"{_remedies(kind, proof, requirements, share)}"
+            f"{_remedies(kind, proof, requirements, share, document.evaluation)}"
         )
 
 
@@ -171,12 +172,20 @@ def _bodies(coverage: Coverage, proof: Certificate) -> str:
 
 
 def _remedies(
-    kind: str, proof: Certificate, requirements: Requirements, share: float
+    kind: str,
+    proof: Certificate,
+    requirements: Requirements,
+    share: float,
+    evaluation: EvaluationRecord | None,
 ) -> str:
     needed = proof.needed
     allowed = getattr(requirements, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {_down(share)} accepts this plan"
+    if evaluation is not None:
+        # A share of 0 is none that an option takes.
+        more = f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
+        return f"{more}, or {accept}" if share > 0.0 else more
     # Where bodies are in the way, more devices may be no help.
     in_vain = needed.count <= proof.but_for_bodies
     if allowed is None or needed.count <= allowed or in_vain:

@@ -5,15 +5,15 @@ from planning.model.plan import RigPlan
 from planning.model.words import labelled
 
 _WORDS = {
-    "standoff": "stands {by} mm nearer or farther than the rig lets devices stand",
+    "standoff": "stands {by} mm {what} for the distances that the rig allows",
     "cone": "stands {by} mm outside the cone of positions",
     "floor": "stands {by} mm below the floor",
     "box": "stands {by} mm outside the room",
     "mounting": "stands {by} mm off {what}",
     "keep_out": "stands {by} mm inside the keep-out volume {what!r}",
-    "range": "has the whole object {by} mm out of its range",
+    "range": "stands {by} mm {what} for any of the object to be in its range",
     "clearance": "stands {by} mm too near to {what}",
-    "body": "its body touches or reaches into {what}",
+    "body": "touches or reaches into {what} with its housing",
 }
 
 

@@ -80,11 +80,13 @@ def _of_positions(case: AuditCase) -> Iterator[tuple[_Key, float]]:
 def _of_gaps(case: AuditCase) -> Iterator[tuple[_Key, float]]:
     """How much nearer than the clearance housings stand that don't touch [m]."""
     clearance = case.plan.requirements.workspace.clearance_m
+    if not clearance:
+        return
     blocks = [block_of(d) for d in (*case.plan.projectors, *case.plan.cameras)]
     for one, other in combinations(filter(None, blocks), 2):
-        gap = one.gap(other)
-        if gap > _ROUNDING_M:
-            yield (other.name, "clearance", f"the body of {one.name}"), clearance - gap
+        gap, key = one.gap(other), (other.name, "clearance", f"the body of {one.name}")
+        # Of two that may be called touching this may be told or not.
+        yield key, clearance - gap if gap > _NEAR_M else _TOLD_M
 
 
 def _of_position(
@@ -96,7 +98,8 @@ def _of_position(
     offset = position - np.array(space.centre)
     distance, axis = float(np.linalg.norm(offset)), np.array(space.axis)
     low, high = kind.shell
-    yield "standoff", "", max(low - distance, distance - high)
+    yield "standoff", "too near", low - distance
+    yield "standoff", "too far", distance - high
     across = float(np.linalg.norm(np.cross(axis, offset)))
     turned = np.arctan2(across, float(offset @ axis))
     yield "cone", "", float(turned - space.half_angle) * distance
@@ -107,7 +110,8 @@ def _of_position(
         points = (points @ ahead)[:, None] * ahead
     away = np.linalg.norm(points, axis=1)
     nearest, farthest = device.device.range_m
-    yield "range", "", float(max(nearest - away.max(), away.min() - farthest))
+    yield "range", "too near", float(nearest - away.max())
+    yield "range", "too far", float(away.min() - farthest)
 
 
 def _of_zones(space: Workspace, offset: Array) -> Iterator[tuple[str, str, float]]:
