@@ -129,21 +129,6 @@ def pan_tilt_roll(turns: Array, up: Array) -> Array:
     return angles + 0.0
 
 
-def turned_by(pan: float, tilt: float, roll: float, up: Array) -> Array:
-    """Return ``world_from_device`` rotations by angles about a world axis, (3, 3).
-
-    What `pan_tilt_roll` takes apart; with its e1, e2 and level::
-
-        z = cos(tilt) (cos(pan) e1 + sin(pan) e2) + sin(tilt) up
-        x = cos(roll) level + sin(roll) z x level
-    """
-    e1, e2 = horizontal_axes(up)
-    z = np.cos(tilt) * (np.cos(pan) * e1 + np.sin(pan) * e2) + np.sin(tilt) * up
-    level = np.sin(pan) * e1 - np.cos(pan) * e2
-    x = np.cos(roll) * level + np.sin(roll) * np.cross(z, level)
-    return np.stack([x, np.cross(z, x), z], axis=1)
-
-
 def turns_of(angles: Array, up: Array) -> Array:
     """Return the rotations of devices of a pan, tilt and roll, (..., 3) to (..., 3, 3).
 

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from planning.model.errors import PlanningError as PlanningError
     from planning.model.plan import RequirementError as RequirementError
     from planning.model.plan import RigPlan as RigPlan
+    from planning.rig.mounted import read_mounted as read_mounted
     from planning.rig.rig import Rig as Rig
     from planning.rig.rig import load_rig as load_rig
     from planning.scene.interest import read_selection as read_selection
@@ -34,6 +35,7 @@ _EXPORTS = {
     "load_mesh": "geometry.files.readers",
     "load_rig": "planning.rig.rig",
     "plan_rig": "planning.pipeline",
+    "read_mounted": "planning.rig.mounted",
     "read_ranges": "planning.scene.ranges.ranged_body",
     "read_selection": "planning.scene.interest",
     "read_weight": "planning.scene.interest",

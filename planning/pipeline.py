@@ -12,6 +12,7 @@ from planning.model.document.certificates import CamerasBy
 from planning.model.errors import InputError, TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
+from planning.model.words import count_words
 from planning.report.assemble import write_plan
 from planning.report.entries.device_entries import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
@@ -43,7 +44,7 @@ def plan_rig(
     mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
     rig: Rig,
     *,
-    max_projectors: int,
+    max_projectors: int | None,
     max_cameras: int | None = None,
     target: TargetName | None = None,
     select: Select | None = None,
@@ -70,7 +71,10 @@ def plan_rig(
         mesh: The surface, in metres; one for now. Or the body that `read_ranges` found:
             then limits are tightened by what isn't known of it.
         rig: Devices and limits, from `load_rig`.
-        max_projectors: Projectors at most.
+        max_projectors: Projectors at most; None: the fixed devices and those of the rig
+            file are evaluated as they stand. None is sought or moved, nothing is proved
+            of their number, and limits of the workspace that they break are told and
+            refuse nothing.
         max_cameras: Cameras at most; None: as many as the coverage needs.
         target: The `dominant` regions, or the whole `surface`; None: the former, and
             the latter of a body known by its ranges.
@@ -105,6 +109,10 @@ def plan_rig(
         RequirementError: If a requirement is missed; it carries the best plan.
         TimeLimitError: If the time limit came before any plan.
     """
+    rig = rig if fixed is None else fixed.on(rig)
+    evaluates = max_projectors is None
+    if max_projectors is None:
+        max_projectors, max_cameras = _standing(rig)
     wishes = Wishes(
         max_projectors=max_projectors,
         max_cameras=max_cameras,
@@ -115,7 +123,6 @@ def plan_rig(
         accuracy_mm=accuracy_mm,
         up=up,
     )
-    rig = rig if fixed is None else fixed.on(rig)
     clock = Stopwatch(progress, time_limit=time_limit)
     # BLAS must not split sums differently with another number of threads.
     with clock.ticking(), threadpool_limits(1):
@@ -127,117 +134,11 @@ def plan_rig(
             prove=prove,
             cameras_by=cameras_by,
             mounted=fixed,
+            evaluates=evaluates,
         )
-        plan, partial = _planned(request, clock, keep)
-        return _finished(plan, partial, clock, check=check, keep=keep)
-
-
-def evaluate_rig(
-    mesh: TriangleMesh,
-    rig: Rig,
-    devices: Mounted,
-    *,
-    target: TargetName | None = None,
-    select: Select | None = None,
-    weight: Weight | None = None,
-    dominant_coverage: float | None = None,
-    coverage: float | None = None,
-    min_reachable: float | None = None,
-    accuracy_mm: float | None = None,
-    up: str | None = None,
-    seed: int = 0,
-    threads: int = 2,
-    check: bool = True,
-    time_limit: float | None = None,
-    progress: Report | None = None,
-    command: Sequence[str] = (),
-    keep: Keep | None = None,
-) -> RigPlan:
-    """Return the plan of devices as they stand: what they measure, and its check.
-
-    No device is sought or moved, and nothing is proved of their number. Rings of
-    projectors that bring none are planned for them. Limits of the workspace that the
-    devices break are told, and refuse nothing.
-
-    Args:
-        mesh: The surface, in metres.
-        rig: Their optics, and the limits; its existing devices belong to them.
-        devices: From `read_mounted`.
-        target: As of `plan_rig`, like all that follow.
-        select: Faces that are the target.
-        weight: Of each vertex.
-        dominant_coverage: Lit / reachable by projectors.
-        coverage: Measured / reachable by cameras.
-        min_reachable: Reachable by projectors / target.
-        accuracy_mm: Largest standard deviation along the normal [mm].
-        up: Axis that points up.
-        seed: Of every random draw.
-        threads: Worker threads.
-        check: Whether the plan is audited and reconstructed from pixels.
-        time_limit: Wall time in [s].
-        progress: Receives a line when a stage begins.
-        command: Words of the command line, for the record.
-        keep: Receives the plan when it is made and not yet checked.
-
-    Returns:
-        The plan, every requirement met.
-
-    Raises:
-        InputError: If an argument can't be used, or there is no projector or no camera.
-        RequirementError: If a requirement is missed; it carries the plan.
-        TimeLimitError: If the time limit came first.
-    """
-    rig = devices.on(rig)
-    counts = {
-        kind: sum(table.kind == kind for table in rig.table.existing)
-        for kind in ("projector", "camera")
-    }
-    for kind, count in counts.items():
-        if not count:
-            raise InputError(
-                f"{devices.path}: holds no {kind}; a rig has one of either or more"
-            )
-    wishes = Wishes(
-        max_projectors=counts["projector"],
-        max_cameras=counts["camera"],
-        target=target,
-        dominant_coverage=dominant_coverage,
-        coverage=coverage,
-        min_reachable=min_reachable,
-        accuracy_mm=accuracy_mm,
-        up=up,
-    )
-    clock = Stopwatch(progress, time_limit=time_limit)
-    with clock.ticking(), threadpool_limits(1):
-        request = replace(
-            request_of(mesh, rig, wishes, clock, select=select, weight=weight),
-            seed=seed,
-            threads=threads,
-            command=tuple(command),
-            mounted=devices,
-            evaluates=True,
-        )
-        partial = as_they_stand(prepared(request, clock), clock)
-        plan = write_plan(partial, clock)
-        return _finished(plan, partial, clock, check=check, keep=keep)
-
-
-def _finished(
-    plan: RigPlan,
-    partial: PartialPlan,
-    clock: Stopwatch,
-    *,
-    check: bool,
-    keep: Keep | None,
-) -> RigPlan:
-    """Return a plan, checked if that is asked for, every requirement met.
-
-    Raises:
-        InterruptedPlanError: If the check is interrupted; it carries the plan as it is.
-        RequirementError: If a requirement is missed; it carries the plan.
-    """
-    if check and not plan.document.truncated:
-        plan = _checked(plan, partial, clock, keep)
+        plan, partial = (_evaluated if evaluates else _planned)(request, clock, keep)
+        if check and not plan.document.truncated:
+            plan = _checked(plan, partial, clock, keep)
     if missed := missed_by(plan, check=check):
         raise RequirementError(plan, missed)
     return plan
@@ -249,6 +150,31 @@ def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
     return missed
+
+
+def _standing(rig: Rig) -> tuple[int, int]:
+    """How many projectors and cameras of a rig stand already.
+
+    Raises:
+        InputError: If none of either does.
+    """
+    kinds = [table.kind for table in rig.table.existing]
+    counts = kinds.count("projector"), kinds.count("camera")
+    if not all(counts):
+        raise InputError(
+            f"{count_words(counts[0], 'projector')} and "
+            f"{count_words(counts[1], 'camera')} stand; a rig measures with one of "
+            f"either or more"
+        )
+    return counts
+
+
+def _evaluated(
+    request: PlanRequest, clock: Stopwatch, keep: Keep | None
+) -> tuple[RigPlan, PartialPlan]:
+    """The devices as they stand, and their rings."""
+    partial = as_they_stand(prepared(request, clock), clock)
+    return write_plan(partial, clock), partial
 
 
 def _planned(

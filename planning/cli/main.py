@@ -81,7 +81,7 @@ def commands() -> None:
 
     \b
     plan --mesh face.obj --max-projectors 3   plans, checks, writes ./face-plan/
-    plan evaluate --mesh F --poses mounted.csv  what a rig measures as it stands
+    plan evaluate face.obj --poses rig.csv    what a rig measures as it stands
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
     plan lens --mesh face.obj                 which lens and focus suit an object

@@ -1,7 +1,6 @@
 """What `plan --mesh` and `plan --ranges` do."""
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +9,12 @@ import click
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
-from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
+from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Report, Stopwatch
-from planning.pipeline import evaluate_rig, missed_by, plan_rig
+from planning.pipeline import missed_by, plan_rig
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.summary.summary import summary
-from planning.rig.mounted import read_mounted, split_fixed
+from planning.rig.mounted import Mounted, read_mounted, split_fixed
 from planning.rig.rig import Rig, load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import RangedBody, read_ranges
@@ -24,8 +23,10 @@ from .console import print_json, reporter, writable
 from .object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
-# Options that are taken as they are: by both, and where devices are sought.
+# Options that `plan_rig` takes as they are.
 _ASKED = (
+    "max_projectors",
+    "max_cameras",
     "target",
     "dominant_coverage",
     "coverage",
@@ -33,10 +34,11 @@ _ASKED = (
     "accuracy_mm",
     "up",
     "seed",
+    "prove",
+    "cameras_by",
 )
 # Of a time limit: the rest is for the interpreter, which begins and ends beside it.
 _OURS = 0.95
-_PLANNED = ("max_projectors", "max_cameras", "prove", "cameras_by")
 
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
@@ -46,18 +48,20 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     clock = Stopwatch(time_limit=limit, begin=begin)
     report = reporter(quiet=options["quiet"])
     path = Path(options["ranges"] or options["meshes"][0])
-    result = "plan" if options["poses"] is None else "evaluation"
+    result = "plan" if options["max_projectors"] else "evaluation"
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
     saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
     check, interrupted = not options["no_check"], False
     with writable(folder):
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
-            make = _maker(options, rig)
+            fixed = _fixed(options["fixed"], rig)
             surface, interest = _read(path, options, rig, report)
         try:
-            plan = make(
+            plan = plan_rig(
                 surface,
+                rig,
+                fixed=fixed,
                 select=interest,
                 threads=options["threads"] or n_threads(),
                 check=check,
@@ -83,17 +87,12 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     return RequirementError.exit_code if missed else 0
 
 
-def _maker(options: Mapping[str, Any], rig: Rig) -> Callable[..., RigPlan]:
-    """What plans with the rig, around fixed devices or not, or evaluates devices."""
-    if options["poses"] is not None:
-        devices = read_mounted(options["poses"], rig)
-        return partial(evaluate_rig, rig=rig, devices=devices)
-    fixed = None
-    if options["fixed"] is not None:
-        path, names = split_fixed(options["fixed"])
-        fixed = read_mounted(path, rig, names)
-    asked = {name: options[name] for name in _PLANNED}
-    return partial(plan_rig, rig=rig, fixed=fixed, **asked)
+def _fixed(words: str | None, rig: Rig) -> Mounted | None:
+    """Read devices that stay where they are: all of a file, or those that are named."""
+    if words is None:
+        return None
+    path, names = split_fixed(words)
+    return read_mounted(path, rig, names)
 
 
 def _read(

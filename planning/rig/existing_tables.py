@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from geometry.devices import DeviceModel
-from geometry.poses import turned_by
+from geometry.poses import turns_of
 from planning.model.bodies import Body, BodyTable
 from planning.model.device_poses import rounded_pose
 from planning.model.errors import InfeasibleLimitsError
@@ -84,8 +84,8 @@ class ExistingTable(Table):
             aim = origin + 1e-3 * np.array(self.aim_mm)
             return aimed_poses(position[None], aim, up, device, roll=roll)[0]
         pose = np.eye(4)
-        pan, tilt = (np.radians(a or 0.0) for a in (self.pan_deg, self.tilt_deg))
-        pose[:3, :3], pose[:3, 3] = turned_by(pan, tilt, roll, up), position
+        degrees = self.pan_deg or 0.0, self.tilt_deg or 0.0, self.roll_deg
+        pose[:3, :3], pose[:3, 3] = turns_of(np.radians(degrees), up), position
         return pose
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from planning.model.csv_rows import CsvRow, read_csv
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -22,6 +21,7 @@ from planning.model.requirements import Existing, Requirements, Workspace
 from planning.model.surface import Surface
 from planning.model.table_types import fault_words
 from planning.scene.placed_bodies import Device, kind_of
+from planning.scene.ranges.csv_rows import CsvRow, read_csv
 
 from .existing_tables import ExistingTable
 from .rig import Rig

@@ -1,6 +1,7 @@
 """`plan evaluate --mesh FILE --poses FILE`: its options, most of them the planner's."""
 
 import sys
+from pathlib import Path
 from typing import Any
 
 import click
@@ -9,17 +10,34 @@ from planning.cli.console import run
 
 from .plan_declared import check_options, rig_command
 
-# What devices that stand don't take: there is nothing to seek, and no body of ranges.
-_OF_PLANS = {"ranges", "max_projectors", "max_cameras", "prove", "cameras_by", "fixed"}
+# What a rig that stands doesn't take: nothing is sought, and the mesh is known. As if
+# they weren't given; `--poses` is what `--fixed` is to a plan.
+_OF_PLANS = {
+    "ranges": None,
+    "max_projectors": None,
+    "max_cameras": None,
+    "fixed": None,
+    "prove": False,
+    "cameras_by": "both",
+}
 
 
-@click.command(params=[p for p in rig_command.params if p.name not in _OF_PLANS])
+@click.command(
+    params=[p for p in rig_command.params if p.name not in {*_OF_PLANS, "output"}]
+)
 @click.option(
     "--poses",
     required=True,
     metavar="mounted.csv|plan.json",
     help="Where the devices stand: a CSV file with name, kind, x_mm, y_mm, z_mm and an "
-    "aim, angles or a quaternion, or the plan whose devices and rings are kept.",
+    "aim, angles or a quaternion; or a plan, whose rings are kept, too.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Output folder [default: ./NAME-evaluation].",
 )
 def evaluate(**options: Any) -> None:  # noqa: ANN401
     """Say what a rig measures as it stands; nothing is sought, moved or proved.
@@ -29,8 +47,8 @@ def evaluate(**options: Any) -> None:  # noqa: ANN401
     """
     from planning.cli.plan_command import plan_command
 
-    if not options["meshes"]:
+    if not options["meshes"] + options["files"]:
         raise click.UsageError("give --mesh FILE")
-    options |= dict.fromkeys(_OF_PLANS)
+    options |= _OF_PLANS | {"fixed": options["poses"]}
     check_options(options)
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

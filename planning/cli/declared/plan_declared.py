@@ -159,7 +159,6 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.plan_command import plan_command
 
     check_options(options)
-    options["poses"] = None
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from geometry.shapes.sight_lines import SightLines
-from planning.model.csv_rows import CsvRow, read_csv
 from planning.model.errors import InputError
+
+from .csv_rows import CsvRow, read_csv
 
 REQUIRED = ("point", "x_mm", "y_mm", "z_mm", "dx", "dy", "dz", "sigma_deg")
 OPTIONAL = ("range_mm", "sigma_mm")

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from geometry.files.file_content import file_content
-
-from .errors import InputError
+from planning.model.errors import InputError
 
 # As the largest number of a rig file: beyond any rig.
 _LARGEST = 1e9
