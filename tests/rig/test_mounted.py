@@ -220,9 +220,8 @@ def test_rings_of_a_plan_stay_and_are_written_down(plan_file):
 
 
 def test_a_plan_of_another_rig_is_refused(plan_file):
-    plan, path = plan_file
     with pytest.raises(
         InputError,
         match=r"P1 has K = .* a projector of rig 'default' .* --rig the file",
     ):
-        read_mounted(path, load_rig())
+        read_mounted(plan_file[1], load_rig())
