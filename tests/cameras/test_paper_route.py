@@ -17,7 +17,7 @@ from planning.cameras.paper.camera_rings import camera_rings
 from planning.cameras.paper.paper_route import paper_route
 from planning.cameras.paper.route_problem import CameraSet, RouteProblem
 from planning.cameras.paper.route_starts import grown
-from planning.model.bodies import Box
+from planning.model.bodies import Box, Mount
 from planning.model.planned import PlannedCamera
 
 THETA = np.radians(60.0)
@@ -258,3 +258,16 @@ def test_a_pose_at_the_limit_keeps_the_workspace_and_what_stands_already():
     fixed = [replace(pair[0], existing="old"), pair[1]]
     (other,) = limit_poses(fixed, *seen, free, shares_past=(0.0,))
     assert azimuths([other])[0] > 0.0
+
+
+def test_a_pose_at_the_limit_is_one_that_the_mount_can_be_set_to():
+    body = band(np.radians(2.0), span=np.radians(110.0))
+    pair = [at(-0.6), at(0.6)]
+    clicks = workspace(camera_mount=Mount(pan_step=np.radians(15.0)))
+    limits = BaselineLimits(THETA, 0.0, clicks)
+    found = limit_poses(pair, body.surface, body.measure(pair), limits)
+    assert len(found) >= 2
+    for camera in found:
+        axis = camera.world_from_device[:3, 2]
+        pan = np.degrees(np.arctan2(axis[1], axis[0]))
+        assert pan / 15.0 == pytest.approx(round(pan / 15.0), abs=1e-9)

@@ -635,6 +635,14 @@ def test_example_of_the_documentation_loads(write):
     )
 
 
+def test_rig_files_of_the_documentation_load():
+    folder = Path(__file__).parents[2] / "docs" / "use" / "rigs"
+    paths = sorted(folder.glob("*.toml"))
+    assert len(paths) >= 4
+    for path in paths:
+        assert require(load_rig(path)).max_projectors, path
+
+
 def test_documentation_names_every_key():
     page = (
         Path(__file__).parents[2] / "docs" / "reference" / "rig-files.md"

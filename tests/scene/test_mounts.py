@@ -18,6 +18,7 @@ from planning.scene.workspace.admissible import admissible
 from planning.scene.workspace.candidates import Candidates, aimed_poses
 from planning.scene.workspace.mount_settings import device_from_mount, settable
 from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.devices.mount_claims import _off_steps
 
 LEVEL = "[camera.mount]\noffset_mm = [0, 30, -40]\naxis = [0, 2, 0]\n"
 
@@ -165,6 +166,28 @@ def test_steps_alone_turn_by_half_a_step_at_most_and_leave_the_place():
     for before, after in zip(poses, found, strict=True):
         turned = angles_by_hand(after) - angles_by_hand(before)
         assert np.all(np.abs((turned + 180.0) % 360.0 - 180.0) <= 2.5 + 1e-6)
+
+
+@pytest.mark.parametrize("up", ["+x", "-x", "+y", "-y", "+z", "-z"])
+@pytest.mark.parametrize("rolls", [(), (0.0, QUARTER)])
+def test_planner_and_audit_agree_about_settings_whatever_is_up(up, rolls):
+    way = np.eye(3)["xyz".index(up[1])] * (1.0 if up[0] == "+" else -1.0)
+    device = device_of("projector")
+    mount = Mount(None, None, rolls, 3 * FIVE, FIVE)
+    space = replace(SPACE, up=tuple(way), projector_mount=mount)
+    ways = np.random.default_rng(3).normal(size=(80, 3))
+    # Among them some that look straight up and down.
+    ways = np.concatenate([ways, [way, -way]])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    poses = aimed_poses(CENTRE + 1.1 * ways, CENTRE, way, device.device, roll=0.3)
+    found = settable(space, device, poses)
+    assert len(found) > 40
+    for off in _off_steps(mount, found[:, :3, :3], way).values():
+        assert off.max() < 1e-7
+    before = _off_steps(mount, poses[:, :3, :3], way)
+    assert before["pan"].max() > 0.05
+    assert before["tilt"].max() > 0.02
+    assert (before["roll"].max() > 0.1) == bool(rolls)
 
 
 def test_grids_take_the_nearest_place_that_the_workspace_has():
