@@ -33,6 +33,7 @@ from planning.proofs.candidate_certificate import larger, unproved
 from planning.proofs.selection import CandidateCover, Selection
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
+from planning.report.advice.standing_inside import standing_inside
 from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.rings.axis_moves import move_ring_axes
@@ -57,6 +58,7 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
             stage = plan_projectors(ready.scene, ready.template, n_poses)
         except NothingLitError as error:
             helps = nothing_lit(ready.scene, error)
+            helps += standing_inside(ready.scene, error.candidates.projectors)
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
         _say_count(stage, stage.projectors, clock)
     return stage
@@ -90,6 +92,7 @@ def placed(ready: Prepared, stage: ProjectorStage, clock: Stopwatch) -> PartialP
             solution = place_cameras(scene, projectors, views, request.cameras_by)
         except NothingMeasuredError as error:
             helps = nothing_measured(scene, request.rig, error)
+            helps += standing_inside(scene, error.cameras)
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
         cameras = solution.stage
         _say_count(cameras, cameras.cameras, clock)
