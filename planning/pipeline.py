@@ -17,6 +17,7 @@ from planning.report.assemble import write_plan
 from planning.report.entries.device_entries import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
+from planning.rig.lens_fit import check_fields
 from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
 from planning.rig.wishes import TargetName, Wishes
@@ -227,6 +228,7 @@ def _first_kept(partial: PartialPlan, clock: Stopwatch, keep: Keep | None) -> Ri
 
 def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
     """Sections III and VI: regions, projectors, cameras; each the fewest."""
+    check_fields(request.rig.fits(request.mesh))
     ready = prepared(request, clock)
     stage = bounded_projectors(ready, first_projectors(ready, clock), clock)
     return placed(ready, stage, clock)

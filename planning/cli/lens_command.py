@@ -11,14 +11,14 @@ from planning.rig.lens_fit import LensFit
 from planning.rig.rig import load_rig
 
 from .console import print_json
-from .object_lines import fits_of, size_lines
+from .object_lines import size_lines
 
 
 def lens_command(options: Mapping[str, Any]) -> int:
     """Print fields, sharpness and what would fit; return 0."""
     rig = load_rig(options["rig_name"], light=options["light"], checked=False)
     mesh = load_mesh(options["mesh"], unit=options["unit"], size_mm=options["size_mm"])
-    fits = fits_of(rig, mesh)
+    fits = rig.fits(mesh)
     if options["as_json"]:
         print_json({fit.role: fit.to_document() for fit in fits})
         return 0

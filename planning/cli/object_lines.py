@@ -2,13 +2,11 @@
 
 from collections.abc import Iterator
 
-from scipy.spatial import ConvexHull
-
 from geometry.mesh.extent import body_areas
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.words import percent
-from planning.rig.lens_fit import LensFit, optics_notes
-from planning.rig.rig import DEVICE_ROLES, Rig
+from planning.rig.lens_fit import optics_notes
+from planning.rig.rig import Rig
 
 # So many bodies are told one by one.
 _MOST_BODIES = 4
@@ -35,17 +33,6 @@ def size_lines(mesh: TriangleMesh) -> Iterator[str]:
         )
 
 
-def fits_of(rig: Rig, mesh: TriangleMesh) -> tuple[LensFit, ...]:
-    """Return how the camera and the projector of a rig suit an object.
-
-    A convex body's shadow is a quarter of its surface, as a mean over all directions
-    (Cauchy); the object's is that of its convex hull.
-    """
-    # Joggled, so that a flat plate has a hull, of both its sides.
-    shadow = ConvexHull(mesh.vertices, qhull_options="QJ").area / 4.0
-    return tuple(rig.fit(role, mesh.radius, float(shadow)) for role in DEVICE_ROLES)
-
-
 def optics_lines(rig: Rig, mesh: TriangleMesh) -> list[str]:
     """Return a line for each device whose optics leave most of its image unused."""
-    return [f"  {note}" for note in optics_notes(fits_of(rig, mesh))]
+    return [f"  {note}" for note in optics_notes(rig.fits(mesh))]

@@ -13,6 +13,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.words import percent
 
 from . import optics
+from .object_size import ObjectSize
 from .rig_tables import ParallelTable, PinholeTable
 
 # One view of an object that takes more images side by side is refused: candidates grow
@@ -48,8 +49,7 @@ class LensFit:
         device: Its optics.
         standoff_m: Distance from the surface [m].
         play_m: How much nearer or farther it may stand [m].
-        radius_m: Of the smallest ball that holds the object; 0: of no size [m].
-        shadow_m2: Mean area of its shadow over all directions; None: the ball's.
+        size: Of the object.
     """
 
     role: str
@@ -57,8 +57,12 @@ class LensFit:
     device: DeviceModel
     standoff_m: float
     play_m: float
-    radius_m: float = 0.0
-    shadow_m2: float | None = None
+    size: ObjectSize
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the smallest ball that holds the object [m]."""
+        return self.size.radius_m
 
     @property
     def middle_m(self) -> float:
@@ -74,8 +78,12 @@ class LensFit:
     @property
     def images(self) -> int:
         """Images side by side that one view of the whole object takes."""
-        each = np.maximum(np.ceil(2.0 * self.radius_m / np.array(self.field_m)), 1.0)
-        return int(np.prod(each))
+        long, short = self.size.sides_m
+        fields = self.field_m, self.field_m[::-1]
+        return min(
+            max(math.ceil(long / width), 1) * max(math.ceil(short / height), 1)
+            for width, height in fields
+        )
 
     @property
     def share(self) -> float:
@@ -85,11 +93,10 @@ class LensFit:
 
             S / (p^2 w h),   1 at most
         """
-        shadow = self.shadow_m2
-        if shadow is None:
-            shadow = math.pi * self.radius_m**2
         width, height = self.device.resolution
-        filled = shadow / (self.device.pixel_m(self.middle_m) ** 2 * width * height)
+        filled = self.size.shadow_m2 / (
+            self.device.pixel_m(self.middle_m) ** 2 * width * height
+        )
         return min(1.0, filled)
 
     @property
@@ -253,24 +260,25 @@ class LensFit:
         }
 
 
-def check_field(fit: LensFit) -> None:
-    """Refuse a device whose field is so small that a plan would take hours.
+def check_fields(fits: Sequence[LensFit]) -> None:
+    """Refuse devices whose field is so small that a plan would take hours.
 
     Raises:
         InfeasibleLimitsError: It says which lens and which standoff would do.
     """
-    if fit.images <= _MOST_IMAGES:
-        return
-    across = " x ".join(f"{1e3 * side:.3g}" for side in fit.field_m)
-    away = fit.standoff_that_holds_m
-    farther = "" if away is None else f", or this one from {1e3 * away:.0f} mm on"
-    raise InfeasibleLimitsError(
-        f"the {fit.role} {fit.table.name} sees {across} mm at the standoff of "
-        f"{1e3 * fit.standoff_m:g} mm, and the object is {2e3 * fit.radius_m:.0f} mm "
-        f"across: one view of it takes {fit.images} images, {_MOST_IMAGES} at most. At "
-        f"that standoff {fit.advice()}{farther}; check the mesh's unit, and see "
-        f"`plan lens`"
-    )
+    for fit in fits:
+        if fit.images <= _MOST_IMAGES:
+            continue
+        across = " x ".join(f"{1e3 * side:.3g}" for side in fit.field_m)
+        away = fit.standoff_that_holds_m
+        farther = "" if away is None else f", or this one from {1e3 * away:.0f} mm on"
+        raise InfeasibleLimitsError(
+            f"the {fit.role} {fit.table.name} sees {across} mm at the standoff of "
+            f"{1e3 * fit.standoff_m:g} mm, and the object is {2e3 * fit.radius_m:.0f} "
+            f"mm across: one view of it takes {fit.images} images, {_MOST_IMAGES} at "
+            f"most. At that standoff {fit.advice()}{farther}; check the mesh's unit, "
+            f"and see `plan lens`"
+        )
 
 
 def optics_notes(fits: Sequence[LensFit]) -> Iterator[str]:

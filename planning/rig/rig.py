@@ -23,7 +23,8 @@ from planning.model.requirements import Requirements, Workspace
 from planning.scene.lights import light_of
 
 from .existing_tables import build_existing, check_existing
-from .lens_fit import LensFit, check_field, unsharp
+from .lens_fit import LensFit, unsharp
+from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
 from .rig_files import read_rig, rig_folder
@@ -32,7 +33,6 @@ from .rig_tables import ParallelTable, PinholeTable, RigTable
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
-DEVICE_ROLES = "camera", "projector"
 
 _WARN_INCIDENCE_DEG = 70.0
 
@@ -138,15 +138,18 @@ class Rig:
         tables = {"projector": self._projector_table, "camera": self.table.camera}
         return {f"{kind}_mount": Mount.of(each.mount) for kind, each in tables.items()}
 
-    def fit(
-        self, role: str, radius_m: float = 0.0, shadow_m2: float | None = None
-    ) -> LensFit:
+    def fit(self, role: str, size: ObjectSize) -> LensFit:
         """Return how `camera` or `projector` suits an object, see `LensFit`."""
         projects = role == "projector"
         table = self._projector_table if projects else self.table.camera
         device = self._projector if projects else self._camera
         stands = self.standoff_m, self.standoff_play_m
-        return LensFit(role, table, device, *stands, radius_m, shadow_m2)
+        return LensFit(role, table, device, *stands, size)
+
+    def fits(self, mesh: TriangleMesh) -> tuple[LensFit, ...]:
+        """Return how camera and projector suit an object."""
+        size = ObjectSize.of(mesh)
+        return tuple(self.fit(role, size) for role in ("camera", "projector"))
 
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
@@ -201,8 +204,6 @@ class Rig:
             ),
         )
         workspace = replace(workspace, **self.mounts())
-        for role in DEVICE_ROLES:
-            check_field(self.fit(role, object_radius_m))
         required = build_requirements(self.table, wishes, workspace, tau_m=tau_m)
         devices = {
             "projector": (projector, self.projector_body()),
@@ -305,7 +306,9 @@ def _check_devices(rig: Rig) -> None:
     for role, device in devices.items():
         low, high = device.range_m
         if not low <= rig.standoff_m <= high:
-            raise InfeasibleLimitsError(f"rig {rig.name}: {unsharp(rig.fit(role))}")
+            raise InfeasibleLimitsError(
+                f"rig {rig.name}: {unsharp(rig.fit(role, ObjectSize.ball(0.0)))}"
+            )
     if not math.isfinite(rig.outer_ring_radius()):
         raise RigError(
             f"rig {rig.name}: rings.tilt_deg = {rig.table.rings.tilt_deg:g} turns the "

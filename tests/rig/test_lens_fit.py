@@ -7,15 +7,18 @@ import sys
 
 import numpy as np
 import pytest
-from support.factories import make_requirements, make_rig
+from support.factories import make_rig
 from support.plain_shapes import box, joined
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning.cli.main import main
-from planning.cli.object_lines import fits_of, optics_lines, size_lines
+from planning.cli.object_lines import optics_lines, size_lines
 from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.pipeline import plan_rig
 from planning.rig import optics
+from planning.rig.lens_fit import check_fields
+from planning.rig.object_size import ObjectSize
 from planning.rig.rig import load_rig
 
 BALL = 0.13
@@ -61,7 +64,7 @@ def test_depths_that_no_lens_images_are_refused():
 
 
 def test_a_ball_in_a_centred_image_has_closed_forms():
-    fit = make_rig().fit("camera", BALL)
+    fit = make_rig().fit("camera", ObjectSize.ball(BALL))
     disc = math.pi * (BALL * FOCAL_PX / DISTANCE) ** 2
     assert fit.share == pytest.approx(disc / (2048 * 1536))
     width, height = fit.field_m
@@ -76,7 +79,7 @@ def test_a_ball_in_a_centred_image_has_closed_forms():
 
 
 def test_the_longest_lens_of_a_shifted_projector_is_the_longest_that_holds_the_ball():
-    fit = make_rig().fit("projector", BALL)
+    fit = make_rig().fit("projector", ObjectSize.ball(BALL))
     best = fit.fitting.focal_px / fit.device.focal_px
     for factor, holds in ((0.999, True), (1.001, False), (2.0, False)):
         matrix = fit.device.camera_matrix * [[factor, 1, 1], [1, factor, 1], [1, 1, 1]]
@@ -90,7 +93,7 @@ def test_the_longest_lens_of_a_shifted_projector_is_the_longest_that_holds_the_b
 
 def test_a_lens_too_long_to_be_sharp_gives_way_to_one_that_is():
     """A ball of 20 mm: what would fill the image has no depth at any stop."""
-    fit = make_rig().fit("camera", 0.01)
+    fit = make_rig().fit("camera", ObjectSize.ball(0.01))
     near, far = fit.depths_m
     focal = fit.fitting.focal_px * PIXEL_M
     assert focal < 768 * PIXEL_M / math.tan(math.asin(0.01 / 1.01))
@@ -101,7 +104,7 @@ def test_a_lens_too_long_to_be_sharp_gives_way_to_one_that_is():
 
 
 def test_parallel_light_fits_by_its_pixels():
-    fit = make_rig("parallel").fit("projector", BALL)
+    fit = make_rig("parallel").fit("projector", ObjectSize.ball(BALL))
     assert fit.fitting.pixel_pitch_m == pytest.approx(2 * BALL / 768)
     assert fit.share == pytest.approx(math.pi * BALL**2 / (1024 * 768 * 0.8e-3**2))
     assert fit.standoff_that_holds_m is None
@@ -111,7 +114,7 @@ def test_a_bodys_shadow_is_a_quarter_of_its_hull(write):
     """Of a box (ab + bc + ca) / 2; a notch in it casts no smaller one."""
     sides = (0.2, 0.1, 0.05)
     pair = joined(box(sides), moved(box((0.02, 0.02, 0.02)), [0.0, 0.0, 0.0]))
-    fits = fits_of(load_rig(write(CENTRED)), pair)
+    fits = load_rig(write(CENTRED)).fits(pair)
     shadow = (0.2 * 0.1 + 0.1 * 0.05 + 0.05 * 0.2) / 2
     for fit, pixel in zip(fits, (1 / FOCAL_PX, 1 / 1500), strict=True):
         side = pixel * fit.middle_m
@@ -128,8 +131,8 @@ def test_a_thin_plate_has_a_shadow_too():
         np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]]),
         np.array([[0, 1, 2], [0, 2, 3]]),
     )
-    fit = fits_of(make_rig(), plate)[0]
-    assert fit.shadow_m2 == pytest.approx(0.005, rel=1e-6)
+    fit = make_rig().fits(plate)[0]
+    assert fit.size.shadow_m2 == pytest.approx(0.005, rel=1e-6)
 
 
 @pytest.mark.parametrize(("radius", "told"), [(0.04, True), (0.2, False)])
@@ -145,10 +148,9 @@ def test_an_object_that_leaves_the_image_empty_is_told_what_would_fill_it(radius
 def test_a_field_far_smaller_than_the_object_is_refused_with_what_would_fit(write):
     """64 images at most, of 0.5888 x 0.4416 m each."""
     rig = load_rig(write(CENTRED))
-    required = make_requirements(sphere(1.98), rig, max_projectors=3)
-    assert required.workspace.camera_standoff_m == 1.0
+    check_fields(rig.fits(sphere(1.98)))
     with pytest.raises(InfeasibleLimitsError) as caught:
-        make_requirements(sphere(2.0), rig, max_projectors=3)
+        plan_rig(sphere(2.0), rig, max_projectors=3, target="surface", check=False)
     message = str(caught.value)
     assert "sees 589 x 442 mm at the standoff of 1000 mm" in message
     assert f"takes {7 * 10} images, 64 at most" in message
@@ -157,6 +159,17 @@ def test_a_field_far_smaller_than_the_object_is_refused_with_what_would_fit(writ
     assert f"a lens of {1e3 * lens:.3g} mm would show all of it" in message
     away = 2.0 / math.sin(math.atan(768 / FOCAL_PX)) - 2.0
     assert f"or this one from {1e3 * away:.0f} mm on" in message
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_a_long_part_takes_a_row_of_images_however_it_lies(turn):
+    """12 m of a bar 0.2 m wide: by its ball it would be 21 x 28 images."""
+    bar = box((12.0, 0.2, 0.1))
+    c, s = math.cos(turn), math.sin(turn)
+    rolled = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    fits = make_rig().fits(TriangleMesh(bar.vertices @ rolled.T, bar.faces))
+    assert [fit.images for fit in fits] == [math.ceil(12 / 0.5888), 21]
+    check_fields(fits)
 
 
 @pytest.mark.parametrize(
