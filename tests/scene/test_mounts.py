@@ -4,7 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.factories import make_camera, make_projector, make_rig, make_workspace
+from support.factories import (
+    make_camera,
+    make_projector,
+    make_requirements,
+    make_rig,
+    make_scene,
+    make_workspace,
+)
 from support.plain_shapes import box as plate_of
 
 from geometry.mesh.mesh import TriangleMesh
@@ -12,8 +19,13 @@ from planning import RequirementError, load_rig, plan_rig
 from planning.model.bodies import Mount
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan
-from planning.report.advice.least_changes import larger_workspaces
+from planning.report.advice.least_changes import ANY_SETTING, larger_workspaces
+from planning.report.advice.projector_relaxations import reachability_relaxations
+from planning.report.reach import furthest_lit
+from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.summary import summary
+from planning.scene.draws import DRAWS
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.admissible import admissible
 from planning.scene.workspace.candidates import Candidates, aimed_poses
 from planning.scene.workspace.mount_settings import device_from_mount, settable
@@ -251,6 +263,36 @@ def test_a_mount_that_can_be_set_to_nothing_is_named():
     (change,) = larger_workspaces(space, "camera")
     assert change[1].camera_mount == Mount()
     assert not list(larger_workspaces(space, "projector"))
+
+
+def test_it_is_told_what_a_coarse_mount_costs(handmade):
+    plate = plate_of((0.1, 0.1, 0.02), divisions=4)
+    rig = make_rig()
+    required = make_requirements(plate, rig, max_projectors=3)
+    coarse = Mount(pan_step=QUARTER, tilt_step=QUARTER)
+    space = replace(required.workspace, projector_mount=coarse)
+    scene = make_scene(plate, replace(required, workspace=space))
+    device = make_projector(rig, [0.1, 0.2])
+    reference = Candidates(device, space).over(30)
+    told = reachability_relaxations(scene, reference)
+    (free,) = [step for step in told if step.change == ANY_SETTING]
+    assert free.reachable_share > 0.95
+    assert furthest_share(scene, reference) < free.reachable_share - 0.1
+
+    def change(document):
+        document["coverage"]["relaxations"] = [free.to_document()]
+        target = document["coverage"]["target"]
+        target["reachable_by_projectors_m2"] = 0.5 * target["area_m2"]
+
+    lines = coverage_lines(handmade.tampered(handmade.build_plan(), change))
+    (line,) = [line for line in lines if ANY_SETTING in line]
+    assert line.endswith("of the target, not 50.0 %")
+
+
+def furthest_share(scene, projectors):
+    """The share of fresh samples that any of them lights."""
+    target = scene.target_samples(DRAWS.baselines)
+    return float(np.mean(furthest_lit(scene, projectors, target) == LIT))
 
 
 # ---- a whole plan

@@ -68,8 +68,10 @@ def out_of_reach(
     for moved, rest in among.less_one_obstacle():
         gained = measured_by_any(rest, devices.reference_cameras, unmeasured)
         changes[f"{moved} out of the way"] = int(gained.sum())
-    larger = larger_workspaces(required.workspace, "camera") if share.wanted > 0 else ()
-    for change, whole in larger:
+    mount = required.workspace.camera_mount
+    stepped = mount is not None and mount.is_stepped
+    larger = larger_workspaces(required.workspace, "camera")
+    for change, whole in larger if share.wanted > 0 or stepped else ():
         camera = devices.reference_cameras[0]
         site = scene.site("camera", camera.device)
         site_there = None if site is None else replace(site, workspace=whole)

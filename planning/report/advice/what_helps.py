@@ -11,19 +11,26 @@ from planning.report.partial_plan import PartialPlan
 from .camera_relaxations import for_so_many, out_of_reach
 from .projector_relaxations import reachability_relaxations, wider_field
 
+# Share of reach from which on what mounts cost isn't worth telling.
+_TOLD = 0.99
+
 
 def with_relaxations(
     partial: PartialPlan, devices: Devices, claims: Claims, clock: Stopwatch
 ) -> Coverage:
-    """Return the claims' coverage with what would let devices reach enough."""
-    coverage, least = claims.coverage, partial.scene.requirements.min_reachable
-    areas = coverage.target
+    """Return the claims' coverage with what would let devices reach enough.
+
+    Of mounts that can't be set to everything: with what that costs, too.
+    """
+    coverage, areas = claims.coverage, claims.coverage.target
+    least = _asked_reach(partial, "projector")
     if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
             relaxations = reachability_relaxations(
                 partial.scene, devices.reference_projectors
             )
         coverage = coverage.changed(relaxations=relaxations)
+    least = _asked_reach(partial, "camera")
     if falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least):
         with _timed(clock):
             causes, relaxations = out_of_reach(
@@ -57,6 +64,14 @@ def with_fewer_needed(
             needed = cameras.needed.changed(relaxations=changes)
             proofs = proofs.changed(cameras=cameras.changed(needed=needed))
     return proofs
+
+
+def _asked_reach(partial: PartialPlan, kind: str) -> float:
+    """The share of reach below which it is said what would give more."""
+    required = partial.scene.requirements
+    mount = required.workspace.mount_of(kind)
+    told = _TOLD if mount is not None and mount.is_stepped else 0.0
+    return max(required.min_reachable, told)
 
 
 def falls_short(area_m2: float, whole_m2: float, share: float) -> bool:

@@ -4,6 +4,7 @@ from planning.model.document.coverage_records import CameraMarginal, ProjectorMa
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, labelled, percent
+from planning.report.advice.least_changes import ANY_SETTING
 
 from .proof_lines import user_selection
 from .shortfall import causes_line
@@ -42,12 +43,37 @@ def coverage_lines(plan: RigPlan) -> list[str]:
         lines.append(f"not measured: {causes_line(causes, target.area_m2)}")
     if blocked := coverage.blocked_by_obstacle_m2:
         lines.append(_behind(blocked))
-    lines += [*_apart(document), *_idle(document)]
+    lines += [*_lost_to_mounts(plan), *_apart(document), *_idle(document)]
     return [
         "",
         *labelled("", table),
         *labelled("COVERAGE", lines),
         *schedule_lines(document),
+    ]
+
+
+def _lost_to_mounts(plan: RigPlan) -> list[str]:
+    """Say how much more could be reached, were mounts set to anything."""
+    coverage, target = plan.coverage, plan.coverage.target
+    return [
+        f"{step.change} would let {kind} reach {percent(step.reachable_share)} of "
+        f"{whole}, not {percent(share)}"
+        for kind, whole, share, steps in (
+            (
+                "projectors",
+                "the target",
+                target.reachable_by_projectors_m2 / target.area_m2,
+                coverage.relaxations,
+            ),
+            (
+                "cameras",
+                "what is lit",
+                target.reachable_by_cameras_m2 / max(target.lit_m2, 1e-12),
+                coverage.camera_relaxations,
+            ),
+        )
+        for step in steps
+        if step.change == ANY_SETTING
     ]
 
 
