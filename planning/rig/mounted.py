@@ -48,7 +48,7 @@ class Mounted:
         sha256: Of that file.
         tables: Their poses, one entry of `[[existing]]` each.
         rings: Ring frame and radii of projectors whose rings stay, by name.
-        plan: Whose devices they are; None: of no plan.
+        plan: Whose devices these all are; None: of no plan.
     """
 
     path: str
@@ -231,7 +231,9 @@ def _of_plan(path: Path, rig: Rig, only: Sequence[str] | None) -> Mounted:
         if isinstance(device, PlannedProjector) and name in spaced:
             rings[called] = device
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return Mounted(str(path), digest, tuple(tables), rings, plan)
+    # Without one of its devices, it isn't this plan.
+    whole = plan if len(tables) == len(devices) else None
+    return Mounted(str(path), digest, tuple(tables), rings, whole)
 
 
 def _chosen(names: list[str], only: Sequence[str] | None, path: str) -> Sequence[str]:
