@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.rays.proximity import closest_points
+from geometry.shapes.primitives import sphere
 from planning.model.errors import CapturesError
 from planning.model.plan import RigPlan
 from planning.verify.audit.coverage.prediction import predict_measured
@@ -410,6 +412,54 @@ def test_an_object_that_is_not_the_mesh_is_measured_and_said_to_differ(job):
     assert all(pair.n_points > 1000 for pair in found.pairs)
     distance = closest_points(other, found.merged.cloud.points).distances
     assert np.abs(distance).max() < WRONG_M
+
+
+def test_where_no_majority_tells_which_camera_moved_nobody_is_certain(job):
+    """Both of its pairs agree, so do the other camera's, and no mesh decides."""
+    body = job.plan.surface.mesh
+    down = Rotation.from_euler("x", 90, degrees=True).as_matrix()
+    on_its_side = TriangleMesh(body.vertices @ down.T, body.faces)
+
+    def turned(document):
+        pose = np.array(document["cameras"][0]["world_from_device"])
+        turn = Rotation.from_euler("z", 0.2, degrees=True).as_matrix()
+        pose[:3, :3] = turn @ pose[:3, :3]
+        document["cameras"][0]["world_from_device"] = pose.tolist()
+
+    found = stood_there(job, turned, mesh=on_its_side)
+    cloud = found.everything
+    # Certain or not, all of them stay.
+    assert all(pair.n_points > 1500 for pair in found.pairs)
+    assert sum("no majority tells" in why for why in found.failures) == 2
+    off = closest_points(on_its_side, cloud.points).distances
+    assert np.abs(off[cloud.camera == 1]).max() < WRONG_M
+    wrong = np.abs(off) > WRONG_M
+    assert np.mean(wrong[cloud.camera == 0]) > 0.3
+    assert cloud.noise_px[wrong].min() >= AGREE_PX
+
+
+def test_a_pair_is_not_confirmed_by_one_that_is_left_out(job):
+    """The object moved between the projectors, out of the sight of P2 with C2."""
+    ball = sphere(0.02, subdivisions=4)
+    toward = np.array(job.plan.to_document()["cameras"][0]["world_from_device"])[:3, 3]
+    nearer = 0.05 * toward / np.linalg.norm(toward)
+    stacks = {}
+    for p, shift in enumerate((nearer, 0.0 * nearer)):
+        images = InMemory(Path("x"), job.scanner)
+        truth = replace(
+            job.scanner, mesh=TriangleMesh(ball.vertices + shift, ball.faces)
+        )
+        reconstruct_rendered(
+            job.scanner, job.expected, seed=0, threads=1, truth=truth, save=images
+        )
+        stacks |= {key: stack for key, stack in images.stacks.items() if key[0] == p}
+    found = job.of(stacks)
+    told = {why.split(": ")[0]: why.split(": ")[1] for why in found.failures[:3]}
+    assert told == {
+        "P1 with C1": "doubtful",
+        "P2 with C1": "left out",
+        "P2 with C2": "doubtful",
+    }
 
 
 def test_a_deep_dent_that_two_pairs_saw_is_certain_and_one_pairs_word_is_not(job):

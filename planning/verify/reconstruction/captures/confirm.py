@@ -71,11 +71,13 @@ class _Verdict:
         words: What is said of it.
         points: Which of them, shape (n,).
         doubt_px: How far their edges may be off [px]; None: they are left out.
+        gives_way: Whether doubted points go where a pair that nobody doubts has one.
     """
 
     words: str
     points: Mask
     doubt_px: float | None = None
+    gives_way: bool = True
 
 
 def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
@@ -154,10 +156,11 @@ class _Judge:
             if known:
                 return self._strays(key)
             if against:
-                return None
-        # Nobody who is believed saw its spots: whoever did, then.
-        against = against or self._residuals(key, self.agreement.clouds.keys())
+                return self._undecided(key)
         everywhere = np.ones(len(self.agreement.clouds[key]), dtype=bool)
+        if not against:
+            # Nobody who is believed saw its spots: whoever contradicts it, then.
+            against = self._contradictions(key)
         if against:
             other = max(against, key=lambda one: against[one])
             px, name = against[other], self.plan.name(other)
@@ -173,6 +176,36 @@ class _Judge:
             words = f"doubtful: {where}, which its sigma counts: {_INACCURATE}"
             return _Verdict(words, everywhere, px)
         return None
+
+    def _undecided(self, key: PairIndex) -> _Verdict | None:
+        """Return the doubt of a pair off the mesh whose word stands against another's.
+
+        As many agree with the other, or most that saw its spots contradict it.
+        """
+        agree = self._support(key)
+        rivals = self._contradictions(key)
+        if len(rivals) <= agree:
+            rivals = {k: px for k, px in rivals.items() if self._support(k) >= agree}
+        if not rivals:
+            return None
+        other = max(rivals, key=lambda one: rivals[one])
+        words = (
+            f"doubtful: where {self.plan.name(other)} measured the same spots, edges "
+            f"are {rivals[other]:.2g} px off, which its sigma counts: no majority "
+            f"tells which of them is right"
+        )
+        everywhere = np.ones(len(self.agreement.clouds[key]), dtype=bool)
+        return _Verdict(words, everywhere, rivals[other], gives_way=False)
+
+    def _contradictions(self, key: PairIndex) -> dict[PairIndex, float]:
+        """Return the pairs that differ from one, and by how much [px]."""
+        every = self._residuals(key, self.agreement.clouds.keys())
+        return {other: px for other, px in every.items() if px > AGREE_PX}
+
+    def _support(self, key: PairIndex) -> int:
+        """Return how many pairs agree with one."""
+        every = self._residuals(key, self.agreement.clouds.keys())
+        return len(every) - len(self._contradictions(key))
 
     def _residuals(
         self, key: PairIndex, among: Set[PairIndex]
@@ -263,7 +296,7 @@ def _after(pair: Decoded, verdict: _Verdict, near: _Near) -> Decoded:
         doubted = np.where(verdict.points, verdict.doubt_px, 0.0)
         noise_px = np.hypot(pair.cloud.noise_px, doubted)
         pair = replace(pair, cloud=replace(pair.cloud, noise_px=noise_px))
-        gone = verdict.points & near.covers(pair.cloud)
+        gone = verdict.points & verdict.gives_way & near.covers(pair.cloud)
     why = pair.rejected | {"unconfirmed": int(np.count_nonzero(gone))}
     outcomes = pair.outcomes.copy()
     outcomes[np.flatnonzero(outcomes < 0)[gone]] = CAUSES.index("unconfirmed")
