@@ -114,6 +114,11 @@ def test_a_plan_evaluated_has_its_own_figures(folder, plate, planned, with_few_s
     with with_few_samples():
         seen = made(plate, rig, fixed=read_mounted(folder / "plan", rig))
     assert seen.coverage == plan.coverage
+    # What is reachable is told by the same poses.
+    for name in ("reference_projectors", "reference_rings", "reference_cameras"):
+        theirs = getattr(plan.surface, name)
+        ours = getattr(seen.surface, name)[-len(theirs) :]
+        assert ours == pytest.approx(theirs, abs=1e-11), name
     for kind in ("projectors", "cameras"):
         ours, theirs = getattr(seen, kind), getattr(plan, kind)
         assert [device.id for device in ours] == [device.id for device in theirs]
