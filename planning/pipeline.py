@@ -9,9 +9,9 @@ from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.certificates import CamerasBy
-from planning.model.errors import InputError, TimeLimitError
+from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
-from planning.model.progress import Report, Stopwatch
+from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.model.words import count_words
 from planning.report.assemble import write_plan
 from planning.report.entries.device_entries import cost_record
@@ -206,11 +206,11 @@ def _planned(
         clock.lift()
         cut = replace(partial, truncated=True)
         raise InterruptedPlanError(write_plan(cut, clock)) from None
-    except TimeLimitError:
+    except TIME_IS_UP:
         clock.extend()
         if first is None:
             raise
-        with suppress(TimeLimitError):
+        with suppress(*TIME_IS_UP):
             if partial is not begun:
                 first = write_plan(replace(partial, truncated=True), clock)
         return first, partial
@@ -253,7 +253,7 @@ def _checked(
             )
     except KeyboardInterrupt:
         raise InterruptedPlanError(cut) from None
-    except TimeLimitError:
+    except TIME_IS_UP:
         return cut
     check, seconds, record = verification.reconstruction, clock.processor, None
     if check is not None:

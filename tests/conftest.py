@@ -46,6 +46,14 @@ def _one_thread() -> Generator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _stay() -> Generator[None]:
+    """A run that was cut ends itself, not the process of the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("planning.cli.console.leave", sys.exit)
+        yield
+
+
 @pytest.fixture
 def by_threads() -> Callable[[Callable[[], Any]], list[Any]]:
     """What a function returns with one BLAS thread, and with two."""

@@ -31,12 +31,12 @@ RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
 MOST = 1.1
 SAMPLE = "face.obj"
 LIMITS_S = {
-    SAMPLE: (5, 15, 20, 25),
-    "face_scan_james.obj": (10, 20, 30),
-    "snowden_bust_lo.obj": (10, 20, 30),
-    "vtk_horse.ply": (10, 20, 35),
-    "vtk_turbineblade.ply": (20, 40),
-    "colin27_head_1mm.ply.gz": (20, 60, 180),
+    SAMPLE: (5, 20, 60),
+    "face_scan_james.obj": (10, 30),
+    "snowden_bust_lo.obj": (10, 30),
+    "vtk_horse.ply": (10, 60),
+    "vtk_turbineblade.ply": (20, 50),
+    "colin27_head_1mm.ply.gz": (20, 60, 120),
 }
 
 

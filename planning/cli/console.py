@@ -22,6 +22,7 @@ from planning.model.shares import percent_as_share
 _Command = Callable[..., Any]
 # As in sysexits.h: a bug of ours, nothing that the user did.
 _INTERNAL = 70
+_INTERRUPTED = 130
 _STOPS = (signal.SIGINT, signal.SIGTERM)
 
 debug_option = click.option(
@@ -186,19 +187,18 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
     """Run a command; turn our own errors into one line and the documented exit code."""
     from geometry.mesh.mesh import MeshError
     from geometry.parallel import abandoned
-    from planning.model.errors import PlanningError
+    from planning.model.errors import PlanningError, TimeLimitError
 
     try:
         for number in _STOPS:
             signal.signal(number, signal.default_int_handler)
         code = command()
-        if abandoned():
-            # What was cut must not be waited for, nor what an interpreter tidies up.
-            sys.stdout.flush()
-            os._exit(code)
+        if code == _INTERRUPTED or abandoned():
+            leave(code)
         sys.exit(code)
     except KeyboardInterrupt:
-        stop("interrupted before a first plan stood; nothing was written", 130)
+        _tell("interrupted before a first plan stood; nothing was written")
+        leave(_INTERRUPTED)
     except BrokenPipeError:
         # Whoever reads stdout has had enough; Python must not complain at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -206,6 +206,9 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
     except (PlanningError, MeshError, OSError) as error:
         if debug:
             raise
+        if isinstance(error, TimeLimitError):
+            _tell(str(error))
+            leave(error.exit_code)
         code = 2 if isinstance(error, OSError) else getattr(error, "exit_code", 3)
         stop(str(error), code)
     except Exception as error:
@@ -221,6 +224,17 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
 
 def stop(message: str, code: int) -> NoReturn:
     """Write a line to stderr for each line of a message; leave with an exit code."""
+    _tell(message)
+    sys.exit(code)
+
+
+def leave(code: int) -> NoReturn:
+    """End the process where work was cut: no thread of it is waited for."""
+    with suppress(BrokenPipeError):
+        sys.stdout.flush()
+    os._exit(code)
+
+
+def _tell(message: str) -> None:
     for line in message.splitlines():
         click.echo(f"plan: {' '.join(line.split())}", err=True)
-    sys.exit(code)

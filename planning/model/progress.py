@@ -12,12 +12,21 @@ from .errors import TimeLimitError
 
 Report = Callable[[str], None]
 
+
+class Cut(BaseException):
+    """The time limit has passed; no handler of errors takes it for one of its own."""
+
+
+# What ends work when the time limit passes, where it looks at the clock or not.
+TIME_IS_UP = TimeLimitError, Cut
+
 # A run with a time limit looks at the clock so often [s] ...
 _TICK_S = 0.1
 # ... and is cut again where the first cut was swallowed, or is still cleaning up [s].
 _AGAIN_S = 1.0
-# Not in a solver of CasADi, which warns of exceptions, nor amid an import.
-_WHOLE = "casadi.py", "<frozen importlib._bootstrap>"
+# Not in a solver of CasADi, which warns of exceptions, nor where threads are begun: one
+# that is unknown to its pool is waited for in vain. Nor amid an import.
+_WHOLE = "casadi.py", "concurrent/futures/thread.py", "<frozen importlib._bootstrap>"
 # A stage that has said nothing for so long says that it still runs [s].
 _SILENCE_S = 30.0
 
@@ -54,9 +63,10 @@ class Stopwatch:
 
     @contextmanager
     def ticking(self) -> Generator[None]:
-        """Raise within, as `check` does, wherever the main thread is by then.
+        """Raise `Cut` within, wherever the main thread is when the time limit passes.
 
-        In another thread, and where systems have no timer, only `check` raises.
+        What leaves is a TimeLimitError. In another thread, and where systems have no
+        timer, only `check` raises.
         """
         main = threading.current_thread() is threading.main_thread()
         if not (self.limited and main and hasattr(signal, "setitimer")):
@@ -67,6 +77,8 @@ class Stopwatch:
         timer = signal.setitimer(signal.ITIMER_REAL, _TICK_S, _TICK_S)
         try:
             yield
+        except Cut as cut:
+            raise TimeLimitError(str(cut)) from None
         finally:
             self._next_cut = math.inf
             signal.setitimer(signal.ITIMER_REAL, *timer)
@@ -75,14 +87,14 @@ class Stopwatch:
     def _tick(self, _: int, frame: FrameType | None) -> None:
         now = time.monotonic()
         # What was planned is still to be written, with whole packages.
-        whole = _WHOLE if self._deadline < self._limit else _WHOLE[:1]
+        whole = _WHOLE if self._deadline < self._limit else _WHOLE[:2]
         if now < self._next_cut or _runs(frame, whole):
             return
         try:
             self.check()
-        except TimeLimitError:
+        except TimeLimitError as error:
             self._next_cut = now + _AGAIN_S
-            raise
+            raise Cut(str(error)) from None
 
     @contextmanager
     def stage(self, name: str, line: str) -> Generator[None]:

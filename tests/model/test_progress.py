@@ -8,7 +8,7 @@ import pytest
 
 from geometry.parallel import abandonable, abandoned, mapped
 from planning.model.errors import TimeLimitError
-from planning.model.progress import Stopwatch, untimed
+from planning.model.progress import Cut, Stopwatch, untimed
 
 pytestmark = pytest.mark.skipif(
     not hasattr(signal, "setitimer"), reason="no timers there"
@@ -41,10 +41,22 @@ def test_a_cut_that_is_swallowed_comes_again():
     def swallows(_):
         try:
             spin(20.0)
-        except TimeLimitError:
+        except Cut:
             spin(20.0)
 
     assert cut(swallows) < 8.0
+
+
+def test_a_handler_of_errors_takes_no_cut_for_one_of_them():
+    """A reader that calls whatever goes wrong a damaged file, say."""
+
+    def reads(_):
+        try:
+            spin(20.0)
+        except Exception as error:
+            raise ValueError("damaged") from error
+
+    assert cut(reads) < 5.0
 
 
 def test_a_reserve_ends_planning_earlier_and_is_given_back():
@@ -52,7 +64,7 @@ def test_a_reserve_ends_planning_earlier_and_is_given_back():
         clock.reserve(100.0)
         try:
             spin(20.0)
-        except TimeLimitError:
+        except Cut:
             clock.extend()
             raise TimeLimitError(f"{clock.remaining:.0f} s left") from None
 
@@ -93,6 +105,21 @@ def test_imports_stay_whole_while_a_plan_is_to_be_written(
 
     spent = cut(imports, time_limit=reserved + 0.3)
     assert (spent >= 2.0) == (name in sys.modules) == (reserved > 0.0)
+
+
+@pytest.mark.parametrize("name", ["concurrent/futures/thread.py", "casadi.py"])
+def test_threads_and_solvers_are_left_whole(name):
+    """A thread that its pool doesn't know of would be waited for without end."""
+    code = "def busy():\n    spin(1.5)\n    done.append(True)\n"
+    world = {"spin": spin, "done": []}
+    exec(compile(code, f"/lib/{name}", "exec"), world)
+
+    def begins(_):
+        world["busy"]()
+        spin(20.0)
+
+    assert 1.5 <= cut(begins) < 6.0
+    assert world["done"] == [True]
 
 
 def test_without_a_limit_nothing_ticks():
