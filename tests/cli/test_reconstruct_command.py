@@ -232,6 +232,7 @@ def test_no_cloud_stays_where_no_image_can_be_used(folder, simulated, tmp_path):
     """But a folder that was mistyped costs nothing."""
     out_folder, captures = tmp_path / "out", tmp_path / "captures"
     shutil.copytree(folder / "one", out_folder)
+    shutil.copy(out_folder / "cloud.ply", out_folder / "deviation.ply")
     words = ["-o", out_folder, "--quiet", "--captures"]
     assert run(folder / "plan.json", *words, captures)[0] == 3
     assert (out_folder / "cloud.ply").exists()

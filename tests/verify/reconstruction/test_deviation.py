@@ -18,6 +18,7 @@ from planning.verify.reconstruction.check.deviation import (
 )
 from planning.verify.reconstruction.check.merge import Merged
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.cloud_file import CloudFile, LengthUnit
 from planning.verify.reconstruction.scanner import Scanner
 
 NOISE_M = 1e-4
@@ -119,6 +120,7 @@ def test_distances_are_signed_and_told_by_region():
         "100.0%",
     ]
     assert [line.split()[0] for line in lines[1:]] == ["region", "0", "none", "all"]
+    assert plate_map((-5e-5, 4e-4)).whole().outside == 0.5
     assert "outside" not in deviation_lines(plate_map())[1]
 
 
@@ -126,3 +128,25 @@ def test_the_fit_is_told():
     found = plate_map(align="best-fit")
     assert "(--align none leaves them)" in deviation_lines(found)[0]
     assert abs(found.whole().mean_m) < 1e-4
+
+
+def test_what_the_fit_did_is_told_and_points_and_normals_went_along(waved):
+    found = sample_surface(waved, 2000, seed=0)
+    moved = pose_of((-3e-3, 4e-3, 1e-3), 6)
+    points = transform(moved, found.points)
+    n = len(points)
+    cloud = replace(
+        Cloud.empty(), points=points, noise_px=np.ones(n), shift=np.zeros((n, 3))
+    )
+    normals = found.normals @ moved[:3, :3].T
+    merged = Merged(cloud, np.ones(n, dtype=bool), normals, np.full(n, 1e-5))
+    scanner = replace(BLANK, mesh=waved, region=np.zeros(len(waved.faces), int))
+    fit = measure_deviation(merged, scanner, "best-fit")
+    back = found.points.mean(axis=0) - points.mean(axis=0)
+    assert fit.shift_m == pytest.approx(np.linalg.norm(back), abs=1e-6)
+    assert np.degrees(fit.turn_rad) == pytest.approx(6.0, abs=1e-3)
+    assert np.abs(fit.normals - found.normals).max() < 1e-4
+    rows = CloudFile.of_deviation(merged, fit, LengthUnit("mm", 1e-3)).rows
+    written = 1e-3 * np.stack([rows[a] for a in "xyz"], axis=1)
+    assert np.abs(written - found.points).max() < 1e-6
+    assert "6.000 degrees" in deviation_lines(fit)[0]
