@@ -2,14 +2,10 @@
 
 from collections.abc import Iterator
 
-from geometry.mesh.extent import body_areas
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.words import percent
+from planning.report.summary.summary import body_words
 from planning.rig.lens_fit import optics_notes
 from planning.rig.rig import Rig
-
-# So many bodies are told one by one.
-_MOST_BODIES = 4
 
 
 def size_lines(mesh: TriangleMesh) -> Iterator[str]:
@@ -23,14 +19,8 @@ def size_lines(mesh: TriangleMesh) -> Iterator[str]:
         )
         for repair in source.repairs:
             yield f"  repaired: {repair.kind}, {repair.count}"
-    areas = body_areas(mesh.faces, mesh.face_areas)
-    if len(areas) > 1:
-        shares = [percent(area / mesh.area) for area in areas[:_MOST_BODIES]]
-        more = ", ..." if len(areas) > _MOST_BODIES else ""
-        yield (
-            f"  {len(areas)} bodies that share no vertex, of {', '.join(shares)}{more} "
-            f"of the area: all are planned for"
-        )
+    if bodies := body_words(mesh):
+        yield f"  {bodies}: all are planned for"
 
 
 def optics_lines(rig: Rig, mesh: TriangleMesh) -> list[str]:

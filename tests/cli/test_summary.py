@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plain_shapes import joined
 
 from geometry.devices import PinholeModel
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
@@ -15,7 +17,7 @@ from planning.report.entries.device_entries import cost_record
 from planning.report.summary.check_lines import cost_lines
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.device_lines import aim_angles
-from planning.report.summary.summary import summary
+from planning.report.summary.summary import body_words, summary
 from planning.scene.workspace.candidates import aimed_poses
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -182,3 +184,16 @@ def test_a_stage_that_says_nothing_says_that_it_still_runs(monkeypatch):
     assert said[0] == "sleeps"
     assert said[1:3] == ["  sleeps: 0 s so far"] * 2
     assert said[3:] == ["talks", *["a line"] * 5]
+
+
+def test_the_summary_tells_of_bodies_that_do_not_touch(handmade, monkeypatch):
+    plan = handmade.build_plan()
+    alone = plan.surface.mesh
+    apart = joined(alone, TriangleMesh(alone.vertices + 5.0, alone.faces))
+    words = "2 bodies that share no vertex, of 50.0 %, 50.0 % of the area"
+    assert (body_words(alone), body_words(apart)) == ("", words)
+    assert "bodies" not in summary(plan, [], []).split("COVERAGE")[0]
+    place = "planning.report.summary.summary.body_words"
+    monkeypatch.setattr(place, lambda mesh: f"{len(mesh.faces)} bodies")
+    told = summary(plan, [], []).splitlines()
+    assert f"         {len(alone.faces)} bodies" in told

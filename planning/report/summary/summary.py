@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from geometry.mesh.extent import body_areas
+from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.input_records import MeshRecord
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
@@ -18,6 +20,8 @@ from .warning_lines import warning_lines
 
 # An object under this share of the field is taken to be in another unit.
 _TINY = 0.1
+# So many bodies are told one by one.
+_MOST_BODIES = 4
 
 
 def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
@@ -53,6 +57,8 @@ def _head(plan: RigPlan) -> str:
     cut = "; TRUNCATED" if document.truncated else ""
     cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
     cut += _lost_in_field(plan)
+    words = body_words(plan.surface.mesh)
+    bodies = f"         {words}\n" if words else ""
     return (
         f"{'AS BUILT' if evaluation else 'PLAN':<9}"
         f"{count_words(len(plan.projectors), 'projector')}, "
@@ -63,6 +69,7 @@ def _head(plan: RigPlan) -> str:
         f"{_unit(mesh)}, up {axis_name(workspace.up)}; rig {document.rig.name}, "
         f"{document.rig.light} light\n"
         f"{shell_line(mesh)}"
+        f"{bodies}"
         f"         devices may stand in {_where(workspace)}"
     )
 
@@ -79,6 +86,19 @@ def _lost_in_field(plan: RigPlan) -> str:
     return (
         f"; WARNING: it is {1e3 * across:.3g} mm across in a camera's field of "
         f"{1e3 * field:.0f} mm, is its unit right?"
+    )
+
+
+def body_words(mesh: TriangleMesh) -> str:
+    """Return how many bodies a mesh has, with their shares; nothing of a single one."""
+    areas = body_areas(mesh.faces, mesh.face_areas)
+    if len(areas) == 1:
+        return ""
+    shares = [percent(area / mesh.area) for area in areas[:_MOST_BODIES]]
+    more = ", ..." if len(areas) > _MOST_BODIES else ""
+    return (
+        f"{len(areas)} bodies that share no vertex, of {', '.join(shares)}{more} of "
+        f"the area"
     )
 
 
