@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
-from planning.model.document.coverage_records import Areas, Coverage
+from planning.model.document.coverage_records import Areas, Coverage, PredictedSigma
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
@@ -20,7 +20,12 @@ from planning.scene.lighting import (
 )
 from planning.scene.limits import camera_limits, pair_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, furthest_failure, measured_by
+from planning.scene.measured import (
+    LitSamples,
+    furthest_failure,
+    least_sigma,
+    measured_by,
+)
 from planning.scene.placed_bodies import Blocker, Device, Obstruction, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -117,6 +122,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
             target, _named(projector_limits.CAUSES, target.furthest[unreachable])
         ),
         unreachable_inside_m2=area(inside),
+        sigma=_sigma(planned, devices, target),
     )
     coverage = coverage.changed(**_blocked(planned, devices, target))
     lit, margin = target.first == LIT, lit_margins(scene, devices.projectors, samples)
@@ -232,6 +238,22 @@ def _blocked(
             key, name = "blocked_by_body_m2", next(d.id for d in every if body.is_of(d))
         blocked.setdefault(key, {})[name] = target.area(column)
     return blocked
+
+
+def _sigma(scene: Scene, devices: Devices, target: _Judged) -> PredictedSigma | None:
+    chosen = np.flatnonzero(target.measured)
+    if not len(chosen):
+        return None
+    some = target.target.take(chosen)
+    lit = LitSamples.of(devices.projectors, some, target.first[chosen] == LIT)
+    views = [view_of(scene, camera, some) for camera in devices.cameras]
+    limits = scene.requirements.triangulation
+    least = np.min(
+        [least_sigma(limits, lit, views, p) for p in range(len(devices.projectors))],
+        axis=0,
+    )
+    median, p95 = np.quantile(least, (0.5, 0.95)).tolist()
+    return PredictedSigma(median_m=median, p95_m=p95)
 
 
 def _inside(scene: Scene, target: Target) -> NDArray[np.bool_]:

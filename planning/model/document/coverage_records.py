@@ -29,6 +29,16 @@ class Relaxation(Part):
     reachable_share: float
 
 
+class PredictedSigma(Part):
+    """Standard deviation along the normal, by the best pair of each measured sample.
+
+    Of `noise_px` and `ring_sigma_m` alone: calibration is taken as perfect.
+    """
+
+    median_m: float
+    p95_m: float
+
+
 class Coverage(Part):
     """What is covered, and what isn't by which cause; areas in [m²].
 
@@ -41,6 +51,7 @@ class Coverage(Part):
             before; absent where no device has a body.
         blocked_by_obstacle_m2: Unmeasured target area that each obstacle stands before;
             absent where there are none.
+        sigma: What is predicted of the target's measured samples; None: there are none.
         relaxations: What would let projectors reach enough.
         unmeasurable_by_cause: Lit target area that no reference camera measures.
         camera_relaxations: What would let cameras reach enough.
@@ -54,6 +65,7 @@ class Coverage(Part):
     unreachable_inside_m2: float = 0.0
     blocked_by_body_m2: dict[str, float] = Field(default={})
     blocked_by_obstacle_m2: dict[str, float] = Field(default={})
+    sigma: PredictedSigma | None = None
     relaxations: tuple[Relaxation, ...] = ()
     unmeasurable_by_cause: dict[str, float] = Field(default={})
     camera_relaxations: tuple[Relaxation, ...] = ()

@@ -39,6 +39,14 @@ def coverage_lines(plan: RigPlan) -> list[str]:
         f"lit / reachable by projectors {lit}, measured / reachable by "
         f"cameras {measured}, on the target, {coverage.samples} fresh samples",
     ]
+    if sigma := coverage.sigma:
+        limit = plan.requirements.triangulation.max_sigma_m
+        at_most = "" if limit is None else f" (limit {1e3 * limit:g})"
+        lines.append(
+            f"predicted sigma along the normal, of edge noise alone: median "
+            f"{1e3 * sigma.median_m:.3f} mm, 95 % within {1e3 * sigma.p95_m:.3f} mm"
+            f"{at_most}"
+        )
     if causes := coverage.uncovered_by_cause:
         lines.append(f"not measured: {causes_line(causes, target.area_m2)}")
     if blocked := coverage.blocked_by_obstacle_m2:

@@ -25,6 +25,7 @@ from planning.verify.audit.counts.table_claims import (
 from planning.verify.audit.coverage.area_claims import audit_areas, recomputed_areas
 from planning.verify.audit.coverage.inside_claims import audit_inside
 from planning.verify.audit.coverage.region_claims import audit_margins, audit_regions
+from planning.verify.audit.coverage.sigma_claims import audit_sigma
 from planning.verify.audit.devices.body_claims import audit_bodies, audit_clearance
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
 from planning.verify.audit.devices.evaluation_claims import audit_evaluation
@@ -50,6 +51,7 @@ _CLAIMS = (
     audit_obstacles,
     audit_areas,
     audit_inside,
+    audit_sigma,
     audit_margins,
     audit_regions,
     audit_tables,

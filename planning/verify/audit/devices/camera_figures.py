@@ -95,7 +95,7 @@ def _filled(camera: PlannedCamera, shadow: Shadow) -> float:
     u, v = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
     pixels = np.column_stack([u.ravel(), v.ravel()]) / [columns, rows] * size - 0.5
     turn, origin = camera.world_from_device[:3, :3], camera.world_from_device[:3, 3]
-    hit, _ = shadow.caster.first_hits(origin, camera.device.rays(pixels) @ turn.T)
+    hit, _ = shadow.caster.first_hits(origin, rays_of(camera.device, pixels) @ turn.T)
     return float(np.mean(hit >= 0))
 
 

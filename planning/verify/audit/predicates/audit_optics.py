@@ -10,6 +10,7 @@ from geometry.arrays import Array, Mask
 from geometry.devices import PinholeModel
 
 _STEP = 1e-5
+_INVERSIONS = 30
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -50,6 +51,19 @@ def pixels_of(device: PinholeModel, local: Array) -> Array:
     bent_y = y * radial + p1 * (s + 2 * y**2) + 2 * p2 * x * y
     (fx, skew, cx), (_, fy, cy) = device.camera_matrix[:2]
     return np.column_stack([fx * bent_x + skew * bent_y + cx, fy * bent_y + cy])
+
+
+def rays_of(device: PinholeModel, pixels: Array) -> Array:
+    """Return unit directions (n, 3) in the device's frame of pixels (n, 2).
+
+    By fixed point: what `pixels_of` misses a pixel by is taken off, until it settles.
+    """
+    focal = np.diag(device.camera_matrix)[:2]
+    local = np.ones((len(pixels), 3))
+    local[:, :2] = (pixels - device.camera_matrix[:2, 2]) / focal
+    for _ in range(_INVERSIONS):
+        local[:, :2] += (pixels - pixels_of(device, local)) / focal
+    return local / np.linalg.norm(local, axis=1, keepdims=True)
 
 
 def in_image(resolution: tuple[int, int], pixels: Array) -> Mask:

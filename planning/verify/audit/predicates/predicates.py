@@ -114,6 +114,21 @@ def pair_steps(
     limits: TriangulationLimits,
 ) -> Steps:
     """Return how many limits of *measurable* lit and seen samples pass, shape (n,)."""
+    conditioning, sigma, pitch = pair_figures(projector, camera, samples, limits)
+    return _passed(
+        conditioning >= limits.min_conditioning,
+        sigma <= _or(limits.max_sigma_m, np.inf),
+        pitch >= _or(limits.min_ring_pitch_px, -np.inf),
+    )
+
+
+def pair_figures(
+    projector: AuditProjector,
+    camera: AuditCamera,
+    samples: AuditSamples,
+    limits: TriangulationLimits,
+) -> tuple[Array, Array, Array]:
+    """Return |r.m|, the standard deviation [m] and the ring pitch [px], each (n,)."""
     light, _ = projector.light.to_points(samples.points)
     r, t = towards(samples.points, camera.world_from_device[:3, 3])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -131,11 +146,7 @@ def pair_steps(
         sigma = np.hypot(edge * t * g, placement) / conditioning
         gap = projector.ring_gap(projector.ring_coordinate(samples.points))
         pitch = gap / steepness * np.abs(dot(normal, r)) / (t * g)
-    return _passed(
-        conditioning >= limits.min_conditioning,
-        sigma <= _or(limits.max_sigma_m, np.inf),
-        pitch >= _or(limits.min_ring_pitch_px, -np.inf),
-    )
+    return conditioning, sigma, pitch
 
 
 def _passed(*conditions: Mask) -> Steps:
