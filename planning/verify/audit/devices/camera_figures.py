@@ -12,7 +12,12 @@ from planning.verify.audit.predicates.audit_devices import (
     AuditProjector,
     audit_projectors,
 )
-from planning.verify.audit.predicates.audit_optics import dot, in_frame, towards
+from planning.verify.audit.predicates.audit_optics import (
+    dot,
+    in_frame,
+    rays_of,
+    towards,
+)
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import MEASURED
 from planning.verify.audit.predicates.recompute import recompute
