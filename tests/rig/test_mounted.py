@@ -118,6 +118,8 @@ def test_bad_rows_are_refused_by_their_line(written, lines, message):
         (NAMES.replace("kind,", ""), "line 1: the header lacks 'kind'"),
         (NAMES.replace("tilt", "tilted"), "line 1: the header doesn't know 'tilted_"),
         (NAMES.replace("qz", "qw"), "line 1: the header names qw twice"),
+        (NAMES.replace(",", ";"), "line 1: .* by ';', must be by commas, with poi"),
+        (NAMES.replace(",", "\t"), r"line 1: .* by '\\t', must be by commas"),
     ],
 )
 def test_bad_headers_are_refused(written, header, message):

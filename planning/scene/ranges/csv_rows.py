@@ -102,6 +102,13 @@ def _check_header(
     required: tuple[str, ...],
     optional: tuple[str, ...],
 ) -> None:
+    # As spreadsheets write where the comma is the decimal mark.
+    for mark in ";\t":
+        if mark in "".join(names):
+            raise InputError(
+                f"{where}: cells are separated by {mark!r}, must be by commas, with "
+                f"points in numbers"
+            )
     missing = [name for name in required if name not in names]
     strange = [name for name in names if name not in (*required, *optional)]
     twice = sorted({name for name in names if names.count(name) > 1})
