@@ -42,8 +42,8 @@ _OTHER_OBJECT = (
     "stands elsewhere"
 )
 _FOREIGN = (
-    "images of other devices, or exchanged, or poses that aren't those of the plan or "
-    "the calibration"
+    "images of other devices, or exchanged, or of an object that moved in between, or "
+    "poses that aren't those of the plan or the calibration"
 )
 _INACCURATE = "a pose or optics aren't quite those of the plan or the calibration"
 
