@@ -219,6 +219,7 @@ def _of_plan(path: Path, rig: Rig, only: Sequence[str] | None) -> Mounted:
         if name not in chosen:
             continue
         _check_optics(device, rig, str(path))
+        _check_body(device, rig, str(path))
         pose, called = device.world_from_device, device.existing or name
         tables.append(
             ExistingTable(
@@ -266,3 +267,21 @@ def _check_optics(device: Device, rig: Rig, path: str) -> None:
                 f"{path}: {device.id} has {key} = {one}, a {kind} of rig "
                 f"{rig.name!r} {other}; give --rig the file that the plan was made with"
             )
+
+
+def _check_body(device: Device, rig: Rig, path: str) -> None:
+    """Refuse a device whose housing would be lost; another one may be measured."""
+    if device.body is None:
+        return
+    kind = kind_of(device)
+    # One that the rig file knows by name has the body that it has there.
+    if device.existing and any(
+        (table.kind, table.name) == (kind, device.existing)
+        for table in rig.table.existing
+    ):
+        return
+    if (rig.projector_body() if kind == "projector" else rig.camera_body()) is None:
+        raise InputError(
+            f"{path}: {device.id} has a housing, a {kind} of rig {rig.name!r} none; "
+            f"give --rig the file that the plan was made with"
+        )

@@ -1,5 +1,6 @@
 """Devices that are bolted already: poses from a CSV file, and of an earlier plan."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from support.written import requirements_of
 
 from geometry.poses import pan_tilt_roll
 from planning import load_rig, read_mounted
+from planning.model.bodies import Body
 from planning.model.errors import InputError
 from planning.rig.mounted import split_fixed
 from planning.rig.wishes import Wishes
@@ -186,6 +188,9 @@ class _RigOf:
     def camera_device(self):
         return self.plan.cameras[0].device
 
+    def camera_body(self):
+        return None
+
 
 def test_devices_of_a_plan_stand_where_it_says_by_their_ids(plan_file):
     plan, path = plan_file
@@ -227,3 +232,16 @@ def test_a_plan_of_another_rig_is_refused(plan_file):
         match=r"P1 has K = .* a projector of rig 'default' .* --rig the file",
     ):
         read_mounted(plan_file[1], load_rig())
+
+
+def test_housings_of_a_plan_arent_left_behind(plan_file):
+    plan, path = plan_file
+    document = json.loads(path.read_text())
+    body = {"centre_m": [0.0, 0.0, -0.05], "half_m": [0.03, 0.03, 0.05]}
+    document["cameras"][0]["body"] = body
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=r"C1 has a housing, .* 'theirs' none; give"):
+        read_mounted(path, _RigOf(plan))
+    housed = _RigOf(plan)
+    housed.camera_body = lambda: Body((0.0, 0.0, 0.0), (0.02, 0.02, 0.04))
+    assert len(read_mounted(path, housed, ["C1"]).tables) == 1
