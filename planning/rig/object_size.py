@@ -38,9 +38,11 @@ class ObjectSize:
         object's is that of its convex hull. The box lies along the axes of the mesh or
         the principal ones of the hull's corners, whichever shows less.
         """
-        # Joggled, so that a flat plate has a hull, of both its sides.
-        hull = ConvexHull(mesh.vertices, qhull_options="QJ")
-        corners = mesh.vertices[hull.vertices]
+        # Joggled, so that a flat plate has a hull, of both its sides; of a triangle the
+        # middle is the fourth point that is asked for.
+        points = np.vstack([mesh.vertices, mesh.vertices.mean(axis=0)])
+        hull = ConvexHull(points, qhull_options="QJ")
+        corners = points[hull.vertices]
         principal = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)[
             2
         ]

@@ -25,8 +25,9 @@ def audit_sigma(case: AuditCase, findings: AuditFindings) -> None:
         return
     below = findings.at("coverage.sigma")
     least = _least_sigma(case)
-    if claims.sigma is None:
-        below.holds(not len(least), "", "null, but the target is measured")
+    if claims.sigma is None or not len(least):
+        either = "null, but the target is measured" if len(least) else "not measured"
+        below.holds((claims.sigma is None) == (not len(least)), "", either)
         return
     claimed = int(claims.samples * claims.target.measured_m2 / claims.target.area_m2)
     for name, share in _SHARES.items():
