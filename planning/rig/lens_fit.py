@@ -173,6 +173,12 @@ class LensFit:
         stop, distance = optics.least_stop(focal, blur_px * pixel_m, near, far)
         return Focus(focal, stop, distance, _DIFFRACTION_M * stop / pixel_m)
 
+    def focused_at_none(self, device: DeviceModel) -> bool:
+        """Whether the nearest depth has no image: the focal length is known, longer."""
+        if self.pixel_m is None or isinstance(device, ParallelModel):
+            return False
+        return device.focal_px * self.pixel_m >= self.depths_m[0]
+
     @property
     def pixel_m(self) -> float | None:
         """Pixel pitch on sensor or panel [m], if the rig file gives it."""
@@ -217,6 +223,8 @@ class LensFit:
         """Return how a lens is set to be sharp over the depths."""
         near, far = (f"{1e3 * depth:.0f}" for depth in self.depths_m)
         focus = self.focused(device)
+        if focus is None and self.focused_at_none(device):
+            return f"at no focus sharp from {near} mm on, nearer than its focal point"
         if focus is None:
             return f"sharp from {near} to {far} mm"
         blur = f"for {near} to {far} mm at {self._blur_px:g} px of blur"

@@ -103,6 +103,13 @@ def test_a_lens_too_long_to_be_sharp_gives_way_to_one_that_is():
     assert f"diffraction blurs {faint:.1f} px" in fit.advice()
 
 
+def test_a_lens_longer_than_the_distance_is_never_called_sharp(write):
+    """The object is nearer than the focal point: nothing of it has an image."""
+    text = 'base = "default"\n[camera]\nfocal_mm = 960.0\n'
+    with pytest.raises(InfeasibleLimitsError, match="a lens of 960 mm at no focus sha"):
+        load_rig(write(text + "[camera.focus]\ndistance_mm = 2000.0\n"))
+
+
 def test_parallel_light_fits_by_its_pixels():
     fit = make_rig("parallel").fit("projector", ObjectSize.ball(BALL))
     assert fit.fitting.pixel_pitch_m == pytest.approx(2 * BALL / 768)
