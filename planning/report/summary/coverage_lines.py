@@ -40,11 +40,13 @@ def coverage_lines(plan: RigPlan) -> list[str]:
         f"cameras {measured}, on the target, {coverage.samples} fresh samples",
     ]
     if sigma := coverage.sigma:
-        limit = plan.requirements.triangulation.max_sigma_m
+        limits = plan.requirements.triangulation
+        limit = limits.max_sigma_m
         at_most = "" if limit is None else f" (limit {1e3 * limit:g})"
         lines.append(
-            f"predicted sigma along the normal, of edge noise alone: median "
-            f"{1e3 * sigma.median_m:.3f} mm, 95 % within {1e3 * sigma.p95_m:.3f} mm"
+            f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise "
+            f"alone: median {1e3 * sigma.median_m:.3f} mm, 95 % within "
+            f"{1e3 * sigma.p95_m:.3f} mm"
             f"{at_most}"
         )
     if causes := coverage.uncovered_by_cause:
