@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from geometry.arrays import Array, Ints
 
 from .gltf_buffers import PACKED, QUANTIZED, Buffers, Fetch, Tree, item
-from .polygons import strip_triangles
+from .polygons import strip_triangles, with_area
 from .reading import FormatError, RawMesh, ScenePart, joined
 
 # Required extensions that leave the triangles as the core format stores them.
@@ -166,6 +166,5 @@ def _primitive(
     if mode == _FAN and len(order) >= 3:
         hub = np.full(len(order) - 2, order[0])
         faces = np.stack([hub, order[1:-1], order[2:]], axis=1)
-        a, b, c = faces.T
-        return points.astype(np.float64), faces[(a != b) & (b != c) & (c != a)]
+        return points.astype(np.float64), with_area(faces)
     raise FormatError(f"{len(order)} corners make no triangles in mode {mode}")

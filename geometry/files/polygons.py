@@ -44,8 +44,13 @@ def strip_triangles(corners: Ints) -> Ints:
     place = np.arange(len(faces)) - np.repeat(ends[:-1] + 1, lengths + 1)[: len(faces)]
     turned = place % 2 == 1
     faces[turned, :2] = faces[turned, 1::-1]
+    return with_area(faces[np.all(faces != -1, axis=1)])
+
+
+def with_area(faces: Ints) -> Ints:
+    """Return the triangles (m, 3) that don't name a corner twice."""
     a, b, c = faces.T
-    return faces[(a != b) & (b != c) & (c != a) & np.all(faces != -1, axis=1)]
+    return faces[(a != b) & (b != c) & (c != a)]
 
 
 def triangulated(

@@ -32,8 +32,6 @@ AGREE_PX = 0.75
 _SAME_SPOT_PX = 0.5
 _QUANTILE = 0.75
 _FEWEST = 30
-# Rings of one projector lie this far apart where neighbours on one ring are searched.
-_RINGS_APART = 1e6
 # Which index of a pair.
 _PROJECTOR, _CAMERA = 0, 1
 
@@ -106,7 +104,7 @@ class Agreement:
     ) -> tuple[Array, Array]:
         """Return where light passes to both, in pixels of the camera that measured.
 
-        Along a ring if both are of one projector: across it nothing is measured.
+        Rings are several pixels apart: of one projector those near are of one ring.
         """
         projector, camera = self.plan.projectors[by[0]], self.plan.cameras[by[1]]
         reach = _lengths(measured.points - camera.centre)
@@ -116,9 +114,6 @@ class Agreement:
         spots = projector.light.plane(local[0]) * per_pixel
         known = projector.light.plane(local[1]) * per_pixel
         spots[~projector.light.reaches(local[0][:, 2])] = np.nan
-        if points.projector[0] == by[0]:
-            spots = np.column_stack([spots, _RINGS_APART * points.ring])
-            known = np.column_stack([known, _RINGS_APART * measured.ring])
         return np.asarray(spots, np.float64), np.asarray(known, np.float64)
 
 

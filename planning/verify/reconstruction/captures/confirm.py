@@ -102,8 +102,7 @@ def confirm(pairs: Pairs, plan: Scanner) -> Confirmed:
         (key, _after(pair, verdicts[key], near) if key in verdicts else pair)
         for key, pair in pairs
     ]
-    limit = plan.limits.check.max_rms_m
-    off = [judge.median_m[key] > limit for key, pair in kept if len(pair.cloud)]
+    off = [not judge.on_mesh(key) for key, pair in kept if len(pair.cloud)]
     return Confirmed(
         kept,
         {key: verdict.words for key, verdict in verdicts.items()},
@@ -131,6 +130,10 @@ class _Judge:
         """Median distance of each pair from the mesh [m]."""
         return {key: float(np.median(error)) for key, error in self.error_m.items()}
 
+    def on_mesh(self, key: PairIndex) -> bool:
+        """Return whether a pair's median distance from the mesh keeps the limit."""
+        return self.median_m[key] <= self.plan.limits.check.max_rms_m
+
     @cached_property
     def believed(self) -> set[PairIndex]:
         """The pairs that agree wherever two of them measured the same spots."""
@@ -150,10 +153,9 @@ class _Judge:
 
     def verdict(self, key: PairIndex) -> _Verdict | None:
         """Return what is wrong with a pair; None: nothing."""
-        known = self.median_m[key] <= self.plan.limits.check.max_rms_m
         against = self._residuals(key, self.believed)
         if key in self.believed:
-            if known:
+            if self.on_mesh(key):
                 return self._strays(key)
             if against:
                 return self._undecided(key)
@@ -244,9 +246,7 @@ class _Judge:
             return None
         cloud = self.agreement.clouds[key]
         stray = _distances(self.plan.mesh, cloud) > stray_m
-        others = self.believed & {
-            k for k, m in self.median_m.items() if m <= self.plan.limits.check.max_rms_m
-        }
+        others = {k for k in self.believed if self.on_mesh(k)}
         seen_px = self._seen_px(cloud.take(stray), key, others)
         if seen_px is None:
             why, px = (
