@@ -53,6 +53,7 @@ def plan_rig(
     dominant_coverage: float | None = None,
     coverage: float | None = None,
     min_reachable: float | None = None,
+    region_coverage: float | None = None,
     accuracy_mm: float | None = None,
     up: str | None = None,
     seed: int = 0,
@@ -86,6 +87,8 @@ def plan_rig(
         dominant_coverage: Lit / reachable by projectors; None: the rig's.
         coverage: Measured / reachable by cameras; None: the rig's.
         min_reachable: Reachable by projectors / target; None: the rig's.
+        region_coverage: Floor of each dominant region, lit / reachable by projectors
+            and measured / reachable by cameras, 0 for none; None: the rig's.
         accuracy_mm: Largest standard deviation along the normal [mm]; None: the rig's.
         up: Axis that points up, `z` or `-y` and so on; None: the rig's.
         seed: The same seed gives the same plan.
@@ -121,6 +124,7 @@ def plan_rig(
         dominant_coverage=dominant_coverage,
         coverage=coverage,
         min_reachable=min_reachable,
+        region_coverage=region_coverage,
         accuracy_mm=accuracy_mm,
         up=up,
     )

@@ -75,8 +75,8 @@ class Positive(Finite):
 class Share(Finite):
     """A share over 0 and at most 1, in percent if it says so: 0.95, 95% or "95 %"."""
 
-    def __init__(self) -> None:
-        super().__init__(0.0, 1.0, min_open=True)
+    def __init__(self, *, or_none: bool = False) -> None:
+        super().__init__(0.0, 1.0, min_open=not or_none)
 
     def convert(
         self,

@@ -31,6 +31,7 @@ _ASKED = (
     "dominant_coverage",
     "coverage",
     "min_reachable",
+    "region_coverage",
     "accuracy_mm",
     "up",
     "seed",

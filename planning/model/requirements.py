@@ -263,6 +263,9 @@ class Requirements:
         target: `dominant` regions, or the whole `surface`.
         pattern: `rings`; `dense` and `none` come later.
         existing: Devices that stand already and are part of every plan.
+        region_coverage: Floor of each dominant region: lit area / area reachable by
+            projectors, and measured area / area reachable by cameras; 0: no floor.
+        region_share: Regions of at least this share of the target's area have it.
     """
 
     max_projectors: int
@@ -278,6 +281,8 @@ class Requirements:
     check: CheckLimits
     workspace: Workspace
     existing: tuple[Existing, ...] = ()
+    region_coverage: float = 0.0
+    region_share: float = 0.01
 
     def existing_of(self, kind: str) -> tuple[Existing, ...]:
         """Return the existing devices that are a `projector` or a `camera`."""

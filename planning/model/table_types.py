@@ -13,6 +13,7 @@ from .shares import percent_as_share
 
 Positive = Annotated[float, Field(gt=0.0)]
 Share = Annotated[float, BeforeValidator(percent_as_share), Field(gt=0.0, le=1.0)]
+ShareOrNone = Annotated[float, BeforeValidator(percent_as_share), Field(ge=0.0, le=1.0)]
 Acute = Annotated[float, Field(gt=0.0, lt=90.0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 PositivePair = Annotated[list[Positive], Field(min_length=2, max_length=2)]

@@ -68,6 +68,8 @@ def build_requirements(
         triangulation=triangulation,
         check=CheckLimits(**checked, tau_m=tau_m),
         workspace=workspace,
+        region_coverage=_share("region_coverage", wishes, shares, or_none=True),
+        region_share=shares.region_share,
     )
 
 
@@ -193,10 +195,13 @@ def _check_positive(name: str, value: float) -> None:
         raise InputError(f"{name} = {value} must be positive and finite")
 
 
-def _share(name: str, wishes: Wishes, table: RequirementsTable) -> float:
-    """Return a share that is asked for, else the rig's."""
+def _share(
+    name: str, wishes: Wishes, table: RequirementsTable, *, or_none: bool = False
+) -> float:
+    """Return a share that is asked for, else the rig's; perhaps 0."""
     asked = getattr(wishes, name)
     share = float(getattr(table, name) if asked is None else asked)
-    if not 0.0 < share <= 1.0:
-        raise InputError(f"{name} = {share} must be a share, over 0 and at most 1")
+    if not (0.0 < share <= 1.0 or (or_none and share == 0.0)):
+        least = "0 or more" if or_none else "over 0"
+        raise InputError(f"{name} = {share} must be a share, {least} and at most 1")
     return share

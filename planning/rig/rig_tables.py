@@ -17,6 +17,7 @@ from planning.model.table_types import (
     Positive,
     PositivePair,
     Share,
+    ShareOrNone,
     Table,
 )
 
@@ -198,6 +199,8 @@ class RequirementsTable(Table):
     coverage: Share = 0.95
     dominant_coverage: Share = 0.90
     min_reachable: Share = 0.90
+    region_coverage: ShareOrNone = 0.0
+    region_share: Share = 0.01
 
 
 class CheckTable(Table):

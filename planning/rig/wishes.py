@@ -22,5 +22,6 @@ class Wishes:
     dominant_coverage: float | None = None
     coverage: float | None = None
     min_reachable: float | None = None
+    region_coverage: float | None = None
     accuracy_mm: float | None = None
     up: str | None = None

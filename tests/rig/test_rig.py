@@ -475,15 +475,18 @@ def test_wishes_override_the_rig():
         coverage=0.8,
         dominant_coverage=0.7,
         min_reachable=0.6,
+        region_coverage=0.5,
         accuracy_mm=0.05,
         up="-y",
     )
+    assert asked.region_coverage == 0.5
     assert (asked.max_projectors, asked.max_cameras) == (3, 5)
     assert (asked.coverage, asked.dominant_coverage, asked.min_reachable) == (
         0.8,
         0.7,
         0.6,
     )
+    assert require(load_rig(), region_coverage=0.0).region_coverage == 0.0
     assert asked.target == "surface"
     assert asked.triangulation.max_sigma_m == pytest.approx(5e-5)
     assert asked.workspace.up == (0.0, -1.0, 0.0)
@@ -567,6 +570,8 @@ def test_limits_can_be_switched_off(write):
         {"coverage": math.nan},
         {"dominant_coverage": -0.1},
         {"min_reachable": math.inf},
+        {"region_coverage": -0.1},
+        {"region_coverage": math.nan},
         {"accuracy_mm": 0.0},
         {"accuracy_mm": math.nan},
         {"max_projectors": 0},

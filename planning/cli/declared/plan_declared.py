@@ -112,6 +112,13 @@ from planning.cli.console import (
     help="Share of the target that must be reachable [default: 0.90].",
 )
 @click.option(
+    "--region-coverage",
+    type=Share(or_none=True),
+    metavar="F",
+    help="Floor of every dominant region: lit and measured share of what is reachable "
+    "of it; 0: none [default: 0].",
+)
+@click.option(
     "--accuracy",
     "accuracy_mm",
     type=Positive(),
