@@ -14,7 +14,7 @@ from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.model.words import count_words
 from planning.report.assemble import write_plan
-from planning.report.entries.device_entries import cost_record
+from planning.report.entries.cost_entry import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.lens_fit import check_fields
@@ -259,20 +259,26 @@ def _checked(
         raise InterruptedPlanError(cut) from None
     except TIME_IS_UP:
         return cut
-    check, seconds, record = verification.reconstruction, clock.processor, None
+    check, record = verification.reconstruction, None
     if check is not None:
         false = verification.audit.failures
         record = check.record()
         record = record.changed(
             failures=(*false, *record.failures), passed=record.passed and not false
         )
-        seconds = seconds | check.seconds
     greedy = partial.camera_stage.certificate.greedy_count
     (member,) = plan.document.members
     document = plan.document.changed(
         reconstruction=record,
         members=(member.changed(reconstruction=record),),
         timings_s=dict(clock.seconds),
-        cost=cost_record(plan.cameras, greedy, seconds),
+        cost=cost_record(
+            plan.document.rig,
+            plan.projectors,
+            plan.cameras,
+            n_before=greedy,
+            stages=clock.processor,
+            scan=None if check is None else check.seconds,
+        ),
     )
     return RigPlan(document, plan.surface)

@@ -296,11 +296,11 @@ def openness(job: Job) -> Image.Image:
 
 
 def cost(job: Job) -> Image.Image:
-    """The terms of eq. (8), in processor seconds."""
+    """The terms of eq. (8) in seconds."""
     entry = job.plan.document.cost.model_dump()
     pixels = entry["pixels"]
     terms = {
-        "t1, t2": pixels * (entry["t1"] + entry["t2"]),
+        **{name: pixels * entry[name] for name in ("t1", "t2")},
         **{name: float(entry[name]) for name in ("t3", "t4", "t5")},
     }
     unit, longest = SUPERSAMPLING, max(terms.values())

@@ -27,6 +27,7 @@ from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
+from planning.report.entries.cost_entry import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.report.entries.violations import violations
@@ -58,6 +59,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     overlaps, schedule = overlap_records(among, devices.projectors)
     surface = _surface(scene, devices)
     requirements = _final_requirements(among, claims, devices)
+    rig = RigRecord(**partial.request.rig.to_document())
     document = PlanDocument(
         format=FORMAT,
         version=VERSION,
@@ -68,7 +70,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         truncated=partial.truncated,
         meshes=(entries.mesh_record(scene.mesh, scene.shell),),
         surface=_surface_record(partial, surface),
-        rig=RigRecord(**partial.request.rig.to_document()),
+        rig=rig,
         requirements=requirements,
         regions=regions,
         projectors=entries.projector_records(among, devices, partial.rings, claims),
@@ -83,8 +85,12 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
             tuple(devices.cameras[c].id for c in group)
             for group in overlap_components(claims.measured_by)
         ),
-        cost=entries.cost_record(
-            devices.cameras, certificates.cameras.greedy_count, clock.processor
+        cost=cost_record(
+            rig,
+            devices.projectors,
+            devices.cameras,
+            n_before=certificates.cameras.greedy_count,
+            stages=clock.processor,
         ),
         members=(
             MemberRecord(

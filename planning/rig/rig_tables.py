@@ -31,6 +31,7 @@ Resolution = Annotated[
     list[Annotated[int, Field(ge=2, le=MOST_PIXELS)]],
     Field(min_length=2, max_length=2),
 ]
+Rate = Annotated[float, Field(ge=1e-3, le=1e6)]
 Five = Annotated[list[float], Field(min_length=5, max_length=5)]
 
 
@@ -84,6 +85,7 @@ class PinholeTable(SourcedTable):
     distortion: Five = Field(default=[0.0, 0.0, 0.0, 0.0, 0.0])
     pixel_um: Positive | None = None
     range_mm: PositivePair | None = None
+    frame_rate_hz: Rate | None = None
     focus: FocusTable | None = None
 
     @model_validator(mode="after")
@@ -108,6 +110,12 @@ class PinholeTable(SourcedTable):
         return self
 
 
+class CameraTable(PinholeTable):
+    """A camera, `[camera]`."""
+
+    exposure_ms: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
+
+
 class ParallelTable(SourcedTable):
     """A projector of parallel light, `[parallel_projector]`."""
 
@@ -115,6 +123,7 @@ class ParallelTable(SourcedTable):
     pixel_pitch_mm: Positive
     range_mm: PositivePair
     beam_radius_mm: Positive | None = None
+    frame_rate_hz: Rate | None = None
 
     @model_validator(mode="after")
     def _check_range(self) -> Self:
@@ -219,7 +228,7 @@ class RigTable(Table):
     name: Name
     description: str = ""
     light: Literal["diverging", "parallel"] = "diverging"
-    camera: PinholeTable
+    camera: CameraTable
     projector: PinholeTable | None = None
     parallel_projector: ParallelTable | None = None
     placement: PlacementTable = PlacementTable()

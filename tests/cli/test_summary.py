@@ -1,4 +1,4 @@
-"""Angles as a designer reads them off the printout, and eq. (8)."""
+"""Angles as a designer reads them off the printout."""
 
 import time
 from dataclasses import replace
@@ -13,8 +13,6 @@ from geometry.poses import look_at
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.report.entries.device_entries import cost_record
-from planning.report.summary.check_lines import cost_lines
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.device_lines import aim_angles
 from planning.report.summary.summary import body_words, summary
@@ -82,55 +80,6 @@ def test_a_device_that_looks_straight_up_has_roll_0():
     azimuth, elevation, roll = aim_angles(PlannedCamera("C1", pose, CAMERA), Z)
     assert elevation == pytest.approx(90.0)
     assert (roll, np.isfinite(azimuth)) == (0.0, True)
-
-
-def test_eq_8_before_and_after_the_number_of_cameras_was_minimised():
-    """C = (sum M N)(t1 + t2) + t3 + t4 + t5, term by term."""
-    cameras = [looking([0.0, -1.0, 0.0]), looking([1.0, 0.0, 0.0])]
-    seconds = {
-        "render": 6.0,
-        "decode": 3.0,
-        "merge": 0.5,
-        "regions": 0.25,
-        "projectors": 1,
-        "bounds": 0.25,
-        "projector_poses": 0.25,
-        "rings": 0.25,
-        "cameras": 3,
-        "baselines": 1,
-        "claims": 90,
-        "check": 90,
-    }
-    cost = cost_record(cameras, 3, seconds).to_document()
-    assert cost["pixels"] == 2 * 2000 * 1500
-    assert cost["t1"] * cost["pixels"] == pytest.approx(6.0)
-    assert cost["t2"] * cost["pixels"] == pytest.approx(3.0)
-    assert (cost["t3"], cost["t4"], cost["t5"]) == (0.5, 2.0, 4.0)
-    assert cost["n_cameras_before"] == 3
-    assert cost["C"] == pytest.approx(6.0 + 3.0 + 0.5 + 2.0 + 4.0)
-    assert cost["C_before"] == pytest.approx(1.5 * 9.0 + 0.5 + 2.0 + 4.0)
-
-
-def test_eq_8_is_told_with_its_terms_in_microseconds_a_pixel():
-    seconds = {
-        "render": 6.0,
-        "decode": 3.0,
-        "merge": 0.5,
-        "projectors": 2,
-        "cameras": 4,
-    }
-    cameras = [looking([0.0, -1.0, 0.0]), looking([1.0, 0.0, 0.0])]
-    now, before = cost_lines(cost_record(cameras, 3, seconds))
-    assert "6.0 Mpx x (1.00 + 0.50) us + 0.5 + 2.0 + 4.0 s = 15.5 s" in now
-    assert "the 3 cameras of a greedy cover" in before
-    assert before.endswith("20.0 s")
-
-
-def test_eq_8_is_unknown_without_a_check():
-    cost = cost_record([looking([0.0, -1.0, 0.0])], 1, {"projectors": 2, "cameras": 4})
-    assert cost.C is None
-    assert cost.t4 == 2
-    assert cost_lines(cost) == []
 
 
 def test_of_a_whole_surface_one_sampling_is_told(handmade):

@@ -159,8 +159,9 @@ def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
         "surface": {"path": "surface.npz", "sha256": "", "curvature_radius_m": 0.01},
         "rig": {
             "light": light,
-            "projector": dict(projector),
-            "camera": dict(camera),
+            "projector": projector | {"figures": {"frame_rate_hz": 60.0}},
+            "camera": camera
+            | {"figures": {"frame_rate_hz": 40.0, "exposure_ms": 20.0}},
             "limits": {
                 "projector_max_incidence_deg": 60.0,
                 "min_tangent_angle_deg": 40.0,
@@ -173,20 +174,29 @@ def _document(light: str, target: str, surface: Surface) -> dict[str, Any]:
         "requirements": _requirements(light, target, surface),
         "projectors": projectors,
         "cameras": cameras,
-        "cost": {
-            "pixels": 2 * 640 * 480,
-            "t1": 2e-7,
-            "t2": 1e-7,
-            "t3": 0.25,
-            "t4": 2.0,
-            "t5": 7.0,
-            "n_cameras_before": 3,
-            "C": 614_400 * 3e-7 + 9.25,
-            "C_before": 921_600 * 3e-7 + 9.25,
-        },
+        "cost": _cost(light),
         "members": [],
         "reconstruction": None,
         "timings_s": {},
+    }
+
+
+def _cost(light: str) -> dict[str, Any]:
+    """Two projectors of 30 rings, 5 bits, or 38, 6 bits; two refreshes a frame."""
+    bits = 5 if light == "parallel" else 6
+    frames, before = (2 * (2 + 2 * bits + 2 * cameras) for cameras in (2, 3))
+    return {
+        "pixels": 2 * 640 * 480,
+        "n_frames": frames,
+        "frame_s": 1.0 / 30.0,
+        "t1": frames / 30.0 / 614_400,
+        "t2": 1e-7,
+        "t3": 0.25,
+        "t4": 2.0,
+        "t5": 7.0,
+        "n_cameras_before": 3,
+        "C": frames / 30.0 + 614_400 * 1e-7 + 9.25,
+        "C_before": before / 30.0 + 921_600 * 1e-7 + 9.25,
     }
 
 

@@ -106,6 +106,8 @@ class FiguresRecord(Part):
     vertical_offset_percent: float | None = None
     distortion: tuple[float, ...] | None = None
     pixel_um: float | None = None
+    frame_rate_hz: float | None = None
+    exposure_ms: float | None = None
     pixel_pitch_mm: float | None = None
     range_mm: Interval | None = None
     beam_radius_mm: float | None = None

@@ -33,10 +33,21 @@ VERSION = 1
 
 
 class CostRecord(Part):
-    """Eq. (8); `docs/method/cost.md` defines every key. None: no check was made."""
+    """Eq. (8); `docs/method/cost.md` defines every key.
+
+    Attributes:
+        n_frames: Frames that the projectors show, one after the other.
+        frame_s: Time of one; None: the rig doesn't say how fast its devices are.
+        t1: None where `frame_s` is.
+        t2: None: no check was made; likewise `t3` and `render_s`.
+        C: None where a term is.
+        render_s: What the simulated images took; no part of C.
+    """
 
     pixels: int
     n_cameras_before: int
+    n_frames: int = 0
+    frame_s: float | None = None
     t4: float
     t5: float
     t1: float | None
@@ -44,6 +55,7 @@ class CostRecord(Part):
     t3: float | None
     C: float | None
     C_before: float | None
+    render_s: float | None = None
 
 
 class MemberRecord(Part):

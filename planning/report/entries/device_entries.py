@@ -1,10 +1,9 @@
-"""Devices as they will be written; records of mesh, target, coverage and cost."""
+"""Devices as they will be written; records of mesh, target, coverage."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from itertools import count
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from planning.model.document.input_records import (
     MeshRecord,
     SelectionRecord,
 )
-from planning.model.document.plan_document import CostRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.claims import Claims, Devices
 from planning.rings.ring_shares import ring_shares
@@ -35,11 +33,6 @@ from planning.scene.interest import Interest
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 from planning.scene.workspace.mount_settings import device_from_mount
-
-# Stages of planning that place light, with what they need to know of the surface, and
-# those that place cameras.
-_PROJECTOR_STAGES = ("regions", "projectors", "bounds", "projector_poses", "rings")
-_CAMERA_STAGES = ("cameras", "baselines")
 
 
 def device_ids(
@@ -160,42 +153,3 @@ def region_records(
         )
         for region, (lit_by, lit_fraction) in zip(regions, claims.regions, strict=True)
     )
-
-
-def cost_record(
-    cameras: Sequence[PlannedCamera],
-    n_before: int,
-    seconds: Mapping[str, float],
-) -> CostRecord:
-    """Return the plan's `cost`; `docs/method/cost.md` defines every key.
-
-    With M_j N_j pixels of camera j::
-
-        C = (sum_j M_j N_j)(t1 + t2) + t3 + t4 + t5
-
-    t1 (acquisition, here rendering) and t2 (pixels to points) are seconds a pixel, t3
-    (fusion), t4 (projector planning) and t5 (camera planning) seconds. C_before is the
-    same with the cameras of the greedy cover, which is what D was before it was
-    minimised. Without a check t1 to t3 are unknown, and C with them.
-
-    Args:
-        cameras: As planned.
-        n_before: Cameras of the greedy cover.
-        seconds: Measured processor times in [s]: of the stages of planning, and where a
-            check was made of `render`, `decode` and `merge`.
-    """
-    pixels = sum(prod(camera.device.resolution) for camera in cameras)
-    t4, t5 = (
-        sum(seconds.get(name, 0.0) for name in names)
-        for names in (_PROJECTOR_STAGES, _CAMERA_STAGES)
-    )
-    times = dict.fromkeys(("t1", "t2", "t3", "C", "C_before"))
-    if "render" in seconds:
-        t1, t2 = seconds["render"] / pixels, seconds["decode"] / pixels
-        t3 = seconds["merge"]
-        costs = (
-            pixels * share * (t1 + t2) + t3 + t4 + t5
-            for share in (1.0, n_before / len(cameras))
-        )
-        times = dict(zip(times, (t1, t2, t3, *costs), strict=True))
-    return CostRecord(pixels=pixels, n_cameras_before=n_before, t4=t4, t5=t5, **times)

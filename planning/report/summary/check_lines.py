@@ -53,16 +53,21 @@ def _agreement(check: ReconstructionRecord) -> list[str]:
 
 
 def cost_lines(cost: CostRecord) -> list[str]:
-    """Return eq. (8) with its terms, for a person; nothing where C is unknown."""
-    if cost.C is None or cost.C_before is None:
-        return []
-    per_pixel = " + ".join(f"{1e6 * (t or 0.0):.2f}" for t in (cost.t1, cost.t2))
-    once = " + ".join(f"{t or 0.0:.1f}" for t in (cost.t3, cost.t4, cost.t5))
-    n = cost.n_cameras_before
+    """Return eq. (8) with its terms, for a person."""
+    if cost.frame_s is None:
+        unknown = "frame_rate_hz of camera or projector, so eq. (8) has no t1"
+        return labelled("COST", [f"the rig doesn't say {unknown}"])
+    acquired = cost.n_frames * cost.frame_s
+    scan = f"{cost.n_frames} frames of {1e3 * cost.frame_s:.1f} ms, {acquired:.2f} s"
+    if cost.C is None or cost.C_before is None or cost.t2 is None or cost.t3 is None:
+        return labelled("COST", [f"a scan is {scan}"])
+    saved, before = cost.C_before - cost.C, count_words(cost.n_cameras_before, "camera")
     lines = [
-        f"eq. (8): {1e-6 * cost.pixels:.1f} Mpx x ({per_pixel}) us + "
-        f"{once} s = {cost.C:.1f} s of processor time",
-        f"with the {count_words(n, 'camera')} of a greedy cover, before D was "
-        f"minimised: {cost.C_before:.1f} s",
+        f"a scan is {scan}; {1e-6 * cost.pixels:.1f} Mpx to points "
+        f"{cost.pixels * cost.t2:.2f} s, merged {cost.t3:.2f} s",
+        f"eq. (8), with planning of {cost.t4:.1f} + {cost.t5:.1f} s: "
+        f"C = {cost.C:.1f} s",
+        f"{cost.C_before:.1f} s with the {before} of a greedy cover: minimising D "
+        f"{f'saved {saved:.1f} s' if saved > 0.0 else 'saved nothing'}",
     ]
     return labelled("COST", lines)

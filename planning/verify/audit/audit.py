@@ -10,13 +10,13 @@ from planning.verify.audit.baselines.range_claims import audit_ranges
 from planning.verify.audit.counts.certificate_claims import (
     audit_certificates,
 )
+from planning.verify.audit.counts.cost_claims import audit_cost
 from planning.verify.audit.counts.overlap_claims import (
     audit_groups,
     audit_overlaps,
     audit_schedule,
 )
 from planning.verify.audit.counts.table_claims import (
-    audit_cost,
     audit_limits,
     audit_scales,
     audit_shares,

@@ -127,26 +127,3 @@ def audit_scales(case: AuditCase, findings: AuditFindings) -> None:
         if truth is not None:
             unit = f"m ({mesh.unit})"
             findings.number(key, mesh.scale_to_m, truth, _RELATIVE * truth, unit)
-
-
-def audit_cost(case: AuditCase, findings: AuditFindings) -> None:
-    """Eq. (8): C = pixels (t1 + t2) + t3 + t4 + t5, from the entry's own times."""
-    document, findings = case.plan.document, findings.at("cost")
-    cost, cameras = document.cost, document.cameras
-    pixels = sum(math.prod(camera.resolution) for camera in cameras)
-    findings.number("pixels", cost.pixels, pixels, 0.0, "px")
-    greedy, before = document.certificates.cameras.greedy_count, cost.n_cameras_before
-    whose = "certificates.cameras.greedy_count"
-    findings.same("n_cameras_before", before, greedy, whose)
-    earlier = pixels * before / max(len(cameras), 1)
-    times = (cost.t1, cost.t2, cost.t3, cost.t4, cost.t5)
-    for name, each in (("C", pixels), ("C_before", earlier)):
-        claimed = getattr(cost, name)
-        if claimed is None:
-            continue
-        if any(time is None or time < 0.0 for time in times):
-            findings.fail(name, f"is claimed with the times {times}")
-            continue
-        t1, t2, t3, t4, t5 = (time or 0.0 for time in times)
-        total = each * (t1 + t2) + t3 + t4 + t5
-        findings.number(name, claimed, total, _RELATIVE * (1.0 + total), "s")

@@ -1,0 +1,87 @@
+"""The plan's `cost`: eq. (8)."""
+
+from collections.abc import Mapping, Sequence
+from math import prod
+
+from planning.model.acquisition import frame_time, n_frames
+from planning.model.document.input_records import RigRecord
+from planning.model.document.plan_document import CostRecord
+from planning.model.planned import PlannedCamera, PlannedProjector
+
+# What places light, with what that needs to know of the surface, is t4. All the rest of
+# planning is t5. The check is neither: t1 to t3 are of a scan, not of planning.
+_PROJECTOR_STAGES = ("regions", "projectors", "bounds", "projector_poses", "rings")
+_CHECK = "check"
+
+
+def cost_record(
+    rig: RigRecord,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    *,
+    n_before: int,
+    stages: Mapping[str, float],
+    scan: Mapping[str, float] | None = None,
+) -> CostRecord:
+    """Return the plan's `cost`; `docs/method/cost.md` defines every key.
+
+    With M_j N_j pixels of camera j::
+
+        C = (sum_j M_j N_j)(t1 + t2) + t3 + t4 + t5
+
+    t1 (acquisition: frames times the time of one) and t2 (pixels to points) are seconds
+    a pixel, t3 (fusion), t4 (projector planning) and t5 (camera planning) seconds.
+    C_before is the same with the cameras of the greedy cover, which is what D was
+    before it was minimised: each has its own pixels and root discs. What isn't known is
+    None, and C with it.
+
+    Args:
+        rig: Says how fast its devices are.
+        projectors: As planned.
+        cameras: Likewise.
+        n_before: Cameras of the greedy cover.
+        stages: Measured processor times of the stages of planning [s].
+        scan: Where a check was made those of `render`, `decode` and `merge` [s].
+    """
+    pixels = sum(prod(camera.device.resolution) for camera in cameras)
+    shown = n_frames(projectors, len(cameras))
+    t4 = sum(stages.get(name, 0.0) for name in _PROJECTOR_STAGES)
+    frame_s = _frame_time(rig)
+    known = CostRecord(
+        pixels=pixels,
+        n_cameras_before=n_before,
+        n_frames=shown,
+        frame_s=frame_s,
+        t4=t4,
+        t5=sum(stages.values()) - stages.get(_CHECK, 0.0) - t4,
+        t1=None if frame_s is None else shown * frame_s / pixels,
+        t2=None,
+        t3=None,
+        C=None,
+        C_before=None,
+    )
+    if scan is None:
+        return known
+    t2, t3 = scan["decode"] / pixels, scan["merge"]
+    known = known.changed(t2=t2, t3=t3, render_s=scan["render"])
+    if frame_s is None:
+        return known
+    C, C_before = (
+        n_frames(projectors, count) * frame_s
+        + pixels * count / len(cameras) * t2
+        + t3
+        + known.t4
+        + known.t5
+        for count in (len(cameras), n_before)
+    )
+    return known.changed(C=C, C_before=C_before)
+
+
+def _frame_time(rig: RigRecord) -> float | None:
+    camera, projector = rig.camera.figures, rig.projector.figures
+    exposure = camera.exposure_ms
+    return frame_time(
+        camera.frame_rate_hz,
+        projector.frame_rate_hz,
+        None if exposure is None else 1e-3 * exposure,
+    )

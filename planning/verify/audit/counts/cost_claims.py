@@ -1,0 +1,67 @@
+"""Claims of eq. (8) that follow from a plan: frames, their time, pixels, C."""
+
+import math
+
+from planning.model.document.plan_document import CostRecord
+from planning.model.plan import RigPlan
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+
+_RELATIVE = 1e-6
+
+
+def audit_cost(case: AuditCase, findings: AuditFindings) -> None:
+    """Eq. (8) and its terms, but for the processor times, which are as measured."""
+    document, findings = case.plan.document, findings.at("cost")
+    cost, cameras = document.cost, document.cameras
+    count, before = len(cameras), cost.n_cameras_before
+    pixels = sum(math.prod(camera.resolution) for camera in cameras)
+    findings.number("pixels", cost.pixels, pixels, 0.0, "px")
+    whose = "certificates.cameras.greedy_count"
+    greedy = document.certificates.cameras.greedy_count
+    findings.same("n_cameras_before", before, greedy, whose)
+    frames = _frames(case.plan, count)
+    findings.number("n_frames", cost.n_frames, frames, 0.0, "")
+    frame_s = _frame_time(case.plan)
+    whose = "rates and exposure under rig.*.figures"
+    truths = [("frame_s", frame_s, whose)]
+    a_pixel = None if frame_s is None else frames * frame_s / max(pixels, 1)
+    truths.append(("t1", a_pixel, "n_frames x frame_s / pixels"))
+    for name, number in (("C", count), ("C_before", before)):
+        acquired = None if frame_s is None else _frames(case.plan, number) * frame_s
+        total = _total(cost, acquired, pixels * number / max(count, 1))
+        truths.append((name, total, "the sum of its terms"))
+    for name, truth, whose in truths:
+        slack = _RELATIVE * abs(truth or 0.0)
+        findings.same(name, getattr(cost, name), truth, whose, slack)
+
+
+def _frames(plan: RigPlan, n_cameras: int) -> int:
+    """White and black; a code for each annulus, a disc for each camera; inverses."""
+    coded = 0
+    for projector in plan.document.projectors:
+        n_annuli = len(projector.ring_radii) + 1
+        coded += math.ceil(math.log2(n_annuli)) + n_cameras + 1
+    return 2 * coded
+
+
+def _frame_time(plan: RigPlan) -> float | None:
+    """Refreshes of the projector until the camera has exposed and is ready again."""
+    rig = plan.document.rig
+    rate, refresh = (
+        device.figures.frame_rate_hz for device in (rig.camera, rig.projector)
+    )
+    if not (rate and refresh and rate > 0.0 and refresh > 0.0):
+        return None
+    longest = max(1.0 / rate, 1e-3 * (rig.camera.figures.exposure_ms or 0.0))
+    refreshes = longest * refresh * (1.0 - _RELATIVE)
+    return max(math.ceil(refreshes), 1) / refresh if math.isfinite(refreshes) else None
+
+
+def _total(cost: CostRecord, acquired: float | None, pixels: float) -> float | None:
+    """Eq. (8); None where a term isn't known."""
+    terms = acquired, cost.t2, cost.t3, cost.t4, cost.t5
+    if any(term is None or not term >= 0.0 for term in terms):
+        return None
+    t1, t2, t3, t4, t5 = (term or 0.0 for term in terms)
+    return t1 + pixels * t2 + t3 + t4 + t5
