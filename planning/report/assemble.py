@@ -34,8 +34,9 @@ from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
 from planning.scene.scene import Scene
 
-from .claims import Claims, Devices, make_claims
+from .claims import Claims, make_claims
 from .entries import device_entries as entries
+from .judged import Devices
 from .marginal import marginal_records
 from .partial_plan import PartialPlan
 
@@ -55,7 +56,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     if not partial.truncated:
         coverage = with_relaxations(partial, devices, claims, clock)
         certificates = with_fewer_needed(certificates, partial, clock)
-    regions = entries.region_records(partial.ready.regions, claims)
+    regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
     overlaps, schedule = overlap_records(among, devices.projectors)
     surface = _surface(scene, devices)
     requirements = _final_requirements(among, claims, devices)

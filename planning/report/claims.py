@@ -2,48 +2,34 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
 from planning.model.document.coverage_records import Areas, Coverage, PredictedSigma
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import (
     assigned_projectors,
     first_failure,
     lit_margins,
-    lit_stages,
 )
-from planning.scene.limits import camera_limits, pair_limits, projector_limits
+from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import (
     LitSamples,
-    furthest_failure,
     least_sigma,
-    measured_by,
 )
 from planning.scene.placed_bodies import Blocker, Device, Obstruction, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
-from .reach import furthest_lit, measured_by_any
+from .judged import Devices, Judged, by_cause
+from .region_claims import RegionClaim, RegionSamples, claim_regions
 
 _BETWEEN_LIGHT = projector_limits.BLOCKED, projector_limits.OBSTRUCTED
 _BETWEEN_VIEW = camera_limits.BLOCKED, camera_limits.OBSTRUCTED
-
-
-@dataclass(frozen=True, eq=False)
-class Devices:
-    """The devices of a plan and the reference sets that reachability refers to."""
-
-    projectors: tuple[PlannedProjector, ...]
-    cameras: tuple[PlannedCamera, ...]
-    reference_projectors: tuple[PlannedProjector, ...]
-    reference_cameras: tuple[PlannedCamera, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +42,10 @@ class Claims:
         min_margin_rad: Least margin over what each projector serves, None for nothing.
         seen_area_m2: Area that each camera measures.
         sole_area_m2: Area that only this camera measures.
-        regions: Projectors that samples of each region are assigned to, and its lit
-            share.
+        regions: Of each, in their order.
         target_samples: The samples behind the target's figures.
         measured_by: Which camera measures which of those, (n, n_cameras).
+        region_samples: The samples behind the regions' figures.
     """
 
     coverage: Coverage
@@ -67,59 +53,28 @@ class Claims:
     min_margin_rad: tuple[float | None, ...]
     seen_area_m2: tuple[float, ...]
     sole_area_m2: tuple[float, ...]
-    regions: tuple[tuple[tuple[str, ...], float], ...]
+    regions: tuple[RegionClaim, ...]
     target_samples: Target
     measured_by: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class _Judged:
-    """What becomes of n samples.
-
-    Attributes:
-        first: First limit that each projector violates, or `LIT`, (n, n_projectors).
-        furthest: Of those that aren't lit, how far they come over the reference set.
-    """
-
-    target: Target
-    first: NDArray[np.int8]
-    measured_by: NDArray[np.bool_]
-    furthest: NDArray[np.int8]
-
-    @cached_property
-    def lit(self) -> NDArray[np.bool_]:
-        return np.any(self.first == LIT, axis=1)
-
-    @cached_property
-    def measured(self) -> NDArray[np.bool_]:
-        return np.any(self.measured_by, axis=1)
-
-    def unmeasured(self, devices: Devices) -> LitSamples:
-        """Those that are lit all the same."""
-        chosen = np.flatnonzero(self.lit & ~self.measured)
-        lit = self.first[chosen] == LIT
-        return LitSamples.of(devices.projectors, self.target.take(chosen), lit)
-
-    def area(self, *counts: NDArray[np.bool_]) -> float:
-        """Of samples that hold in one of several masks [m²]."""
-        return self.target.samples.weight * sum(int(mask.sum()) for mask in counts)
+    region_samples: RegionSamples
 
 
 def make_claims(scene: Scene, devices: Devices) -> Claims:
     """Recompute every area from poses as they will be written."""
     planned = scene.among((*devices.projectors, *devices.cameras))
-    target = _judged(scene, planned, devices, scene.target_samples(DRAWS.claims))
-    surface = _judged(scene, planned, devices, scene.surface_samples(DRAWS.claims))
+    target = Judged.of(scene, devices, scene.target_samples(DRAWS.claims))
+    surface = Judged.of(scene, devices, scene.surface_samples(DRAWS.claims))
     samples, area, seen = target.target, target.area, target.measured_by
+    weight = samples.samples.weight
     unreachable = target.furthest < LIT
     inside = _inside(scene, samples.take(~target.lit).take(unreachable))
     coverage = Coverage(
         samples=len(samples),
-        surface=_areas(scene, devices, surface),
-        target=_areas(scene, devices, target),
-        uncovered_by_cause=_uncovered(planned, devices, target),
-        unreachable_by_cause=_by_cause(
-            target, _named(projector_limits.CAUSES, target.furthest[unreachable])
+        surface=_areas(surface),
+        target=_areas(target),
+        uncovered_by_cause=by_cause(target.causes(scene, devices), weight),
+        unreachable_by_cause=by_cause(
+            np.array(projector_limits.CAUSES)[target.furthest[unreachable]], weight
         ),
         unreachable_inside_m2=area(inside),
         sigma=_sigma(planned, devices, target),
@@ -127,6 +82,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
     coverage = coverage.changed(**_blocked(planned, devices, target))
     lit, margin = target.first == LIT, lit_margins(scene, devices.projectors, samples)
     served = assigned_projectors(lit, margin)
+    region_samples = RegionSamples.of(scene, devices, target)
     alone = seen & (seen.sum(axis=1) == 1)[:, None]
     return Claims(
         coverage,
@@ -137,60 +93,25 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
         ),
         tuple(area(column) for column in seen.T),
         tuple(area(column) for column in alone.T),
-        _regions(scene, devices, target, served),
+        claim_regions(devices, region_samples),
         samples,
         seen,
+        region_samples,
     )
 
 
-def _judged(scene: Scene, planned: Scene, devices: Devices, target: Target) -> _Judged:
-    first = lit_stages(planned, devices.projectors, target)
-    lit = first == LIT
-    samples = LitSamples.of(devices.projectors, target, lit)
-    dark = target.take(~np.any(lit, axis=1))
-    return _Judged(
-        target,
-        first,
-        measured_by(planned, devices.cameras, samples),
-        furthest_lit(scene, devices.reference_projectors, dark),
-    )
-
-
-def _areas(scene: Scene, devices: Devices, judged: _Judged) -> Areas:
-    # Another camera needn't stand among those that were chosen.
-    among = scene.among(devices.projectors)
-    others = measured_by_any(
-        among, devices.reference_cameras, judged.unmeasured(devices)
-    )
+def _areas(judged: Judged) -> Areas:
     return Areas(
         area_m2=judged.target.samples.weight * len(judged.target),
-        reachable_by_projectors_m2=judged.area(judged.lit, judged.furthest == LIT),
+        reachable_by_projectors_m2=judged.area(judged.by_projectors),
         lit_m2=judged.area(judged.lit),
-        reachable_by_cameras_m2=judged.area(judged.measured, others),
+        reachable_by_cameras_m2=judged.area(judged.by_cameras),
         measured_m2=judged.area(judged.measured),
     )
 
 
-def _uncovered(scene: Scene, devices: Devices, target: _Judged) -> dict[str, float]:
-    """The area that isn't measured, by cause."""
-    dark = target.first[~target.lit].max(axis=1)
-    lit = furthest_failure(scene, devices.cameras, target.unmeasured(devices))
-    causes = _named(projector_limits.CAUSES, dark) + _named(pair_limits.CAUSES, lit)
-    return _by_cause(target, causes)
-
-
-def _named(causes: tuple[str, ...], first: NDArray[np.int8]) -> list[str]:
-    return [causes[index] for index in first]
-
-
-def _by_cause(judged: _Judged, causes: list[str]) -> dict[str, float]:
-    weight = judged.target.samples.weight
-    order = dict.fromkeys(projector_limits.CAUSES + pair_limits.CAUSES)
-    return {c: weight * causes.count(c) for c in order if c in causes}
-
-
 def _blocked(
-    scene: Scene, devices: Devices, target: _Judged
+    scene: Scene, devices: Devices, target: Judged
 ) -> dict[str, dict[str, float]]:
     """Unmeasured area that bodies and obstacles keep light or a view from, by name.
 
@@ -240,7 +161,7 @@ def _blocked(
     return blocked
 
 
-def _sigma(scene: Scene, devices: Devices, target: _Judged) -> PredictedSigma | None:
+def _sigma(scene: Scene, devices: Devices, target: Judged) -> PredictedSigma | None:
     chosen = np.flatnonzero(target.measured)
     if not len(chosen):
         return None
@@ -262,16 +183,3 @@ def _inside(scene: Scene, target: Target) -> NDArray[np.bool_]:
         return np.zeros(0, dtype=bool)
     samples = target.samples
     return lies_inside(scene.visibility.caster, samples.faces, samples.points)
-
-
-def _regions(
-    scene: Scene, devices: Devices, target: _Judged, served: NDArray[np.int64]
-) -> tuple[tuple[tuple[str, ...], float], ...]:
-    region = scene.region[target.target.samples.faces]
-    lights: list[tuple[tuple[str, ...], float]] = []
-    for index in range(int(scene.region.max()) + 1):
-        inside = region == index
-        by = np.unique(served[inside & (served >= 0)])
-        share = float(target.lit[inside].mean()) if inside.any() else 0.0
-        lights.append((tuple(devices.projectors[p].id for p in by), share))
-    return tuple(lights)

@@ -17,7 +17,8 @@ from planning.scene.measured import lit_samples, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
-from .claims import Claims, Devices
+from .claims import Claims
+from .judged import Devices
 from .partial_plan import PartialPlan
 
 _D = TypeVar("_D")
@@ -40,6 +41,12 @@ def marginal_records(
         light = lit_samples(among, projectors, samples)
         return np.any(measured_by(among, cameras, light), axis=1)
 
+    def worst_region(n: int) -> tuple[int, float] | None:
+        samples = claims.region_samples
+        if n == len(devices.projectors):
+            return samples.worst(samples.lit)
+        return samples.worst(lit(partial.stage.by_count[n], samples.target))
+
     lights = _areas(
         scene,
         partial.stage.by_count,
@@ -54,8 +61,15 @@ def marginal_records(
     )
     return (
         *(
-            ProjectorMarginal(n_projectors=n, lit_target_m2=a, lit_surface_m2=b)
+            ProjectorMarginal(
+                n_projectors=n,
+                lit_target_m2=a,
+                lit_surface_m2=b,
+                worst_region=worst[0],
+                worst_region_lit=worst[1],
+            )
             for n, (a, b) in lights.items()
+            for worst in (worst_region(n) or (None, None),)
         ),
         *(
             CameraMarginal(n_cameras=n, measured_target_m2=a, measured_surface_m2=b)

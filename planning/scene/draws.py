@@ -14,6 +14,10 @@ class Draw:
     count: int
     stream: int
 
+    def of(self, count: int) -> "Draw":
+        """Return the draw with so many samples."""
+        return replace(self, count=count)
+
     def later(self, streams: int) -> "Draw":
         """Return the draw from a stream so many further on."""
         return replace(self, stream=self.stream + streams)
@@ -24,7 +28,8 @@ class Draws:
     """Every draw of a plan, and how many of drawn samples slower steps look at.
 
     Fresh samples confirm a cover, a stream further on each round; rounds of ring
-    spacing go two streams further. Areas of the plan are computed from `claims`. Mere
+    spacing go two streams further. Areas of the plan are computed from `claims`, those
+    of a region from at least as many as `region_claims`. Mere
     numbers are samples at most: `dark` where nothing at all is lit, `fewer_devices` for
     what would let fewer be enough.
     """
@@ -39,6 +44,7 @@ class Draws:
     confirming_baselines: Draw = Draw(16_000, 301)
     rings: Draw = Draw(6000, 400)
     claims: Draw = Draw(12_000, 900)
+    region_claims: Draw = Draw(400, 904)
     overlaps: Draw = Draw(12_000, 902)
     relaxations: Draw = Draw(800, 950)
     dark: int = 400

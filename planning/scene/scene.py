@@ -103,6 +103,22 @@ class Scene:
             return np.ones(len(self.mesh.faces), dtype=bool)
         return self.region >= 0
 
+    @cached_property
+    def large_regions(self) -> NDArray[np.int64]:
+        """Regions of at least `region_share` of the target's area, ascending.
+
+        A `region_coverage` is theirs.
+        """
+        areas = self.mesh.face_areas
+        inside = self.region >= 0
+        of_region = np.bincount(self.region[inside], areas[inside])
+        least = self.requirements.region_share * areas[self.target_faces].sum()
+        return np.flatnonzero(of_region >= least * (1.0 - 1e-9))
+
+    def region_samples(self, draw: Draw, region: int) -> Target:
+        """Return area-true samples of a region, by a stream of its own."""
+        return self._samples(draw, self.region == region, region + 1)
+
     def target_samples(self, draw: Draw) -> Target:
         """Return area-true samples of the target."""
         return self._samples(draw, self.target_faces)
@@ -124,10 +140,12 @@ class Scene:
         samples = self.target_samples(DRAWS.site).samples
         return Site(device, space, radius, standoff, samples, limits.max_incidence)
 
-    def _samples(self, draw: Draw, within: NDArray[np.bool_] | None) -> Target:
+    def _samples(
+        self, draw: Draw, within: NDArray[np.bool_] | None, *part: int
+    ) -> Target:
         # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.
-        mixed = np.random.SeedSequence([self.seed, draw.stream]).generate_state(1)
+        mixed = np.random.SeedSequence([self.seed, draw.stream, *part])
         samples = sample_surface(
-            self.mesh, draw.count, seed=int(mixed[0]), within=within
+            self.mesh, draw.count, seed=int(mixed.generate_state(1)[0]), within=within
         )
         return Target(samples, self.steep[samples.faces])

@@ -27,7 +27,8 @@ from planning.report.advice.camera_relaxations import (
 from planning.report.advice.demands import Demands, demands
 from planning.report.advice.least_changes import Share, least_changes, least_enough
 from planning.report.advice.least_changes import relaxations_of_cameras as ways
-from planning.report.claims import Devices, make_claims
+from planning.report.claims import make_claims
+from planning.report.judged import Devices
 from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
 from planning.rig.rig import load_rig

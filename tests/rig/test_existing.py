@@ -21,7 +21,8 @@ from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.all_poses import Effort
 from planning.proofs.selection import CandidateCover, marginals, select_fewest
-from planning.report.claims import Devices, make_claims
+from planning.report.claims import make_claims
+from planning.report.judged import Devices
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
 from planning.verify.audit.audit import audit_plan

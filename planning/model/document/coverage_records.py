@@ -71,12 +71,35 @@ class Coverage(Part):
     camera_relaxations: tuple[Relaxation, ...] = ()
 
 
+class RegionCoverage(Part):
+    """What is covered of a region, as `coverage` says it of the target; areas in [m²].
+
+    Attributes:
+        samples: Fresh samples behind the figures, more than those of the target where
+            few of these fall into a large region.
+        uncovered_by_cause: Area that isn't measured.
+        floor: Whether enough of it is lit and measured; None: it has no floor.
+        relaxations: What would let a missed floor be met.
+    """
+
+    samples: int
+    reachable_by_projectors_m2: float
+    lit_m2: float
+    reachable_by_cameras_m2: float
+    measured_m2: float
+    uncovered_by_cause: dict[str, float]
+    floor: Literal["met", "missed"] | None
+    relaxations: tuple[str, ...] = ()
+
+
 class RegionRecord(Part):
     """A region of the target.
 
     Attributes:
         lit_by: Projectors that samples of it are assigned to.
-        lit_fraction: Share of its samples that any projector lights.
+        lit_fraction: Share of its area that any projector lights.
+        centre_m: Area-weighted mean of its faces' centroids, in the world [m].
+        coverage: Areas of it; None in plans from before.
     """
 
     id: int
@@ -87,14 +110,24 @@ class RegionRecord(Part):
     mean_curvedness: float
     lit_by: tuple[str, ...]
     lit_fraction: float
+    centre_m: Vector3 | None = None
+    coverage: RegionCoverage | None = None
 
 
 class ProjectorMarginal(Part):
-    """Areas with so many projectors [m²]."""
+    """Areas with so many projectors [m²].
+
+    Attributes:
+        worst_region: Large region of which they light the least share of what can be
+            reached; None: there is none, or the plan is from before.
+        worst_region_lit: That share.
+    """
 
     n_projectors: int
     lit_target_m2: float
     lit_surface_m2: float
+    worst_region: int | None = None
+    worst_region_lit: float | None = None
 
 
 class CameraMarginal(Part):

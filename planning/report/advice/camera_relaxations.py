@@ -18,7 +18,8 @@ from planning.model.document.coverage_records import Relaxation
 from planning.model.planned import PlannedCamera
 from planning.model.words import percent
 from planning.proofs.selection import required_samples
-from planning.report.claims import Claims, Devices
+from planning.report.claims import Claims
+from planning.report.judged import Devices
 from planning.report.reach import measured_by_any
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS

@@ -25,8 +25,10 @@ from planning.model.document.input_records import (
     MeshRecord,
     SelectionRecord,
 )
+from planning.model.document.part import Vector3
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.report.claims import Claims, Devices
+from planning.report.claims import Claims
+from planning.report.judged import Devices
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
@@ -137,7 +139,7 @@ def selection_record(
 
 
 def region_records(
-    regions: DominantRegions, claims: Claims
+    mesh: TriangleMesh, regions: DominantRegions, claims: Claims
 ) -> tuple[RegionRecord, ...]:
     """Return the plan's `regions`."""
     return tuple(
@@ -148,8 +150,16 @@ def region_records(
             mean_normal=region.mean_normal.tolist(),
             cone_angle=region.cone_angle,
             mean_curvedness=region.mean_curvedness,
-            lit_by=lit_by,
-            lit_fraction=lit_fraction,
+            lit_by=claim.lit_by,
+            lit_fraction=claim.coverage.lit_m2 / region.area_m2,
+            centre_m=_centre(mesh, region.faces),
+            coverage=claim.coverage,
         )
-        for region, (lit_by, lit_fraction) in zip(regions, claims.regions, strict=True)
+        for region, claim in zip(regions, claims.regions, strict=True)
     )
+
+
+def _centre(mesh: TriangleMesh, faces: NDArray[np.int64]) -> Vector3:
+    areas = mesh.face_areas[faces]
+    x, y, z = (areas @ mesh.face_centroids[faces] / areas.sum()).tolist()
+    return x, y, z

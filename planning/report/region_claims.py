@@ -1,0 +1,158 @@
+"""What a plan may claim of each dominant region, on samples enough for its share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.document.coverage_records import RegionCoverage
+from planning.scene.draws import DRAWS
+from planning.scene.lighting import assigned_projectors, lit_margins
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.samples import Target, merged
+from planning.scene.scene import Scene
+
+from .judged import Devices, Judged, by_cause
+
+_Mask = NDArray[np.bool_]
+# Equal up to rounding is enough.
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RegionClaim:
+    """What a plan does for a region: who is primary to samples of it, and areas."""
+
+    lit_by: tuple[str, ...]
+    coverage: RegionCoverage
+
+
+@dataclass(frozen=True, eq=False)
+class RegionSamples:
+    """Samples of the target, and more of large regions that got few; n in all.
+
+    Shares of a region are those of its samples; what each stands for differs.
+
+    Attributes:
+        scene: What they lie on.
+        target: Where.
+        region: Region of each, -1 for none, shape (n,).
+        lit, measured, by_projectors, by_cameras: As in `Judged`, shape (n,).
+        causes: By which limit each isn't measured, "" where it is, shape (n,).
+        primary: Index of the projector that each is assigned to, -1 for none, (n,).
+    """
+
+    scene: Scene
+    target: Target
+    region: NDArray[np.int64]
+    lit: _Mask
+    measured: _Mask
+    by_projectors: _Mask
+    by_cameras: _Mask
+    causes: NDArray[np.str_]
+    primary: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, scene: Scene, devices: Devices, judged: Judged) -> "RegionSamples":
+        """Return judged samples of the target, and what large regions lack."""
+        parts = [judged]
+        if (lacking := _lacking(scene, judged.target)) is not None:
+            parts.append(Judged.of(scene, devices, lacking))
+        target = (
+            parts[0].target if len(parts) == 1 else merged(*(p.target for p in parts))
+        )
+        margins = lit_margins(scene, devices.projectors, target)
+        first = np.concatenate([part.first for part in parts])
+
+        def of_all(name: str) -> _Mask:
+            return np.concatenate([getattr(part, name) for part in parts])
+
+        return cls(
+            scene,
+            target,
+            scene.region[target.samples.faces],
+            of_all("lit"),
+            of_all("measured"),
+            of_all("by_projectors"),
+            of_all("by_cameras"),
+            np.concatenate([part.causes(scene, devices) for part in parts]),
+            assigned_projectors(first == LIT, margins),
+        )
+
+    def worst(self, lit: _Mask) -> tuple[int, float] | None:
+        """Return the large region of least lit / reachable, and that share.
+
+        The first of equals, of those of which anything is lit or reachable by the plan;
+        None: there are none. `lit` says which samples are, shape (n,).
+        """
+        shares: dict[int, float] = {}
+        for index in self.scene.large_regions.tolist():
+            inside = self.region == index
+            if n := int((self.by_projectors | lit)[inside].sum()):
+                shares[index] = int(lit[inside].sum()) / n
+        return min(shares.items(), key=lambda pair: pair[1], default=None)
+
+
+def claim_regions(devices: Devices, samples: RegionSamples) -> tuple[RegionClaim, ...]:
+    """Return the claims of all regions, in their order."""
+    scene = samples.scene
+    large, share = scene.large_regions, scene.requirements.region_coverage
+    claims: list[RegionClaim] = []
+    for index in range(int(scene.region.max()) + 1):
+        areas = _areas(samples, index)
+        if share and index in large:
+            met = meets_floor(areas, share)
+            areas = areas.changed(floor="met" if met else "missed")
+        by = np.unique(samples.primary[samples.region == index])
+        names = tuple(devices.projectors[p].id for p in by if p >= 0)
+        claims.append(RegionClaim(names, areas))
+    return tuple(claims)
+
+
+def _areas(samples: RegionSamples, index: int) -> RegionCoverage:
+    mesh, inside = samples.scene.mesh, samples.region == index
+    n = int(inside.sum())
+    area = float(mesh.face_areas[samples.scene.region == index].sum())
+    weight = area / max(n, 1)
+    by_projectors, lit, by_cameras, measured = (
+        weight * int(mask[inside].sum())
+        for mask in (
+            samples.by_projectors,
+            samples.lit,
+            samples.by_cameras,
+            samples.measured,
+        )
+    )
+    return RegionCoverage(
+        samples=n,
+        reachable_by_projectors_m2=by_projectors,
+        lit_m2=lit,
+        reachable_by_cameras_m2=by_cameras,
+        measured_m2=measured,
+        uncovered_by_cause=by_cause(samples.causes[inside], weight),
+        floor=None,
+    )
+
+
+def meets_floor(areas: RegionCoverage, share: float) -> bool:
+    """Return whether a share of what can be lit is, and of what can be measured."""
+    return all(
+        part >= share * whole * (1.0 - _SLACK)
+        for part, whole in (
+            (areas.lit_m2, areas.reachable_by_projectors_m2),
+            (areas.measured_m2, areas.reachable_by_cameras_m2),
+        )
+    )
+
+
+def _lacking(scene: Scene, target: Target) -> Target | None:
+    """Draw the samples that large regions lack; None: they have enough."""
+    draw = DRAWS.region_claims
+    region = scene.region[target.samples.faces]
+    every: Target | None = None
+    for index in scene.large_regions.tolist():
+        lack = draw.count - int((region == index).sum())
+        if lack > 0:
+            more = scene.region_samples(draw.of(lack), index)
+            every = more if every is None else merged(every, more)
+    return every
