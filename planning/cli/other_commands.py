@@ -13,11 +13,14 @@ from geometry.shapes.sample_head.sample_head import (
     sample_head,
 )
 from planning.model.files import write_atomically
-from planning.rig.rig_files import list_presets
+from planning.rig.rig_files import list_presets, preset_text
 
 
-def rigs_command() -> int:
-    """Print the presets with the source of every number."""
+def rigs_command(name: str | None) -> int:
+    """Print the presets with the source of every number, or one's file as it is."""
+    if name is not None:
+        click.echo(preset_text(name), nl=False)
+        return 0
     for preset in list_presets():
         click.echo(f"{preset.name}: {preset.description}")
         for role, device in preset.devices.items():

@@ -71,7 +71,10 @@ def read_rig(name_or_path: str | Path) -> RigTable:
     if _is_path(name_or_path):
         where, tables = str(name_or_path), _read_file(Path(name_or_path))
     else:
-        where, tables = f"rig {name_or_path}", _read_preset(str(name_or_path))
+        where, tables = (
+            f"rig {name_or_path}",
+            tomllib.loads(preset_text(str(name_or_path))),
+        )
     base = tables.pop("base", None)
     if base is not None:
         if not isinstance(base, str) or base not in preset_names():
@@ -79,7 +82,7 @@ def read_rig(name_or_path: str | Path) -> RigTable:
                 f"{where}: base = {base!r} must name a preset: "
                 f"{', '.join(preset_names())}"
             )
-        tables = lay_over(_read_preset(base), tables)
+        tables = lay_over(tomllib.loads(preset_text(base)), tables)
     try:
         return RigTable.model_validate(tables)
     except ValidationError as error:
@@ -143,7 +146,12 @@ def _read_file(path: Path) -> dict[str, Any]:
         raise RigError(f"{path}: not TOML ({error}); correct that line") from None
 
 
-def _read_preset(name: str) -> dict[str, Any]:
+def preset_text(name: str) -> str:
+    """Return the file of a preset.
+
+    Raises:
+        RigError: If there is none of this name.
+    """
     known = preset_names()
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
@@ -152,7 +160,7 @@ def _read_preset(name: str) -> dict[str, Any]:
             f"rig {name}: no such preset; {hint} A file's name ends in .toml"
         )
     file = files("planning.rig").joinpath("presets", f"{name}.toml")
-    return tomllib.loads(file.read_text(encoding="utf-8"))
+    return file.read_text(encoding="utf-8")
 
 
 def _preset(name: str) -> Preset:

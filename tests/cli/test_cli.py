@@ -16,6 +16,7 @@ from planning.cli.main import main
 from planning.cli.other_commands import write_sample
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.report.drawing.rig_picture import draw_rig
+from planning.rig.rig import load_rig
 from planning.verify.verification import verify_plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -384,6 +385,16 @@ def test_rigs_lists_every_number_with_its_source(monkeypatch, capsys):
     assert "default:" in out
     assert "assumed" in out
     assert "read:" in out
+
+
+def test_a_rig_is_shown_as_a_file_that_can_be_planned(monkeypatch, capsys, tmp_path):
+    code, out, _ = in_process(monkeypatch, capsys, "rigs", "show", "lee-krim-2014")
+    assert code == 0
+    (tmp_path / "mine.toml").write_text(out)
+    mine, preset = load_rig(tmp_path / "mine.toml"), load_rig("lee-krim-2014")
+    assert mine.to_document() == preset.to_document()
+    for words, status in ((["show", "nobody"], 3), (["show"], 2), (["new"], 2)):
+        assert in_process(monkeypatch, capsys, "rigs", *words)[0] == status
 
 
 def test_sample_writes_the_file_at_the_root(tmp_path, monkeypatch, capsys):

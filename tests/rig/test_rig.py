@@ -10,6 +10,15 @@ from pydantic import BaseModel
 from support.written import requirements_of
 
 from geometry.devices import ParallelModel, PinholeModel
+from planning.experiments.paper_devices import (
+    CAMERA_PX,
+    FITTING,
+    PIXEL_PITCH_M,
+    PRINTED,
+    PROJECTOR_PX,
+    STANDOFF_M,
+)
+from planning.experiments.setups import FACE_RADII_M
 from planning.model.errors import InfeasibleLimitsError, InputError, RigError
 from planning.rig.rig import load_rig
 from planning.rig.rig_files import lay_over, list_presets, preset_names, read_rig
@@ -109,7 +118,8 @@ def test_default_plans_objects_from_40_to_600_mm(size_mm, light):
 def test_every_figure_of_every_preset_names_its_source(name):
     table = read_rig(name)
     for device in (table.camera, table.projector, table.parallel_projector):
-        assert device is not None
+        if device is None:
+            continue
         assert set(device.sources) == set(device.figures())
         for source in device.sources.values():
             assert source.startswith(("read: ", "assumed: "))
@@ -124,6 +134,20 @@ def test_presets_are_listed_with_sources():
     beam = [f for f in default.figures if f.device == "parallel_projector"]
     assert beam
     assert all(f.source.startswith("assumed") for f in beam)
+
+
+@pytest.mark.parametrize(
+    ("name", "optics"), [("lee-krim-2014", PRINTED), ("lee-krim-2014-fits", FITTING)]
+)
+def test_the_papers_rig_is_that_of_its_experiments(name, optics):
+    rig = load_rig(name)
+    camera, beam = rig.camera_device(), rig.projector_device()
+    assert isinstance(beam, ParallelModel)
+    assert (camera.resolution, beam.resolution) == (CAMERA_PX, PROJECTOR_PX)
+    assert camera.camera_matrix[0, 0] == optics.focal_px
+    assert tuple(camera.camera_matrix[:2, 2]) == optics.centre_px
+    assert (rig.standoff_m, beam.pixel_pitch_m) == (STANDOFF_M, PIXEL_PITCH_M)
+    assert rig.ring_gap_m == FACE_RADII_M[0]
 
 
 def test_default_counts_and_contract_values():

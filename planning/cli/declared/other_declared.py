@@ -76,12 +76,24 @@ def lens(**options: Any) -> None:  # noqa: ANN401
 
 
 @click.command()
+@click.argument("action", type=click.Choice(["show", "new"]), required=False)
+@click.argument("name", required=False)
 @debug_option
-def rigs(debug: bool) -> None:
-    """List the rigs that need no file, with the source of every number."""
+def rigs(action: str | None, name: str | None, debug: bool) -> None:
+    """List the rigs that need no file, with the source of every number.
+
+    `plan rigs show NAME` prints one as the file that it is: to read, or to change.
+    """
     from planning.cli.other_commands import rigs_command
 
-    run(rigs_command, debug=debug)
+    if action == "new":
+        raise click.UsageError(
+            "`plan rigs new` isn't built yet; change what `plan rigs show default` "
+            "prints"
+        )
+    if (action is None) != (name is None):
+        raise click.UsageError("`plan rigs show` needs the NAME of a rig")
+    run(lambda: rigs_command(name), debug=debug)
 
 
 @click.command()
