@@ -181,4 +181,5 @@ def _reachable(whole: WholeRows, store: CellStore) -> bool:
         int(BitSum(np.where(whole.row_sets == g, whole.weights, 0))(served[None])[0])
         for g in range(len(whole.needed))
     ]
-    return all(w >= n for w, n in zip(weights, whole.needed, strict=True))
+    each = all(w >= n for w, n in zip(weights, whole.needed, strict=True))
+    return each and sum(weights) >= whole.needed_total

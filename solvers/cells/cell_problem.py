@@ -11,6 +11,12 @@ that hold all poses together, K poses satisfy::
     K M >= sum_k lambda(S_k) >= sum_i lambda_i r_i y_i >= need(lambda)
     need(lambda) = sum_g min {sum lambda_i r_i y_i : w y >= W_g, 0 <= y <= 1}
 
+Where W is required of all rows together and the W_g are floors beside it, need(lambda)
+fills each set up to its floor from its cheapest rows, then W from the cheapest of the
+rest. With t the price of a unit of W and P_g >= t of one of W_g, it is at least::
+
+    t (W - sum_g W_g) + sum_g (P_g W_g - sum_{i in g} max(0, P_g w_i - lambda_i r_i))
+
 so K >= need / M, and their weight is at most max {w y : sum lambda_i r_i y_i <= K M}.
 M is the largest, never a sum over different cells: a cell may be used again.
 
@@ -49,6 +55,8 @@ class CellProblem:
             shape (n_rows,); 0 where fixed devices serve it already.
         row_sets: Number of each row's set, default 0, shape (n_rows,). Who wants a row
             in two sets gives it twice.
+        required_total: Weight to serve of all rows together; then `required_weight` are
+            floors of row sets. None: there is no such requirement.
 
     Raises:
         ValueError: On wrong shapes, negative or non-finite numbers.
@@ -58,6 +66,7 @@ class CellProblem:
     required_weight: NDArray[np.float64]
     needs: NDArray[np.int64] = field(default=None)  # type: ignore[assignment]
     row_sets: NDArray[np.int64] = field(default=None)  # type: ignore[assignment]
+    required_total: float | None = None
 
     def __post_init__(self) -> None:
         weights = real_numbers("weights", self.weights)
@@ -70,6 +79,9 @@ class CellProblem:
         check_weights(weights)
         if not np.all((required >= 0.0) & np.isfinite(required)):
             raise ValueError("required_weight must be finite and at least 0")
+        whole = self.required_total
+        if whole is not None and not 0.0 <= whole < np.inf:
+            raise ValueError("required_total must be finite and at least 0")
         needs = _counts("needs", self.needs, weights.size, 1)
         row_sets = _counts("row_sets", self.row_sets, weights.size, 0)
         if not np.all(row_sets < required.size):
@@ -98,6 +110,7 @@ class WholeRows:
         row_sets: As in the problem.
         unit: Weight, in the problem's unit, of one integer step.
         rounded: Number of rows whose weight isn't a whole number of steps.
+        needed_total: Integer weight required of all, 0 where none is beside the sets'.
     """
 
     weights: NDArray[np.int64]
@@ -106,6 +119,7 @@ class WholeRows:
     row_sets: NDArray[np.int64]
     unit: float
     rounded: int
+    needed_total: int = 0
 
     @property
     def total(self) -> int:
@@ -139,11 +153,22 @@ class WholeRows:
 
     def least_cost(self, multipliers: NDArray[np.int64]) -> Fraction:
         """Return the least cost of serving enough: need(lambda), or a little less."""
-        costs = multipliers * self.needs
-        least = Fraction(0)
+        live = self.weights > 0
+        weights, costs = self.weights[live], (multipliers * self.needs)[live]
+        sets, rest = self.row_sets[live], weights.copy()
+        prices: list[Fraction] = []
         for g, needed in enumerate(self.needed):
-            rows = self.row_sets == g
-            least += _cheapest(self.weights[rows], costs[rows], needed)
+            rows = np.flatnonzero(sets == g)
+            price, rest[rows] = _filled(weights[rows], rest[rows], costs[rows], needed)
+            prices.append(price)
+        lacking = min(self.needed_total - int((weights - rest).sum()), int(rest.sum()))
+        price, _ = _filled(weights, rest, costs, lacking)
+        least = price * max(0, lacking)
+        for g, needed in enumerate(self.needed):
+            rows = sets == g
+            reached = min(needed, int(weights[rows].sum()))
+            dearer = max(price, prices[g])
+            least += _dual(weights[rows], costs[rows], reached, dearer)
         return least
 
     def count_bound(self, multipliers: NDArray[np.int64], largest_cost: int) -> float:
@@ -179,38 +204,57 @@ def whole_rows(problem: CellProblem) -> WholeRows:
     sets = np.arange(problem.required_weight.size)
     lost = [0.5 * np.count_nonzero(inexact & (problem.row_sets == g)) for g in sets]
     # More than there is can't be had, however much more; of nothing, nothing.
-    required = np.minimum(problem.required_weight, 4.0 * total)
-    needed = np.ldexp(required, exponent) * (1.0 - WEIGHT_SLACK) - lost
+    wanted = np.append(problem.required_weight, problem.required_total or 0.0)
+    required = np.minimum(wanted, 4.0 * total)
+    needed = np.ldexp(required, exponent) * (1.0 - WEIGHT_SLACK) - [*lost, sum(lost)]
     if not total > 0:
-        needed = (problem.required_weight > 0).astype(np.float64)
+        needed = (wanted > 0).astype(np.float64)
+    *each, of_all = (max(0, int(np.floor(x))) for x in needed)
+    row_sets = problem.row_sets
+    if of_all and (len(each) == 1 or not any(each)):
+        # No floor tells rows apart.
+        row_sets, each, of_all = np.zeros_like(row_sets), [max(of_all, *each)], 0
     return WholeRows(
         weights=whole.astype(np.int64),
-        needed=tuple(max(0, int(np.floor(x))) for x in needed),
+        needed=tuple(each),
+        needed_total=of_all,
         needs=problem.needs,
-        row_sets=problem.row_sets,
+        row_sets=row_sets,
         unit=float(np.ldexp(1.0, -exponent)),
         rounded=int(np.count_nonzero(inexact)),
     )
 
 
-def _cheapest(
-    weights: NDArray[np.int64], costs: NDArray[np.int64], needed: int
+def _filled(
+    weights: NDArray[np.int64],
+    rest: NDArray[np.int64],
+    costs: NDArray[np.int64],
+    needed: int,
+) -> tuple[Fraction, NDArray[np.int64]]:
+    """Take what is needed of the rest of rows, the cheapest first.
+
+    Return the marginal row's ratio of cost and weight, and what is left of each. Where
+    all together can't reach it, all is taken.
+    """
+    if needed <= 0 or weights.size == 0:
+        return Fraction(0), rest
+    order = _by_ratio(weights, costs)
+    upto = np.cumsum(rest[order])
+    marginal = order[min(int(np.searchsorted(upto, needed)), order.size - 1)]
+    remaining = rest.copy()
+    remaining[order] -= np.clip(needed - upto + rest[order], 0, rest[order])
+    return Fraction(int(costs[marginal]), int(weights[marginal])), remaining
+
+
+def _dual(
+    weights: NDArray[np.int64], costs: NDArray[np.int64], needed: int, price: Fraction
 ) -> Fraction:
     """Return a lower bound on min {c y : w y >= W, 0 <= y <= 1}: t W - (t w - c)+.
 
-    The marginal row's ratio t makes it the minimum. What all rows together can't reach
-    costs all of them.
+    The marginal row's ratio t makes it the minimum.
     """
-    live = weights > 0
-    weights, costs = weights[live], costs[live]
-    if needed <= 0 or weights.size == 0:
-        return Fraction(0)
-    order = _by_ratio(weights, costs)
-    last = int(np.searchsorted(np.cumsum(weights[order]), needed))
-    marginal = order[min(last, order.size - 1)]
-    p, q = int(costs[marginal]), int(weights[marginal])
-    reached = min(needed, int(weights.sum()))
-    return Fraction(p * reached - _excess(weights, p, costs, q), q)
+    p, q = price.numerator, price.denominator
+    return Fraction(p * needed - _excess(weights, p, costs, q), q)
 
 
 def _by_ratio(

@@ -6,6 +6,8 @@ The least upper bound on what K poses serve, over multipliers lambda_i = w_i u_i
     subject to  sum_{i in S} (w_i / r_i) u_i <= theta   for the cells S in hand
                 0 <= u_i <= t_g,  sum_g t_g = 1
 
+Where W is required of all rows as well, t <= t_g for all sets adds -t (W - sum_g W_g).
+
 A negative value refutes K: its multipliers satisfy need(lambda) > K M. Rows are cells,
 a few hundred; their dual values are the poses that a fractional cover would use. What
 comes back is a proposal, evaluated again in integers by who uses it.
@@ -62,6 +64,9 @@ class MultiplierProgram:
                 for g, needed in enumerate(whole.needed)
             ]
         )
+        lacking = whole.needed_total - sum(whole.needed)
+        # The price of what is required of all, where that is more than the floors.
+        self._of_all = np.full(int(lacking > 0), -lacking * scale)
         self.cells = np.empty(0, dtype=np.int64)
         self._solver = self._model()
 
@@ -116,14 +121,19 @@ class MultiplierProgram:
         n, n_sets = self._live.size, self._slack.size
         solver = quiet_highs(solver="simplex")
         infinity = self._highs.kHighsInf
-        lower = np.zeros(n + 1 + n_sets)
-        upper = np.concatenate([np.ones(n), [infinity], np.ones(n_sets)])
+        upper = np.concatenate(
+            [np.ones(n), [infinity], np.ones(n_sets + self._of_all.size)]
+        )
+        lower = np.zeros_like(upper)
         solver.addVars(lower.size, lower, upper)
-        costs = np.concatenate([-self._gains, [1.0], self._slack])
+        costs = np.concatenate([-self._gains, [1.0], self._slack, self._of_all])
         every = np.arange(lower.size, dtype=np.int32)
         solver.changeColsCost(every.size, every, costs)
         places = (n + 1 + np.arange(n_sets)).astype(np.int32)
         solver.addRow(1.0, 1.0, n_sets, places, np.ones(n_sets))
+        for place in places[: n_sets * self._of_all.size]:
+            pair = np.array([n + 1 + n_sets, place], dtype=np.int32)
+            solver.addRow(-infinity, 0.0, 2, pair, np.array([1.0, -1.0]))
         if n_sets > 1:
             # With one set its share is 1, and the bound of u says the same.
             for i, g in enumerate(self._sets):

@@ -82,7 +82,7 @@ class Enough:
         self._planes = int(min(needs.max(initial=0), n_poses))
         self._exactly = pack_rows(needs == np.arange(self._planes + 1)[:, None])
         self._simple = bool(np.all(needs == 1))
-        self._needed = whole.needed
+        self._needed, self._needed_total = whole.needed, whole.needed_total
         self._sums = [
             BitSum(np.where(whole.row_sets == g, whole.weights, 0))
             for g in range(len(whole.needed))
@@ -116,7 +116,8 @@ class Enough:
         covered = self.served(rows)
         each = np.stack([weigh(covered) for weigh in self._sums])
         meets = [w >= needed for w, needed in zip(each, self._needed, strict=True)]
-        return np.all(meets, axis=0), each.sum(axis=0)
+        served = each.sum(axis=0)
+        return np.all(meets, axis=0) & (served >= self._needed_total), served
 
 
 def _weigh(

@@ -16,6 +16,7 @@ from solvers.status import SolveStatus, WorkBudget
 
 NONE = np.empty(0, dtype=np.int64)
 INTEGER_PROOF = "branch and bound (HiGHS)"
+FLOORS_COUNTED = "floors counted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +29,14 @@ class Answer:
         bound: On the number or the cost of sets from below, or on the integer-valued
             weight from above, as was asked.
         proof: What proves the bound.
+        total_bound: As `CoverSolution.total_bound`; None: the bound.
     """
 
     status: SolveStatus
     selected: NDArray[np.int64]
     bound: float
     proof: str
+    total_bound: float | None = None
 
 
 def cut_short(proof: str, budget: WorkBudget) -> str:

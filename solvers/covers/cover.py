@@ -3,7 +3,8 @@
 The program is stated in ``cover_problem``. Counts (unit costs) are solved by greedy and
 large-neighbourhood search from above, Lagrangian bound and exact search over tuples
 from below; among the covers of the fewest sets the one of most weight is sought.
-Costs, several needs and row sets go to the linear program and HiGHS.
+Floors of row sets come after what is required of all (``floors``). Costs, several needs
+and row sets go to the linear program and HiGHS.
 
 References:
     Tarbox and Gottschlich, "Planning for complete sensor coverage in inspection",
@@ -25,6 +26,7 @@ from .answers import NONE, Answer
 from .cheapest import cheapest_sets
 from .counts import fewest_sets
 from .cover_problem import CoverProblem
+from .floored_counts import fewest_with_floors
 from .heaviest import most_weight
 
 DEFAULT_BUDGET = 2e9
@@ -43,6 +45,8 @@ class CoverSolution:
         lower_bound: Proven lower bound on the cost of any cover; inf if infeasible.
             Where HiGHS' bound comes within 1e-5 of the cost, it is the cost.
         proof: What proves the bound, and what cut the proof short if anything did.
+        total_bound: The part of the bound that ``required_total`` proves without the
+            floors of row sets, where all cost the same.
     """
 
     problem: CoverProblem
@@ -50,6 +54,7 @@ class CoverSolution:
     selected: NDArray[np.int64]
     lower_bound: float
     proof: str
+    total_bound: float
 
     @property
     def cost(self) -> float:
@@ -62,11 +67,21 @@ class CoverSolution:
         return self.problem.covered_weight(self.selected)
 
     def shortfall(self) -> float:
-        """Return the largest missing share of a row set's weight; 0 if all are met."""
+        """Return the largest missing share of a row set's weight; 0 if all are met.
+
+        With ``required_total``, of the weight of all as well.
+        """
         problem = self.problem
-        missing = problem.required_weight - problem.covered_weights(self.selected)
-        missing[missing <= forgiven(problem)] = 0.0
+        covered, spare = problem.covered_weights(self.selected), forgiven(problem)
         totals = problem.by_row_set(problem.weights)
+        missing = problem.required_weight - covered
+        if problem.required_total is not None:
+            missing = np.append(missing, problem.required_total - covered.sum())
+            totals, spare = (
+                np.append(totals, totals.sum()),
+                np.append(spare, spare.sum()),
+            )
+        missing[missing <= spare] = 0.0
         shares = missing / np.where(totals > 0, totals, np.maximum(missing, 1e-300))
         return float(shares.max())
 
@@ -76,9 +91,10 @@ class MaxCoverageSolution:
     """Answer of :func:`solve_max_coverage`.
 
     Attributes:
-        problem: The problem this answers; its requirement plays no part.
+        problem: The problem this answers; its requirement plays no part, floors but.
         n_sets: Number of sets allowed.
-        status: ``OPTIMAL`` if no such selection covers more, else ``FEASIBLE``.
+        status: ``OPTIMAL`` if no such selection covers more, else ``FEASIBLE``, as
+            where the floors of row sets aren't met.
         selected: Chosen sets in increasing order, at most ``n_sets``.
         upper_bound: Weight that no ``n_sets`` sets exceed.
         proof: What proves the bound, and what cut the proof short if anything did.
@@ -136,7 +152,7 @@ def solve_cover(
     cover = _or_reduce(problem, reduced)
     work.spend(cover.entries)
     free = None if max_sets is None else max_sets - fixed.size
-    if not np.any(cover.quotas > 0):
+    if not cover.required > 0:
         nothing = "no weight is required"
         proof = "the fixed sets suffice" if fixed.size else nothing
         answer = Answer(SolveStatus.OPTIMAL, NONE, 0.0, proof)
@@ -147,14 +163,21 @@ def solve_cover(
         unit = float(problem.costs[0]) if counting else 1.0
         cover = replace(cover, costs=cover.costs / unit)
         search = fewest_sets if counting and cover.simple else cheapest_sets
+        if counting and cover.floored and cover.without_floors.simple:
+            search = fewest_with_floors
         answer = search(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
         answer = replace(answer, bound=answer.bound * unit)
+        if answer.total_bound is not None:
+            answer = replace(answer, total_bound=answer.total_bound * unit)
     selected = np.union1d(fixed, cover.kept[answer.selected])
     lower = answer.bound + float(problem.costs[fixed].sum())
     cost = float(problem.costs[selected].sum())
     # Both are sums of costs, in another order.
     lower = cost if cost < lower <= cost * (1.0 + 1e-12) else lower
-    return CoverSolution(problem, answer.status, selected, lower, answer.proof)
+    total = lower
+    if answer.total_bound is not None:
+        total = min(lower, answer.total_bound + float(problem.costs[fixed].sum()))
+    return CoverSolution(problem, answer.status, selected, lower, answer.proof, total)
 
 
 @on_one_thread
@@ -170,8 +193,12 @@ def solve_max_coverage(
 ) -> MaxCoverageSolution:
     """Find the largest weight that at most ``n_sets`` sets cover; costs play no part.
 
+    With ``required_total`` the floors of row sets count: of the selections found that
+    lack least of them (and of the total), the one of most weight is returned. The bound
+    is of selections that meet the floors where these are met, else of any.
+
     Args:
-        problem: The cover; its required weight plays no part.
+        problem: The cover; its required weight plays no part but for floors.
         n_sets: Sets allowed, at least 0.
         warm_start: A selection to start from; the answer is never worse.
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
@@ -198,7 +225,7 @@ def solve_max_coverage(
     selected = np.union1d(fixed, cover.kept[answer.selected])
     warm = np.union1d(fixed, start)
     better = problem.covered_weight(warm) > problem.covered_weight(selected)
-    if better and warm.size <= n_sets:
+    if better and warm.size <= n_sets and not cover.floored:
         # Only where sets that stand in for others coincide.
         selected = warm
     covered = problem.covered_weight(selected)

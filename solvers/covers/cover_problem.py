@@ -8,9 +8,13 @@ share the elements among them and each asks for a weight of its own::
                 sum_{e in G_g} w_e y_e >= W_g        for each row set g
                 x_s = 1 for s fixed,   x, y in {0, 1}
 
-W_g are absolute weights over frozen rows: a share of "what can be covered" would change
-its meaning with the sets on offer. r_e = 2 keeps what it covers when any set is lost;
-several row sets are several objects on one rig.
+With a weight W required of all rows together, the W_g are floors beside it::
+
+        sum_e w_e y_e >= W
+
+W and W_g are absolute weights over frozen rows: a share of "what can be covered" would
+change its meaning with the sets on offer. r_e = 2 keeps what it covers when any set is
+lost; several row sets are several objects on one rig, or regions of one.
 """
 
 from dataclasses import dataclass, field
@@ -57,6 +61,9 @@ class CoverProblem:
             1; one number or shape (n_e,). Default 1.
         row_sets: Row set of each element, 0, 1, ... n_g - 1, shape (n_e,); default one
             row set.
+        required_total: Weight W to cover of all elements together; then
+            ``required_weight`` are floors of row sets, 0 for none. None: each row set
+            has its own requirement and there is no other.
         fixed: Sets that are in every selection (devices that stand already).
 
     Raises:
@@ -72,6 +79,7 @@ class CoverProblem:
     required_weight: NDArray[np.float64] = field(default=None)  # type: ignore[assignment]
     needs: NDArray[np.int64] = field(default=1)  # type: ignore[assignment]
     row_sets: NDArray[np.int64] = field(default=None)  # type: ignore[assignment]
+    required_total: float | None = None
     fixed: NDArray[np.int64] = field(default=())  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
@@ -87,6 +95,11 @@ class CoverProblem:
             )
         row_sets = _row_sets(self.row_sets, n_e)
         totals = _sums(weights, row_sets)
+        whole = self.required_total
+        if whole is not None and not 0.0 <= whole < np.inf:
+            raise ValueError(
+                f"required_total must be finite and at least 0, got {whole}"
+            )
         values = {
             "covers": covers,
             "weights": weights,

@@ -1,8 +1,9 @@
 """Most weight of K sets: the order in which the methods are tried.
 
 From below: greedy, then swaps (`neighbourhood`). From above: Lagrangian bound, then
-exact search, over pairs or over groups of alike sets; where rows have several needs or
-row sets, HiGHS' branch and bound. Each spends a share of one counted budget.
+exact search, over pairs or over groups of alike sets; where floors of row sets aren't
+met by that, the same at prices of the row sets; where rows have several needs or row
+sets, HiGHS' branch and bound. Each spends a share of one counted budget.
 """
 
 from collections.abc import Callable
@@ -23,9 +24,17 @@ from solvers.covers.search.neighbourhood import (
     most_coverage,
     moves,
 )
+from solvers.covers.search.prices import lack, least_shortage, tightest
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import INTEGER_PROOF, NONE, Answer, ExactSearch, cut_short
+from .answers import (
+    FLOORS_COUNTED,
+    INTEGER_PROOF,
+    NONE,
+    Answer,
+    ExactSearch,
+    cut_short,
+)
 
 # Relative to the cost; HiGHS' own tolerance is below it.
 SETTLED = 1e-5
@@ -43,10 +52,15 @@ def most_weight(
     seed: int,
     start: NDArray[np.int64] = NONE,
 ) -> Answer:
-    """Find the most weight that K sets cover, whatever is required, and a bound."""
+    """Find the most weight that K sets cover, whatever is required, and a bound.
+
+    With floors, of those that lack least of them.
+    """
     n_sets = min(n_sets, cover.n_sets)
     if n_sets == 0:
         return Answer(SolveStatus.OPTIMAL, NONE, 0.0, "no set is allowed")
+    if cover.floored and cover.without_floors.simple:
+        return _of_floored(cover, n_sets, budget, seed, start)
     best = NONE
     for first in (start, NONE) if start.size else (NONE,):
         filled = greedy(cover, first, budget, n_sets=n_sets)
@@ -59,9 +73,14 @@ def most_weight(
 def exact_search(n_sets: int) -> tuple[Callable[..., ExactSearch], str]:
     """Return the search that exhausts K sets of a simple cover, and its proof."""
     if n_sets >= _LEAST_GROUPED:
-        return best_by_groups, f"sets of {n_sets} by branching on groups of alike sets"
+        return best_by_groups, group_proof(n_sets)
     sets = "single sets" if n_sets == 1 else "pairs"
     return best_pair, f"{sets} by exhaustion"
+
+
+def group_proof(n_sets: int) -> str:
+    """Return what proves that no K sets do, by groups."""
+    return f"sets of {n_sets} by branching on groups of alike sets"
 
 
 def _of_simple(
@@ -111,6 +130,45 @@ def _of_simple(
         return Answer(SolveStatus.OPTIMAL, best, weight, proof)
     proof = cut_short("Lagrangian bound", budget)
     return Answer(SolveStatus.FEASIBLE, best, upper, proof)
+
+
+def _of_floored(
+    cover: ReducedCover,
+    n_sets: int,
+    budget: WorkBudget,
+    seed: int,
+    start: NDArray[np.int64],
+) -> Answer:
+    alone = cover.without_floors
+    part = budget.part(0.5 * budget.units)
+    free = most_weight(alone, n_sets, part, seed=seed, start=start)
+    best = free.selected
+    if np.all(cover.covered_by(best) >= cover.quotas):
+        return free
+    part = budget.part(0.4 * budget.remaining)
+    for first in (best, greedy(cover, start, budget, n_sets=n_sets)):
+        lacks_less, prices = least_shortage(cover, first, part, seed)
+        best = min(best, lacks_less, key=lambda s: lack(cover, s))
+    met, target, weight = cover.meets(best), cover.required, cover.weight_of(best)
+    if met:
+        target = weight + max(cover.grain, np.floor(cover.total * 1e-11))
+    part = budget.part(0.3 * budget.remaining)
+    tight, multipliers = tightest(prices, n_sets, target, part)
+    answer = best_by_groups(
+        cover,
+        n_sets,
+        target=target,
+        multipliers=multipliers,
+        budget=budget.part(budget.remaining),
+        prices=tight,
+    )
+    if answer.selected is not None:
+        best, weight, met = answer.selected, answer.weight, True
+    if met and answer.complete:
+        proof = f"{group_proof(n_sets)}, {FLOORS_COUNTED}"
+        return Answer(SolveStatus.OPTIMAL, best, weight, proof)
+    upper = max(weight, min(free.bound, answer.upper_bound)) if met else free.bound
+    return Answer(SolveStatus.FEASIBLE, best, upper, cut_short(free.proof, budget))
 
 
 def _of_any(

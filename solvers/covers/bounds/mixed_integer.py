@@ -1,7 +1,7 @@
 """Covers as linear and mixed-integer programs for HiGHS, over plain arrays.
 
     minimise c x   subject to   A x >= r y,  w_g y >= W_g for each row set g,
-                                1 x <= K,  0 <= y <= 1,  x binary
+                                w y >= W,  1 x <= K,  0 <= y <= 1,  x binary
 
 or with the largest w y as the aim. One thread and limits on iterations and nodes, so
 that the answer doesn't depend on the machine. What comes back is a proposal: selections
@@ -144,7 +144,9 @@ def _model(
     n_e, n_s = cover.weights.size, cover.n_sets
     # Weights of mean 1, so that the solver's tolerance is a small share of a row.
     weights, dropped = _weights(cover)
-    needed = np.maximum(0.0, cover.quotas / cover.weights.mean() - dropped)
+    quotas = np.append(cover.quotas, cover.quota)
+    dropped = np.append(dropped, dropped.sum())
+    needed = np.maximum(0.0, quotas / cover.weights.mean() - dropped)
     with_rows = heaviest or not cover.full
     link: sparse.csr_array = cover.by_row
     lower = cover.needs.astype(np.float64)
@@ -152,8 +154,11 @@ def _model(
     if with_rows:
         service = sparse.dia_array((-lower[None], [0]), shape=(n_e, n_e))
         groups = sparse.csr_array(
-            (weights, (cover.row_sets, np.arange(n_e))), shape=(needed.size, n_e)
+            (weights, (cover.row_sets, np.arange(n_e))), shape=(cover.quotas.size, n_e)
         )
+        if cover.quota > 0:
+            groups = _stack([[groups], [sparse.csr_array(weights.reshape(1, -1))]])
+        needed = needed[: groups.shape[0]]
         link = _stack([[link, service], [None, groups]])
         lower = np.concatenate([np.zeros(n_e), needed])
         cost = np.concatenate(

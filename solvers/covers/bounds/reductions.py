@@ -11,7 +11,7 @@ as float64: sums of them are exact in any order, so neither BLAS nor the number 
 threads can decide a comparison.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,8 @@ from solvers.bit_rows import pack_shuffled, sparse_rows
 from solvers.checked_numbers import WEIGHT_SLACK, whole_weights
 from solvers.covers.cover_problem import CoverProblem
 
+# Bits of the largest price of a floor (`floors`).
+PRICE_BITS = 12
 _SKETCH_WORDS = 4
 # Words of columns that are compared, some seconds; so many are reached beyond about
 # ten thousand columns.
@@ -41,6 +43,7 @@ class ReducedCover:
         row_sets: Row set of each row, shape (n_e,).
         quotas: Integer-valued weight to reach in each row set, rounded in favour of
             reaching it, shape (n_g,).
+        quota: Integer-valued weight to reach in all, beside that of each row set.
         costs: Cost of each set, shape (n_s,).
         unit: Weight in the caller's unit that one integer step stands for.
         settled: Integer-valued weight that the fixed sets cover already.
@@ -56,6 +59,7 @@ class ReducedCover:
     needs: NDArray[np.int64]
     row_sets: NDArray[np.int64]
     quotas: NDArray[np.float64]
+    quota: float
     costs: NDArray[np.float64]
     unit: float
     settled: float
@@ -73,9 +77,20 @@ class ReducedCover:
         return self.quotas.size == 1 and bool(np.all(self.needs == 1))
 
     @property
+    def floored(self) -> bool:
+        """Whether row sets have floors beside what is required of all."""
+        return self.problem.required_total is not None and self.quotas.size > 1
+
+    @cached_property
+    def without_floors(self) -> "ReducedCover":
+        """The same cover with what is required of all rows alone."""
+        one = np.zeros(self.weights.size, dtype=np.int64)
+        return replace(self, row_sets=one, quotas=np.array([self.quota]), quota=0.0)
+
+    @property
     def required(self) -> float:
         """Integer-valued weight to reach, all row sets together."""
-        return float(self.quotas.sum())
+        return max(self.quota, float(self.quotas.sum()))
 
     @property
     def total(self) -> float:
@@ -90,14 +105,15 @@ class ReducedCover:
     @property
     def reachable(self) -> bool:
         """Whether all sets together reach what is required."""
-        return bool(np.all(self.totals >= self.quotas))
+        return self._enough(self.totals)
 
     @cached_property
     def full(self) -> bool:
         """Whether no row may be lost."""
         lightest = np.full(self.quotas.size, np.inf)
         np.minimum.at(lightest, self.row_sets, self.weights)
-        return bool(np.all(self.totals - self.quotas < lightest))
+        each = bool(np.all(self.totals - self.quotas < lightest))
+        return each or self.total - self.quota < lightest.min(initial=np.inf)
 
     @cached_property
     def grain(self) -> float:
@@ -132,8 +148,22 @@ class ReducedCover:
 
     def meets(self, selected: NDArray[np.int64]) -> bool:
         """Whether a selection reaches what every row set requires."""
-        covered = np.where(self.served(selected) >= self.needs, self.weights, 0.0)
-        return bool(np.all(self.by_row_set(covered) >= self.quotas))
+        return self._enough(self.covered_by(selected))
+
+    def covered_by(self, selected: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the weight that sets cover of each row set, shape (n_g,)."""
+        covered = self.served(selected) >= self.needs
+        return self.by_row_set(np.where(covered, self.weights, 0.0))
+
+    def shortage(self, selected: NDArray[np.int64]) -> float:
+        """Return the weight that is lacking of row sets, and of all of them."""
+        covered = self.covered_by(selected)
+        lacking = np.clip(self.quotas - covered, 0.0, None).sum()
+        return float(lacking) + max(0.0, self.quota - float(covered.sum()))
+
+    def _enough(self, covered: NDArray[np.float64]) -> bool:
+        each = bool(np.all(covered >= self.quotas))
+        return each and float(covered.sum()) >= self.quota
 
 
 def reduce_problem(
@@ -145,14 +175,27 @@ def reduce_problem(
     """
     costs = problem.costs if costs is None else costs
     exponent, whole, inexact = _whole_weights(problem)
-    quotas = _quotas(problem, exponent, inexact)
+    wanted, row_sets = problem.required_weight, problem.row_sets
+    quotas = _quotas(problem, wanted, exponent, inexact)
+    quota = 0.0
+    if problem.required_total is not None:
+        total = np.array([problem.required_total])
+        quota = float(_quotas(problem, total, exponent, inexact.sum())[0])
 
     already = np.asarray(problem.covers[:, problem.fixed].sum(axis=1)).ravel()
     needs = problem.needs - already
     done = problem.by_row_set(np.where(needs <= 0, whole, 0.0))
+    quotas = np.maximum(quotas - done, 0.0)
+    quota = max(quota - float(done.sum()), 0.0)
+    alone = quotas.size == 1 or not np.any(quotas > 0)
+    if problem.required_total is not None and alone:
+        # No floor is left, and only they tell rows apart.
+        quotas, quota = np.array([max(quota, quotas.max())]), 0.0
+        row_sets = np.zeros_like(row_sets)
     servers = np.diff(problem.covers.indptr) - already
     live = (whole > 0) & (needs > 0) & (servers >= needs)
-    bits, first, inverse = _merge_rows(problem, live, needs)
+    labels = np.stack([needs[live], row_sets[live]], axis=1)
+    bits, first, inverse = _merge_rows(problem, live, labels)
     dense = np.unpackbits(bits, axis=1, count=costs.size).astype(bool)
     merged = np.bincount(inverse, weights=whole[live], minlength=first.size)
     merged, needs = merged.astype(np.float64), needs[live][first]
@@ -164,8 +207,9 @@ def reduce_problem(
         by_row=by_row,
         weights=merged,
         needs=needs,
-        row_sets=problem.row_sets[live][first],
-        quotas=np.maximum(quotas - done, 0.0),
+        row_sets=row_sets[live][first],
+        quotas=quotas,
+        quota=quota,
         costs=costs[kept],
         unit=float(np.ldexp(1.0, -exponent)),
         settled=float(done.sum()),
@@ -175,15 +219,18 @@ def reduce_problem(
 
 
 def _quotas(
-    problem: CoverProblem, exponent: int, inexact: NDArray[np.float64]
+    problem: CoverProblem,
+    wanted: NDArray[np.float64],
+    exponent: int,
+    inexact: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the whole weight that each row set must reach, rounded in its favour."""
+    """Return wanted weights as whole weight to reach, rounded in favour of reaching."""
     total = problem.total_weight
     if not total > 0:
         # Nothing can be had, so anything is too much.
-        return (problem.required_weight > 0).astype(np.float64)
+        return (wanted > 0).astype(np.float64)
     # More than there is can't be had, however much more.
-    required = np.ldexp(np.minimum(problem.required_weight, 4.0 * total), exponent)
+    required = np.ldexp(np.minimum(wanted, 4.0 * total), exponent)
     return np.floor(required * (1.0 - WEIGHT_SLACK) - 0.5 * inexact)
 
 
@@ -202,14 +249,16 @@ def _whole_weights(
     problem: CoverProblem,
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
     """Return the unit's exponent, weights in it, and how many each row set rounds."""
-    exponent, whole, inexact = whole_weights(problem.weights, bits=52)
+    # Prices of floors multiply weights, and sums of these must be exact as well.
+    bits = 52 if problem.required_total is None else 52 - PRICE_BITS
+    exponent, whole, inexact = whole_weights(problem.weights, bits=bits)
     return exponent, whole, problem.by_row_set(inexact.astype(np.float64))
 
 
 def _merge_rows(
-    problem: CoverProblem, live: NDArray[np.bool_], needs: NDArray[np.int64]
+    problem: CoverProblem, live: NDArray[np.bool_], labels: NDArray[np.int64]
 ) -> tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the live rows that differ in sets that aren't fixed, need or row set.
+    """Return the live rows that differ in sets that aren't fixed, or in their labels.
 
     Packed, shape (n, bytes); the first live row like each; which each live row is like.
     """
@@ -220,7 +269,6 @@ def _merge_rows(
     if packed.shape[0] == 0 or packed.shape[1] == 0:
         none = np.empty(0, dtype=np.int64)
         return packed[:0], none, none
-    labels = np.stack([needs[live], problem.row_sets[live]], axis=1)
     marked = np.ascontiguousarray(np.hstack([labels.view(np.uint8), packed]))
     key = marked.view(f"V{marked.shape[1]}").ravel()
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)

@@ -5,8 +5,9 @@ Covered y_i costs r_i service, so the rows ask together at least for::
     need(lambda) = sum_g min {sum_{i in G_g} lambda_i r_i y_i :
                               sum_{i in G_g} w_i y_i >= W_g, 0 <= y <= 1}
 
-a fractional knapsack for each row set, and a set pays at most lambda(a_j). So for any
-lambda >= 0, with reduced costs d_j = c_j - lambda(a_j):
+a fractional knapsack for each row set (with W required of all rows, what is lacking of
+W is filled up from the cheapest of the rest), and a set pays at most lambda(a_j). So
+for any lambda >= 0, with reduced costs d_j = c_j - lambda(a_j):
 
 * fewest sets: the first K whose K costliest sets pay need(lambda);
 * cheapest (of at most K) sets: cost >= need(lambda) + the (K) least min(0, d_j);
@@ -90,6 +91,12 @@ def least_service(cover: ReducedCover, multipliers: NDArray[np.float64]) -> floa
     missing = cover.quotas[groups] - (before - ahead[groups])
     rows = np.zeros(weights.size)
     rows[order] = np.clip(missing / weights, 0.0, 1.0)
+    lacking = cover.quota - float(cover.weights @ rows)
+    if lacking > 0:
+        order = np.argsort(payments / cover.weights, kind="stable")
+        rest = (cover.weights * (1.0 - rows))[order]
+        missing = lacking - (np.cumsum(rest) - rest)
+        rows[order] += np.clip(missing, 0.0, rest) / cover.weights[order]
     return float(payments @ rows)
 
 

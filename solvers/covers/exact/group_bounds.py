@@ -99,10 +99,6 @@ class PartBounds:
             live = [part for part in live if part.bound >= self._target]
         return bounded + live
 
-    def weight_of(self, chosen: NDArray[np.int64]) -> float:
-        """Return the weight that sets cover."""
-        return float(self._weights[self.covers[chosen].any(axis=0)].sum())
-
     def _stepped(self, parts: list[GroupPart]) -> list[GroupPart]:
         weights, aim = self._weights, 0.998 * self._target
         shares = np.stack([part.shares for part in parts]).astype(np.float64)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from solvers.covers.answers import NONE, ExactSearch, Incumbent
 from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.search.prices import Prices
 from solvers.status import WorkBudget
 
 from .group_bounds import GroupPart, PartBounds
@@ -49,10 +50,13 @@ def best_by_groups(
     multipliers: NDArray[np.float64],
     budget: WorkBudget,
     first: bool = False,
+    prices: Prices | None = None,
 ) -> ExactSearch:
     """Find K sets of a simple cover, as `pairs.best_pair` does, K at least 1.
 
-    Where the budget ends, the bound of what is left open is returned.
+    Where the budget ends, the bound of what is left open is returned. With prices, the
+    cover has floors that they are of, the multipliers are the priced cover's, and sets
+    that miss a floor are none.
     """
     size = cover.n_sets * cover.weights.size
     too_large = size > _MAX_DENSE or cover.n_sets > _MAX_SETS
@@ -61,7 +65,8 @@ def best_by_groups(
     if too_large or too_dear or n_sets >= cover.n_sets:
         return ExactSearch(None, 0.0, cover.total, complete=False)
     budget.spend(_table_units(cover))
-    return _Tree(cover, n_sets, target, budget, first=first).run(multipliers)
+    prices = Prices.even(cover) if prices is None else prices
+    return _Tree(prices, n_sets, target, budget, first=first).run(multipliers)
 
 
 class _Tree(Incumbent):
@@ -69,28 +74,31 @@ class _Tree(Incumbent):
 
     def __init__(
         self,
-        cover: ReducedCover,
+        prices: Prices,
         n_sets: int,
         target: float,
         budget: WorkBudget,
         *,
         first: bool,
     ) -> None:
+        cover = prices.cover
         super().__init__(cover, target, first=first)
         self.cover, self.n_sets, self.budget = cover, n_sets, budget
+        self.prices = prices
         self._names = count()
         self._open: list[tuple[float, int, GroupPart]] = []
-        self.bounds = PartBounds(cover, n_sets, target, budget)
+        self.bounds = PartBounds(prices.priced, n_sets, self._least_priced, budget)
         self._alike = _likeness(self.bounds.covers, cover.weights)
 
     def run(self, multipliers: NDArray[np.float64]) -> ExactSearch:
-        whole = self.bounds.whole(multipliers / self.cover.weights)
+        whole = self.bounds.whole(multipliers / self.prices.priced.weights)
         self._take([whole], _FIRST_STEPS)
         most = _MAX_OPEN // (4 * self.cover.weights.size + 5 * self.cover.n_sets)
         while self._promising:
             if self.done or self.budget.exhausted or len(self._open) > most:
                 # What the clock cut before it was bounded may cover everything.
-                bound = min(-self._open[0][0], self.cover.total)
+                bound = self.prices.weight(-self._open[0][0])
+                bound = min(bound, self.cover.total)
                 upper = max(self.weight, bound // self.cover.grain * self.cover.grain)
                 return ExactSearch(self.selected, self.weight, upper, complete=False)
             split: list[GroupPart] = []
@@ -101,7 +109,12 @@ class _Tree(Incumbent):
 
     @property
     def _promising(self) -> bool:
-        return bool(self._open) and -self._open[0][0] >= self.target
+        return bool(self._open) and -self._open[0][0] >= self._least_priced
+
+    @property
+    def _least_priced(self) -> float:
+        """Priced weight below which nothing is of interest."""
+        return self.prices.demand(self.target)
 
     def _take(self, parts: list[GroupPart], steps: int) -> None:
         """Bound parts, look at what they would take, and keep those still open."""
@@ -109,15 +122,20 @@ class _Tree(Incumbent):
         for part in self.bounds.lowered(parts, steps):
             only = self._only(part)
             if only is not None:
-                self.offer(np.sort(only), self.bounds.weight_of(only))
+                self._try(np.sort(only))
                 continue
             if part.costliest.size:
-                costliest = np.sort(part.costliest)
-                self.offer(costliest, self.bounds.weight_of(costliest))
+                self._try(np.sort(part.costliest))
             still.append(part)
         for part in still:
-            if part.bound >= self.target:
+            if part.bound >= self._least_priced:
                 heapq.heappush(self._open, (-part.bound, next(self._names), part))
+
+    def _try(self, chosen: NDArray[np.int64]) -> None:
+        covered = self.bounds.covers[chosen].any(axis=0)
+        weights = self.cover.by_row_set(np.where(covered, self.cover.weights, 0.0))
+        if np.all(weights >= self.cover.quotas) or not self.cover.floored:
+            self.offer(chosen, float(weights.sum()))
 
     def _only(self, part: GroupPart) -> NDArray[np.int64] | None:
         """Return the selection that covers all that a part's can, if it is one."""

@@ -41,6 +41,8 @@ def greedy(
         if n_sets is None:
             covered = cover.by_row_set(np.where(open_rows, 0.0, cover.weights))
             lacking = covered < cover.quotas
+            # Of all together any row helps.
+            lacking |= covered.sum() < cover.quota
             if not np.any(lacking):
                 break
             open_rows &= lacking[cover.row_sets]
@@ -115,7 +117,8 @@ def prune(cover: ReducedCover, selected: NDArray[np.int64]) -> NDArray[np.int64]
             weights=cover.weights[lost],
             minlength=cover.quotas.size,
         )
-        if np.all(covered - loss >= cover.quotas):
+        kept = covered - loss
+        if np.all(kept >= cover.quotas) and kept.sum() >= cover.quota:
             chosen.remove(s)
             counts[rows] -= 1
             covered -= loss

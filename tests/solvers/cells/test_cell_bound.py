@@ -39,7 +39,9 @@ def serves_enough(problem, rows):
         problem.weights * served,
         minlength=problem.required_weight.size,
     )
-    return bool(np.all(each >= problem.required_weight * (1 - 1e-11)))
+    total = (problem.required_total or 0.0) * (1 - 1e-11)
+    each_met = np.all(each >= problem.required_weight * (1 - 1e-11))
+    return bool(each_met and each.sum() >= total)
 
 
 def fewest(problem, leaves, most):
@@ -92,6 +94,18 @@ def random_problem(rng, leaves, *, plain=False):
     return CellProblem(weights, share * weight, redundancy, row_sets)
 
 
+def with_floors(rng, problem):
+    """The same weights in two or three row sets, with floors and a total."""
+    n, n_sets = problem.weights.size, int(rng.integers(2, 4))
+    row_sets = rng.integers(0, n_sets, n)
+    weight = np.bincount(row_sets, problem.weights, minlength=n_sets)
+    share = rng.choice([0.0, 0.3, 0.5, 0.8], n_sets)
+    total = rng.choice([0.3, 0.5, 0.7]) * problem.required_weight.sum()
+    return CellProblem(
+        problem.weights, share * weight, problem.needs, row_sets, float(total)
+    )
+
+
 def random_case(seed, **kinds):
     rng = np.random.default_rng(seed)
     tree, leaves = random_tree(rng, int(rng.integers(3, 12)))
@@ -103,6 +117,8 @@ def test_what_is_complete_equals_brute_force(block):
     statuses = set()
     for seed in range(25 * block, 25 * block + 25):
         tree, leaves, problem = random_case(seed)
+        if seed % 3 == 0:
+            problem = with_floors(np.random.default_rng(seed), problem)
         count = 1 + seed % 4
         truth = fewest(problem, leaves, count)
         answer = bound_count(problem, tree, count, budget=PLENTY)

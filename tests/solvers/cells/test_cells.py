@@ -226,8 +226,9 @@ def random_rows(seed, n=9):
     sets = rng.integers(0, n_sets, n)
     weights = rng.integers(0, 5, n) * rng.choice([1.0, 0.1, 1e-9, 1e9])
     per_set = np.bincount(sets, weights, minlength=n_sets)
+    total = rng.random() * weights.sum() if seed % 2 else None
     return CellProblem(
-        weights, rng.random() * per_set, rng.integers(0, 3, n), sets
+        weights, rng.random() * per_set, rng.integers(0, 3, n), sets, total
     ), rng.integers(0, 2**20, n)
 
 
@@ -239,10 +240,10 @@ def test_the_knapsacks_are_those_of_a_linear_program(seed):
     costs = (given * whole.needs).astype(float)
     weights, n_sets = whole.weights.astype(float), len(whole.needed)
     member = (whole.row_sets == np.arange(n_sets)[:, None]) * weights
+    member = np.vstack([member, weights])
+    needed = np.append(whole.needed, whole.needed_total)
     unit = max(1.0, weights.max())
-    cheapest = linprog(
-        costs, -member / unit, -np.array(whole.needed) / unit, bounds=(0, 1)
-    )
+    cheapest = linprog(costs, -member / unit, -needed / unit, bounds=(0, 1))
     assert float(whole.least_cost(given)) == pytest.approx(
         cheapest.fun, rel=1e-9, abs=1e-6
     )
@@ -270,7 +271,8 @@ def test_the_knapsacks_err_on_the_safe_side_exactly(seed):
             for g in range(len(whole.needed))
         ]
         cost = sum(c * t for c, t in zip(costs, taken, strict=True))
-        if all(w >= n for w, n in zip(each, whole.needed, strict=True)):
+        met = all(w >= n for w, n in zip(each, whole.needed, strict=True))
+        if met and sum(each) >= whole.needed_total:
             assert whole.least_cost(given) <= cost
         if cost <= paid:
             assert whole.most(given, paid) >= sum(each)

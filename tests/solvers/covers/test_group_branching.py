@@ -12,6 +12,7 @@ from solvers.covers.cover import solve_cover, solve_max_coverage
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.exact.group_bounds import PartBounds
 from solvers.covers.exact.group_branching import _Tree, best_by_groups
+from solvers.covers.search.prices import Prices
 from solvers.status import SolveStatus, WorkBudget
 
 
@@ -99,7 +100,7 @@ def test_no_selection_of_a_part_exceeds_its_bound(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_children_share_out_the_selections_of_a_part(seed):
     cover = alike_covers(seed)
-    tree = _Tree(cover, 3, cover.total, plenty(), first=False)
+    tree = _Tree(Prices.even(cover), 3, cover.total, plenty(), first=False)
     selections = every_selection(cover, 3)
 
     def held(part):

@@ -1,0 +1,102 @@
+"""Fewest sets that cover what is required of all, and floors of row sets beside it.
+
+What is required of all comes first: its searches are fast, and its bound holds for the
+stricter cover. Where what they choose misses a floor, as many sets that miss none are
+looked for at prices of the row sets, then one more, and so on; from below, counts are
+refuted by the exact search at those prices, at last by HiGHS' branch and bound.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.covers.bounds.mixed_integer import branch_and_bound, fits
+from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.exact.group_branching import best_by_groups
+from solvers.covers.search.neighbourhood import better, greedy, prune
+from solvers.covers.search.prices import Prices, lack, least_shortage, tightest
+from solvers.status import SolveStatus, WorkBudget
+
+from .answers import FLOORS_COUNTED, INTEGER_PROOF, NONE, Answer
+from .counts import fewest_sets
+from .heaviest import closed, group_proof
+
+
+def fewest_with_floors(
+    cover: ReducedCover,
+    budget: WorkBudget,
+    *,
+    seed: int,
+    max_sets: int | None = None,
+    heaviest: bool = True,
+) -> Answer:
+    """Find the fewest sets of a cover with floors of costs 1, with a lower bound.
+
+    But for floors it is simple. All sets together meet the requirement.
+    """
+    alone, part = cover.without_floors, budget.part(0.5 * budget.units)
+    found = fewest_sets(alone, part, seed=seed, heaviest=False)
+    total_bound = found.bound
+    if not cover.meets(found.selected):
+        selected, prices = _from_above(cover, found.selected, budget, seed)
+        found = replace(found, status=SolveStatus.FEASIBLE, selected=selected)
+        found = _from_below(cover, found, prices, budget)
+    found = closed(cover, found, budget, seed, max_sets, heaviest=heaviest)
+    return replace(found, total_bound=total_bound)
+
+
+def _from_above(
+    cover: ReducedCover, free: NDArray[np.int64], budget: WorkBudget, seed: int
+) -> tuple[NDArray[np.int64], list[Prices]]:
+    """Return few sets that meet all, and prices at which fewer were looked for."""
+    few = prune(cover, greedy(cover, NONE, budget))
+    prices = [Prices.even(cover)]
+    for count in range(free.size, few.size):
+        part = budget.part(0.2 * budget.remaining)
+        shorter = few
+        while shorter.size > count:
+            without = [np.delete(shorter, i) for i in range(shorter.size)]
+            shorter = min(without, key=lambda s: lack(cover, s))
+        filled = greedy(cover, free, budget, n_sets=count)
+        for start in (filled, shorter):
+            selected, prices = least_shortage(cover, start, part, seed)
+            if cover.meets(selected):
+                return prune(cover, selected), prices
+    return few, prices
+
+
+def _from_below(
+    cover: ReducedCover, found: Answer, prices: list[Prices], budget: WorkBudget
+) -> Answer:
+    """Refute counts, or find fewer sets on the way."""
+    selected, lower, proof = found.selected, int(found.bound), found.proof
+    while lower < selected.size and not budget.exhausted:
+        part = budget.part(0.2 * budget.remaining)
+        tight, multipliers = tightest(prices, lower, cover.required, part)
+        answer = best_by_groups(
+            cover,
+            lower,
+            target=cover.required,
+            multipliers=multipliers,
+            budget=budget.part(0.7 * budget.remaining),
+            first=True,
+            prices=tight,
+        )
+        if answer.selected is not None:
+            selected = answer.selected
+        elif not answer.complete:
+            break
+        else:
+            proof = f"{group_proof(lower)}, {FLOORS_COUNTED}"
+            lower += 1
+    if lower < selected.size and fits(cover):
+        integers = branch_and_bound(cover, selected, budget)
+        if integers.selected is not None:
+            selected = better(cover, selected, integers.selected)
+        bound = math.ceil((integers.bound or 0.0) - 1e-5)
+        # A bound above a cover that was counted here is none.
+        if lower < bound <= selected.size:
+            lower, proof = bound, f"{INTEGER_PROOF}, {FLOORS_COUNTED}"
+    return replace(found, selected=selected, bound=float(lower), proof=proof)
