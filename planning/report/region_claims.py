@@ -24,6 +24,7 @@ class RegionClaim:
     """What a plan does for a region: who is primary to samples of it, and areas."""
 
     lit_by: tuple[str, ...]
+    lit_fraction: float
     coverage: RegionCoverage
 
 
@@ -96,16 +97,19 @@ class RegionSamples:
 def claim_regions(devices: Devices, samples: RegionSamples) -> tuple[RegionClaim, ...]:
     """Return the claims of all regions, in their order."""
     scene = samples.scene
-    large, share = scene.large_regions, scene.requirements.region_coverage
+    large, floor = scene.large_regions, scene.requirements.region_coverage
     claims: list[RegionClaim] = []
     for index in range(int(scene.region.max()) + 1):
         areas = _areas(samples, index)
-        if share and index in large:
-            met = meets_floor(areas, share)
+        if floor and index in large:
+            met = meets_floor(areas, floor)
             areas = areas.changed(floor="met" if met else "missed")
-        by = np.unique(samples.primary[samples.region == index])
+        inside = samples.region == index
+        by = np.unique(samples.primary[inside])
         names = tuple(devices.projectors[p].id for p in by if p >= 0)
-        claims.append(RegionClaim(names, areas))
+        lit = samples.lit[inside]
+        share = float(lit.mean()) if len(lit) else 0.0
+        claims.append(RegionClaim(names, share, areas))
     return tuple(claims)
 
 
@@ -113,9 +117,8 @@ def _areas(samples: RegionSamples, index: int) -> RegionCoverage:
     mesh, inside = samples.scene.mesh, samples.region == index
     n = int(inside.sum())
     area = float(mesh.face_areas[samples.scene.region == index].sum())
-    weight = area / max(n, 1)
     by_projectors, lit, by_cameras, measured = (
-        weight * int(mask[inside].sum())
+        area * (int(mask[inside].sum()) / max(n, 1))
         for mask in (
             samples.by_projectors,
             samples.lit,
@@ -129,7 +132,7 @@ def _areas(samples: RegionSamples, index: int) -> RegionCoverage:
         lit_m2=lit,
         reachable_by_cameras_m2=by_cameras,
         measured_m2=measured,
-        uncovered_by_cause=by_cause(samples.causes[inside], weight),
+        uncovered_by_cause=by_cause(samples.causes[inside], area / max(n, 1)),
         floor=None,
     )
 

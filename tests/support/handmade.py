@@ -238,6 +238,8 @@ def _requirements(light: str, target: str, surface: Surface) -> dict[str, Any]:
         "coverage": 0.5,
         "dominant_coverage": 0.6,
         "min_reachable": 0.3,
+        "region_coverage": 0.3,
+        "region_share": 0.01,
         "target": target,
         "pattern": "rings",
         "projector": {
@@ -608,7 +610,7 @@ def _claim_regions(
     document: Any, surface: Surface, rows: Any, faces: np.ndarray
 ) -> None:
     document["regions"] = []
-    areas = surface.mesh.face_areas
+    limits, areas = document["requirements"], surface.mesh.face_areas
     for number in (0, 1):
         members = surface.region == number
         mine = [
@@ -632,11 +634,38 @@ def _claim_regions(
                 "lit_by": sorted(names),
                 "lit_fraction": sum(weight for row, weight in mine if row["lit"])
                 / whole,
+                "centre_m": (
+                    areas[members]
+                    @ surface.mesh.face_centroids[members]
+                    / areas[members].sum()
+                ).tolist(),
+                "coverage": _region_coverage(mine, limits["region_coverage"]),
             }
         )
     document["surface"]["dominant_share"] = float(
         areas[surface.in_dominant].sum() / areas.sum()
     )
+
+
+def _region_coverage(mine: Any, share: float) -> dict[str, Any]:
+    def area(test: Callable[[Any], object]) -> float:
+        return sum(weight for row, weight in mine if test(row)) / 4
+
+    areas: dict[str, Any] = {
+        "samples": len(mine),
+        "reachable_by_projectors_m2": area(lambda row: row["by_projectors"]),
+        "lit_m2": area(lambda row: row["lit"]),
+        "reachable_by_cameras_m2": area(lambda row: row["by_cameras"]),
+        "measured_m2": area(lambda row: row["measured"]),
+    }
+    split = {
+        c: area(lambda row, c=c: row["uncovered_by_cause"] == c)
+        for c in LIGHT + SIGHT + PAIR
+    }
+    areas["uncovered_by_cause"] = {cause: a for cause, a in split.items() if a > 0}
+    met = areas["lit_m2"] >= share * areas["reachable_by_projectors_m2"]
+    met &= areas["measured_m2"] >= share * areas["reachable_by_cameras_m2"]
+    return areas | {"floor": "met" if met else "missed"}
 
 
 def _claim_tables(
@@ -655,6 +684,16 @@ def _claim_tables(
         )
         for n in (1, 2)
     ]
+    shares = {
+        region["id"]: areas["lit_m2"] / areas["reachable_by_projectors_m2"]
+        for region in document["regions"]
+        if (areas := region["coverage"])["reachable_by_projectors_m2"] > 0.0
+    }
+    worst = min(shares, key=lambda number: shares[number], default=None)
+    document["marginal"][1] |= {
+        "worst_region": worst,
+        "worst_region_lit": shares.get(worst),
+    }
     target, limits = document["coverage"]["target"], document["requirements"]
     document["certificates"] = {
         kind: {

@@ -151,7 +151,7 @@ def region_records(
             cone_angle=region.cone_angle,
             mean_curvedness=region.mean_curvedness,
             lit_by=claim.lit_by,
-            lit_fraction=claim.coverage.lit_m2 / region.area_m2,
+            lit_fraction=claim.lit_fraction,
             centre_m=_centre(mesh, region.faces),
             coverage=claim.coverage,
         )

@@ -23,6 +23,7 @@ from planning.verify.audit.counts.table_claims import (
     audit_tables,
 )
 from planning.verify.audit.coverage.area_claims import audit_areas, recomputed_areas
+from planning.verify.audit.coverage.floor_claims import audit_floors
 from planning.verify.audit.coverage.inside_claims import audit_inside
 from planning.verify.audit.coverage.region_claims import audit_margins, audit_regions
 from planning.verify.audit.coverage.sigma_claims import audit_sigma
@@ -54,6 +55,7 @@ _CLAIMS = (
     audit_sigma,
     audit_margins,
     audit_regions,
+    audit_floors,
     audit_tables,
     audit_shares,
     audit_certificates,
@@ -117,8 +119,9 @@ def _unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
 
     lit >= dominant_coverage x reachable by projectors, measured >= coverage x reachable
     by cameras, reachable by projectors >= min_reachable x target, reachable by cameras
-    >= min_reachable x lit. Read from the claims, which the audit holds against its own
-    figures apart.
+    >= min_reachable x lit; and of each region that has a floor lit and measured >=
+    region_coverage x what is reachable of it. Read from the claims, which the audit
+    holds against its own figures apart.
     """
     limits, areas = plan.requirements, plan.coverage.target
     by_projectors = ("reachable_by_projectors_m2", areas.reachable_by_projectors_m2)
@@ -131,9 +134,17 @@ def _unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
         ("coverage", measured, limits.coverage, by_cameras),
         ("min_reachable", by_cameras, limits.min_reachable, lit),
     )
-    return tuple(
+    unmet = tuple(
         f"requirements.{name}: {part} {area:.6g} m² is less than {share:g} x {of} = "
         f"{share * total:.6g} m²"
         for name, (part, area), share, (of, total) in rules
         if not (total > 0.0 and area >= share * total * (1.0 - 1e-9))
+    )
+    return unmet + tuple(
+        f"requirements.region_coverage: regions.{region.id} is lit "
+        f"{areas.lit_m2:.6g} m² of {areas.reachable_by_projectors_m2:.6g} m² and "
+        f"measured {areas.measured_m2:.6g} m² of {areas.reachable_by_cameras_m2:.6g} "
+        f"m², less than {limits.region_coverage:g} of either"
+        for region in plan.document.regions
+        if (areas := region.coverage) is not None and areas.floor == "missed"
     )

@@ -66,6 +66,12 @@ def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSampl
     return AuditSamples(*(np.concatenate(column) for column in columns))
 
 
+def draw_region(surface: Surface, region: int, n: int, seed: int) -> AuditSamples:
+    """Draw n points of a dominant region, as `draw_samples` does of a part."""
+    rng = np.random.default_rng((_STREAM, seed, 1 + region))
+    return _draw(surface, surface.region == region, True, n, rng)
+
+
 def samples_on(
     surface: Surface,
     points: Array,

@@ -1,0 +1,212 @@
+"""Claims about what is lit and measured of each region, and about floors."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from geometry.arrays import Ints, Mask
+from planning.model.document.coverage_records import (
+    ProjectorMarginal,
+    RegionCoverage,
+    RegionRecord,
+)
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.audit_samples import draw_region
+from planning.verify.audit.estimates import POINT, ROUNDING, share_error
+from planning.verify.audit.predicates.predicates import (
+    LIGHT_CAUSES,
+    PAIR_CAUSES,
+    SIGHT_CAUSES,
+)
+from planning.verify.audit.predicates.recompute import reachable_by, recompute
+
+# Samples of the audit in a large region, and of the plan, which earns no more tolerance
+# for stating fewer.
+_AT_LEAST, _CLAIMED = 500, 400
+_SLACK = 1e-9
+_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
+
+
+@dataclass(frozen=True, eq=False)
+class _RegionFigures:
+    """What becomes of the audit's n samples in one region.
+
+    Attributes:
+        covered: Which are in each of its areas, the smallest first, shape (n,) each.
+        cause: Index in `_CAUSES`, -1 where measured, shape (n,).
+    """
+
+    covered: dict[str, Mask]
+    cause: Ints
+
+
+def audit_floors(case: AuditCase, findings: AuditFindings) -> None:
+    """Check `centre_m` and `coverage` of regions, their floors, the worst of each row.
+
+    Plans from before have none of these, and no floors.
+    """
+    plan, large = case.plan, _large_regions(case)
+    share = plan.requirements.region_coverage
+    for region in plan.document.regions:
+        below = findings.at(f"regions.{region.id}")
+        _audit_centre(case, region, below)
+        if region.coverage is None:
+            missing = share > 0.0 and region.id in large
+            below.holds(not missing, "coverage", "is missing, but a floor is asked for")
+            continue
+        floor = region.coverage.floor
+        expected = _floor(region.coverage, share) if region.id in large else None
+        below.same("coverage.floor", floor, expected, "by its areas the floor")
+        if region.area_m2 > 0.0:
+            lit = region.coverage.lit_m2 / region.area_m2
+            below.number("lit_fraction", region.lit_fraction, lit, ROUNDING, "")
+            _audit_coverage(
+                case, region, region.coverage, region.id in large, below.at("coverage")
+            )
+    _audit_worst(case, large, findings)
+
+
+def _large_regions(case: AuditCase) -> set[int]:
+    surface, limits = case.plan.surface, case.plan.requirements
+    areas = surface.mesh.face_areas
+    least = limits.region_share * areas[surface.target_faces(limits.target)].sum()
+    return {
+        int(number)
+        for number in np.unique(surface.region[surface.in_dominant])
+        if areas[surface.region == number].sum() >= least * (1.0 - _SLACK)
+    }
+
+
+def _floor(areas: RegionCoverage, share: float) -> str | None:
+    """Whether a floor of this share is met, by the areas as they are claimed."""
+    if not share > 0.0:
+        return None
+    lit = areas.lit_m2 >= share * areas.reachable_by_projectors_m2 * (1.0 - _SLACK)
+    enough = share * areas.reachable_by_cameras_m2 * (1.0 - _SLACK)
+    return "met" if lit and areas.measured_m2 >= enough else "missed"
+
+
+def _audit_centre(
+    case: AuditCase, region: RegionRecord, findings: AuditFindings
+) -> None:
+    surface, mesh = case.plan.surface, case.plan.surface.mesh
+    faces = surface.region == region.id
+    weights = mesh.face_areas[faces]
+    if region.centre_m is None or not weights.sum() > 0.0:
+        return
+    middle = weights @ mesh.corners[faces].mean(axis=1) / weights.sum()
+    whose = "the mean of its faces' centroids"
+    findings.same("centre_m", region.centre_m, middle, whose, ROUNDING * mesh.radius)
+
+
+def _audit_coverage(
+    case: AuditCase,
+    region: RegionRecord,
+    areas: RegionCoverage,
+    large: bool,
+    findings: AuditFindings,
+) -> None:
+    """Check that the areas are parts of each other, and what they and causes are.
+
+    A share of the audit's samples of the region and of the plan's may differ by 1 % and
+    three standard errors. Where no sample of either fell into it there is nothing to
+    compare.
+    """
+    figures = _figures(case, region.id, _AT_LEAST if large else 0)
+    whole, n = region.area_m2, len(figures.cause)
+    fallen = case.plan.coverage.samples * whole / case.estimator.target_m2
+    n_claimed = max(areas.samples, int(fallen), _CLAIMED if large else 0)
+    unmeasured = whole - areas.measured_m2
+    if areas.samples < 1:
+        findings.holds(not large, "samples", f"{areas.samples!r} of a large region")
+        return
+    claimed = {name: getattr(areas, name) for name in figures.covered}
+    for (smaller, low), (larger, high) in pairwise((claimed | {"area": whole}).items()):
+        findings.holds(
+            -ROUNDING * whole <= low <= high + ROUNDING * whole,
+            smaller,
+            f"claimed {low:.6g} m², must lie between 0 and {larger} = {high:.6g} m²",
+        )
+    causes = areas.uncovered_by_cause
+    unknown = ", ".join(sorted(set(causes) - set(_CAUSES)))
+    key = "uncovered_by_cause"
+    findings.holds(not unknown, key, f"causes that there are not: {unknown}")
+    findings.number(f"{key} (sum)", sum(causes.values()), unmeasured, 1e-4 * whole)
+    if n == 0:
+        return
+    masks = {name: (claimed[name], mask) for name, mask in figures.covered.items()}
+    masks |= {
+        f"{key}.{cause}": (causes.get(cause, 0.0), mask)
+        for cause, mask in _by_cause(figures.cause)
+    }
+    for name, (area, mask) in masks.items():
+        count = np.array(mask.sum())
+        slack = POINT + 3.0 * float(share_error(count, n, n_claimed))
+        findings.number(name, area, whole * float(count) / n, slack * whole)
+
+
+def _by_cause(cause: Ints) -> Iterator[tuple[str, Mask]]:
+    """Yield each cause and where it is the one; an obstacle's stands in two places."""
+    for name in dict.fromkeys(_CAUSES):
+        yield name, np.isin(cause, [k for k, c in enumerate(_CAUSES) if c == name])
+
+
+def _figures(case: AuditCase, number: int, at_least: int) -> _RegionFigures:
+    """The audit's samples in a region, and more of it where they are too few."""
+    parts = [(case.actual, case.reachable, case.samples.region == number)]
+    lack = at_least - int(parts[0][2].sum())
+    if lack > 0:
+        more = draw_region(case.plan.surface, number, lack, case.seed)
+        actual = recompute(case.plan, more, case.shadow)
+        reachable = reachable_by(case.plan, actual, case.shadow, case.seed)
+        parts.append((actual, reachable, np.ones(lack, dtype=bool)))
+    covered = {
+        "measured_m2": [a.measured[mask] for a, _, mask in parts],
+        "reachable_by_cameras_m2": [r.cameras[mask] for _, r, mask in parts],
+        "lit_m2": [a.lit[mask] for a, _, mask in parts],
+        "reachable_by_projectors_m2": [r.projectors[mask] for _, r, mask in parts],
+    }
+    return _RegionFigures(
+        {name: np.concatenate(masks) for name, masks in covered.items()},
+        np.concatenate([a.cause[mask] for a, _, mask in parts]),
+    )
+
+
+def _audit_worst(case: AuditCase, large: set[int], findings: AuditFindings) -> None:
+    """Check which region each row of `marginal` calls the worst.
+
+    The row of the plan's own count follows from its regions; of others, whose poses
+    aren't written, only that it names a large region and a share.
+    """
+    document = case.plan.document
+    shares = {
+        region.id: areas.lit_m2 / areas.reachable_by_projectors_m2
+        for region in document.regions
+        if (areas := region.coverage) is not None
+        and region.id in large
+        and areas.reachable_by_projectors_m2 > 0.0
+    }
+    for row in document.marginal:
+        if not isinstance(row, ProjectorMarginal):
+            continue
+        below = findings.at(f"marginal.projectors.{row.n_projectors}")
+        if row.n_projectors == len(document.projectors) and shares:
+            key, least = "worst_region", min(shares.values())
+            below.number(f"{key}_lit", row.worst_region_lit, least, 1e-6, "")
+            whose = shares.get(-1 if row.worst_region is None else row.worst_region)
+            below.holds(
+                whose is not None and whose <= least + 1e-6,
+                key,
+                f"{row.worst_region!r} is claimed, lit {whose!r}, but the least "
+                f"share of a large region is {least:.6g}",
+            )
+        elif row.worst_region is not None:
+            share = row.worst_region_lit
+            below.holds(
+                row.worst_region in large and share is not None and 0 <= share <= 1,
+                "worst_region",
+                f"{row.worst_region!r} at {share!r} must be a large region and a share",
+            )

@@ -1,0 +1,165 @@
+"""Each false claim about a region or its floor is found, with the sentence for it."""
+
+from dataclasses import replace
+
+import pytest
+
+from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.audit_case import AuditCase, examine
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.coverage.floor_claims import audit_floors
+
+
+@pytest.fixture(scope="module")
+def case(handmade) -> AuditCase:
+    """The figures of a true plan; lies about regions change none of them."""
+    return examine(handmade.build_plan(), seed=3, n_samples=3000, threads=1)
+
+
+def findings_of(case: AuditCase, plan) -> tuple[str, ...]:
+    findings = AuditFindings()
+    audit_floors(replace(case, plan=plan), findings)
+    return findings.failures
+
+
+def _region(index, **values):
+    """Change claims of a region's coverage: to a value, or by a function of it."""
+
+    def change(document):
+        claims = document["regions"][index]["coverage"]
+        for name, value in values.items():
+            claims[name] = value(claims[name]) if callable(value) else value
+
+    return change
+
+
+def _cause(name, area_m2):
+    return _region(1, uncovered_by_cause=lambda x: {**x, name: area_m2})
+
+
+def _swapped(split):
+    """The same areas, two of them under each other's cause."""
+    (first, a), (second, b), *rest = sorted(split.items(), key=lambda pair: -pair[1])
+    return {first: b, second: a, **dict(rest)}
+
+
+def _asked(name, value):
+    return lambda document: document["requirements"].update({name: value})
+
+
+def _row(index, **values):
+    return lambda document: document["marginal"][index].update(values)
+
+
+LIES = {
+    "centre": (
+        lambda document: document["regions"][0]["centre_m"].__setitem__(2, 0.0301),
+        "regions.0.centre_m: claimed",
+    ),
+    "lit": (_region(1, lit_m2=lambda x: 1.2 * x), "1.coverage.lit_m2: claimed"),
+    "lit fraction": (
+        lambda document: document["regions"][1].update(lit_fraction=0.65),
+        "regions.1.lit_fraction: claimed",
+    ),
+    "measured": (
+        _region(0, measured_m2=lambda x: 0.6 * x),
+        "0.coverage.measured_m2: claimed",
+    ),
+    "lightable": (
+        _region(1, reachable_by_projectors_m2=lambda x: 0.8 * x),
+        "1.coverage.reachable_by_projectors_m2: claimed",
+    ),
+    "measurable": (
+        _region(0, reachable_by_cameras_m2=lambda x: 1.4 * x),
+        "0.coverage.reachable_by_cameras_m2: claimed",
+    ),
+    "order": (
+        _region(0, reachable_by_cameras_m2=1e-3),
+        "0.coverage.measured_m2: claimed 0.00",
+    ),
+    "causes": (
+        _region(0, uncovered_by_cause=_swapped),
+        "regions.0.coverage.uncovered_by_cause.",
+    ),
+    "cause sum": (
+        _cause("sigma", 0.0),
+        "1.coverage.uncovered_by_cause (sum): claimed",
+    ),
+    "unknown cause": (
+        _cause("gremlins", 0.0),
+        "1.coverage.uncovered_by_cause: causes that there are not: gremlins",
+    ),
+    "samples": (_region(1, samples=0), "1.coverage.samples: 0 of a large region"),
+    "missed": (
+        _region(1, floor="missed"),
+        "1.coverage.floor: claimed 'missed', but by its areas the floor is 'met'",
+    ),
+    "untold": (_region(1, floor=None), "1.coverage.floor: claimed None, but"),
+    "met": (
+        _asked("region_coverage", 0.95),
+        "0.coverage.floor: claimed 'met', but by its areas the floor is 'missed'",
+    ),
+    "no floor": (
+        _asked("region_coverage", 0.0),
+        "0.coverage.floor: claimed 'met', but by its areas the floor is None",
+    ),
+    "small region": (
+        _asked("region_share", 0.5),
+        "1.coverage.floor: claimed 'met', but by its areas the floor is None",
+    ),
+    "left out": (
+        lambda document: document["regions"][1].pop("coverage"),
+        "regions.1.coverage: is missing, but a floor is asked for",
+    ),
+    "worst region": (
+        lambda document: document["marginal"][1].update(
+            worst_region=1 - document["marginal"][1]["worst_region"]
+        ),
+        "marginal.projectors.2.worst_region: ",
+    ),
+    "worst share": (
+        _row(1, worst_region_lit=0.9),
+        "marginal.projectors.2.worst_region_lit: claimed",
+    ),
+    "worst left out": (
+        _row(1, worst_region=None, worst_region_lit=None),
+        "marginal.projectors.2.worst_region_lit: None is claimed",
+    ),
+    "worst of another count": (
+        _row(0, worst_region=7, worst_region_lit=0.5),
+        "marginal.projectors.1.worst_region: 7 at 0.5 must be a large region",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LIES)
+def test_a_false_claim_about_a_region_is_found(case, handmade, name):
+    change, sentence = LIES[name]
+    found = findings_of(case, handmade.tampered(case.plan, change))
+    assert any(sentence in failure for failure in found), found
+
+
+def test_true_claims_and_plans_from_before_pass(case, handmade):
+    def before(document):
+        for name in ("region_coverage", "region_share"):
+            del document["requirements"][name]
+        for region in document["regions"]:
+            del region["coverage"], region["centre_m"]
+        for row in document["marginal"]:
+            row.pop("worst_region", None), row.pop("worst_region_lit", None)
+
+    assert findings_of(case, case.plan) == ()
+    assert findings_of(case, handmade.tampered(case.plan, before)) == ()
+
+
+def test_a_missed_floor_is_unmet_and_no_false_claim(handmade):
+    def missed(document):
+        document["requirements"]["region_coverage"] = 0.69
+        for region in document["regions"]:
+            region["coverage"]["floor"] = "met"
+        document["regions"][0]["coverage"]["floor"] = "missed"
+
+    audit = audit_plan(handmade.tampered(handmade.build_plan(), missed), n_samples=3000)
+    assert not [failure for failure in audit.failures if "regions.0" in failure]
+    (unmet,) = audit.unmet
+    assert "requirements.region_coverage: regions.0 is lit 0.00434" in unmet
