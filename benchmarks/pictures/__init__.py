@@ -1,0 +1,1 @@
+"""The pictures of the documentation: `benchmarks.house.doc_pictures`."""
